@@ -1,0 +1,1 @@
+"""The dancer: motion sources, puppeteers, the puppet and its blending."""

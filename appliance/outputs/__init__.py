@@ -1,0 +1,1 @@
+"""What leaves the box: the joint frame and the receivers that get it."""

@@ -1,0 +1,1 @@
+"""Poses: quaternions, skeletons, recordings, BVH files and pictures of them."""

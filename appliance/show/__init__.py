@@ -1,0 +1,1 @@
+"""What a show and a venue need: the show bundle and the box file, typed and bounded."""

@@ -1,0 +1,1 @@
+"""The stage: clock, tick, budget and the run itself."""

@@ -1,0 +1,1 @@
+"""The studio (workstation only): data, networks, training, export and experiments."""

@@ -1,0 +1,1 @@
+"""Peers for the box: emulated sensors, a venue network, receivers and the latency probe."""
