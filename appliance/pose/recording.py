@@ -1,0 +1,68 @@
+"""Recording: a sequence of poses at a known rate, from motion capture or made by a network."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class Recording:
+    """poses (N, J, 4) local unit quaternions without sign jumps; roots (N, 3) metres; fps in poses a second.
+
+    translations (N, J, 3) metres only where bones change their length over time, else None.
+    """
+
+    skeleton: Skeleton
+    poses: Array
+    roots: Array
+    fps: float
+    translations: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @property
+    def seconds(self) -> float:
+        return len(self) / self.fps
+
+    def without_first(self, frames: int) -> Recording:
+        """The same recording without its first frames (a T-pose, for example)."""
+        return self._frames(np.arange(min(frames, len(self)), len(self)))
+
+    def excerpt(self, start_s: float, end_s: float | None = None) -> Recording:
+        """The part from start_s up to end_s (seconds; None: to the end)."""
+        last = len(self) if end_s is None else min(round(end_s * self.fps), len(self))
+        return self._frames(np.arange(min(round(start_s * self.fps), last), last))
+
+    def resampled(self, fps: float) -> Recording:
+        """The same motion at another rate: rotations by SLERP, positions straight between frames."""
+        if fps == self.fps or len(self) < 2:
+            return replace(self, fps=fps)
+        count = int(np.floor((len(self) - 1) * fps / self.fps + 1e-9)) + 1
+        at = np.minimum(np.arange(count) * self.fps / fps, len(self) - 1)
+        before = np.minimum(at.astype(int), len(self) - 2)
+        share = at - before
+        poses = quaternion.slerp(self.poses[before], self.poses[before + 1], share[:, None])
+
+        def straight(values: Array) -> Array:
+            weight = share.reshape(-1, *[1] * (values.ndim - 1))
+            mixed: Array = (1 - weight) * values[before] + weight * values[before + 1]
+            return mixed
+
+        return Recording(
+            self.skeleton,
+            quaternion.continuous(poses),
+            straight(self.roots),
+            fps,
+            None if self.translations is None else straight(self.translations),
+        )
+
+    def _frames(self, chosen: Array) -> Recording:
+        translations = None if self.translations is None else self.translations[chosen]
+        return replace(self, poses=self.poses[chosen], roots=self.roots[chosen], translations=translations)

@@ -1,0 +1,93 @@
+"""Skeleton: joint names, parents and offsets; forward kinematics turns a pose into world positions."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+
+
+class UnknownJoint(KeyError):
+    """A joint name that the skeleton does not have; says which one was probably meant."""
+
+    def __init__(self, name: str, names: Sequence[str]) -> None:
+        by_folded = {known.casefold(): known for known in names}
+        near = difflib.get_close_matches(name.casefold(), by_folded, n=1, cutoff=0.5)
+        self.name, self.nearest = name, by_folded[near[0]] if near else None
+        meant = f" Did you mean '{self.nearest}'?" if self.nearest else ""
+        super().__init__(f"The skeleton has no joint '{name}'.{meant}")
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Joints in an order in which parents come first.
+
+    names: J joint names; parents: index of each joint's parent, -1 for the root;
+    offsets: (J, 3) metres from the parent joint, in the parent's frame, zero for the root;
+    ends: where bones without a child joint end, as (joint, offset in metres).
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: NDArray[np.float64]
+    ends: tuple[tuple[int, tuple[float, float, float]], ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def index(self, name: str) -> int:
+        """Place of a joint; raises UnknownJoint naming the nearest one."""
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise UnknownJoint(name, self.names) from None
+
+    def same_joints(self, other: Skeleton) -> bool:
+        """Whether a pose of the other skeleton means the same here: equal names and parents."""
+        return self.names == other.names and self.parents == other.parents
+
+    @cached_property
+    def feet(self) -> tuple[int, ...]:
+        """Joints that stand on the floor: those named foot or ankle and the toes below them."""
+        return tuple(i for i, n in enumerate(self.names) if any(w in n.casefold() for w in ("foot", "ankle")))
+
+    @cached_property
+    def _levels(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], ...]:
+        """(joints, their parents) for each depth of the tree below the root."""
+        depth = [0] * len(self)
+        for joint, parent in enumerate(self.parents):
+            depth[joint] = 0 if parent < 0 else depth[parent] + 1
+        levels = []
+        for level in range(1, max(depth) + 1):
+            joints = np.array([j for j in range(len(self)) if depth[j] == level])
+            levels.append((joints, np.array([self.parents[j] for j in joints])))
+        return tuple(levels)
+
+    def forward_kinematics(
+        self, pose: Array, root: Array, translations: Array | None = None
+    ) -> tuple[Array, Array]:
+        """World positions (..., J, 3) in metres and world rotations (..., J, 4).
+
+        pose: (..., J, 4) local unit quaternions; root: (..., 3) metres, the root joint's position;
+        translations: (..., J, 3) metres where bones change their length, in place of the offsets.
+        """
+        offsets = self.offsets.astype(pose.dtype) if translations is None else translations
+        world = np.array(pose)
+        positions = np.empty((*pose.shape[:-1], 3), dtype=pose.dtype)
+        positions[..., 0, :] = root
+        for joints, parents in self._levels:
+            above = world[..., parents, :]
+            world[..., joints, :] = quaternion.multiply(above, pose[..., joints, :])
+            reach = quaternion.rotate(above, offsets[..., joints, :])
+            positions[..., joints, :] = positions[..., parents, :] + reach
+        return positions, world
