@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
@@ -97,7 +98,7 @@ def write_bvh(path: Path | str, recording: Recording, metres_per_unit: float = 0
     write_joint(0, "")
     text.append(f"MOTION\nFrames: {len(recording)}\nFrame Time: {1 / recording.fps:.12g}")
     angles = np.degrees(quaternion.to_euler_zxy(recording.poses.astype(np.float64)))
-    columns: list[NDArray[np.float64]] = []
+    columns: list[Array] = []
     for joint in order:
         if skeleton.parents[joint] < 0:
             columns.append(recording.roots / metres_per_unit)
@@ -270,7 +271,7 @@ def _to_recording(
     fps: float,
     scale: float,
 ) -> Recording:
-    poses = np.empty((len(frames), len(joints), 4))
+    poses: Array = np.empty((len(frames), len(joints), 4))
     places = np.empty((len(frames), len(joints), 3))
     first = 0
     for number, joint in enumerate(joints):

@@ -33,14 +33,16 @@ def multiply(a: Array, b: Array) -> Array:
 
 def inverse(q: Array) -> Array:
     """Inverse of a unit quaternion (its conjugate), (..., 4)."""
-    return q * _CONJUGATE
+    conjugate: Array = q * _CONJUGATE
+    return conjugate
 
 
 def normalize(q: Array) -> Array:
     """Unit length; a quaternion of length zero becomes the identity."""
     length = np.sqrt(np.sum(q * q, axis=-1, keepdims=True))
     safe = np.where(length > 1e-12, q, IDENTITY.astype(q.dtype))
-    return safe / np.where(length > 1e-12, length, np.ones_like(length))
+    unit: Array = safe / np.where(length > 1e-12, length, np.ones_like(length))
+    return unit
 
 
 def rotate(q: Array, vectors: Array) -> Array:
@@ -148,7 +150,7 @@ def from_6d(columns: Array) -> Array:
 
 def from_euler(angles: Array, axes: str) -> Array:
     """Rotation of angles (..., len(axes)) in radians about axes such as 'zxy', applied as in BVH: z*x*y."""
-    q = np.broadcast_to(IDENTITY.astype(np.float64), (*angles.shape[:-1], 4))
+    q: Array = np.broadcast_to(IDENTITY.astype(np.float64), (*angles.shape[:-1], 4))
     for column, axis in enumerate(axes):
         half = angles[..., column] / 2
         turn = np.zeros((*half.shape, 4))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
@@ -63,6 +64,6 @@ class Recording:
             None if self.translations is None else straight(self.translations),
         )
 
-    def _frames(self, chosen: Array) -> Recording:
+    def _frames(self, chosen: NDArray[np.intp]) -> Recording:
         translations = None if self.translations is None else self.translations[chosen]
         return replace(self, poses=self.poses[chosen], roots=self.roots[chosen], translations=translations)

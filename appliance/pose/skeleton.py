@@ -14,7 +14,7 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 
 
-class UnknownJoint(KeyError):
+class UnknownJointError(KeyError):
     """A joint name that the skeleton does not have; says which one was probably meant."""
 
     def __init__(self, name: str, names: Sequence[str]) -> None:
@@ -46,11 +46,11 @@ class Skeleton:
         return len(self.names)
 
     def index(self, name: str) -> int:
-        """Place of a joint; raises UnknownJoint naming the nearest one."""
+        """Place of a joint; raises UnknownJointError naming the nearest one."""
         try:
             return self.names.index(name)
         except ValueError:
-            raise UnknownJoint(name, self.names) from None
+            raise UnknownJointError(name, self.names) from None
 
     def same_joints(self, other: Skeleton) -> bool:
         """Whether a pose of the other skeleton means the same here: equal names and parents."""
