@@ -1,0 +1,112 @@
+"""Start-up admission: how many coding iterations fit the tick's budget on this machine, measured warm."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+Dance = Callable[[int, int], object]  # runs the puppet once with K coding and J interaction iterations
+
+PACED = (
+    2.0  # a paced tick costs twice a back-to-back run: caches and clocks cool down in the pause (measured)
+)
+MOST_ITERATIONS = 64
+_WARM_UP = 5
+_RUNS = 60
+_FEWEST_RUNS = 8
+_PATIENCE_S = 0.15  # a start may take 1.5 s in all
+
+
+@dataclass(frozen=True)
+class Admission:
+    """What the box will dance with, and why. Times are milliseconds of one puppet run as paced on stage."""
+
+    asked_coding: int
+    asked_interaction: int
+    coding: int
+    interaction: int
+    most_coding: int
+    p50_ms: float
+    p99_ms: float
+    budget_ms: float
+
+    @property
+    def fits(self) -> bool:
+        """True when the show's own iterations fit."""
+        return self.p99_ms <= self.budget_ms
+
+    def sentence(self) -> str:
+        """The verdict for people: what was measured, what it means for the show, what to do."""
+        if self.fits:
+            return (
+                f"{self.coding} coding iterations cost {self.p99_ms:.1f} ms (p99, paced) "
+                f"of a budget of {self.budget_ms:.1f} ms; up to {self.most_coding} would fit."
+            )
+        return (
+            f"{self.asked_coding} coding iterations do not fit: they cost {self.p99_ms:.1f} ms (p99, paced) "
+            f"of a budget of {self.budget_ms:.1f} ms. On stage the dancer runs with {self.coding}, "
+            f"{self.interaction} of them interactive, and follows the phrase more closely. "
+            f"Lower dancer.coding_iterations to {self.most_coding}, choose a faster network, "
+            "or raise limits.tick_budget_ms."
+        )
+
+
+def admit(
+    dance: Dance,
+    coding: int,
+    interaction: int,
+    budget_ms: float,
+    *,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Admission:
+    """Measure `dance` at the show's iterations; where that does not fit, find the most that does.
+
+    The free passes (coding - interaction) are kept when iterations are lowered; one iteration always runs.
+    """
+    p50_ms, p99_ms = cost_ms(dance, coding, interaction, clock)
+    one_ms = p99_ms if coding == 1 else min(cost_ms(dance, 1, min(1, interaction), clock)[1], p99_ms)
+    most = _most_that_fits(coding, one_ms, p99_ms, budget_ms)
+    if p99_ms > budget_ms and coding > 1:
+        most = min(most, coding - 1)
+        while most > 1 and cost_ms(dance, most, _free_kept(coding, interaction, most), clock)[1] > budget_ms:
+            most -= max(1, most // 8)
+    allowed = min(coding, most)
+    return Admission(
+        asked_coding=coding,
+        asked_interaction=interaction,
+        coding=allowed,
+        interaction=_free_kept(coding, interaction, allowed),
+        most_coding=most,
+        p50_ms=p50_ms,
+        p99_ms=p99_ms,
+        budget_ms=budget_ms,
+    )
+
+
+def cost_ms(dance: Dance, coding: int, interaction: int, clock: Callable[[], float]) -> tuple[float, float]:
+    """Median and p99 of warm runs, in milliseconds, times the price of pacing."""
+    for _ in range(_WARM_UP):
+        dance(coding, interaction)
+    costs: list[float] = []
+    begun = clock()
+    while len(costs) < _RUNS and (len(costs) < _FEWEST_RUNS or clock() - begun < _PATIENCE_S):
+        before = clock()
+        dance(coding, interaction)
+        costs.append(clock() - before)
+    costs.sort()
+    paced_ms = [1000.0 * PACED * cost for cost in costs]
+    return paced_ms[len(costs) // 2], paced_ms[math.ceil(0.99 * len(costs)) - 1]
+
+
+def _most_that_fits(coding: int, one_ms: float, all_ms: float, budget_ms: float) -> int:
+    """Cost grows by the same amount with every iteration: a straight line through the two measurements."""
+    slope_ms = (all_ms - one_ms) / (coding - 1) if coding > 1 else one_ms
+    if slope_ms <= 0.0:
+        return MOST_ITERATIONS if one_ms <= budget_ms else 1
+    return max(1, min(MOST_ITERATIONS, 1 + int((budget_ms - one_ms) / slope_ms)))
+
+
+def _free_kept(coding: int, interaction: int, allowed: int) -> int:
+    return max(0, min(allowed, allowed - (coding - interaction)))

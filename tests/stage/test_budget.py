@@ -1,0 +1,84 @@
+"""Admission measures the puppet and lowers the iterations to what the tick can hold."""
+
+from __future__ import annotations
+
+import pytest
+
+from appliance.stage.budget import PACED, admit
+from tests.stage.fakes import FakeTime
+
+
+class Puppet:
+    """Costs a fixed time a pass on a fake clock."""
+
+    def __init__(self, time: FakeTime, pass_ms: float, base_ms: float = 0.1) -> None:
+        self.time, self.pass_ms, self.base_ms = time, pass_ms, base_ms
+        self.runs: list[tuple[int, int]] = []
+
+    def dance(self, coding: int, interaction: int) -> None:
+        self.runs.append((coding, interaction))
+        self.time.work((self.base_ms + coding * self.pass_ms) / 1000.0)
+
+
+def test_a_show_that_fits_is_admitted_as_it_is() -> None:
+    time = FakeTime()
+    puppet = Puppet(time, pass_ms=0.1)
+    admission = admit(puppet.dance, 10, 9, 10.0, clock=time.monotonic)
+    assert admission.fits
+    assert (admission.coding, admission.interaction) == (10, 9)
+    assert admission.p99_ms == pytest.approx(PACED * 1.1)
+    assert 40 <= admission.most_coding <= 50
+
+
+def test_a_show_that_does_not_fit_is_lowered_to_the_most_that_does_and_keeps_its_free_pass() -> None:
+    time = FakeTime()
+    puppet = Puppet(time, pass_ms=1.0)
+    admission = admit(puppet.dance, 10, 9, 10.0, clock=time.monotonic)
+    assert not admission.fits
+    assert (admission.coding, admission.interaction) == (4, 3)  # 2 * (0.1 + 4) = 8.2 ms fits, 5 would be 10.2
+    assert "10 coding iterations do not fit" in admission.sentence()
+    assert "runs with 4, 3 of them" in admission.sentence()
+    assert "to 4" in admission.sentence()
+
+
+def test_what_was_lowered_has_been_measured_not_only_extrapolated() -> None:
+    time = FakeTime()
+    puppet = Puppet(time, pass_ms=1.0)
+    admission = admit(puppet.dance, 10, 9, 10.0, clock=time.monotonic)
+    assert (admission.coding, admission.interaction) in puppet.runs
+
+
+def test_a_cost_that_is_no_straight_line_is_lowered_until_it_really_fits() -> None:
+    time = FakeTime()
+
+    def dance(coding: int, interaction: int) -> None:
+        time.work((0.5 if coding < 3 else 6.0) / 1000.0)
+
+    admission = admit(dance, 12, 6, 10.0, clock=time.monotonic)
+    assert admission.coding == 2
+    assert admission.interaction == 0
+
+
+def test_one_iteration_runs_even_if_it_does_not_fit() -> None:
+    time = FakeTime()
+    admission = admit(Puppet(time, pass_ms=40.0).dance, 10, 10, 10.0, clock=time.monotonic)
+    assert (admission.coding, admission.interaction) == (1, 1)
+    assert not admission.fits
+
+
+def test_a_heavy_network_does_not_hold_up_the_start() -> None:
+    time = FakeTime()
+    admit(Puppet(time, pass_ms=20.0).dance, 10, 9, 10.0, clock=time.monotonic)
+    assert time.now - 1000.0 < 12.0
+
+
+def test_the_slowest_run_counts_not_the_usual_one() -> None:
+    time = FakeTime()
+    runs = iter(range(10_000))
+
+    def dance(coding: int, interaction: int) -> None:
+        time.work(0.02 if next(runs) % 20 == 19 else 0.001)
+
+    admission = admit(dance, 1, 1, 10.0, clock=time.monotonic)
+    assert admission.p50_ms == pytest.approx(2.0)
+    assert admission.p99_ms == pytest.approx(40.0)
