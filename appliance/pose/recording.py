@@ -11,8 +11,12 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
+TPOSE_SEARCH_FRAMES = 10
+TPOSE_JUMP_DEGREES = 25.0  # a step like this among the first frames leaves a rest pose
+TPOSE_SETTLED_DEGREES = 10.0  # filters ring after the jump: 94, 27, 24, 17, 7, 1 degrees in CMU's salsa
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Recording:
     """poses (N, J, 4) local unit quaternions without sign jumps; roots (N, 3) metres; fps in poses a second.
 
@@ -67,3 +71,12 @@ class Recording:
     def _frames(self, chosen: NDArray[np.intp]) -> Recording:
         translations = None if self.translations is None else self.translations[chosen]
         return replace(self, poses=self.poses[chosen], roots=self.roots[chosen], translations=translations)
+
+
+def leading_tpose_frames(recording: Recording) -> int:
+    """How many frames at the start are a rest pose or still swing away from one."""
+    head = recording.poses[: TPOSE_SEARCH_FRAMES + 1]
+    steps = np.degrees(quaternion.angle_between(head[1:], head[:-1])).max(axis=-1)
+    if not (steps > TPOSE_JUMP_DEGREES).any():
+        return 0
+    return int(np.flatnonzero(steps > TPOSE_SETTLED_DEGREES)[-1]) + 1

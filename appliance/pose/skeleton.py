@@ -28,7 +28,7 @@ class UnknownJointError(KeyError):
         return str(self.args[0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Skeleton:
     """Joints in an order in which parents come first.
 
@@ -58,7 +58,7 @@ class Skeleton:
 
     @cached_property
     def feet(self) -> tuple[int, ...]:
-        """Joints that stand on the floor: those named foot or ankle and the toes below them."""
+        """Joints that stand on the floor: those named foot or ankle."""
         return tuple(i for i, n in enumerate(self.names) if any(w in n.casefold() for w in ("foot", "ankle")))
 
     @cached_property
