@@ -1,0 +1,144 @@
+"""box.yaml as typed, bounded configuration: what the venue needs; without a file, all on loopback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, field_validator
+
+from appliance.show.section import Ipv4, LocalFile, Section, refusal
+from appliance.show.validation import validated
+from appliance.show.yaml_file import read_yaml
+
+Dialect = Literal["ai-toolbox", "joint", "vmc"]
+
+
+class UdpConfig(Section):
+    """Where sensors' datagrams arrive."""
+
+    host: Ipv4 = Field(
+        default="127.0.0.1", description="Address to listen on; 0.0.0.0 for all of the box's networks."
+    )
+    port: int = Field(default=9750, ge=0, le=65535, description="UDP port; 0 takes any free one.")
+
+
+class SerialConfig(Section):
+    """A sensor on a cable."""
+
+    device: str = Field(min_length=1, max_length=200, description="The serial device, like /dev/ttyACM0.")
+    baud: int = Field(default=115200, ge=1200, le=4_000_000, description="Speed in baud.")
+
+
+class SensorsConfig(Section):
+    """How sensors reach the box."""
+
+    udp: UdpConfig | None = Field(
+        default_factory=UdpConfig, description="Sensors over the network; null: none."
+    )
+    serial: list[SerialConfig] = Field(default_factory=list, max_length=8, description="Sensors on cables.")
+    keys: LocalFile | None = Field(
+        default=None,
+        description="File with the sensors' keys, relative to the box file; null: none is let in.",
+    )
+
+
+class OscConfig(Section):
+    """One receiver of the dancer's joints."""
+
+    host: Ipv4 = Field(default="127.0.0.1", description="The receiver's address in numbers.")
+    port: int = Field(
+        default=9004, ge=1, le=65535, description="The receiver's UDP port; VMC: usually 39539."
+    )
+    dialect: Dialect = Field(
+        default="ai-toolbox", description="The messages that it understands; docs/osc.md shows them."
+    )
+    frame_message: bool = Field(
+        default=False, description="Send /bunraku/frame (tick, time, sequence, late) before the joints."
+    )
+
+
+class OutputsConfig(Section):
+    """Where the dance goes."""
+
+    osc: list[OscConfig] = Field(
+        default_factory=lambda: [OscConfig()], max_length=16, description="Receivers by OSC; [] for none."
+    )
+
+    @field_validator("osc")
+    @classmethod
+    def _each_receiver_once(cls, receivers: list[OscConfig]) -> list[OscConfig]:
+        seen = [(receiver.host, receiver.port, receiver.dialect) for receiver in receivers]
+        for place, receiver in enumerate(seen):
+            if receiver in seen[:place]:
+                raise refusal("This receiver stands here twice.", "Remove one, or change its port.", at=place)
+        return receivers
+
+
+class ControlConfig(Section):
+    """Where commands by OSC arrive."""
+
+    host: Ipv4 = Field(
+        default="127.0.0.1", description="Address to listen on; 0.0.0.0 lets the whole network command."
+    )
+    port: int = Field(default=9002, ge=0, le=65535, description="UDP port; 0 takes any free one.")
+
+
+class LimitsConfig(Section):
+    """How much time the dance may take."""
+
+    tick_budget_ms: float = Field(
+        default=10.0,
+        ge=0.5,
+        le=18,
+        description="What one tick of 20 ms may use; a show needing more is refused.",
+    )
+    late_ms: float = Field(
+        default=15.0,
+        ge=1,
+        le=20,
+        description="A frame that leaves later than this after its slot began counts as late.",
+    )
+
+
+class RealtimeConfig(Section):
+    """Real-time rights of the stage."""
+
+    enabled: bool = Field(default=True, description="Ask for real-time scheduling and locked memory.")
+    priority: int = Field(default=70, ge=1, le=99, description="SCHED_FIFO priority.")
+
+
+class JournalConfig(Section):
+    """The flight recorder."""
+
+    file: LocalFile | None = Field(default=None, description="File, relative to the box file; null: none.")
+    minutes: float = Field(
+        default=30.0, ge=0.1, le=1440, description="How much it keeps before it overwrites the oldest."
+    )
+
+
+class BoxConfig(Section):
+    """box.yaml."""
+
+    sensors: SensorsConfig = Field(default_factory=SensorsConfig, description=str(SensorsConfig.__doc__))
+    outputs: OutputsConfig = Field(default_factory=OutputsConfig, description=str(OutputsConfig.__doc__))
+    control: ControlConfig | None = Field(
+        default_factory=ControlConfig, description="Where commands by OSC arrive; null: nowhere."
+    )
+    limits: LimitsConfig = Field(default_factory=LimitsConfig, description=str(LimitsConfig.__doc__))
+    realtime: RealtimeConfig = Field(default_factory=RealtimeConfig, description=str(RealtimeConfig.__doc__))
+    phase_lock: bool = Field(
+        default=True, description="Place each tick just after the primary sensor's usual arrival."
+    )
+    journal: JournalConfig = Field(default_factory=JournalConfig, description=str(JournalConfig.__doc__))
+
+
+def load_box(path: Path | str | None) -> BoxConfig:
+    """Read a box file; without one, everything at its default. Files in it are relative to its folder.
+
+    Raises ConfigError with file, line, what is wrong and what to do, for all that is wrong at once.
+    """
+    if path is None:
+        return BoxConfig()
+    path = Path(path)
+    return validated(BoxConfig, read_yaml(path), {"directory": path.resolve().parent})

@@ -1,0 +1,81 @@
+"""What all sections of a configuration file share: strict types, no unknown keys, kinds of value."""
+
+from __future__ import annotations
+
+import ipaddress
+import math
+from pathlib import Path, PurePosixPath
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
+from pydantic_core import PydanticCustomError
+
+UNIT_TOLERANCE = 0.05  # how far from length 1 a hand-written quaternion may be before it is a typing error
+
+
+class Section(BaseModel):
+    """A part of show.yaml or box.yaml. Frozen; a word is never taken for a number, nor 'yes' for a text."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def refusal(message: str, cure: str, at: str | int | None = None) -> PydanticCustomError:
+    """An error for validators to raise; `at` names the key below the validated one where it stands."""
+    return PydanticCustomError("refused", "{message}", {"message": message, "cure": cure, "at": at})
+
+
+def _unit(quaternion: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    length = math.hypot(*quaternion)
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        raise refusal(
+            f"This orientation has the length {length:.3g}; a rotation has the length 1.",
+            "Write a unit quaternion in the order w, x, y, z; [1, 0, 0, 0] turns nothing.",
+        )
+    w, x, y, z = (part / length for part in quaternion)
+    return w, x, y, z
+
+
+def _axis(axis: tuple[float, float, float]) -> tuple[float, float, float]:
+    length = math.hypot(*axis)
+    if not 1e-6 < length < 1e6:
+        raise refusal("An axis needs a direction.", "Write for instance [0, 1, 0], which points upwards.")
+    x, y, z = (part / length for part in axis)
+    return x, y, z
+
+
+def _ipv4(host: str) -> str:
+    if host == "localhost":
+        return "127.0.0.1"
+    try:
+        return str(ipaddress.IPv4Address(host))
+    except ValueError:
+        raise refusal(
+            f"'{host}' is not an IPv4 address in numbers.",
+            "Write it like 192.168.0.20: looking up a name could hold up the show.",
+        ) from None
+
+
+def _inside_the_bundle(name: str, info: ValidationInfo) -> str:
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts or "\\" in name:
+        raise refusal(
+            f"'{name}' is not inside the show's folder.", "Put the file there and write its name alone."
+        )
+    directory = (info.context or {}).get("directory")
+    if directory is not None and not (directory / name).is_file():
+        raise refusal(
+            f"There is no file '{name}' in {directory}.", "Check the name, or copy the whole bundle again."
+        )
+    return name
+
+
+def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
+    directory = (info.context or {}).get("directory")
+    return path if directory is None else Path(directory, path.expanduser())
+
+
+Orientation = Annotated[tuple[float, float, float, float], Field(strict=False), AfterValidator(_unit)]
+Axis = Annotated[tuple[float, float, float], Field(strict=False), AfterValidator(_axis)]
+Ipv4 = Annotated[str, AfterValidator(_ipv4)]
+BundleFile = Annotated[str, Field(min_length=1), AfterValidator(_inside_the_bundle)]
+LocalFile = Annotated[Path, Field(strict=False), AfterValidator(_beside_the_file)]

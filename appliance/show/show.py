@@ -1,0 +1,284 @@
+"""show.yaml as typed, bounded configuration, and the show bundle's folder around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from appliance.pose.bvh import BvhError, read_bvh
+from appliance.pose.skeleton import Skeleton
+from appliance.show.config_error import ConfigError, Problem, did_you_mean
+from appliance.show.section import Axis, BundleFile, Orientation, Section, refusal
+from appliance.show.validation import validated
+from appliance.show.yaml_file import YamlFile, read_yaml
+
+MAX_HANDS = 8
+KINDS = ("sensor", "turning", "fixed", "osc")
+
+
+class DancerConfig(Section):
+    """The puppet: which network dances, and how often it goes over a window."""
+
+    network: BundleFile = Field(default="puppet.onnx", description="The network's file in the bundle.")
+    coding_iterations: int = Field(
+        default=10,
+        ge=1,
+        le=64,
+        description="How often encode and decode run on each window. "
+        "More: away from the phrase, towards the dancer's habits; and more time for each tick.",
+    )
+    interaction_iterations: int = Field(
+        default=9,
+        ge=0,
+        le=64,
+        description="In how many of those, from the first on, the held joints are overwritten; at most "
+        "coding_iterations. Equal to it: the output shows the held orientation itself. "
+        "Left out: one less than coding_iterations (but at least 1), so the last pass is free.",
+    )
+    hop: int = Field(
+        default=1, ge=1, le=8, description="Ticks from one window to the next; they are blended."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _last_pass_is_free(cls, values: Any) -> Any:
+        if isinstance(values, dict) and "interaction_iterations" not in values:
+            iterations = values.get("coding_iterations")
+            if isinstance(iterations, int):
+                return {**values, "interaction_iterations": min(max(iterations - 1, 1), 64)}
+        return values
+
+    @field_validator("interaction_iterations")
+    @classmethod
+    def _at_most_coding_iterations(cls, value: int, info: ValidationInfo) -> int:
+        coding_iterations = info.data.get("coding_iterations")
+        if coding_iterations is not None and value > coding_iterations:
+            raise refusal(
+                f"interaction_iterations ({value}) is more than coding_iterations ({coding_iterations}).",
+                f"Write 0 to {coding_iterations}; {max(coding_iterations - 1, 1)} leaves the last pass free.",
+            )
+        return value
+
+
+class MotionConfig(Section):
+    """What the puppet starts from: playback of a phrase."""
+
+    phrase: BundleFile = Field(default="phrase.bvh", description="The phrase's file in the bundle.")
+    start_s: float = Field(
+        default=0.0, ge=0, le=86400, description="Where in the phrase the excerpt starts, in seconds."
+    )
+    end_s: float | None = Field(
+        default=None,
+        gt=0,
+        le=86400,
+        description="Where it ends, in seconds; after start_s. null: at the phrase's end.",
+    )
+    rate: float = Field(
+        default=1.0,
+        ge=-4,
+        le=4,
+        description="Speed of playback: 1 as recorded, 0 stands still, below 0 runs backwards.",
+    )
+    crossfade_s: float = Field(
+        default=0.5, ge=0, le=5, description="How long the loop's end melts into its start, in seconds."
+    )
+    grounded: bool = Field(
+        default=True, description="Keep the lowest foot on the floor after the puppet has changed the legs."
+    )
+
+    @field_validator("end_s")
+    @classmethod
+    def _after_start(cls, value: float | None, info: ValidationInfo) -> float | None:
+        start_s = info.data.get("start_s")
+        if value is not None and start_s is not None and value <= start_s:
+            raise refusal(
+                f"end_s ({value:g}) is not after start_s ({start_s:g}).", "Write a later end, or null."
+            )
+        return value
+
+
+class TurningConfig(Section):
+    """A hand that turns its joint at a constant rate."""
+
+    axis: Axis = Field(
+        default=(0.0, 1.0, 0.0), description="Axis (x, y, z) in the parent's frame, any length."
+    )
+    seconds_per_turn: float = Field(default=5.0, ge=0.1, le=3600, description="Seconds for one turn.")
+
+
+class FixedConfig(Section):
+    """A hand that holds its joint still."""
+
+    orientation: Orientation = Field(
+        default=(1.0, 0.0, 0.0, 0.0), description="Local to the parent joint; order w, x, y, z."
+    )
+
+
+class HandConfig(Section):
+    """A puppeteer's hold on one joint. Exactly one of sensor, turning, fixed and osc says who holds it."""
+
+    sensor: str | None = Field(
+        default=None, min_length=1, max_length=32, description="Name of the worn sensor that holds it."
+    )
+    turning: TurningConfig | None = Field(default=None, description="The joint turns at a constant rate.")
+    fixed: FixedConfig | None = Field(default=None, description="The joint is held still.")
+    osc: Literal[True] | None = Field(
+        default=None, description="Messages to the control port hold the joint."
+    )
+    joint: str = Field(min_length=1, description="Name of the held joint, one that the network moves.")
+    weight: float = Field(
+        default=1.0,
+        ge=0,
+        le=1,
+        description="How firmly it is held: 0 not at all, 1 fully overwritten in each interaction.",
+    )
+    neutral: Orientation = Field(
+        default=(1.0, 0.0, 0.0, 0.0),
+        description="For sensors: the orientation (w, x, y, z) at which the joint stands in its rest pose.",
+    )
+    primary: bool = Field(
+        default=False,
+        description="For sensors: the tick's phase follows this one; otherwise the first one.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_kind(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        given = [kind for kind in KINDS if values.get(kind) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) if given else "none of them"
+            raise refusal(
+                f"A hand has exactly one of {', '.join(KINDS)}; this one has {found}.",
+                "Say who holds the joint, and write a second hand for a second puppeteer.",
+                at=given[1] if given else None,
+            )
+        for key in ("neutral", "primary"):
+            if key in values and given != ["sensor"]:
+                raise refusal(
+                    f"'{key}' belongs to a sensor, and this hand is {given[0]}.", "Remove it.", at=key
+                )
+        return values
+
+    @field_validator("joint")
+    @classmethod
+    def _in_the_skeleton(cls, name: str, info: ValidationInfo) -> str:
+        joints: Sequence[str] | None = (info.context or {}).get("joints")
+        if joints is not None and name not in joints:
+            raise refusal(f"The skeleton has no joint '{name}'.", did_you_mean(name, joints))
+        return name
+
+    @property
+    def kind(self) -> str:
+        """sensor, turning, fixed or osc."""
+        return next(kind for kind in KINDS if getattr(self, kind) is not None)
+
+
+class ShowConfig(Section):
+    """show.yaml."""
+
+    name: str = Field(min_length=1, max_length=100, description="What the show is called.")
+    acknowledgement: str = Field(default="", max_length=4000, description="Whom to thank for the recordings.")
+    dancer: DancerConfig = Field(default_factory=DancerConfig, description=str(DancerConfig.__doc__))
+    motion: MotionConfig = Field(default_factory=MotionConfig, description=str(MotionConfig.__doc__))
+    hands: list[HandConfig] = Field(
+        default_factory=list,
+        max_length=MAX_HANDS,
+        description="Who holds which joints, each joint at most once.",
+    )
+
+    @field_validator("hands")
+    @classmethod
+    def _each_joint_once(cls, hands: list[HandConfig]) -> list[HandConfig]:
+        joints = [hand.joint for hand in hands]
+        for place, joint in enumerate(joints):
+            if joint in joints[:place]:
+                raise refusal(
+                    f"Two hands hold the joint '{joint}' (hands[{joints.index(joint)}] and hands[{place}]).",
+                    "Give one of them another joint.",
+                    at=place,
+                )
+        primaries = [place for place, hand in enumerate(hands) if hand.primary]
+        if len(primaries) > 1:
+            raise refusal(
+                "Two hands are primary.", "The tick can follow one sensor: keep one.", at=primaries[1]
+            )
+        return hands
+
+    @property
+    def primary_sensor(self) -> str | None:
+        """Name of the sensor that the tick's phase follows; None without sensors."""
+        sensors = sorted((hand for hand in self.hands if hand.sensor), key=lambda hand: not hand.primary)
+        return sensors[0].sensor if sensors else None
+
+
+@dataclass(frozen=True)
+class Show:
+    """A show bundle that was read: its configuration, its files, its skeleton."""
+
+    config: ShowConfig
+    directory: Path
+    skeleton: Skeleton
+    file: YamlFile
+
+    @property
+    def network(self) -> Path:
+        """The puppet's ONNX file."""
+        return self.directory / self.config.dancer.network
+
+    @property
+    def phrase(self) -> Path:
+        """The BVH file that playback starts from."""
+        return self.directory / self.config.motion.phrase
+
+    def require_moving(self, joints: Sequence[str]) -> None:
+        """Refuse hands on joints that the network does not move; `joints` are those that it does."""
+        problems = [
+            Problem(
+                self.file.path,
+                self.file.line(("hands", place, "joint")),
+                f"The network does not move the joint '{hand.joint}'.",
+                did_you_mean(hand.joint, joints),
+            )
+            for place, hand in enumerate(self.config.hands)
+            if hand.joint not in joints
+        ]
+        if problems:
+            raise ConfigError(problems)
+
+
+def load_show(directory: Path | str) -> Show:
+    """Read a show bundle: show.yaml and skeleton.bvh; network and phrase are only known to be there.
+
+    Raises ConfigError with file, line, what is wrong and what to do, for all that is wrong at once.
+    """
+    directory = Path(directory)
+    if not directory.is_dir():
+        raise ConfigError(
+            [Problem(directory, 0, "There is no such show folder.", "Check the path of the show.")]
+        )
+    file = read_yaml(directory / "show.yaml")
+    skeleton, problems = _skeleton(directory / "skeleton.bvh")
+    context = {"directory": directory, "joints": skeleton.names if skeleton else None}
+    try:
+        config = validated(ShowConfig, file, context)
+    except ConfigError as error:
+        problems.extend(error.problems)
+    if problems or skeleton is None:
+        raise ConfigError(problems)
+    return Show(config, directory, skeleton, file)
+
+
+def _skeleton(path: Path) -> tuple[Skeleton | None, list[Problem]]:
+    cure = "Copy the whole bundle again."
+    try:
+        return read_bvh(path).skeleton, []
+    except BvhError as error:
+        return None, [Problem(path, error.line, str(error).split(": ", 1)[-1], cure)]
+    except OSError as error:
+        return None, [Problem(path, 0, f"The skeleton cannot be read ({error.strerror}).", cure)]

@@ -1,0 +1,116 @@
+"""From the plain values of a YAML file to a typed section, or one error that lists all that is wrong."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from appliance.show import describe
+from appliance.show.config_error import ConfigError, Problem, did_you_mean
+from appliance.show.section import Section
+from appliance.show.yaml_file import Location, YamlFile
+
+AnySection = TypeVar("AnySection", bound=Section)
+
+
+def validated(model: type[AnySection], file: YamlFile, context: dict[str, Any]) -> AnySection:
+    """The file as a section; raises ConfigError with every problem's line, message and cure."""
+    try:
+        return model.model_validate(file.values, context=context)
+    except ValidationError as error:
+        raise ConfigError(_problem(model, file, details) for details in error.errors()) from None
+
+
+def _problem(model: type[Section], file: YamlFile, error: ErrorDetails) -> Problem:
+    location: Location = tuple(error["loc"])
+    context: dict[str, Any] = error.get("ctx", {})
+    if error["type"] == "refused":
+        at = context["at"]
+        below = location if at is None else (*location, at)
+        return Problem(file.path, file.line(below), context["message"], context["cure"])
+    message, cure = _words(model, location, error)
+    return Problem(file.path, file.line(location), message, cure)
+
+
+def _words(model: type[Section], location: Location, error: ErrorDetails) -> tuple[str, str]:
+    """Message and cure for an error that pydantic found by itself."""
+    around = _section_at(model, location[:-1])
+    if error["type"] == "extra_forbidden":
+        where = f" in '{spoken(location[:-1])}'" if location[:-1] else ""
+        return f"Unknown key '{location[-1]}'{where}.", did_you_mean(location[-1], list(around.model_fields))
+    field, name = _field_at(model, location), spoken(location)
+    if error["type"] == "missing":
+        description = field.description if field else ""
+        return f"The key '{name}' is missing.", f"Add it: {description}" if description else ""
+    return f"'{name}' is {_shown(error['input'])}, {_complaint(error, field)}.", _cure(error, field)
+
+
+def _complaint(error: ErrorDetails, field: FieldInfo | None) -> str:
+    if error["type"] in ("too_long", "too_short", "string_too_long", "string_too_short"):
+        return "of a wrong length"
+    if error["type"].startswith(("greater", "less", "finite")):
+        return "out of range"
+    wanted = (
+        "a number" if field is None or isinstance(error["loc"][-1], int) else describe.kind(field.annotation)
+    )
+    if error["type"] == "literal_error":
+        return f"not {wanted}"
+    return f"which is not {wanted}"
+
+
+def _cure(error: ErrorDetails, field: FieldInfo | None) -> str:
+    if field is None:
+        return ""
+    words, limits = describe.choices(field.annotation), describe.bounds(field)
+    if error["type"] == "literal_error" and len(words) > 1:
+        return did_you_mean(error["input"], words)
+    if isinstance(error["input"], str) and _is_number(error["input"]):
+        return "Write it without quotes and without an exponent (0.001, not 1e-3)."
+    return " ".join(part for part in (f"Write {limits}." if limits else "", field.description) if part)
+
+
+def _section_at(model: type[Section], location: Location) -> type[Section]:
+    """The section in which a location stands."""
+    for step in location:
+        if isinstance(step, str) and step in model.model_fields:
+            model = describe.section(model.model_fields[step].annotation) or model
+    return model
+
+
+def _field_at(model: type[Section], location: Location) -> FieldInfo | None:
+    """The field of a key, or of the list or the numbers around a place in brackets."""
+    while location and isinstance(location[-1], int):
+        location = location[:-1]
+    return _section_at(model, location[:-1]).model_fields.get(str(location[-1])) if location else None
+
+
+def spoken(location: Location) -> str:
+    """('hands', 0, 'joint') as 'hands[0].joint'."""
+    text = ""
+    for step in location:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "empty"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return "a group of keys"
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,131 @@
+"""YAML with its line numbers: plain values, and the line on which each of them stands."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from appliance.show.config_error import ConfigError, Problem
+
+MAX_BYTES = 256 * 1024  # a long show file has some 2 kB
+_TIMESTAMP = "tag:yaml.org,2002:timestamp"
+
+Location = tuple[str | int, ...]
+
+
+@dataclass
+class YamlFile:
+    """Plain values of a file, and the line of each: `lines[("hands", 0, "joint")]`."""
+
+    path: Path
+    values: dict[str, Any] = field(default_factory=dict)
+    lines: dict[Location, int] = field(default_factory=dict)
+
+    def line(self, location: Location) -> int:
+        """Line of a value, or of the nearest thing around it that the file has."""
+        for end in range(len(location), -1, -1):
+            if location[:end] in self.lines:
+                return self.lines[location[:end]]
+        return 1
+
+
+def read_yaml(path: Path) -> YamlFile:
+    """Read one document whose top level has keys.
+
+    Raises ConfigError: file missing or unreadable, not YAML, a key written twice, anchors, too large.
+    """
+    text = _read_text(path)
+    file = YamlFile(path)
+    problems: list[Problem] = []
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        if root is not None:
+            file.values = _Plain(file, problems).value(root, ())
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        raise _not_yaml(path, mark.line + 1 if mark else 1, error.problem or "it breaks off") from None
+    except yaml.YAMLError as error:
+        raise _not_yaml(path, 1, str(error).splitlines()[0]) from None
+    except RecursionError:
+        raise _not_yaml(path, 1, "it is nested too deeply") from None
+    if not problems and not isinstance(file.values, dict):
+        problems.append(Problem(path, 1, "The file does not consist of keys.", "Write 'key: value' lines."))
+    if problems:
+        raise ConfigError(problems)
+    return file
+
+
+def _read_text(path: Path) -> str:
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        why = f"The file cannot be read ({error.strerror})."
+        raise ConfigError([Problem(path, 0, why, "Check its name and place.")]) from None
+    if len(content) > MAX_BYTES:
+        why = f"The file is larger than {MAX_BYTES // 1024} kB: it is no configuration."
+        raise ConfigError([Problem(path, 0, why, "Check that it is the right file.")])
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise ConfigError([Problem(path, line, "This line is not text.", "Save it as UTF-8.")]) from None
+
+
+def _not_yaml(path: Path, line: int, why: str) -> ConfigError:
+    cure = "Check indentation, colons and brackets on this line and the one above."
+    return ConfigError([Problem(path, line, f"This is not YAML: {why}.", cure)])
+
+
+class _Plain:
+    """Turns the node tree into dicts, lists and scalars, noting lines on the way."""
+
+    def __init__(self, file: YamlFile, problems: list[Problem]) -> None:
+        self._file, self._problems = file, problems
+        self._scalars = yaml.constructor.SafeConstructor()
+        self._seen: set[int] = set()
+
+    def value(self, node: yaml.Node, location: Location) -> Any:
+        self._file.lines.setdefault(location, node.start_mark.line + 1)
+        if id(node) in self._seen:  # an alias stands for the anchored node itself, however often
+            self._problem(node, "Anchors and aliases (& and *) are not used here.", "Write the value again.")
+            return None
+        self._seen.add(id(node))
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, location)
+        if isinstance(node, yaml.SequenceNode):
+            return [self.value(item, (*location, place)) for place, item in enumerate(node.value)]
+        return self._scalar(node)
+
+    def _mapping(self, node: yaml.MappingNode, location: Location) -> dict[Hashable, Any]:
+        values: dict[Hashable, Any] = {}
+        for key_node, value_node in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                self._problem(key_node, "A key is a single word.", "Put it on a line of its own.")
+                continue
+            key: str = key_node.value
+            if key in values:
+                first = self._file.line((*location, key))
+                self._problem(
+                    key_node, f"The key '{key}' stands here twice (first on line {first}).", "Remove one."
+                )
+                continue
+            self._file.lines[(*location, key)] = key_node.start_mark.line + 1
+            values[key] = self.value(value_node, (*location, key))
+        return values
+
+    def _scalar(self, node: yaml.Node) -> Any:
+        if node.tag == _TIMESTAMP:
+            return node.value
+        try:
+            return self._scalars.construct_object(node)
+        except (yaml.YAMLError, ValueError, OverflowError):
+            self._problem(node, f"'{node.value}' cannot be read.", "Write a number, a word or 'quoted text'.")
+            return None
+
+    def _problem(self, node: yaml.Node, message: str, cure: str) -> None:
+        self._problems.append(Problem(self._file.path, node.start_mark.line + 1, message, cure))

@@ -1,0 +1,18 @@
+"""What several test folders share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def recordings_dir() -> Path:
+    """Folder with the motion capture recordings, beside the repository."""
+    folder = ROOT.parent / "shared" / "mocap"
+    if not folder.is_dir():
+        pytest.skip("the motion capture recordings (../shared/mocap) are not on this machine")
+    return folder
