@@ -1,0 +1,34 @@
+"""Joint frame: the one message that every output gets; made once, filled anew in every tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(slots=True)
+class JointFrame:
+    """Where the dancer stands at one tick, J joints in the skeleton's order.
+
+    Write into the arrays (`frame.pose[:] = ...`); outputs read them during `send` and keep nothing.
+    """
+
+    joints: int
+    tick: int = 0
+    frame_time: float = 0.0  # seconds on the monotonic clock
+    late: bool = False  # the last pose once more, because the tick did not get done
+    sensor_sequence: int = -1  # of the primary sensor's newest reading in this frame; -1 without one
+    sensor_arrival: float = 0.0  # when that reading came in, seconds on the monotonic clock
+    pose: NDArray[np.float32] = field(init=False)  # (J, 4) w, x, y, z local to the parent joint
+    world: NDArray[np.float32] = field(init=False)  # (J, 4) w, x, y, z
+    positions: NDArray[np.float32] = field(init=False)  # (J, 3) world, metres
+    root: NDArray[np.float32] = field(init=False)  # (3,) world, metres
+
+    def __post_init__(self) -> None:
+        self.pose = np.zeros((self.joints, 4), np.float32)
+        self.pose[:, 0] = 1.0
+        self.world = self.pose.copy()
+        self.positions = np.zeros((self.joints, 3), np.float32)
+        self.root = np.zeros(3, np.float32)

@@ -1,0 +1,23 @@
+"""The OSC dialects by the names that the box file knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.osc.ai_toolbox import AiToolbox
+from appliance.outputs.osc.joint import Joint
+from appliance.outputs.osc.vmc import Vmc
+from appliance.pose.skeleton import Skeleton
+
+
+class Encoder(Protocol):
+    """Turns joint frames into datagrams, always into the same buffers."""
+
+    def encode(self, frame: JointFrame) -> Sequence[memoryview]:
+        """Datagrams of this frame, valid until the next call."""
+        ...
+
+
+DIALECTS: dict[str, Callable[[Skeleton], Encoder]] = {"ai-toolbox": AiToolbox, "joint": Joint, "vmc": Vmc}
