@@ -37,8 +37,6 @@ def read_bvh(
     recording = _to_recording(text, true_fps or text.fps, metres_per_unit)
     if drop_tpose:
         recording = recording.without_first(leading_tpose_frames(recording))
-    if not len(recording):
-        raise BvhError(path, text.lines, "no frames are left. Record at least one pose after the T-pose.")
     return recording
 
 

@@ -42,7 +42,6 @@ class BvhText:
     ends: list[tuple[int, tuple[float, float, float]]]
     frames: NDArray[np.float64]
     fps: float
-    lines: int
 
 
 def read_bvh_text(path: Path) -> BvhText:
@@ -51,7 +50,7 @@ def read_bvh_text(path: Path) -> BvhText:
         lines = _Lines(path, file)
         joints, ends = _read_hierarchy(lines)
         frames, fps = _read_motion(lines, joints)
-    return BvhText(joints, ends, frames, fps, lines.number)
+    return BvhText(joints, ends, frames, fps)
 
 
 class _Lines:
