@@ -32,8 +32,7 @@ def read_bvh(
     frames that swing away from it. The root's OFFSET is ignored: its channels say where it is. Position
     channels of other joints replace their OFFSET. Raises BvhError with the line, or OSError.
     """
-    path = Path(path)
-    text = read_bvh_text(path)
+    text = read_bvh_text(Path(path))
     recording = _to_recording(text, true_fps or text.fps, metres_per_unit)
     if drop_tpose:
         recording = recording.without_first(leading_tpose_frames(recording))

@@ -47,7 +47,8 @@ def normalize(q: Array) -> Array:
 
 def rotate(q: Array, vectors: Array) -> Array:
     """Turn vectors (..., 3) by unit quaternions (..., 4)."""
-    return np.matmul(to_matrix(q), vectors[..., None])[..., 0]
+    turned: Array = np.matmul(to_matrix(q), vectors[..., None])[..., 0]
+    return turned
 
 
 def to_matrix(q: Array) -> Array:
