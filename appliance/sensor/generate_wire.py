@@ -1,0 +1,107 @@
+"""Writes what is made from the wire's declaration: the tables in docs/wire.md and the golden vectors.
+
+`python -m appliance.sensor.generate_wire` in the repository writes them anew; a test fails when one is stale.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from appliance.sensor import framing, wire
+
+REPOSITORY = Path(__file__).parents[2]
+TABLES = REPOSITORY / "docs" / "wire.md"
+VECTORS = REPOSITORY / "tests" / "golden" / "wire.json"
+FRAMES = REPOSITORY / "tests" / "golden" / "wire_framing.json"
+BEGIN, END = "<!-- generated: begin -->\n", "<!-- generated: end -->\n"
+KEY = bytes(range(wire.KEY_BYTES))
+SIGN = (0x1A2B3C4D, 0xDEADBEEF, 7, 258)  # device id, boot nonce, session, sequence
+HALF = 0.5**0.5
+EXAMPLES: tuple[wire.Packet, ...] = (
+    wire.Hello(*SIGN, wire.WIRE_HASH, 1, 2, 3, battery=87, imu_id=bytes(range(0x50, 0x60))),
+    wire.Assignment(*SIGN, hello_sequence=3, hand=1, rate_hz=50, led=1),
+    wire.Reading(*SIGN, 0xFFFFFFFF, orientation=(1.0, 0.0, 0.0, 0.0), calibration=0xFF, battery=87),
+    wire.Reading(*SIGN, 20_000, orientation=(HALF, 0.0, -HALF, 0.0), calibration=0, battery=255),
+    wire.Reading(*SIGN, 0, orientation=(-0.5, 0.5, -0.5, 0.5), calibration=0x3C, battery=0),
+    wire.Heartbeat(*SIGN, echo_sequence=0xFFFFFFFF, echo_held_us=1234, led=2),
+)
+PAYLOADS = (
+    b"\x01",
+    b"\x00",
+    b"\x00\x00\x00",
+    b"\x01\x02\x00\x03",
+    bytes(range(60)),
+    bytes(wire.READING.size),
+)
+
+
+def main() -> None:
+    for path, text in generated().items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        print(f"wrote {path.relative_to(REPOSITORY)}")
+
+
+def generated() -> dict[Path, str]:
+    """Each file and what it should hold."""
+    before, _, rest = TABLES.read_text(encoding="utf-8").partition(BEGIN)
+    after = rest.partition(END)[2]
+    return {TABLES: before + BEGIN + tables() + END + after, VECTORS: vectors(), FRAMES: frames()}
+
+
+def tables() -> str:
+    """Every packet as a table of offset, bytes, type, field and meaning, in Markdown."""
+    text = f"\nMagic `{wire.MAGIC:#06x}`, version {wire.VERSION}, wire hash `{wire.WIRE_HASH:#010x}`.\n"
+    for layout in wire.LAYOUTS.values():
+        text += f"\n### {layout.name}: kind {layout.kind}, {layout.direction}, {layout.size} bytes\n\n"
+        text += f"{layout.meaning}\n\n| offset | bytes | type | field | meaning |\n|---|---|---|---|---|\n"
+        rows = [
+            ("magic", wire.U16, 'the bytes "BK"'),
+            ("version", wire.U8, "of this wire"),
+            ("kind", wire.U8, f"{layout.kind}"),
+            *layout.fields,
+        ]
+        offset = 0
+        for name, coding, meaning in rows:
+            c_type = coding.c_type + (f"[{coding.count}]" if coding.count > 1 else "")
+            text += f"| {offset} | {coding.size} | `{c_type}` | {name} | {meaning} |\n"
+            offset += coding.size
+        tag = wire.TAG_BYTES
+        text += f"| {offset} | {tag} | `uint8_t[{tag}]` | tag | keyed BLAKE2s of all before |\n"
+    return text + "\n"
+
+
+def vectors() -> str:
+    """One line of JSON for each example packet: its fields, its key, its bytes."""
+    tagger = wire.Tagger(KEY)
+    packets = [
+        {
+            "packet": type(packet).__name__,
+            "fields": {field.name: _plain(getattr(packet, field.name)) for field in fields(packet)},
+            "datagram": wire.pack(packet, tagger).hex(),
+        }
+        for packet in EXAMPLES
+    ]
+    return _json({"wire_hash": wire.WIRE_HASH, "key": KEY.hex(), "packets": packets})
+
+
+def frames() -> str:
+    """Payloads and their frames on a serial line."""
+    return _json({"frames": [{"payload": p.hex(), "frame": framing.frame(p).hex()} for p in PAYLOADS]})
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.hex()
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _json(document: dict[str, Any]) -> str:
+    return json.dumps(document, indent=1) + "\n"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,226 @@
+"""The packets between a wearable and the box: the one declaration from which everything else is made.
+
+Little-endian, fixed size, one packet a datagram, an 8-byte keyed BLAKE2s tag at the end of each. The tables
+of docs/wire.md and the golden vectors are made from here by `python -m appliance.sensor.generate_wire`.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from hashlib import blake2s
+from hmac import compare_digest
+from typing import Annotated, Any, get_type_hints
+
+MAGIC = 0x4B42  # the bytes "BK" on the wire
+VERSION = 1
+KEY_BYTES = 16
+TAG_BYTES = 8
+Q14 = 1 << 14  # the BNO055's quaternion scale: 16384 stands for 1.0
+BATTERY_UNKNOWN = 255
+Buffer = bytes | bytearray | memoryview
+
+
+class WireError(ValueError):
+    """A datagram that is not a packet for us; `reason` is one word for a counter."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"not a packet for this box: {reason}")
+        self.reason = reason
+
+
+@dataclass(frozen=True)
+class Coding:
+    """How one field travels: its struct code, its C type, how many values, and what one unit stands for."""
+
+    code: str
+    c_type: str
+    count: int = 1
+    scale: int = 1
+
+    @property
+    def size(self) -> int:
+        return struct.calcsize("<" + self.code * self.count)
+
+
+U8, U16, U32 = Coding("B", "uint8_t"), Coding("H", "uint16_t"), Coding("I", "uint32_t")
+QUATERNION = Coding("h", "int16_t", count=4, scale=Q14)
+IDENTITY16 = Coding("16s", "uint8_t[16]")
+
+
+@dataclass(slots=True)
+class Packet:
+    """What every packet carries behind magic, version and kind."""
+
+    device_id: Annotated[int, U32, "which sensor, as in the key file"]
+    boot_nonce: Annotated[int, U32, "random, drawn by the sensor at each power-on"]
+    session: Annotated[int, U32, "random, drawn by the box at each assignment; 0 before one"]
+    sequence: Annotated[int, U32, "counts this kind of packet from this sender since power-on"]
+
+
+@dataclass(slots=True)
+class Hello(Packet):
+    """The sensor is on and looks for its box: broadcast every 500 ms until assigned."""
+
+    wire_hash: Annotated[int, U32, "hash of this declaration; a mismatch says which side to update"]
+    firmware_major: Annotated[int, U8, "firmware version"]
+    firmware_minor: Annotated[int, U8, ""]
+    firmware_patch: Annotated[int, U8, ""]
+    battery: Annotated[int, U8, "percent; 255 unknown"]
+    imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055; its calibration is kept under it"]
+
+
+@dataclass(slots=True)
+class Assignment(Packet):
+    """The box takes the sensor: stream to the sender of this packet. Bound to the hello that it answers."""
+
+    hello_sequence: Annotated[int, U32, "sequence of the hello that is answered"]
+    hand: Annotated[int, U8, "which hand of the show, from 0"]
+    rate_hz: Annotated[int, U8, "readings a second"]
+    led: Annotated[int, U8, "0 off, 1 on, 2 slow, 3 fast"]
+
+
+@dataclass(slots=True)
+class Reading(Packet):
+    """One orientation of the sensor, 50 times a second."""
+
+    sensor_time_us: Annotated[int, U32, "device clock at the measurement; wraps after 71.6 minutes"]
+    orientation: Annotated[tuple[float, float, float, float], QUATERNION, "w, x, y, z; 16384 stands for 1"]
+    calibration: Annotated[
+        int, U8, "BNO055 register 0x35: system, gyro, accelerometer, magnetometer, 2 bits each"
+    ]
+    battery: Annotated[int, U8, "percent; 255 unknown"]
+
+
+@dataclass(slots=True)
+class Heartbeat(Packet):
+    """The box is there: once a second. Three seconds without it and the sensor says hello again."""
+
+    echo_sequence: Annotated[int, U32, "sequence of the newest reading that arrived"]
+    echo_held_us: Annotated[int, U32, "how long the box held that reading before this packet left"]
+    led: Annotated[int, U8, "0 off, 1 on, 2 slow, 3 fast"]
+
+
+class Layout:
+    """One packet's bytes, compiled from its declaration: magic, version, kind, fields in order, tag."""
+
+    def __init__(self, kind: int, direction: str, packet: type[Packet]) -> None:
+        self.kind = kind
+        self.direction = direction
+        self.packet: Callable[..., Packet] = packet
+        self.name = packet.__name__
+        self.meaning = " ".join((packet.__doc__ or "").split())
+        hints = get_type_hints(packet, include_extras=True)
+        self.fields: list[tuple[str, Coding, str]] = [
+            (field.name, *hints[field.name].__metadata__) for field in fields(packet)
+        ]
+        codes = (
+            f"{coding.count}{coding.code}" if coding.count > 1 else coding.code
+            for _, coding, _ in self.fields
+        )
+        self._struct = struct.Struct("<HBB" + "".join(codes))
+        self.signed_bytes = self._struct.size
+        self.size = self.signed_bytes + TAG_BYTES
+
+    def encode(self, packet: Packet) -> bytes:
+        """The packet's bytes without the tag. Raises struct.error when a value does not fit its field."""
+        values: list[Any] = [MAGIC, VERSION, self.kind]
+        for name, coding, _ in self.fields:
+            value = getattr(packet, name)
+            if coding.count == 1:
+                values.append(value)
+            else:
+                values += (round(part * coding.scale) for part in value)
+        return self._struct.pack(*values)
+
+    def decode(self, data: Buffer) -> Packet:
+        """The packet in `data`, which was checked before: length, magic, kind and tag are not looked at."""
+        values = self._struct.unpack_from(data)
+        arguments: list[Any] = []
+        at = 3
+        for _, coding, _ in self.fields:
+            if coding.count == 1:
+                arguments.append(values[at])
+            else:
+                arguments.append(tuple([part / coding.scale for part in values[at : at + coding.count]]))
+            at += coding.count
+        return self.packet(*arguments)
+
+
+LAYOUTS = {
+    layout.kind: layout
+    for layout in (
+        Layout(1, "sensor to box", Hello),
+        Layout(2, "box to sensor", Assignment),
+        Layout(3, "sensor to box", Reading),
+        Layout(4, "box to sensor", Heartbeat),
+    )
+}
+_BY_NAME = {layout.name: layout for layout in LAYOUTS.values()}
+READING = _BY_NAME["Reading"]
+LARGEST = max(layout.size for layout in LAYOUTS.values())
+HEAD = struct.Struct("<HBBIIII")  # magic, version, kind and the fields of Packet
+
+
+class Tagger:
+    """Signs and checks with one sensor's key: BLAKE2s, keyed, 8 bytes of output, no salt, no person."""
+
+    def __init__(self, key: bytes) -> None:
+        if len(key) != KEY_BYTES:
+            raise ValueError(f"a sensor's key has {KEY_BYTES} bytes, not {len(key)}")
+        self._keyed = blake2s(key=key, digest_size=TAG_BYTES)
+
+    def tag(self, signed: Buffer) -> bytes:
+        keyed = self._keyed.copy()
+        keyed.update(signed)
+        return keyed.digest()
+
+    def is_authentic(self, data: Buffer) -> bool:
+        """Whether the last 8 bytes of `data` are the tag of those before; in constant time."""
+        return compare_digest(self.tag(data[:-TAG_BYTES]), data[-TAG_BYTES:])
+
+
+def pack(packet: Packet, tagger: Tagger) -> bytes:
+    """One datagram: the packet and its tag. Raises struct.error when a value does not fit its field."""
+    signed = _BY_NAME[type(packet).__name__].encode(packet)
+    return signed + tagger.tag(signed)
+
+
+def unpack(data: Buffer, tagger_of: Callable[[int], Tagger | None]) -> Packet:
+    """The packet in one datagram; `tagger_of` gives a device's key, or None for an unknown device.
+
+    Raises WireError with the reason length, magic, version, kind, device or tag, and nothing else.
+    """
+    if len(data) < HEAD.size:
+        raise WireError("length")
+    magic, version, kind, device_id, *_ = HEAD.unpack_from(data)
+    if magic != MAGIC:
+        raise WireError("magic")
+    if version != VERSION:
+        raise WireError("version")
+    layout = LAYOUTS.get(kind)
+    if layout is None:
+        raise WireError("kind")
+    if len(data) != layout.size:
+        raise WireError("length")
+    tagger = tagger_of(device_id)
+    if tagger is None:
+        raise WireError("device")
+    if not tagger.is_authentic(data):
+        raise WireError("tag")
+    return layout.decode(data)
+
+
+def declaration() -> str:
+    """Everything that both sides must agree on, as text: order, names, types, scales, kinds, tag."""
+    lines = [f"magic={MAGIC:#06x} version={VERSION} tag=blake2s-{TAG_BYTES} key={KEY_BYTES}"]
+    for layout in LAYOUTS.values():
+        lines.append(f"{layout.kind} {layout.name} {layout.direction} {layout.size}")
+        lines += [
+            f"  {name} {coding.c_type} {coding.count} {coding.scale}" for name, coding, _ in layout.fields
+        ]
+    return "\n".join(lines)
+
+
+WIRE_HASH = int.from_bytes(blake2s(declaration().encode(), digest_size=4).digest(), "little")
