@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_DATAGRAM = 1472  # bytes: Ethernet's 1500 less the IP and UDP headers
+MAX_DATAGRAM = 1468  # bytes: the last multiple of 4 under Ethernet's 1500 less IP and UDP headers
 BUNDLE_HEADER = b"#bundle\0" + struct.pack(">Q", 1)  # the time tag 1 says: at once
 _FORBIDDEN_IN_ADDRESS = str.maketrans(dict.fromkeys(' #*,/?[]{}"', "_"))
 
