@@ -78,7 +78,7 @@ class DeviceClock:
                 self._points.clear()
             self._height += offset - expected
             return arrival
-        return sensor_s + expected
+        return min(arrival, sensor_s + expected)
 
     def _close_bucket(self) -> None:
         at, least = self._least

@@ -33,7 +33,7 @@ PAYLOADS = (
     b"\x00",
     b"\x00\x00\x00",
     b"\x01\x02\x00\x03",
-    bytes(range(60)),
+    bytes(range(50)),
     bytes(wire.READING.size),
 )
 

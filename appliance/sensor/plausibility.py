@@ -9,7 +9,7 @@ Orientation = tuple[float, float, float, float]
 NORM_TOLERANCE = 0.01  # Q14 rounding gives 6e-5; one torn byte up to 1.5e-2
 FASTEST_DEGREES_S = 2000.0  # the range of the BNO055's gyroscope: its fusion cannot follow anything faster
 SLACK_DEGREES = 3.0  # rounding, and a fusion that corrects itself
-LONGEST_STEP_S = 0.06  # while readings are refused, the way still allowed from the last believed one
+LONGEST_STEP_S = 0.03  # while readings are refused, the way still allowed from the last believed one
 CONSISTENT_READINGS = 5  # this many in a row that agree with one another are believed: 100 ms
 TIMEOUT_S = 0.5  # after this long without a believed reading the next one is believed
 

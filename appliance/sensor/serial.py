@@ -27,7 +27,8 @@ class SerialIntake:
     def __init__(self, device: str, baud: int = 115200, clock: Callable[[], float] = time.monotonic) -> None:
         self.device = device
         self.counts: Counter[str] = Counter()
-        self.trouble: str | None = None  # for people; None while the port is open
+        # For people; None while the port is open.
+        self.trouble: str | None = f"{device} is being opened. Sensors on this cable are silent until it is."
         self._baud = baud
         self._clock = clock
         self._packets: deque[tuple[bytes, float]] = deque(maxlen=WAITING_PACKETS)
