@@ -1,0 +1,92 @@
+"""Blending: overlapping windows of 8 poses become endless motion (Hann weights, SLERP onto the running pose).
+
+Each generated window lies over the running motion of the next 8 ticks. A pose that the window meets there
+moves towards it by SLERP with the share weight / (weight gathered so far + weight), so that after all windows
+have passed it is their Hann-weighted mean.
+
+What this costs in latency: a step of the target reaches the output with the windows that are generated after
+it, newest pose first with the smallest weight. At hop 1 the share in the pose of the same tick is 1 %, then
+after 1, 2, ... 7 more ticks
+
+    9 %   26 %   50 %   74 %   91 %   99 %   100 %
+
+so half of it 60 ms and all of it 140 ms later. A larger hop adds up to hop - 1 ticks of waiting for the next
+window. From hop 5 on some poses are seen by one window only, and at hop 8 all of them: no blending is left.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from appliance.dancer.slerp import FloatArray, Slerp
+
+_ROWS = 256  # poses of running motion before it moves back to the start of its memory
+
+
+class Blending:
+    """A running buffer of the next `window` poses of `joints` joints; a window comes in every `hop` ticks."""
+
+    def __init__(self, joints: int, window: int = 8, hop: int = 1) -> None:
+        self._window = window
+        self.hop = hop
+        hann = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2
+        self._hann = np.repeat(hann.astype(np.float32), joints)
+        self._poses = np.zeros((_ROWS, joints, 4), dtype=np.float32)
+        self._poses[..., 0] = 1.0
+        self._gathered = np.zeros((_ROWS, joints), dtype=np.float32)
+        self._share = np.empty(window * joints, dtype=np.float32)
+        self._slerp = Slerp(window * joints)
+        self._first = 0
+        self._ticks_since_window = 0
+        self._fresh = True
+
+    @property
+    def hop(self) -> int:
+        """Ticks from one generated window to the next, 1..window."""
+        return self._hop
+
+    @hop.setter
+    def hop(self, ticks: int) -> None:
+        if not 1 <= ticks <= self._window:
+            raise ValueError(f"hop is {ticks}; a window of {self._window} poses allows 1 to {self._window}.")
+        self._hop = ticks
+
+    @property
+    def is_due(self) -> bool:
+        """Whether this tick should generate a window."""
+        return self._fresh or self._ticks_since_window >= self._hop
+
+    def add(self, poses: FloatArray) -> None:
+        """Blend a generated window (window, joints, 4) of unit quaternions into the motion from now on."""
+        rows = slice(self._first, self._first + self._window)
+        running = self._poses[rows].reshape(-1, 4)
+        gathered = self._gathered[rows].reshape(-1)
+        np.add(gathered, self._hann, out=gathered)
+        np.divide(self._hann, gathered, out=self._share)
+        self._slerp(running, poses.reshape(-1, 4), self._share, out=running)
+        self._ticks_since_window = 0
+        self._fresh = False
+
+    def take(self) -> FloatArray:
+        """The pose (joints, 4) of this tick; it stays valid until the next call.
+
+        Without new windows the motion runs out after `window` ticks and the last pose is held.
+        """
+        pose: FloatArray = self._poses[self._first]
+        self._first += 1
+        self._ticks_since_window += 1
+        last = self._first + self._window - 1
+        if last == _ROWS:
+            self._move_to_start()
+            last = self._window - 1
+        # A new pose starts as its neighbour with nothing gathered: the first window that meets it replaces
+        # it, in the neighbour's hemisphere, so that no sign ever jumps.
+        self._poses[last] = self._poses[last - 1]
+        self._gathered[last] = 0.0
+        return pose
+
+    def _move_to_start(self) -> None:
+        kept = self._window - 1
+        self._poses[:kept] = self._poses[-kept:]
+        self._gathered[:kept] = self._gathered[-kept:]
+        self._first = 0

@@ -1,0 +1,185 @@
+"""Grounding: a figure whose legs the puppet has changed stands on the floor again, without sliding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from appliance.dancer.figure import Figure, soles_of
+from appliance.dancer.slerp import FloatArray
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+
+# Capture leaves planted feet some centimetres off the floor: up to FLOOR_NOISE_M they are set down on it;
+# from JUMP_M on the phrase really jumps, and keeps its height; in between one turns into the other.
+FLOOR_NOISE_M = 0.03
+JUMP_M = 0.08
+PLANTED_PERCENTILE = 5.0  # of a point's heights over the phrase: its height above the floor while planted
+MOST_ABOVE_OTHER_FOOT_M = 0.03  # a foot that never stands in a phrase is not taken for a planted one
+SUPPORT_M = 0.02  # points of the feet so close to the lowest one share its support
+LEAK_S = 3.0  # the root goes back to its path in about this time
+FAR_M = 0.4  # so far from its path it goes back twice as fast
+
+
+class GroundingError(ValueError):
+    """A skeleton that names no feet."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What grounding knows about a phrase.
+
+    rest_heights (S,): height in metres of each point of the soles above the floor when it is planted;
+    lifts (N,): how far the phrase's lowest foot is above the floor in a jump, 0 while it stands.
+    """
+
+    rest_heights: FloatArray
+    lifts: FloatArray
+
+
+def survey(phrase: Recording) -> Floor:
+    """Learn the floor from a phrase. Raises GroundingError when the skeleton names no feet."""
+    heights = sole_positions(phrase.skeleton, phrase.poses, phrase.roots)[..., 1]
+    rest = np.percentile(heights, PLANTED_PERCENTILE, axis=0)
+    feet = soles_of(phrase.skeleton)
+    if len({len(points) for points in feet}) == 1:
+        same_points = rest.reshape(len(feet), -1)  # ankle of each foot, toe of each foot, ...
+        rest = np.minimum(same_points, same_points.min(axis=0) + MOST_ABOVE_OTHER_FOOT_M).ravel()
+    lifts = lift(np.min(heights - rest, axis=-1))
+    return Floor(rest.astype(np.float32), lifts.astype(np.float32))
+
+
+def lift(clearance: Array) -> Array:
+    """How much of a height above the floor (metres) is a jump: none up to FLOOR_NOISE_M, all from JUMP_M."""
+    share = np.clip((clearance - FLOOR_NOISE_M) / (JUMP_M - FLOOR_NOISE_M), 0.0, 1.0)
+    jumped: Array = clearance * share * share * (3 - 2 * share)
+    return jumped
+
+
+class Grounding:
+    """Stands a pose on the floor and pins the foot that carries it; once per tick.
+
+    Vertically the lowest point of the soles comes to the phrase's lift above the floor. Horizontally the root
+    leaves its path by as much as the supporting points would slide; the support passes from foot to foot with
+    their heights, so nothing pops; the offset leaks back within LEAK_S.
+    """
+
+    def __init__(self, skeleton: Skeleton, floor: Floor | None, tick_s: float = 0.02) -> None:
+        """floor None: figures stay where the phrase has them."""
+        self.figure = Figure(skeleton)
+        self.root = np.zeros(3, dtype=np.float32)
+        self._rest = None if floor is None else floor.rest_heights.tolist()
+        self._leak = tick_s / LEAK_S
+        self._offset_x = self._offset_z = 0.0
+        self._before: list[list[float]] | None = None
+        self._shift = np.zeros(3, dtype=np.float32)
+
+    def stand(self, pose: FloatArray, root: FloatArray, lift_m: float) -> Figure:
+        """Stand the figure in a pose (J, 4), the phrase's root at (3,) metres and its feet lifted so far.
+
+        Its positions and world rotations, and `root`, hold until the next call.
+        """
+        self.figure.stand(pose, root)
+        self.root[:] = root
+        if self._rest is None:
+            return self.figure
+        points = self.figure.soles.tolist()
+        clearances = [point[1] - rest for point, rest in zip(points, self._rest, strict=True)]
+        lowest = min(clearances)
+        if self._before is not None:
+            self._pin(points, self._before, clearances, lowest, lift_m)
+        self._before = points
+        self._shift[:] = self._offset_x, lift_m - lowest, self._offset_z
+        self.figure.move(self._shift)
+        np.add(self.root, self._shift, out=self.root)
+        return self.figure
+
+    def _pin(
+        self,
+        points: list[list[float]],
+        before: list[list[float]],
+        clearances: list[float],
+        lowest: float,
+        lift_m: float,
+    ) -> None:
+        """Move the root's offset against the motion of the points that carry the figure."""
+        total = slide_x = slide_z = 0.0
+        for point, earlier, clearance in zip(points, before, clearances, strict=True):
+            support = max(0.0, 1.0 - (clearance - lowest) / SUPPORT_M) ** 2
+            total += support
+            slide_x += support * (point[0] - earlier[0])
+            slide_z += support * (point[2] - earlier[2])
+        standing = max(0.0, 1.0 - lift_m / JUMP_M) / total  # the lowest point has support 1
+        far = (self._offset_x**2 + self._offset_z**2) / FAR_M**2
+        kept = 1.0 - self._leak * (1.0 + far)
+        self._offset_x = (self._offset_x - standing * slide_x) * kept
+        self._offset_z = (self._offset_z - standing * slide_z) * kept
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How well a motion stands: means over its frames, worst ones beside them."""
+
+    float_cm: float
+    worst_float_cm: float
+    penetration_cm: float
+    worst_penetration_cm: float
+    slide_cm_s: float
+    worst_slide_cm_s: float  # 95th percentile
+
+
+def measure_standing(
+    skeleton: Skeleton,
+    poses: Array,
+    roots: Array,
+    floor: Floor,
+    lifts: Array | None = None,
+    fps: float = 50.0,
+) -> Standing:
+    """Measure poses (N, J, 4) with roots (N, 3) metres against a phrase's floor.
+
+    Float and penetration: the lowest point of the soles above or below where it should be (lifts (N,) metres
+    above the floor, 0 if not given). Slide: horizontal speed of the point that is lowest in two frames
+    running, while nothing jumps.
+    """
+    points = sole_positions(skeleton, poses, roots)
+    clearances = points[..., 1] - floor.rest_heights
+    wanted = np.zeros(len(poses)) if lifts is None else lifts
+    off = clearances.min(axis=-1) - wanted
+    lowest = clearances.argmin(axis=-1)
+    planted = np.flatnonzero((lowest[1:] == lowest[:-1]) & (wanted[1:] == 0) & (wanted[:-1] == 0))
+    carrying = lowest[planted]
+    steps = (points[planted + 1, carrying] - points[planted, carrying])[:, [0, 2]]
+    slides = np.linalg.norm(steps, axis=-1) * fps if len(planted) else np.zeros(1)
+    above, below = np.maximum(off, 0), np.maximum(-off, 0)
+    return Standing(
+        100 * float(above.mean()),
+        100 * float(above.max()),
+        100 * float(below.mean()),
+        100 * float(below.max()),
+        100 * float(slides.mean()),
+        100 * float(np.percentile(slides, 95)),
+    )
+
+
+def sole_positions(skeleton: Skeleton, poses: Array, roots: Array) -> Array:
+    """World positions (N, S, 3) in metres of the points of the soles. Raises GroundingError without feet."""
+    points = [point for foot in soles_of(skeleton) for point in foot]
+    if not points:
+        raise GroundingError(
+            "No joint of this skeleton is named foot or ankle, so the figure cannot be set on the floor. "
+            "Set grounded: false, or rename the joints."
+        )
+    positions, world = skeleton.forward_kinematics(poses, roots)
+    columns = []
+    for point in points:
+        if point < len(skeleton):
+            columns.append(positions[..., point, :])
+        else:
+            joint, offset = skeleton.ends[point - len(skeleton)]
+            turned = quaternion.rotate(world[..., joint, :], np.asarray(offset, dtype=poses.dtype))
+            columns.append(positions[..., joint, :] + turned)
+    return np.stack(columns, axis=-2)

@@ -1,0 +1,241 @@
+"""Puppeteers: whatever holds joints (worn sensor, turning axis, fixed orientation, OSC), and their hands."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.dancer.slerp import FloatArray, Slerp
+from appliance.pose import quaternion
+from appliance.pose.skeleton import UnknownJointError
+
+HOLD_S = 0.1  # a sensor may be silent for so long before its joint is given back
+GIVE_BACK_S = 1.0
+TAKE_S = 0.5
+
+
+class HandError(ValueError):
+    """A hand that cannot hold its joint: which one, why, which joints there are."""
+
+
+@dataclass(slots=True)
+class Target:
+    """One joint, one orientation ((4,) unit, local to the parent), one weight 0..1; reused at each tick."""
+
+    joint: str
+    orientation: FloatArray
+    weight: float = 0.0
+
+
+class Puppeteer(ABC):
+    """Holds one joint. The weight grows over TAKE_S when it takes the joint and fades over GIVE_BACK_S when
+    it lets go, level at both ends; a new `weight` is reached at the pace of taking.
+    """
+
+    def __init__(self, joint: str, weight: float = 1.0) -> None:
+        self.joint = joint
+        self.weight = weight
+        self._target = Target(joint, quaternion.IDENTITY.copy())
+        self._presence = 0.0
+        self._level = weight
+        self._pulled_at: float | None = None
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether the joint is held, even if only a little, at the last pull."""
+        return self._target.weight > 0.0
+
+    def pull(self, now: float) -> Target:
+        """The target at this moment; time never runs backwards from one pull to the next."""
+        elapsed = 0.0 if self._pulled_at is None else now - self._pulled_at
+        self._pulled_at = now
+        self._point(self._target.orientation, now, elapsed)
+        if self._holds(now):
+            self._presence = min(1.0, self._presence + elapsed / TAKE_S)
+        else:
+            self._presence = max(0.0, self._presence - elapsed / GIVE_BACK_S)
+        most = elapsed / TAKE_S
+        self._level += min(max(self.weight - self._level, -most), most)
+        self._target.weight = self._level * self._presence * self._presence * (3 - 2 * self._presence)
+        return self._target
+
+    @abstractmethod
+    def _holds(self, now: float) -> bool:
+        """Whether the joint should be held at this moment."""
+
+    @abstractmethod
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        """Write the orientation (4,) of this moment; `elapsed` seconds since the last one."""
+
+
+class WornSensor(Puppeteer):
+    """A sensor that a dancer wears. Silent for 100 ms: its joint is given back over 1 s, taken again over
+    0.5 s, and the target is led to the new readings over as long as the silence lasted (0.5 s at most).
+
+    neutral: the sensor's orientation at which the joint stands in its rest pose.
+    """
+
+    def __init__(
+        self, joint: str, weight: float = 1.0, neutral: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
+    ) -> None:
+        super().__init__(joint, weight)
+        self.set_neutral(neutral)
+        self._reading = quaternion.IDENTITY.copy()
+        self._heard_at: float | None = None
+        self._leading_s = 0.0
+        self._slerp = Slerp(1)
+
+    def set_neutral(self, neutral: Sequence[float]) -> None:
+        """Take another orientation of the sensor as the one that means the joint's rest pose."""
+        back = quaternion.inverse(quaternion.normalize(np.array(neutral, dtype=np.float32)))
+        # Multiplying a reading by it from the right, as one matrix: a quarter of the time in the tick.
+        self._from_neutral = quaternion.multiply(np.eye(4, dtype=np.float32), back).T.copy()
+
+    def hear(self, orientation: Sequence[float] | FloatArray, arrival: float) -> None:
+        """Take a reading (unit quaternion w, x, y, z) that arrived at this time."""
+        np.matmul(self._from_neutral, np.asarray(orientation, dtype=np.float32), out=self._reading)
+        if self._heard_at is not None and arrival - self._heard_at > HOLD_S:
+            self._leading_s = min(arrival - self._heard_at, TAKE_S)
+        self._heard_at = arrival
+
+    def silent_s(self, now: float) -> float:
+        """Seconds since the last reading; infinite before the first one."""
+        return math.inf if self._heard_at is None else now - self._heard_at
+
+    def _holds(self, now: float) -> bool:
+        return self.silent_s(now) <= HOLD_S
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        if self._leading_s <= elapsed:
+            self._leading_s = 0.0
+            orientation[:] = self._reading
+            return
+        share = elapsed / self._leading_s
+        self._leading_s -= elapsed
+        row = orientation[None]
+        self._slerp(row, self._reading[None], share, row)
+
+
+class TurningAxis(Puppeteer):
+    """Turns its joint about an axis at a constant rate, from the rest pose at its first pull on."""
+
+    def __init__(
+        self, joint: str, axis: Sequence[float], seconds_per_turn: float, weight: float = 1.0
+    ) -> None:
+        """Raises ValueError for an axis of no length or a turn that takes no time."""
+        super().__init__(joint, weight)
+        length = math.hypot(*axis)
+        if len(axis) != 3 or not 0 < length < math.inf:
+            raise ValueError(f"The axis {list(axis)} has no direction. Name one, for example [0, 1, 0].")
+        if not seconds_per_turn:
+            raise ValueError("A turn cannot take 0 seconds. A negative number turns the other way.")
+        self._x, self._y, self._z = (value / length for value in axis)
+        self.seconds_per_turn = seconds_per_turn
+        self._half_angle = 0.0
+
+    def _holds(self, now: float) -> bool:
+        return True
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        self._half_angle = math.fmod(self._half_angle + math.pi * elapsed / self.seconds_per_turn, math.tau)
+        sine = math.sin(self._half_angle)
+        orientation[:] = math.cos(self._half_angle), sine * self._x, sine * self._y, sine * self._z
+
+
+class FixedOrientation(Puppeteer):
+    """Holds its joint still."""
+
+    def __init__(self, joint: str, orientation: Sequence[float], weight: float = 1.0) -> None:
+        super().__init__(joint, weight)
+        self._target.orientation[:] = _unit(orientation)
+
+    def _holds(self, now: float) -> bool:
+        return True
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        return
+
+
+class Remote(Puppeteer):
+    """A joint held from elsewhere (OSC, a slider), set by another thread; free until the first message."""
+
+    def __init__(self, joint: str, weight: float = 1.0) -> None:
+        super().__init__(joint, weight)
+        # One tuple, replaced as a whole: the tick sees the old one or the new one, never a mixture.
+        self._held: tuple[float, float, float, float] | None = None
+
+    def hold(self, orientation: Sequence[float]) -> None:
+        """Hold the joint at a quaternion w, x, y, z of any length but zero. Raises ValueError."""
+        self._held = _unit(orientation)
+
+    def hold_axis_angle(self, axis: Sequence[float], angle: float) -> None:
+        """Hold the joint turned by angle (radians) about an axis. Raises ValueError."""
+        length = math.hypot(*axis)
+        if len(axis) != 3 or not 0 < length < math.inf or not math.isfinite(angle):
+            raise ValueError(f"The axis {list(axis)} with the angle {angle} is no rotation.")
+        sine = math.sin(angle / 2) / length
+        self._held = _unit((math.cos(angle / 2), *(sine * value for value in axis)))
+
+    def release(self) -> None:
+        """Give the joint back to the puppet."""
+        self._held = None
+
+    def _holds(self, now: float) -> bool:
+        return self._held is not None
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        held = self._held
+        if held is not None:
+            orientation[:] = held
+
+
+class Hands:
+    """All puppeteers of a show, gathered for the puppet: mask (M,), targets (M, 4) and weights (M,)."""
+
+    def __init__(self, puppeteers: Sequence[Puppeteer], joints: Sequence[str]) -> None:
+        """joints: the M moving joints of the network. Raises HandError."""
+        self.puppeteers = tuple(puppeteers)
+        self._places: list[int] = []
+        for puppeteer in puppeteers:
+            place = _place(puppeteer.joint, joints)
+            if place in self._places:
+                raise HandError(f"Two hands hold '{puppeteer.joint}'. Give each joint to one hand only.")
+            self._places.append(place)
+        self.mask: NDArray[np.bool_] = np.zeros(len(joints), dtype=np.bool_)
+        self.targets = np.tile(quaternion.IDENTITY, (len(joints), 1))
+        self.weights = np.zeros(len(joints), dtype=np.float32)
+        self._before = self.targets.copy()
+        self._signs = np.empty((len(joints), 1), dtype=np.float32)
+
+    def pull(self, now: float) -> None:
+        """Write all targets of this moment; their signs do not jump from one tick to the next."""
+        np.copyto(self._before, self.targets)
+        for place, puppeteer in zip(self._places, self.puppeteers, strict=True):
+            target = puppeteer.pull(now)
+            self.targets[place] = target.orientation
+            self.weights[place] = target.weight
+        np.einsum("mk,mk->m", self.targets, self._before, out=self._signs[:, 0])
+        np.copysign(1.0, self._signs, out=self._signs)
+        np.multiply(self.targets, self._signs, out=self.targets)
+        np.greater(self.weights, 0.0, out=self.mask)
+
+
+def _place(joint: str, joints: Sequence[str]) -> int:
+    if joint in joints:
+        return list(joints).index(joint)
+    nearest = UnknownJointError(joint, joints).nearest
+    meant = f"Did you mean '{nearest}'? " if nearest else ""
+    raise HandError(f"No hand can hold '{joint}': {meant}The network moves {', '.join(joints)}.")
+
+
+def _unit(orientation: Sequence[float]) -> tuple[float, float, float, float]:
+    length = math.hypot(*orientation)
+    if len(orientation) != 4 or not 0 < length < math.inf:
+        raise ValueError(f"{list(orientation)} is no orientation: four numbers w, x, y, z are needed.")
+    w, x, y, z = (float(value) / length for value in orientation)
+    return w, x, y, z
