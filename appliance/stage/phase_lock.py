@@ -23,8 +23,8 @@ class PhaseLock:
         self,
         period_s: float = TICK_S,
         *,
-        in_time: float = 0.75,
-        margin_s: float = 0.0002,
+        in_time: float = 0.85,
+        margin_s: float = 0.0001,
         gain: float = 0.05,
         most_s: float = 0.0002,
     ) -> None:

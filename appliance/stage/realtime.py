@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import os
@@ -32,6 +33,16 @@ def enter_realtime(priority: int) -> tuple[str, ...]:
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     missing = (_take_priority(priority), _lock_memory(), _sharpen_timers())
     return tuple(words for words in missing if words)
+
+
+def leave_realtime() -> None:
+    """Ordinary again: what comes after the dance may take its time and memory."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).munlockall()
+    gc.unfreeze()
+    gc.enable()
 
 
 def _take_priority(priority: int) -> str:

@@ -1,0 +1,130 @@
+"""The command `bunraku`: play, check, filmstrip, version; simulation and studio plug theirs in."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import version as distribution_version
+from pathlib import Path
+from typing import Annotated
+
+from appliance.stage.realtime import prepare_environment
+
+prepare_environment()
+
+import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
+
+PLUG_INS = "bunraku.commands"
+REFUSED = 2
+
+app = typer.Typer(
+    name="bunraku",
+    help="The box that lets a dancer puppeteer an AI dancer on stage.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+ShowFolder = Annotated[
+    Path | None, typer.Option(help="Show bundle; left out: the show that comes with the box.")
+]
+BoxFile = Annotated[
+    Path | None, typer.Option(help="box.yaml of the venue; left out: everything on this machine.")
+]
+
+
+@app.command()
+def play(
+    show: ShowFolder = None,
+    box: BoxFile = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.1, help="Stop after so long; left out: never.")
+    ] = None,
+    emulate: Annotated[
+        bool, typer.Option("--emulate", help="Start emulated sensors, over real sockets.")
+    ] = False,
+    journal: Annotated[Path | None, typer.Option(help="Write the flight recorder here.")] = None,
+    filmstrip: Annotated[
+        Path | None, typer.Option(help="At the end draw what was danced into this PNG.")
+    ] = None,
+) -> None:
+    """Dance: sensors in, joints out, 50 times a second, until Ctrl-C."""
+    from appliance.stage.play import play_show
+
+    raise typer.Exit(play_show(show, box, seconds, emulate, journal, filmstrip))
+
+
+@app.command()
+def check(
+    show: Annotated[
+        Path | None, typer.Argument(help="Show bundle; left out: the show that comes with the box.")
+    ] = None,
+    box: BoxFile = None,
+) -> None:
+    """Verify a show bundle and a box file, and measure whether the iterations fit this machine."""
+    from appliance.stage.check import check_show
+
+    check_show(show, box)
+
+
+@app.command()
+def filmstrip(
+    recording: Annotated[Path, typer.Argument(help="A BVH recording, or the journal of a run.")],
+    out: Annotated[Path | None, typer.Option(help="The PNG; left out: beside the recording.")] = None,
+    start: Annotated[float, typer.Option(min=0.0, help="Second at which the pictures begin.")] = 0.0,
+    seconds: Annotated[float, typer.Option(min=0.1, help="How many seconds they cover.")] = 10.0,
+    metres_per_unit: Annotated[float, typer.Option(min=1e-6, help="Unit of a BVH file, in metres.")] = 0.01,
+) -> None:
+    """Draw a recording or a journal as a row of poses; held joints are highlighted."""
+    from appliance.stage.pictures import picture_of_file
+
+    typer.echo(picture_of_file(recording, out, start, seconds, metres_per_unit))
+
+
+@app.command()
+def version() -> None:
+    """Say which version this is."""
+    typer.echo(f"bunraku {distribution_version('bunraku')}")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command; errors that people can mend are one clear line and exit status 2."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if not given or given[0] not in _own_commands():
+        plug_in(app, entry_points(group=PLUG_INS), lambda words: print(words, file=sys.stderr))
+    try:
+        app(given, prog_name="bunraku")
+    except Exception as error:
+        if not _is_for_people(error):
+            raise
+        print(f"bunraku: {error}", file=sys.stderr)
+        sys.exit(REFUSED)
+
+
+def plug_in(onto: typer.Typer, found: Iterable[EntryPoint], say: Callable[[str], None]) -> None:
+    """Add the commands of every plug-in that loads; one that does not load costs its own alone."""
+    for point in found:
+        try:
+            onto.add_typer(point.load())
+        except Exception as error:
+            say(f"bunraku: the commands of '{point.name}' are not available here ({error}).")
+
+
+def _own_commands() -> set[str]:
+    return {
+        command.name or command.callback.__name__ for command in app.registered_commands if command.callback
+    }
+
+
+def _is_for_people(error: Exception) -> bool:
+    from appliance.pose.bvh import BvhError
+    from appliance.show.config_error import ConfigError
+    from appliance.stage.journal import JournalError
+    from appliance.stage.stage_error import StageError
+
+    return isinstance(error, BvhError | ConfigError | JournalError | StageError)
+
+
+if __name__ == "__main__":
+    main()

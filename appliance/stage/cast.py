@@ -1,0 +1,184 @@
+"""The cast of a show: every part that a tick joins, made from a show bundle and a box file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.dancer.blending import Blending
+from appliance.dancer.grounding import Grounding, GroundingError, survey
+from appliance.dancer.motion_source import PhraseError, Playback
+from appliance.dancer.puppet import Puppet, PuppetError
+from appliance.dancer.puppeteers import (
+    FixedOrientation,
+    Hands,
+    Puppeteer,
+    Remote,
+    TurningAxis,
+    WornSensor,
+)
+from appliance.outputs.receivers import OscOutputs
+from appliance.pose.bvh import read_bvh
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+from appliance.sensor.keys import KeyFileError, SensorKey, load_keys, unknown_sensor
+from appliance.sensor.link import SensorLink, SensorReading, open_link
+from appliance.sensor.udp import PortError
+from appliance.show.box import BoxConfig
+from appliance.show.show import HandConfig, Show
+from appliance.stage.budget import Admission, admit
+from appliance.stage.stage_error import StageError
+
+
+@dataclass(slots=True)
+class Iterations:
+    """How often the puppet goes over a window; commands may change it up to `most`, which fits the budget."""
+
+    coding: int
+    interaction: int
+    most: int
+
+
+@dataclass(slots=True)
+class Cast:
+    """Everything that dances, hears and speaks.
+
+    `hand_places`: where the hands' joints stand among the moving ones; `worn`: which joints a sensor holds.
+    """
+
+    skeleton: Skeleton
+    puppet: Puppet
+    motion: Playback
+    blending: Blending
+    grounding: Grounding
+    hands: Hands
+    hand_places: list[int]
+    worn: dict[str, list[WornSensor]]
+    primary: str | None
+    link: SensorLink
+    outputs: OscOutputs
+    newest_primary: SensorReading | None = field(default=None)
+
+    def hear(self, reading: SensorReading) -> None:
+        """Give a reading to the joints that its sensor holds."""
+        for puppeteer in self.worn.get(reading.sensor, ()):
+            puppeteer.hear(reading.orientation, reading.arrival)
+        if reading.sensor == self.primary:
+            self.newest_primary = reading
+
+    def close(self) -> None:
+        """Free ports and sockets."""
+        self.link.close()
+        self.outputs.close()
+
+
+def assemble(show: Show, box: BoxConfig) -> Cast:
+    """Open every port and file of a show. Raises StageError or ConfigError before anything dances."""
+    try:
+        puppet = Puppet(show.network, show.skeleton)
+        show.require_moving(puppet.joints)
+        phrase = _phrase(show)
+        floor = survey(phrase) if show.config.motion.grounded else None
+        motion = _playback(show, phrase, puppet.window, None if floor is None else floor.lifts)
+    except (PuppetError, PhraseError, GroundingError) as error:
+        raise StageError(str(error)) from error
+    puppeteers = [_puppeteer(hand) for hand in show.config.hands]
+    worn: dict[str, list[WornSensor]] = {}
+    for hand, puppeteer in zip(show.config.hands, puppeteers, strict=True):
+        if hand.sensor is not None and isinstance(puppeteer, WornSensor):
+            worn.setdefault(hand.sensor, []).append(puppeteer)
+    return Cast(
+        skeleton=show.skeleton,
+        puppet=puppet,
+        motion=motion,
+        blending=Blending(len(puppet.joints), puppet.window, show.config.dancer.hop),
+        grounding=Grounding(show.skeleton, floor),
+        hands=Hands(puppeteers, puppet.joints),
+        hand_places=[puppet.joints.index(hand.joint) for hand in show.config.hands],
+        worn=worn,
+        primary=show.config.primary_sensor,
+        link=_link(box, list(worn)),
+        outputs=OscOutputs(box.outputs.osc, show.skeleton),
+    )
+
+
+def admission(cast: Cast, show: Show, box: BoxConfig) -> Admission:
+    """Measure the show's iterations on this machine with the first window and all hands of the show."""
+    window = cast.puppet.select(cast.motion.window()).copy()
+    mask, targets, weights = cast.hands.mask.copy(), cast.hands.targets, cast.hands.weights
+    mask[cast.hand_places] = True
+
+    def dance(coding: int, interaction: int) -> object:
+        return cast.puppet.dance(window, mask, targets, weights, coding, interaction)
+
+    dancer = show.config.dancer
+    return admit(dance, dancer.coding_iterations, dancer.interaction_iterations, box.limits.tick_budget_ms)
+
+
+def _puppeteer(hand: HandConfig) -> Puppeteer:
+    if hand.sensor is not None:
+        return WornSensor(hand.joint, hand.weight, hand.neutral)
+    if hand.turning is not None:
+        return TurningAxis(hand.joint, hand.turning.axis, hand.turning.seconds_per_turn, hand.weight)
+    if hand.fixed is not None:
+        return FixedOrientation(hand.joint, hand.fixed.orientation, hand.weight)
+    return Remote(hand.joint, hand.weight)
+
+
+def _phrase(show: Show) -> Recording:
+    phrase = read_bvh(show.phrase)
+    if not phrase.skeleton.same_joints(show.skeleton):
+        raise StageError(
+            f"{show.phrase}: the phrase has other joints than {show.directory / 'skeleton.bvh'}. "
+            "Nothing can be danced. Export the show again."
+        )
+    return phrase
+
+
+def _playback(show: Show, phrase: Recording, window: int, lifts: NDArray[np.float32] | None) -> Playback:
+    motion = show.config.motion
+    return Playback(
+        phrase,
+        start_s=motion.start_s,
+        end_s=motion.end_s,
+        rate=motion.rate,
+        crossfade_s=motion.crossfade_s,
+        window=window,
+        lifts=lifts,
+    )
+
+
+def _link(box: BoxConfig, sensors: Sequence[str]) -> SensorLink:
+    keys = _keys(box.sensors.keys, sensors)
+    udp = box.sensors.udp
+    try:
+        return open_link(
+            keys,
+            (udp.host, udp.port) if udp is not None and sensors else None,
+            [(line.device, line.baud) for line in box.sensors.serial],
+        )
+    except PortError as error:
+        raise StageError(str(error)) from error
+
+
+def _keys(path: Path | None, sensors: Sequence[str]) -> dict[str, SensorKey]:
+    """Keys of the box's sensors; none without a key file: then no sensor is let in."""
+    if path is None:
+        return {}
+    try:
+        keys = load_keys(path)
+    except KeyFileError as error:
+        raise StageError(str(error)) from error
+    except OSError as error:
+        raise StageError(
+            f"{path}: the sensors' key file cannot be read ({error.strerror}). No sensor could be heard. "
+            "Check sensors.keys in the box file."
+        ) from error
+    for name in sensors:
+        if name not in keys:
+            raise StageError(f"{path}: {unknown_sensor(name, keys)}")
+    return keys

@@ -1,0 +1,7 @@
+"""The one error with which the stage refuses to start: a sentence for people, exit status 2."""
+
+from __future__ import annotations
+
+
+class StageError(Exception):
+    """The stage cannot start; the message says what happened, what the audience sees and what to do."""

@@ -1,0 +1,102 @@
+"""One tick: readings in, puppet, blending, joints out. The whole of it, in the order in which data flows."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.outputs.joint_frame import JointFrame
+from appliance.stage.cast import Cast, Iterations
+from appliance.stage.clock import Slot
+from appliance.stage.journal import SECTIONS
+
+DRAIN, HANDS, MOTION, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
+
+
+class Tick:
+    """Runs the cast once a slot. Nothing here waits, logs, or allocates for the collector.
+
+    A tick that starts so late that its budget would no longer fit does not dance: it sends the last pose
+    again, marked late. The phrase stands still meanwhile, so nothing is jumped over and nothing is replayed.
+    Where the network gives no sound poses, the last good pose stays.
+    """
+
+    def __init__(
+        self,
+        cast: Cast,
+        iterations: Iterations,
+        latest_start_s: float,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.cast = cast
+        self.iterations = iterations
+        self.latest_start_s = latest_start_s
+        self.frame = JointFrame(len(cast.skeleton))
+        self.frame.pose[:] = cast.motion.window()[0]
+        self.network_failed = False
+        self.sections_ms: NDArray[np.float32] = np.zeros(len(SECTIONS), np.float32)
+        self._section_ends = [0.0] * len(SECTIONS)
+        self._monotonic = monotonic
+        self._stand()
+
+    def run(self, slot: Slot) -> None:
+        """Everything from the sensors' datagrams to the receivers'."""
+        cast, frame, ends, now = self.cast, self.frame, self._section_ends, self._monotonic
+        frame.tick, frame.frame_time = slot.tick, slot.deadline
+        frame.late = slot.lateness_s > self.latest_start_s
+
+        for reading in cast.link.drain(slot.started):
+            cast.hear(reading)
+        ends[DRAIN] = ends[HANDS] = ends[MOTION] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
+
+        if not frame.late:
+            cast.hands.pull(slot.started)
+            ends[HANDS] = now()
+            window = cast.puppet.select(cast.motion.window())
+            ends[MOTION] = now()
+            if cast.blending.is_due:
+                self._regenerate(window)
+            ends[PUPPET] = now()
+            if not self.network_failed:
+                frame.pose[:] = cast.motion.window()[0]
+                cast.puppet.restore(cast.blending.take(), frame.pose)
+            ends[BLEND] = now()
+            self._stand()
+            ends[FIGURE] = now()
+
+        cast.outputs.send(frame)
+        ends[SEND] = now()
+
+    def after(self, slot: Slot) -> float:
+        """What can wait until the frame has left: the motion moves on, times are noted. The cost in ms."""
+        if not self.frame.late:
+            self.cast.motion.advance()
+        begin = slot.started
+        for section, end in enumerate(self._section_ends):
+            self.sections_ms[section] = 1000.0 * (end - begin)
+            begin = end
+        return 1000.0 * (begin - slot.started)
+
+    def _regenerate(self, window: NDArray[np.float32]) -> None:
+        """Let the puppet dance a window and blend it in; the frame names the reading that went into it."""
+        cast, frame, hands, times = self.cast, self.frame, self.cast.hands, self.iterations
+        poses = cast.puppet.dance(
+            window, hands.mask, hands.targets, hands.weights, times.coding, times.interaction
+        )
+        self.network_failed = cast.puppet.is_broken
+        if not self.network_failed:
+            cast.blending.add(poses)
+        if cast.newest_primary is not None:
+            frame.sensor_sequence = cast.newest_primary.sequence
+            frame.sensor_arrival = cast.newest_primary.arrival
+
+    def _stand(self) -> None:
+        """Put the pose on the floor and into the world."""
+        cast, frame = self.cast, self.frame
+        figure = cast.grounding.stand(frame.pose, cast.motion.roots()[0], cast.motion.lift)
+        frame.world[:] = figure.world
+        frame.positions[:] = figure.positions
+        frame.root[:] = cast.grounding.root

@@ -1,0 +1,107 @@
+"""Small show bundles for the stage's tests, made without torch: a swaying phrase, a hand-made network."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import onnx
+import yaml
+from onnx import TensorProto, helper
+
+from appliance.pose import quaternion
+from appliance.pose.bvh import write_bvh
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+
+FIGURE = Skeleton(
+    ("Hips", "Chest", "lShldr", "lForeArm", "lThigh", "lFoot", "rThigh", "rFoot"),
+    (-1, 0, 1, 2, 0, 4, 0, 6),
+    np.array(
+        [
+            *([0, 0, 0], [0, 0.4, 0], [0.2, 0.1, 0], [0.3, 0, 0]),
+            *([0.1, -0.1, 0], [0, -0.8, 0], [-0.1, -0.1, 0], [0, -0.8, 0]),
+        ],
+        float,
+    ),
+    ((3, (0.25, 0.0, 0.0)), (5, (0.0, -0.05, 0.1)), (7, (0.0, -0.05, 0.1))),
+)
+MOVING = ("Hips", "Chest", "lShldr", "lForeArm", "lThigh", "rThigh")
+WORN = {"sensor": "left-wrist", "joint": "lShldr"}
+WINDOW = 8
+
+
+def write_show(folder: Path, hands: list[dict[str, object]] | None = None, network: str = "plain") -> Path:
+    """A bundle with a phrase of three seconds. Networks: plain (shows the targets), broken (not a number)."""
+    folder.mkdir(parents=True, exist_ok=True)
+    phrase = swaying_phrase()
+    write_bvh(folder / "phrase.bvh", phrase)
+    write_bvh(folder / "skeleton.bvh", phrase.excerpt(0.0, 0.02))
+    onnx.save(_network(network), str(folder / "puppet.onnx"))
+    show = {
+        "name": "A test",
+        "dancer": {"coding_iterations": 3, "interaction_iterations": 2},
+        "hands": [WORN] if hands is None else hands,
+    }
+    (folder / "show.yaml").write_text(yaml.safe_dump(show))
+    return folder
+
+
+def swaying_phrase(seconds: float = 3.0) -> Recording:
+    """The chest leans left and right, once a second."""
+    count = round(50 * seconds)
+    poses = np.tile(quaternion.IDENTITY.astype(np.float64), (count, len(FIGURE), 1))
+    angle = 0.3 * np.sin(2 * np.pi * np.arange(count) / 50)
+    poses[:, FIGURE.index("Chest")] = quaternion.from_axis_angle(np.array([0.0, 0.0, 1.0]), angle)
+    return Recording(FIGURE, poses, np.tile([0.0, 0.95, 0.0], (count, 1)), 50.0)
+
+
+def _network(kind: str) -> onnx.ModelProto:
+    """Held joints show their targets, the others the window; `broken` divides by nothing."""
+    moving = len(MOVING)
+    inputs = [
+        helper.make_tensor_value_info("window", TensorProto.FLOAT, [WINDOW, moving, 4]),
+        helper.make_tensor_value_info("mask", TensorProto.BOOL, [moving]),
+        helper.make_tensor_value_info("targets", TensorProto.FLOAT, [moving, 4]),
+        helper.make_tensor_value_info("weights", TensorProto.FLOAT, [moving]),
+        helper.make_tensor_value_info("coding_iterations", TensorProto.INT64, []),
+        helper.make_tensor_value_info("interaction_iterations", TensorProto.INT64, []),
+    ]
+    outputs = [
+        helper.make_tensor_value_info("poses", TensorProto.FLOAT, [WINDOW, moving, 4]),
+        helper.make_tensor_value_info("latent", TensorProto.FLOAT, [1]),
+    ]
+    one, last = np.array([1], np.int64), np.array([-1], np.int64)
+    constants = [
+        helper.make_tensor("last", TensorProto.INT64, [1], last),
+        helper.make_tensor("one", TensorProto.INT64, [1], one),
+        helper.make_tensor("half", TensorProto.FLOAT, [], [0.5]),
+        helper.make_tensor("scale", TensorProto.FLOAT, [], [0.0 if kind == "broken" else 1.0]),
+    ]
+    nodes = [
+        helper.make_node("Unsqueeze", ["mask", "last"], ["mask_column"]),
+        helper.make_node("Unsqueeze", ["weights", "last"], ["weight_column"]),
+        helper.make_node("Greater", ["weight_column", "half"], ["firm"]),
+        helper.make_node("And", ["mask_column", "firm"], ["held"]),
+        helper.make_node("Where", ["held", "targets", "window"], ["shown"]),
+        helper.make_node("Mul", ["shown", "scale"], ["scaled"]),
+        helper.make_node("Div", ["scaled", "scale"], ["poses"]),
+        helper.make_node("Cast", ["coding_iterations"], ["coding"], to=TensorProto.FLOAT),
+        helper.make_node("Cast", ["interaction_iterations"], ["interaction"], to=TensorProto.FLOAT),
+        helper.make_node("Add", ["coding", "interaction"], ["sum"]),
+        helper.make_node("Reshape", ["sum", "one"], ["latent"]),
+    ]
+    graph = helper.make_graph(nodes, kind, inputs, outputs, constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
+    model.ir_version = 9
+    facts = {
+        "bunraku.joints": ",".join(MOVING),
+        "bunraku.window": str(WINDOW),
+        "bunraku.architecture": kind,
+        "bunraku.latent": "1",
+        "bunraku.precision": "fp32",
+        "bunraku.rest": json.dumps(np.tile(quaternion.IDENTITY, (moving, 1)).tolist()),
+    }
+    helper.set_model_props(model, facts)
+    return model

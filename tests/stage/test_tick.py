@@ -1,0 +1,165 @@
+"""The tick with its real parts: puppet, playback, blending, real datagrams to a real receiver."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.pose import quaternion
+from appliance.sensor.link import SensorReading
+from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
+from appliance.show.show import load_show
+from appliance.stage.cast import Cast, Iterations, assemble
+from appliance.stage.clock import TICK_S, Slot
+from appliance.stage.tick import Tick
+from hw_sim.osc_receiver import OscReceiver
+from tests.stage.bundles import FIGURE, write_show
+
+SHOULDER, CHEST = FIGURE.index("lShldr"), FIGURE.index("Chest")
+TURNED = (0.8, 0.6, 0.0, 0.0)
+
+
+@pytest.fixture
+def receiver() -> Iterator[OscReceiver]:
+    with OscReceiver("127.0.0.1") as receiver:
+        yield receiver
+
+
+@pytest.fixture
+def stage(tmp_path: Path, receiver: OscReceiver) -> Iterator[Callable[..., Tick]]:
+    casts: list[Cast] = []
+
+    def made(network: str = "plain", hands: list[dict[str, object]] | None = None) -> Tick:
+        show = load_show(write_show(tmp_path / network, hands, network))
+        box = BoxConfig(
+            sensors=SensorsConfig(udp=None),
+            outputs=OutputsConfig(osc=[OscConfig(port=receiver.port, frame_message=True)]),
+        )
+        casts.append(assemble(show, box))
+        return Tick(casts[-1], Iterations(3, 2, 10), latest_start_s=0.005)
+
+    yield made
+    for cast in casts:
+        cast.close()
+
+
+def dance(tick: Tick, slots: range, late_s: float = 0.0, heard: tuple[float, ...] | None = None) -> None:
+    for number in slots:
+        deadline = 100.0 + number * TICK_S
+        if heard is not None:
+            reading = SensorReading("left-wrist", heard, number, 0, deadline, deadline - 0.001, 90, 255)
+            tick.cast.hear(reading)
+        slot = Slot(number, deadline, deadline + late_s)
+        tick.run(slot)
+        tick.after(slot)
+
+
+def frames(receiver: OscReceiver) -> list[list[object]]:
+    return [list(arguments) for _, address, arguments in receiver.poll(1.0) if address == "/bunraku/frame"]
+
+
+def poses(receiver: OscReceiver) -> np.ndarray:
+    lists = [arguments for _, address, arguments in receiver.poll(1.0) if address.endswith("rot_local")]
+    return np.array(lists, float).reshape(len(lists), len(FIGURE), 4)
+
+
+def test_each_slot_sends_one_frame_with_its_own_number(
+    stage: Callable[..., Tick], receiver: OscReceiver
+) -> None:
+    dance(stage(hands=[]), range(5, 10))
+    assert [frame[0] for frame in frames(receiver)] == [5, 6, 7, 8, 9]
+
+
+def test_without_hands_the_phrase_itself_is_danced(stage: Callable[..., Tick], receiver: OscReceiver) -> None:
+    tick = stage(hands=[])
+    expected = []
+    for number in range(60):
+        expected.append(tick.cast.motion.window()[0].copy())
+        dance(tick, range(number, number + 1))
+    np.testing.assert_allclose(poses(receiver), expected, atol=1e-5)
+
+
+def test_a_worn_sensor_turns_its_joint_and_the_frame_names_the_reading(
+    stage: Callable[..., Tick], receiver: OscReceiver
+) -> None:
+    tick = stage()
+    dance(tick, range(60), heard=TURNED)
+    assert tick.frame.sensor_sequence == 59
+    assert tick.frame.sensor_arrival == pytest.approx(100.0 + 59 * TICK_S - 0.001)
+    assert quaternion.angle_between(tick.frame.pose[SHOULDER], np.array(TURNED)) < 0.01
+    assert frames(receiver)[-1][2] == 59
+
+
+def test_the_neutral_orientation_of_a_sensor_means_the_rest_pose(stage: Callable[..., Tick]) -> None:
+    tick = stage(hands=[{"sensor": "left-wrist", "joint": "lShldr", "neutral": list(TURNED)}])
+    dance(tick, range(60), heard=TURNED)
+    assert quaternion.angle_between(tick.frame.pose[SHOULDER], quaternion.IDENTITY) < 0.01
+
+
+def test_a_late_tick_sends_the_last_pose_marked_late_and_the_phrase_waits(
+    stage: Callable[..., Tick], receiver: OscReceiver
+) -> None:
+    tick = stage(hands=[])
+    dance(tick, range(30))
+    before = tick.cast.motion.position_s
+    dance(tick, range(30, 31), late_s=0.006)
+    assert tick.cast.motion.position_s == before
+    dance(tick, range(31, 32))
+    sent = receiver.poll(1.0)
+    marks = [arguments for _, address, arguments in sent if address == "/bunraku/frame"]
+    shown = [arguments for _, address, arguments in sent if address.endswith("rot_local")]
+    assert [mark[3] for mark in marks[-3:]] == [0, 1, 0]
+    assert [mark[0] for mark in marks[-3:]] == [29, 30, 31]
+    assert shown[-2] == shown[-3]
+    assert shown[-1] != shown[-2]
+
+
+def test_a_late_tick_does_not_claim_the_reading_that_it_could_not_show(stage: Callable[..., Tick]) -> None:
+    tick = stage()
+    dance(tick, range(10), heard=TURNED)
+    dance(tick, range(10, 11), late_s=0.006, heard=TURNED)
+    assert tick.frame.sensor_sequence == 9
+    dance(tick, range(11, 12))
+    assert tick.frame.sensor_sequence == 10
+
+
+def test_a_network_that_gives_no_numbers_holds_the_last_good_pose(
+    stage: Callable[..., Tick], receiver: OscReceiver
+) -> None:
+    tick = stage("broken")
+    first = tick.frame.pose.copy()
+    dance(tick, range(20), heard=TURNED)
+    assert tick.network_failed
+    assert np.isfinite(tick.frame.pose).all()
+    np.testing.assert_array_equal(tick.frame.pose, first)
+    assert np.isfinite(poses(receiver)).all()
+
+
+def test_a_tick_makes_nothing_for_the_collector(stage: Callable[..., Tick]) -> None:
+    tick = stage(hands=[])
+    dance(tick, range(100))
+    gc.collect()
+    gc.disable()
+    try:
+        before = len(gc.get_objects())
+        dance(tick, range(100, 400))
+        grown = len(gc.get_objects()) - before
+        found = gc.collect()
+    finally:
+        gc.enable()
+    assert grown < 20
+    assert found == 0
+
+
+def test_section_times_add_up_to_the_cost(stage: Callable[..., Tick]) -> None:
+    ticking = iter(np.arange(0.0, 100.0, 0.001).tolist())
+    tick = Tick(stage(hands=[]).cast, Iterations(3, 2, 10), 0.005, monotonic=lambda: next(ticking))
+    slot = Slot(0, 0.0, 0.0)
+    tick.run(slot)
+    cost_ms = tick.after(slot)
+    assert cost_ms == pytest.approx(float(tick.sections_ms.sum()), abs=1e-3)
+    assert (tick.sections_ms[1:] > 0.9).all()
