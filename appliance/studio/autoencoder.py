@@ -1,0 +1,110 @@
+"""The adversarial autoencoder of 'Puppeteering an AI': what runs around every network, and the iteration.
+
+A window is turned so that its middle pose faces the same way (heading removed, put back at the end): the
+dancer's habits do not depend on where the audience sits, so no network has to learn them for each heading.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from appliance.studio import rotation
+from appliance.studio.networks import Network, Shape
+
+NEAR = 1.0 - 1e-7  # cosine above which two rotations count as this far apart, so that no weight vanishes
+
+
+class Autoencoder(nn.Module):
+    """Windows (B, T, M, 4) in, windows out; `iterate` is the paper's iterative autoencoding."""
+
+    def __init__(self, network: Network, shape: Shape, rest: Tensor) -> None:
+        """rest: (M, 4) mean heading-free orientation of each joint, the hemisphere all signs follow."""
+        super().__init__()
+        self.network, self.shape = network, shape
+        self.rest: Tensor
+        self.register_buffer("rest", rest.float())
+
+    def facing(self, windows: Tensor) -> Tensor:
+        """Heading (B, 4) of the root joint in the middle of each window."""
+        return rotation.heading(windows[:, windows.shape[1] // 2, 0])
+
+    def without_heading(self, windows: Tensor, facing: Tensor) -> Tensor:
+        """Windows turned to face +Z, every quaternion in the rest pose's hemisphere."""
+        root = rotation.multiply(rotation.inverse(facing)[:, None], windows[:, :, 0])
+        return self._aligned(torch.cat([root[:, :, None], windows[:, :, 1:]], dim=2))
+
+    def with_heading(self, windows: Tensor, facing: Tensor) -> Tensor:
+        root = rotation.multiply(facing[:, None].expand(-1, windows.shape[1], -1), windows[:, :, 0])
+        return torch.cat([root[:, :, None], windows[:, :, 1:]], dim=2)
+
+    def encode(self, windows: Tensor) -> Tensor:
+        """Heading-free windows -> latents (B, Z)."""
+        return self.network.encode(windows.flatten(1))
+
+    def decode_raw(self, latents: Tensor) -> Tensor:
+        """Latents -> heading-free windows before normalisation."""
+        return self.network.decode(latents).unflatten(1, (self.shape.window, self.shape.joints, 4))
+
+    def decode(self, latents: Tensor) -> Tensor:
+        return rotation.normalize(self.decode_raw(latents))
+
+    def iterate(
+        self,
+        windows: Tensor,
+        coding_iterations: int,
+        interaction_iterations: int = 0,
+        mask: Tensor | None = None,
+        targets: Tensor | None = None,
+        weights: Tensor | None = None,
+    ) -> tuple[Tensor, Tensor]:
+        """Iterative autoencoding: (B, T, M, 4) -> the same, and the last latents (B, Z).
+
+        In the first interaction_iterations passes the held joints (mask (M,)) are overwritten before coding:
+        SLERP towards targets (M, 4) by weights (M,). Where all passes are interactive, the result is
+        overwritten too, so that the held orientation shows; otherwise the last pass is the dancer's own.
+        """
+        facing = self.facing(windows)
+        x = self.without_heading(windows, facing)
+        latents = x.new_zeros(len(x), self.shape.latent)
+        held = x.new_zeros(1, 1, self.shape.joints, 1)
+        goal = x
+        if mask is not None and targets is not None and weights is not None:
+            held = (mask.float() * weights)[None, None, :, None]
+            goal = self.without_heading(targets[None, None].expand(len(x), 1, -1, -1), facing)
+        for k in range(coding_iterations):
+            if k < interaction_iterations:
+                x = slerp_towards(x, goal, held)
+            latents = self.encode(x)
+            x = self.decode(latents)
+        if interaction_iterations >= coding_iterations:
+            x = slerp_towards(x, goal, held)
+        return self.with_heading(x, facing), latents
+
+    def _aligned(self, windows: Tensor) -> Tensor:
+        dots = (windows * self.rest).sum(-1, keepdim=True)
+        return torch.where(dots < 0, -windows, windows)
+
+
+def slerp_towards(x: Tensor, goal: Tensor, weight: Tensor) -> Tensor:
+    """SLERP the short way from x to goal by weight; weight 0 gives x, 1 gives +-goal."""
+    dot = (x * goal).sum(-1, keepdim=True)
+    angle = torch.acos(dot.abs().clamp(max=NEAR))
+    towards = torch.where(dot < 0, -goal, goal)
+    mixed = torch.sin(angle * (1 - weight)) * x + torch.sin(angle * weight) * towards
+    return rotation.normalize(mixed)
+
+
+class PriorCritic(nn.Module):
+    """Tells latents from samples of the prior, a standard Gaussian; dense 512, 512, ELU (the paper's)."""
+
+    def __init__(self, latent: int, width: int = 512) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(
+            nn.Linear(latent, width), nn.ELU(), nn.Linear(width, width), nn.ELU(), nn.Linear(width, 1)
+        )
+
+    def forward(self, latents: Tensor) -> Tensor:
+        """Logits (B,): high for what looks like the prior."""
+        logits: Tensor = self.layers(latents)
+        return logits[:, 0]

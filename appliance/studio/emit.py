@@ -1,0 +1,129 @@
+"""Each architecture's encoder and decoder as ONNX nodes.
+
+A window enters as (T, M, 4) and leaves as (T, M, 4) before normalisation; the latent is (1, Z).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import nn
+
+from appliance.studio import networks
+from appliance.studio.graph import Graph, Layers, lstm_weights
+from appliance.studio.networks import Network, Shape
+
+
+def encode(graph: Graph, layers: Layers, network: Network, shape: Shape, window: str) -> str:
+    """Nodes of the encoder: window (T, M, 4) -> latent (1, Z)."""
+    encoder = network.encoder
+    if isinstance(encoder, networks._MlpEncoder):
+        steps = _reshaped(graph, window, shape.window, shape.pose)
+        basis = graph.constant("curves", encoder.time.curves.numpy())
+        amounts = _reshaped(graph, graph.op("MatMul", basis, steps), 1, shape.curves * shape.pose)
+        return _dense_stack(graph, layers, encoder.stack, amounts, "encoder")
+    if isinstance(encoder, networks._ConvEncoder):
+        return _conv_encoder(graph, layers, encoder, shape, window)
+    if isinstance(encoder, networks._LstmEncoder):
+        steps = _reshaped(graph, window, shape.window, 1, shape.pose)
+        last = layers.lstm(graph, steps, encoder.lstm, "encoder.lstm", "last")
+        inner = layers.elu(graph, layers.linear(graph, last, encoder.dense, "encoder.dense"))
+        return layers.linear(graph, inner, encoder.last, "encoder.last")
+    raise TypeError(f"No ONNX form is known for the encoder {type(encoder).__name__}.")
+
+
+def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent: str) -> str:
+    """Nodes of the decoder: latent (1, Z) -> raw window (T, M, 4)."""
+    decoder = network.decoder
+    if isinstance(decoder, networks._MlpDecoder):
+        amounts = _dense_stack(graph, layers, decoder.stack, latent, "decoder")
+        amounts = _reshaped(graph, amounts, shape.curves, shape.pose)
+        basis = graph.constant("curves_back", decoder.time.curves.numpy().T)
+        flat = graph.op("MatMul", basis, amounts)
+    elif isinstance(decoder, networks._ConvDecoder):
+        flat = _conv_decoder(graph, layers, decoder, shape, latent)
+    elif isinstance(decoder, networks._LstmDecoder):
+        held = layers.elu(graph, layers.linear(graph, latent, decoder.dense, "decoder.dense"))
+        steps = layers.lstm_of_repeated(graph, held, decoder.lstm, "decoder.lstm.0", shape.window)
+        steps = layers.lstm(graph, steps, decoder.lstm, "decoder.lstm", "steps", first=1)
+        rows = _reshaped(graph, steps, shape.window, shape.width)
+        flat = layers.linear(graph, rows, decoder.last, "decoder.last")
+    elif isinstance(decoder, networks._AutoregressiveDecoder):
+        flat = _autoregressive_decoder(graph, layers, decoder, shape, latent)
+    else:
+        raise TypeError(f"No ONNX form is known for the decoder {type(decoder).__name__}.")
+    return _reshaped(graph, flat, shape.window, shape.joints, 4)
+
+
+def _reshaped(graph: Graph, x: str, *sizes: int) -> str:
+    name = "shape_" + "x".join(map(str, sizes))
+    return graph.op("Reshape", x, graph.constant(name, sizes, np.int64))
+
+
+def _dense_stack(graph: Graph, layers: Layers, stack: nn.Sequential, x: str, side: str) -> str:
+    for place, layer in enumerate(stack):
+        name = f"{side}.{place}"
+        if isinstance(layer, nn.Linear):
+            x = layers.linear(graph, x, layer, name)
+        elif isinstance(layer, nn.LayerNorm):
+            x = layers.layer_norm(graph, x, layer, name)
+        elif isinstance(layer, nn.ELU):
+            x = layers.elu(graph, x)
+        elif isinstance(layer, networks.Residual):
+            inner = layers.elu(graph, layers.layer_norm(graph, x, layer.norm, f"{name}.norm"))
+            x = graph.op("Add", x, layers.linear(graph, inner, layer.dense, f"{name}.dense"))
+        else:
+            raise TypeError(f"No ONNX form is known for {type(layer).__name__}.")
+    return x
+
+
+def _conv_encoder(
+    graph: Graph, layers: Layers, encoder: networks._ConvEncoder, shape: Shape, window: str
+) -> str:
+    rows = _reshaped(graph, window, shape.window, shape.pose)
+    x = layers.elu(graph, layers.conv_as_matmul(graph, rows, encoder.first, "encoder.first", shape.window))
+    more = layers.conv_as_matmul(graph, x, encoder.second, "encoder.second", shape.window)
+    x = graph.op("Add", x, layers.elu(graph, more))
+    channels_first = graph.op("Transpose", x, perm=[1, 0])  # torch flattens channels before time
+    return layers.linear(
+        graph, _reshaped(graph, channels_first, 1, shape.width * shape.window), encoder.last, "encoder.last"
+    )
+
+
+def _conv_decoder(
+    graph: Graph, layers: Layers, decoder: networks._ConvDecoder, shape: Shape, latent: str
+) -> str:
+    x = layers.elu(graph, layers.linear(graph, latent, decoder.first, "decoder.first"))
+    rows = graph.op("Transpose", _reshaped(graph, x, shape.width, shape.window), perm=[1, 0])
+    more = layers.conv_as_matmul(graph, rows, decoder.second, "decoder.second", shape.window)
+    rows = graph.op("Add", rows, layers.elu(graph, more))
+    return layers.conv_as_matmul(graph, rows, decoder.last, "decoder.last", shape.window)
+
+
+def _autoregressive_decoder(
+    graph: Graph, layers: Layers, decoder: networks._AutoregressiveDecoder, shape: Shape, latent: str
+) -> str:
+    """The steps stand one after the other: a Loop inside the Loop would not prepack its weights."""
+    state = graph.op("Tanh", layers.linear(graph, latent, decoder.state, "decoder.state"))
+    parts = [graph.name("state") for _ in range(4)]
+    graph.ops("Split", [_reshaped(graph, state, 4, 1, shape.width)], parts, axis=0, num_outputs=4)
+    wide = [_reshaped(graph, part, 1, 1, shape.width) for part in parts]
+    (h0, h1), (c0, c1) = wide[:2], wide[2:]
+    first, second = _cell(decoder.first), _cell(decoder.second)
+    pose = graph.constant("no_pose", np.zeros((1, shape.pose)))
+    poses = []
+    for _ in range(shape.window):
+        seen = _reshaped(graph, graph.op("Concat", pose, latent, axis=1), 1, 1, shape.pose + shape.latent)
+        h0, c0 = layers.lstm_node(graph, seen, first, "decoder.cell0", ["last", "cell"], h0, c0)
+        h1, c1 = layers.lstm_node(graph, h0, second, "decoder.cell1", ["last", "cell"], h1, c1)
+        pose = layers.linear(graph, _reshaped(graph, h1, 1, shape.width), decoder.last, "decoder.last")
+        poses.append(pose)
+    return graph.op("Concat", *poses, axis=0)
+
+
+def _cell(cell: nn.LSTMCell) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def parameter(name: str) -> torch.Tensor:
+        value: torch.Tensor = getattr(cell, name)
+        return value
+
+    return lstm_weights(*(parameter(n) for n in ("weight_ih", "weight_hh", "bias_ih", "bias_hh")))

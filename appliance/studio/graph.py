@@ -1,0 +1,194 @@
+"""ONNX nodes by hand: a small builder, and what each torch layer becomes in float or dynamic int8.
+
+Written by hand because the iteration lives or dies by its node count (at batch 1 a node costs about as much
+as its arithmetic), and because the stock tools cannot quantize what stands inside a Loop.
+
+int8 means: weights u8 per output channel with zero point 128 (full-range s8 saturates on AVX2 without VNNI),
+activations quantized per call by onnxruntime's DynamicQuantize* operators.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import onnx
+import torch
+from numpy.typing import NDArray
+from onnx import TensorProto, helper, numpy_helper
+from torch import nn
+
+MICROSOFT = "com.microsoft"
+OPSET = 18
+
+
+class Graph:
+    """Nodes and constants in the order in which they are said."""
+
+    def __init__(self, prefix: str = "", constants: dict[str, NDArray[Any]] | None = None) -> None:
+        self.nodes: list[onnx.NodeProto] = []
+        self.constants: dict[str, NDArray[Any]] = {} if constants is None else constants
+        self._prefix, self._count = prefix, 0
+
+    def name(self, kind: str) -> str:
+        self._count += 1
+        return f"{self._prefix}{kind}_{self._count}"
+
+    def op(self, kind: str, *inputs: str, out: str | None = None, domain: str = "", **attributes: Any) -> str:
+        """Add a node with one output; its name is returned."""
+        out = out or self.name(kind)
+        self.nodes.append(helper.make_node(kind, list(inputs), [out], domain=domain, **attributes))
+        return out
+
+    def ops(self, kind: str, inputs: list[str], outputs: list[str], domain: str = "", **attributes: Any) -> None:
+        """Add a node with any number of outputs ('' leaves one out)."""
+        self.nodes.append(helper.make_node(kind, inputs, outputs, domain=domain, **attributes))
+
+    def constant(self, name: str, value: Any, dtype: Any = np.float32) -> str:
+        """A constant tensor; the same name is stored once and shared with every graph around."""
+        if name not in self.constants:
+            self.constants[name] = np.asarray(value, dtype=dtype)
+        return name
+
+    def initializers(self) -> list[onnx.TensorProto]:
+        return [numpy_helper.from_array(np.array(v, order="C"), k) for k, v in self.constants.items()]
+
+
+class Layers:
+    """Emits torch layers into a graph; `int8` chooses quantized ones where onnxruntime has them."""
+
+    def __init__(self, int8: bool) -> None:
+        self.int8 = int8
+
+    def linear(self, graph: Graph, x: str, layer: nn.Linear, name: str) -> str:
+        """(B, in) -> (B, out)."""
+        weight = _array(layer.weight).T
+        bias = graph.constant(f"{name}.bias", _array(layer.bias))
+        if not self.int8:
+            return graph.op("Gemm", x, graph.constant(f"{name}.weight", weight), bias)
+        quantized = _quantized(graph, f"{name}.weight", weight)
+        return graph.op("DynamicQuantizeMatMul", x, *quantized, bias, domain=MICROSOFT)
+
+    def layer_norm(self, graph: Graph, x: str, layer: nn.LayerNorm, name: str) -> str:
+        scale = graph.constant(f"{name}.scale", _array(layer.weight))
+        bias = graph.constant(f"{name}.bias", _array(layer.bias))
+        return graph.op("LayerNormalization", x, scale, bias, axis=-1, epsilon=layer.eps)
+
+    def elu(self, graph: Graph, x: str) -> str:
+        return graph.op("Elu", x, alpha=1.0)
+
+    def conv_as_matmul(self, graph: Graph, x: str, layer: nn.Conv1d, name: str, steps: int) -> str:
+        """A short convolution over (1, steps, in) as shifted matrix products: (steps, in) -> (steps, out).
+
+        Three rows side by side (zeros at the ends) times one matrix: quantizes like any dense layer.
+        """
+        taps = layer.kernel_size[0]
+        pad = graph.constant(f"pad{taps // 2}", [taps // 2, 0, taps // 2, 0], np.int64)
+        padded = graph.op("Pad", x, pad)
+        rows = np.arange(steps)[:, None] + np.arange(taps)
+        at = graph.constant(f"taps{taps}x{steps}", rows, np.int64)
+        wide = graph.op("Gather", padded, at, axis=0)  # (steps, taps, in)
+        shape = graph.constant(f"wide{steps}x{taps * layer.in_channels}", [steps, taps * layer.in_channels], np.int64)
+        flat = graph.op("Reshape", wide, shape)
+        weight = _array(layer.weight).transpose(2, 1, 0).reshape(taps * layer.in_channels, layer.out_channels)
+        dense = nn.Linear(weight.shape[0], weight.shape[1])
+        dense.weight.data = torch.from_numpy(weight.T.copy())
+        assert layer.bias is not None
+        dense.bias.data = layer.bias.data
+        return self.linear(graph, flat, dense, name)
+
+    def lstm(self, graph: Graph, x: str, layer: nn.LSTM, name: str, keep: str, first: int = 0) -> str:
+        """(T, 1, in) -> all steps (T, 1, H) for keep='steps', the last (1, H) for keep='last'."""
+        for level in range(first, layer.num_layers):
+            last = keep == "last" and level == layer.num_layers - 1
+            kind = "last" if last else "steps"
+            out = self.lstm_node(graph, x, _level(layer, level), f"{name}.{level}", [kind])[0]
+            axis = graph.constant("axis0" if last else "axis1", [0 if last else 1], np.int64)
+            x = graph.op("Squeeze", out, axis)
+        return x
+
+    def lstm_node(
+        self,
+        graph: Graph,
+        x: str,
+        weights: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
+        name: str,
+        keep: list[str],
+        hidden: str = "",
+        cell: str = "",
+        bias: str = "",
+    ) -> list[str]:
+        """One LSTM layer as one node; keep: which of 'steps', 'last', 'cell' are wanted."""
+        w, r, b = weights
+        outputs = [graph.name(kind) if kind in keep else "" for kind in ("steps", "last", "cell")]
+        while not outputs[-1]:
+            outputs.pop()
+        bias = bias or graph.constant(f"{name}.bias", b)
+        size = r.shape[-1]
+        if self.int8:
+            wq, ws, wz = _quantized(graph, f"{name}.w", w[0].T, lead=True)
+            rq, rs, rz = _quantized(graph, f"{name}.r", r[0].T, lead=True)
+            inputs = [x, wq, rq, bias, "", hidden, cell, "", ws, wz, rs, rz]
+            graph.ops("DynamicQuantizeLSTM", inputs, outputs, MICROSOFT, hidden_size=size)
+        else:
+            w_name, r_name = graph.constant(f"{name}.w", w), graph.constant(f"{name}.r", r)
+            graph.ops("LSTM", [x, w_name, r_name, bias, "", hidden, cell], outputs, hidden_size=size)
+        return [out for out in outputs if out]
+
+    def lstm_of_repeated(self, graph: Graph, x: str, layer: nn.LSTM, name: str, steps: int) -> str:
+        """First level of an LSTM whose input (1, in) is the same at each step: (steps, 1, H).
+
+        The input's product with its weights is computed once and handed over as the bias; the node itself
+        gets steps of nothing. Saves steps - 1 of the products.
+        """
+        w, r, b = _level(layer, 0)
+        size = r.shape[-1]
+        dense = nn.Linear(w.shape[-1], 4 * size)
+        dense.weight.data, dense.bias.data = torch.from_numpy(w[0]), torch.from_numpy(b[0, : 4 * size])
+        held = self.linear(graph, x, dense, f"{name}.input")
+        bias = graph.op("Concat", held, graph.constant(f"{name}.recurrent", b[:, 4 * size :]), axis=1)
+        nothing = graph.constant(f"nothing{steps}", np.zeros((steps, 1, 1)))
+        weights = (np.zeros((1, 4 * size, 1), dtype=np.float32), r, b)
+        out = self.lstm_node(graph, nothing, weights, name, ["steps"], bias=bias)[0]
+        return graph.op("Squeeze", out, graph.constant("axis1", [1], np.int64))
+
+
+def _level(layer: nn.LSTM, level: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    kinds = ("weight_ih", "weight_hh", "bias_ih", "bias_hh")
+    return lstm_weights(*(getattr(layer, f"{kind}_l{level}") for kind in kinds))
+
+
+def lstm_weights(
+    weight_ih: torch.Tensor, weight_hh: torch.Tensor, bias_ih: torch.Tensor, bias_hh: torch.Tensor
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """torch's gate order i, f, g, o to ONNX's i, o, f, c; shapes (1, 4H, in), (1, 4H, H), (1, 8H)."""
+
+    def ordered(w: torch.Tensor) -> NDArray[Any]:
+        i, f, g, o = np.split(_array(w), 4, axis=0)
+        return np.concatenate([i, o, f, g], axis=0)
+
+    bias = np.concatenate([ordered(bias_ih), ordered(bias_hh)])
+    return ordered(weight_ih)[None], ordered(weight_hh)[None], bias[None]
+
+
+def info(name: str, shape: list[int], kind: int = TensorProto.FLOAT) -> onnx.ValueInfoProto:
+    return helper.make_tensor_value_info(name, kind, shape)
+
+
+def _array(tensor: torch.Tensor) -> NDArray[np.float32]:
+    return tensor.detach().cpu().numpy().astype(np.float32)
+
+
+def _quantized(graph: Graph, name: str, weight: NDArray[Any], lead: bool = False) -> tuple[str, str, str]:
+    """(in, out) float -> names of u8 weights, scales, zero points per output channel; lead adds an axis."""
+    reach = np.abs(weight).max(axis=0)
+    scale = np.where(reach > 0, reach / 127, 1.0).astype(np.float32)
+    levels = (np.clip(np.rint(weight / scale), -127, 127) + 128).astype(np.uint8)
+    zero = np.full(scale.shape, 128, dtype=np.uint8)
+    if lead:
+        levels, scale, zero = levels[None], scale[None], zero[None]
+    return (
+        graph.constant(f"{name}.q", levels, np.uint8),
+        graph.constant(f"{name}.scale", scale),
+        graph.constant(f"{name}.zero", zero, np.uint8),
+    )

@@ -1,0 +1,272 @@
+"""The networks: encoders and decoders of a window of poses, one class an architecture.
+
+Each maps a flat window (B, 8 * M * 4) to a latent (B, Z) and back to raw quaternions of the same shape.
+`NETWORKS` names them for the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a network is built for: window poses, moving joints, latent size, width of its layers."""
+
+    window: int
+    joints: int
+    latent: int
+    width: int
+    depth: int = 1
+    curves: int = 4  # of the window's 8 degrees of freedom in time, how many the mlp sees
+
+    @property
+    def pose(self) -> int:
+        return self.joints * 4
+
+    @property
+    def flat(self) -> int:
+        return self.window * self.pose
+
+
+class Network(nn.Module):
+    """An encoder and a decoder; the latent is linear, so that a Gaussian prior can shape it."""
+
+    encoder: nn.Module
+    decoder: nn.Module
+
+    def encode(self, window: Tensor) -> Tensor:
+        latent: Tensor = self.encoder(window)
+        return latent
+
+    def decode(self, latent: Tensor) -> Tensor:
+        window: Tensor = self.decoder(latent)
+        return window
+
+    def start_at(self, rest: Tensor) -> None:
+        """Let the decoder's first answer be a standing dancer, (M * 4), not noise."""
+        self.decoder.start_at(rest)  # type: ignore[operator]
+
+
+class Residual(nn.Module):
+    """x + dense(ELU(layer norm(x))): the step that lets a small dense network learn fast."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.norm, self.dense = nn.LayerNorm(width), nn.Linear(width, width)
+        nn.init.zeros_(self.dense.weight)
+        nn.init.zeros_(self.dense.bias)
+
+    def forward(self, x: Tensor) -> Tensor:
+        out: Tensor = x + self.dense(nn.functional.elu(self.norm(x)))
+        return out
+
+
+class TimeBasis(nn.Module):
+    """A window as a few smooth curves: the first cosines along time, (B, T * P) <-> (B, C * P).
+
+    Bodies have mass: of a window's 160 ms the slowest four cosines hold all but 0.09 degrees of the recorded
+    dances. That halves the first and the last layer, the largest of a small dense network.
+    """
+
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.shape = shape
+        moment = (torch.arange(shape.window) + 0.5) / shape.window
+        curves = torch.cos(torch.pi * torch.arange(shape.curves)[:, None] * moment)
+        self.curves: Tensor
+        self.register_buffer("curves", curves / curves.norm(dim=1, keepdim=True))
+
+    def project(self, window: Tensor) -> Tensor:
+        """(B, T * P) -> (B, C * P)."""
+        steps = window.view(-1, self.shape.window, self.shape.pose)
+        return torch.matmul(self.curves, steps).flatten(1)
+
+    def unfold(self, amounts: Tensor) -> Tensor:
+        """(B, C * P) -> (B, T * P)."""
+        steps = amounts.view(-1, self.shape.curves, self.shape.pose)
+        return torch.matmul(self.curves.T, steps).flatten(1)
+
+
+class _MlpEncoder(nn.Module):
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.time = TimeBasis(shape)
+        self.stack = _dense_stack(shape.curves * shape.pose, shape.width, shape.depth, shape.latent)
+
+    def forward(self, window: Tensor) -> Tensor:
+        latent: Tensor = self.stack(self.time.project(window))
+        return latent
+
+
+class _MlpDecoder(nn.Module):
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.time = TimeBasis(shape)
+        self.stack = _dense_stack(shape.latent, shape.width, shape.depth, shape.curves * shape.pose)
+
+    def forward(self, latent: Tensor) -> Tensor:
+        return self.time.unfold(self.stack(latent))
+
+    def start_at(self, rest: Tensor) -> None:
+        """Let the first output be the rest pose (M * 4), held still."""
+        still = self.time.project(rest.repeat(self.time.shape.window)[None])[0]
+        _start_at(self.stack[-1], still)
+
+
+def _dense_stack(size_in: int, width: int, depth: int, size_out: int) -> nn.Sequential:
+    blocks = [Residual(width) for _ in range(depth)]
+    return nn.Sequential(
+        nn.Linear(size_in, width), *blocks, nn.LayerNorm(width), nn.ELU(), nn.Linear(width, size_out)
+    )
+
+
+def _start_at(layer: nn.Module, rest: Tensor) -> None:
+    assert isinstance(layer, nn.Linear | nn.Conv1d) and layer.bias is not None
+    layer.bias.data.copy_(rest)
+    layer.weight.data *= 0.1
+
+
+class Mlp(Network):
+    """The window as four curves through residual dense layers: the compact default."""
+
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.encoder, self.decoder = _MlpEncoder(shape), _MlpDecoder(shape)
+
+
+class _ConvEncoder(nn.Module):
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.window, self.pose = shape.window, shape.pose
+        self.first = nn.Conv1d(shape.pose, shape.width, 3, padding=1)
+        self.second = nn.Conv1d(shape.width, shape.width, 3, padding=1)
+        self.last = nn.Linear(shape.width * shape.window, shape.latent)
+
+    def forward(self, window: Tensor) -> Tensor:
+        x = window.view(-1, self.window, self.pose).transpose(1, 2)
+        x = nn.functional.elu(self.first(x))
+        x = x + nn.functional.elu(self.second(x))
+        latent: Tensor = self.last(x.flatten(1))
+        return latent
+
+
+class _ConvDecoder(nn.Module):
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.window, self.width = shape.window, shape.width
+        self.first = nn.Linear(shape.latent, shape.width * shape.window)
+        self.second = nn.Conv1d(shape.width, shape.width, 3, padding=1)
+        self.last = nn.Conv1d(shape.width, shape.pose, 3, padding=1)
+
+    def forward(self, latent: Tensor) -> Tensor:
+        x = nn.functional.elu(self.first(latent)).view(-1, self.width, self.window)
+        x = x + nn.functional.elu(self.second(x))
+        window: Tensor = self.last(x).transpose(1, 2)
+        return window.flatten(1)
+
+    def start_at(self, rest: Tensor) -> None:
+        _start_at(self.last, rest)
+
+
+class Conv(Network):
+    """Convolution along time: neighbours in time share weights."""
+
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.encoder, self.decoder = _ConvEncoder(shape), _ConvDecoder(shape)
+
+
+class _LstmEncoder(nn.Module):
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.window, self.pose = shape.window, shape.pose
+        self.lstm = nn.LSTM(shape.pose, shape.width, num_layers=2, batch_first=True)
+        self.dense, self.last = nn.Linear(shape.width, shape.width), nn.Linear(shape.width, shape.latent)
+
+    def forward(self, window: Tensor) -> Tensor:
+        steps, _ = self.lstm(window.view(-1, self.window, self.pose))
+        latent: Tensor = self.last(nn.functional.elu(self.dense(steps[:, -1])))
+        return latent
+
+
+class _LstmDecoder(nn.Module):
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.window = shape.window
+        self.dense = nn.Linear(shape.latent, shape.width)
+        self.lstm = nn.LSTM(shape.width, shape.width, num_layers=2, batch_first=True)
+        self.last = nn.Linear(shape.width, shape.pose)
+
+    def forward(self, latent: Tensor) -> Tensor:
+        x = nn.functional.elu(self.dense(latent))
+        steps, _ = self.lstm(x[:, None].expand(-1, self.window, -1))
+        window: Tensor = self.last(steps)
+        return window.flatten(1)
+
+    def start_at(self, rest: Tensor) -> None:
+        _start_at(self.last, rest)
+
+
+class Lstm(Network):
+    """The paper's network (Granular Dance, 'Puppeteering an AI'): 2 x 512 LSTM each way.
+
+    Two departures, both needed for what the paper describes: the latent is linear (a ReLU latent cannot
+    follow a Gaussian of mean zero), and the dense layers are ELU as in the paper's critic.
+    """
+
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.encoder, self.decoder = _LstmEncoder(shape), _LstmDecoder(shape)
+
+
+class _AutoregressiveDecoder(nn.Module):
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.window, self.pose, self.width = shape.window, shape.pose, shape.width
+        self.state = nn.Linear(shape.latent, 4 * shape.width)
+        self.first = nn.LSTMCell(shape.pose + shape.latent, shape.width)
+        self.second = nn.LSTMCell(shape.width, shape.width)
+        self.last = nn.Linear(shape.width, shape.pose)
+
+    def forward(self, latent: Tensor) -> Tensor:
+        h0, h1, c0, c1 = torch.tanh(self.state(latent)).chunk(4, dim=-1)
+        pose = latent.new_zeros(len(latent), self.pose)
+        poses = []
+        for _ in range(self.window):
+            h0, c0 = self.first(torch.cat([pose, latent], dim=-1), (h0, c0))
+            h1, c1 = self.second(h0, (h1, c1))
+            pose = self.last(h1)
+            poses.append(pose)
+        return torch.cat(poses, dim=-1)
+
+    def start_at(self, rest: Tensor) -> None:
+        _start_at(self.last, rest)
+
+
+class LstmAutoregressive(Network):
+    """The paper's encoder with a decoder that is fed each pose that it made."""
+
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        self.encoder, self.decoder = _LstmEncoder(shape), _AutoregressiveDecoder(shape)
+
+
+NETWORKS: dict[str, tuple[Callable[[Shape], Network], dict[str, int]]] = {
+    "mlp": (Mlp, {"latent": 64, "width": 512, "depth": 1}),
+    "conv": (Conv, {"latent": 64, "width": 160}),
+    "lstm": (Lstm, {"latent": 32, "width": 512}),
+    "lstm-autoregressive": (LstmAutoregressive, {"latent": 32, "width": 512}),
+    "lstm256": (Lstm, {"latent": 64, "width": 256}),
+}
+
+
+def build(name: str, window: int, joints: int, **sizes: int) -> tuple[Network, Shape]:
+    """A network by name, its sizes overridden where given (latent, width, depth)."""
+    make, defaults = NETWORKS[name]
+    shape = Shape(window, joints, **{**defaults, **{k: v for k, v in sizes.items() if v}})
+    return make(shape), shape

@@ -1,0 +1,100 @@
+"""Quaternion maths for training: the functions of appliance.pose that need a gradient, in torch."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from appliance.pose.skeleton import Skeleton
+
+
+def multiply(a: Tensor, b: Tensor) -> Tensor:
+    """Hamilton product (..., 4) x (..., 4) -> (..., 4), order w, x, y, z."""
+    aw, ax, ay, az = a.unbind(-1)
+    bw, bx, by, bz = b.unbind(-1)
+    return torch.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        dim=-1,
+    )
+
+
+def inverse(q: Tensor) -> Tensor:
+    """Inverse of a unit quaternion."""
+    return torch.cat([q[..., :1], -q[..., 1:]], dim=-1)
+
+
+def normalize(q: Tensor) -> Tensor:
+    """Unit length along the last axis."""
+    return q / q.norm(dim=-1, keepdim=True)
+
+
+def rotate(q: Tensor, v: Tensor) -> Tensor:
+    """Turn vectors (..., 3)."""
+    u = q[..., 1:]
+    twice = 2 * torch.linalg.cross(u, v, dim=-1)
+    return v + q[..., :1] * twice + torch.linalg.cross(u, twice, dim=-1)
+
+
+def heading(q: Tensor) -> Tensor:
+    """Twist about the vertical (+Y) of a world rotation; the identity where none exists."""
+    twist = q * torch.tensor([1.0, 0.0, 1.0, 0.0], device=q.device)
+    length = twist.norm(dim=-1, keepdim=True)
+    identity = torch.tensor([1.0, 0.0, 0.0, 0.0], device=q.device).expand_as(q)
+    return torch.where(length > 1e-6, twist / length.clamp_min(1e-6), identity)
+
+
+def angle_between(a: Tensor, b: Tensor) -> Tensor:
+    """Angle from a to b in radians, 0..pi."""
+    chord = torch.minimum((a - b).norm(dim=-1), (a + b).norm(dim=-1))
+    return 4 * torch.asin((chord / 2).clamp(max=1.0))
+
+
+class MovingSkeleton(torch.nn.Module):
+    """Forward kinematics of the moving joints alone; the still joints between them are folded in.
+
+    The root joint stays at the origin: what is compared is the figure, not its way through the room.
+    """
+
+    def __init__(self, skeleton: Skeleton, moving: tuple[int, ...], still_pose: Tensor) -> None:
+        super().__init__()
+        parents, turns, reaches = [], [], []
+        for joint in moving:
+            turn, reach = torch.tensor([1.0, 0.0, 0.0, 0.0]), torch.zeros(3)
+            child = joint
+            while True:  # climb over still joints to the next moving one
+                reach = reach + torch.tensor(skeleton.offsets[child], dtype=torch.float32)
+                parent = skeleton.parents[child]
+                if parent < 0 or parent in moving:
+                    break
+                still = still_pose[parent].float()
+                reach, turn = rotate(still, reach), multiply(still, turn)
+                child = parent
+            parents.append(moving.index(parent) if parent >= 0 else -1)
+            turns.append(turn)
+            reaches.append(reach)
+        self.parents = parents
+        self.turns: Tensor
+        self.reaches: Tensor
+        self.register_buffer("turns", torch.stack(turns))
+        self.register_buffer("reaches", torch.stack(reaches))
+
+    def forward(self, pose: Tensor) -> Tensor:
+        """(..., M, 4) -> positions (..., M, 3) in metres, relative to the root joint."""
+        world: list[Tensor] = []
+        places: list[Tensor] = []
+        for joint, parent in enumerate(self.parents):
+            local = pose[..., joint, :]
+            if parent < 0:
+                world.append(local)
+                places.append(torch.zeros_like(local[..., 1:]))
+                continue
+            above = world[parent]
+            reach = self.reaches[joint].expand_as(places[parent])
+            places.append(places[parent] + rotate(above, reach))
+            world.append(multiply(multiply(above, self.turns[joint].expand_as(above)), local))
+        return torch.stack(places, dim=-2)

@@ -1,0 +1,246 @@
+"""The training loop of the adversarial autoencoder, read top to bottom; seeded and resumable."""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from appliance.studio import losses, rotation
+from appliance.studio.autoencoder import Autoencoder, PriorCritic
+from appliance.studio.dataset import WINDOW, Dataset, windows
+from appliance.studio.networks import build
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to train. minutes bounds the wall time and paces the learning rate; steps does so where given."""
+
+    network: str = "mlp"
+    latent: int = 0
+    width: int = 0
+    depth: int = 0
+    seed: int = 1
+    minutes: float = 90.0
+    steps: int = 0
+    batch: int = 512
+    learning_rate: float = 1e-3
+    critic_learning_rate: float = 5e-4
+    smoothing: float = 0.999  # of the averaged weights that are kept
+    latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
+    input_noise_degrees: float = 0.0
+    mirror: bool = True
+    weights: losses.LossWeights = field(default_factory=losses.LossWeights)
+
+
+@dataclass
+class Report:
+    """What the loop tells while it runs: one line of history every report_every steps."""
+
+    step: int
+    seconds: float
+    fraction: float
+    losses: dict[str, float]
+    held_out_degrees: float | None = None
+
+
+class Training:
+    """State of a training: networks, optimisers, averages, history."""
+
+    def __init__(self, dataset: Dataset, settings: Settings, device: str = "cpu") -> None:
+        torch.manual_seed(settings.seed)
+        self.settings, self.device, self.dataset = settings, torch.device(device), dataset
+        still = dataset.still_pose()
+        rest = torch.tensor(still[list(dataset.moving)])
+        network, shape = build(
+            settings.network,
+            WINDOW,
+            len(dataset.moving),
+            latent=settings.latent,
+            width=settings.width,
+            depth=settings.depth,
+        )
+        self.autoencoder = Autoencoder(network, shape, rest).to(self.device)
+        network.start_at(rest.float().flatten().to(self.device))
+        self.averaged = copy.deepcopy(self.autoencoder).requires_grad_(False).eval()
+        self.critic = PriorCritic(shape.latent).to(self.device)
+        self.body = rotation.MovingSkeleton(
+            dataset.skeleton, dataset.moving, torch.tensor(still)
+        ).to(self.device)
+        self.train_windows = self._heading_free(windows(dataset.training, dataset.moving, settings.mirror))
+        self.held_windows = torch.tensor(windows(dataset.held_out, dataset.moving)).to(self.device)
+        self.optimizer = torch.optim.Adam(self.autoencoder.parameters(), lr=settings.learning_rate, fused=True)
+        self.critic_optimizer = torch.optim.Adam(
+            self.critic.parameters(), lr=settings.critic_learning_rate, betas=(0.5, 0.999), fused=True
+        )
+        self.step, self.seconds = 0, 0.0
+        self.history: list[Report] = []
+
+    @property
+    def fraction(self) -> float:
+        """How much of the training is done, 0..1."""
+        if self.settings.steps:
+            return min(self.step / self.settings.steps, 1.0)
+        return min(self.seconds / (self.settings.minutes * 60), 1.0)
+
+    def run(
+        self,
+        report: Callable[[Report], None],
+        save: Callable[[], None],
+        report_every_s: float = 15.0,
+        save_every_s: float = 120.0,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Train until done or stop() says so; reports and saves at intervals of wall time."""
+        sums: dict[str, float] = {}
+        counted = 0
+        began, offset = time.monotonic(), self.seconds
+        last_report = last_save = began
+        while self.fraction < 1.0 and not stop():
+            values = self.train_step()
+            for name, value in values.items():
+                sums[name] = sums.get(name, 0.0) + float(value)
+            counted += 1
+            now = time.monotonic()
+            self.seconds = offset + now - began
+            if now - last_report >= report_every_s or self.fraction >= 1.0:
+                line = Report(
+                    self.step,
+                    self.seconds,
+                    self.fraction,
+                    {name: value / counted for name, value in sums.items()},
+                    self.held_out_degrees(),
+                )
+                self.history.append(line)
+                report(line)
+                sums, counted, last_report = {}, 0, now
+            if now - last_save >= save_every_s:
+                save()
+                last_save = now
+        save()
+
+    def train_step(self) -> dict[str, Tensor]:
+        """One step of the critic and one of the autoencoder on a random batch."""
+        settings = self.settings
+        self._pace_learning()
+        rows = torch.randint(len(self.train_windows), (settings.batch,), device=self.device)
+        batch = self.train_windows[rows]
+        latents = self.autoencoder.encode(_shaken(batch, settings.input_noise_degrees))
+        noise = torch.randn_like(latents)
+        critic = losses.critic_loss(self.critic, latents, noise)
+        self.critic_optimizer.zero_grad(set_to_none=True)
+        critic.backward()  # type: ignore[no-untyped-call]
+        self.critic_optimizer.step()
+
+        raw = self.autoencoder.decode_raw(latents + settings.latent_noise * torch.randn_like(latents))
+        parts = losses.reconstruction_losses(raw, batch, self.body)
+        parts["prior"] = losses.prior_loss(self.critic, latents)
+        total = torch.stack([getattr(settings.weights, name) * part for name, part in parts.items()]).sum()
+        self.optimizer.zero_grad(set_to_none=True)
+        total.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.autoencoder.parameters(), 1.0)
+        self.optimizer.step()
+        self._average()
+        self.step += 1
+        with torch.no_grad():
+            spread = {"latent_mean": latents.mean(0).abs().mean(), "latent_std": latents.std(0).mean()}
+        return {name: part.detach() for name, part in {**parts, "critic": critic, **spread}.items()}
+
+    @torch.no_grad()
+    def held_out_degrees(self, sample: int = 2048) -> float | None:
+        """Mean joint angle error in degrees of the averaged network on windows of takes kept apart."""
+        if not len(self.held_windows):
+            return None
+        rows = torch.linspace(0, len(self.held_windows) - 1, min(sample, len(self.held_windows))).long()
+        batch = self.held_windows[rows]
+        made, _ = self.averaged.iterate(batch, 1)
+        return math.degrees(float(rotation.angle_between(made, batch).mean()))
+
+    def state(self) -> dict[str, Any]:
+        """Everything that a resumed training needs."""
+        return {
+            "settings": asdict(self.settings),
+            "joints": list(self.dataset.moving_names),
+            "shape": asdict(self.autoencoder.shape),
+            "autoencoder": self.autoencoder.state_dict(),
+            "averaged": self.averaged.state_dict(),
+            "critic": self.critic.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "critic_optimizer": self.critic_optimizer.state_dict(),
+            "random": torch.get_rng_state(),
+            "step": self.step,
+            "seconds": self.seconds,
+            "history": [asdict(line) for line in self.history],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on where a saved training stood."""
+        for name in ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer"):
+            getattr(self, name).load_state_dict(state[name])
+        torch.set_rng_state(state["random"].cpu())
+        self.step, self.seconds = state["step"], state["seconds"]
+        self.history = [Report(**line) for line in state["history"]]
+
+    def _heading_free(self, poses: np.ndarray[Any, np.dtype[np.float32]]) -> Tensor:
+        return torch.cat(
+            [
+                self.autoencoder.without_heading(part, self.autoencoder.facing(part))
+                for part in torch.tensor(poses).to(self.device).split(4096)
+            ]
+        )
+
+    def _pace_learning(self) -> None:
+        warm = min(1.0, (self.step + 1) / 200)
+        cosine = 0.5 * (1 + math.cos(math.pi * self.fraction))
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.settings.learning_rate * warm * max(cosine, 0.005)
+        for group in self.critic_optimizer.param_groups:
+            group["lr"] = self.settings.critic_learning_rate * max(cosine, 0.1)
+
+    @torch.no_grad()
+    def _average(self) -> None:
+        keep = min(self.settings.smoothing, (self.step + 1) / (self.step + 10))
+        means, values = list(self.averaged.parameters()), list(self.autoencoder.parameters())
+        torch._foreach_lerp_(means, values, 1 - keep)
+
+
+def save_checkpoint(training: Training, path: Path) -> None:
+    """Write the whole state; the old file stays until the new one is complete."""
+    partial = path.with_suffix(".partial")
+    torch.save(training.state(), partial)
+    partial.replace(path)
+
+
+def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]]:
+    """The averaged network of a checkpoint, its joint names, and the whole state."""
+    state = torch.load(path, map_location="cpu", weights_only=True)
+    shape = state["shape"]
+    network, built = build(
+        state["settings"]["network"],
+        shape["window"],
+        shape["joints"],
+        latent=shape["latent"],
+        width=shape["width"],
+        depth=shape["depth"],
+        curves=shape["curves"],
+    )
+    autoencoder = Autoencoder(network, built, torch.zeros(shape["joints"], 4))
+    autoencoder.load_state_dict(state["averaged"])
+    return autoencoder.requires_grad_(False).eval(), state["joints"], state
+
+
+def _shaken(batch: Tensor, degrees: float) -> Tensor:
+    """The batch with every joint turned by one small random rotation a window."""
+    if degrees <= 0:
+        return batch
+    half = math.radians(degrees) / 2 * torch.randn(len(batch), 1, batch.shape[2], 3, device=batch.device)
+    turn = torch.cat([torch.ones_like(half[..., :1]), half], dim=-1)
+    return rotation.normalize(rotation.multiply(batch, turn.expand(-1, batch.shape[1], -1, -1)))
