@@ -31,8 +31,8 @@ def bounds(field: FieldInfo) -> str:
                     limits[name] = getattr(rule, name)
     if "min_length" in limits or "max_length" in limits:
         return _length_bounds(limits, field)
-    low = f"{limits['ge']:g}" if "ge" in limits else f"more than {limits['gt']:g}" if "gt" in limits else ""
-    high = f"{limits['le']:g}" if "le" in limits else ""
+    low = str(limits["ge"]) if "ge" in limits else f"more than {limits['gt']}" if "gt" in limits else ""
+    high = str(limits["le"]) if "le" in limits else ""
     if low and high:
         return f"{low} to {high}" if "ge" in limits else f"{low}, at most {high}"
     return f"at most {high}" if high else f"at least {low}" if "ge" in limits else low
@@ -78,7 +78,7 @@ def _one_kind(annotation: Any) -> str:
         return f"{len(get_args(annotation))} numbers in brackets"
     if get_origin(annotation) is list:
         return "a list"
-    return _PLAIN.get(annotation, "a section of its own")
+    return _PLAIN.get(annotation, "a group of keys")
 
 
 def _field_infos(annotation: Any) -> list[FieldInfo]:

@@ -42,6 +42,9 @@ def _words(model: type[Section], location: Location, error: ErrorDetails) -> tup
         where = f" in '{spoken(location[:-1])}'" if location[:-1] else ""
         return f"Unknown key '{location[-1]}'{where}.", did_you_mean(location[-1], list(around.model_fields))
     field, name = _field_at(model, location), spoken(location)
+    if error["type"] == "missing" and isinstance(location[-1], int):
+        wanted = describe.kind(field.annotation) if field else "long enough"
+        return f"'{spoken(location[:-1])}' is {_shown(error['input'])}, not {wanted}.", _cure(error, field)
     if error["type"] == "missing":
         description = field.description if field else ""
         return f"The key '{name}' is missing.", f"Add it: {description}" if description else ""

@@ -13,6 +13,9 @@ from appliance.show.config_error import ConfigError, Problem
 
 MAX_BYTES = 256 * 1024  # a long show file has some 2 kB
 _TIMESTAMP = "tag:yaml.org,2002:timestamp"
+_TAGS = {
+    f"tag:yaml.org,2002:{kind}" for kind in ("map", "seq", "str", "int", "float", "bool", "null", "merge")
+}
 
 Location = tuple[str | int, ...]
 
@@ -95,6 +98,9 @@ class _Plain:
             self._problem(node, "Anchors and aliases (& and *) are not used here.", "Write the value again.")
             return None
         self._seen.add(id(node))
+        if node.tag not in _TAGS | {_TIMESTAMP}:
+            self._problem(node, f"Tags like {node.tag} are not used here.", "Remove what starts with '!'.")
+            return None
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, location)
         if isinstance(node, yaml.SequenceNode):

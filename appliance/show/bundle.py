@@ -1,0 +1,88 @@
+"""A show bundle as a folder of files: where the one that comes with the box lies, and its checksums."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from appliance.show.config_error import Problem
+
+CHECKSUMS = "SHA256SUMS"
+_LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
+_COPY_AGAIN = "Copy the whole bundle again."
+
+
+def default_show_path() -> Path:
+    """The bundle that comes with the box."""
+    return Path(__file__).resolve().parent / "default_show"
+
+
+def bundle_files(directory: Path) -> list[str]:
+    """Names of all files in a bundle, relative to it, sorted; without the checksums and hidden files."""
+    names = (path.relative_to(directory) for path in directory.rglob("*") if path.is_file())
+    return sorted(
+        name.as_posix()
+        for name in names
+        if name.as_posix() != CHECKSUMS and not any(part.startswith(".") for part in name.parts)
+    )
+
+
+def bundle_bytes(directory: Path) -> int:
+    """Size of all its files together."""
+    return sum((directory / name).stat().st_size for name in bundle_files(directory))
+
+
+def write_checksums(directory: Path) -> Path:
+    """Write SHA256SUMS over all files of the bundle, in the form that `sha256sum --check` reads."""
+    lines = [f"{_sha256(directory / name)}  {name}\n" for name in bundle_files(directory)]
+    written = directory / f".{CHECKSUMS}.new"
+    written.write_text("".join(lines), encoding="utf-8")
+    return written.replace(directory / CHECKSUMS)
+
+
+def checksum_problems(directory: Path) -> list[Problem]:
+    """Files that changed, are gone, or cannot be read, each with its line in SHA256SUMS."""
+    path = directory / CHECKSUMS
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return [Problem(path, 0, "The checksums are missing or unreadable.", _COPY_AGAIN)]
+    return [
+        Problem(path, number, message, cure)
+        for number, line in enumerate(lines, 1)
+        for message, cure in _line_problems(directory, line)
+    ]
+
+
+def unlisted_files(directory: Path) -> list[str]:
+    """Files of the bundle that SHA256SUMS does not vouch for; none where it cannot be read."""
+    try:
+        lines = (directory / CHECKSUMS).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return []
+    listed = {found[2] for line in lines if (found := _LINE.fullmatch(line))}
+    return [name for name in bundle_files(directory) if name not in listed]
+
+
+def _line_problems(directory: Path, line: str) -> Iterator[tuple[str, str]]:
+    """Message and cure of what is wrong with one line, if anything is."""
+    found = _LINE.fullmatch(line)
+    if not found or ".." in Path(found[2]).parts or Path(found[2]).is_absolute():
+        yield "This is not a checksum and a file's name.", _COPY_AGAIN
+        return
+    name = found[2]
+    try:
+        if _sha256(directory / name) != found[1]:
+            changed = f"'{name}' is not the file that was packed: it is damaged or was changed."
+            yield changed, "Copy the bundle again, or pack it again if you changed it."
+    except FileNotFoundError:
+        yield f"'{name}' is missing.", _COPY_AGAIN
+    except OSError as error:
+        yield f"'{name}' cannot be read ({error.strerror}).", _COPY_AGAIN
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

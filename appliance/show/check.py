@@ -1,0 +1,132 @@
+"""Is a show bundle whole and consistent? Everything that can be said without dancing it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from appliance.pose.bvh import BvhError, read_bvh
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+from appliance.show.bundle import CHECKSUMS, bundle_bytes, checksum_problems, unlisted_files
+from appliance.show.config_error import ConfigError, Problem
+from appliance.show.network import WINDOW, inspect_network
+from appliance.show.show import Show, load_show
+
+LARGEST_BYTES = 25_000_000
+RATE_HZ = 50.0
+OFFSET_TOLERANCE_M = 1e-3
+_COPY_AGAIN = "Copy the whole bundle again."
+
+
+@dataclass(frozen=True)
+class Finding(Problem):
+    """What `bunraku check` has to say: an error keeps the show off the stage, a warning does not."""
+
+    level: Literal["error", "warning"] = "error"
+
+    def __str__(self) -> str:
+        return super().__str__() if self.level == "error" else f"{super().__str__()} (a warning)"
+
+
+def verify_bundle(directory: Path | str) -> list[Finding]:
+    """All that is wrong with a bundle, errors first; empty for a sound one. Never raises for a bad one."""
+    directory = Path(directory)
+    if not directory.is_dir():
+        return [Finding(directory, 0, "There is no such show folder.", "Check the path of the show.")]
+    findings = [*_files(directory), *_show(directory)]
+    return sorted(findings, key=lambda finding: finding.level)
+
+
+def _files(directory: Path) -> Iterator[Finding]:
+    for problem in checksum_problems(directory):
+        yield _error(problem)
+    for name in unlisted_files(directory):
+        message = f"'{name}' has no checksum in {CHECKSUMS}."
+        yield Finding(directory / name, 0, message, "Remove it, or pack the bundle again.", "warning")
+    size = bundle_bytes(directory)
+    if size > LARGEST_BYTES:
+        message = f"The bundle is {size / 1e6:.1f} MB, more than {LARGEST_BYTES / 1e6:g} MB."
+        yield Finding(directory, 0, message, "Shorten the phrase, or quantize the network.", "warning")
+    yield from _report(directory / "report.json")
+
+
+def _report(path: Path) -> Iterator[Finding]:
+    cure = "Evaluate and pack the show again."
+    try:
+        json.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        yield Finding(path, 0, "The report of the training is missing.", cure, "warning")
+    except ValueError as error:
+        line = error.lineno if isinstance(error, json.JSONDecodeError) else 1
+        yield Finding(path, line, "The report is not JSON.", cure, "warning")
+
+
+def _show(directory: Path) -> Iterator[Finding]:
+    try:
+        show = load_show(directory)
+    except ConfigError as error:
+        yield from map(_error, error.problems)
+        return
+    joints, complaints = inspect_network(show.network, show.skeleton.names)
+    for message, cure in complaints:
+        yield Finding(show.network, 0, message, cure)
+    if joints:
+        try:
+            show.require_moving(joints)
+        except ConfigError as error:
+            yield from map(_error, error.problems)
+    yield from _phrase(show)
+
+
+def _phrase(show: Show) -> Iterator[Finding]:
+    path = show.phrase
+    try:
+        phrase = read_bvh(path)
+    except BvhError as error:
+        yield Finding(path, error.line, str(error).split(": ", 1)[-1], _COPY_AGAIN)
+        return
+    except OSError as error:
+        yield Finding(path, 0, f"The phrase cannot be read ({error.strerror}).", _COPY_AGAIN)
+        return
+    yield from _phrase_skeleton(path, phrase.skeleton, show.skeleton)
+    if abs(phrase.fps - RATE_HZ) > 0.1:
+        message = (
+            f"The phrase has {phrase.fps:.4g} poses a second and is resampled to {RATE_HZ:g} at each start."
+        )
+        yield Finding(path, 0, message, "Pack it at 50 Hz.", "warning")
+    yield from _excerpt(show, phrase)
+
+
+def _phrase_skeleton(path: Path, found: Skeleton, wanted: Skeleton) -> Iterator[Finding]:
+    cure = "Pack the phrase with the skeleton of the show."
+    if found.same_joints(wanted):
+        if np.abs(found.offsets - wanted.offsets).max() > OFFSET_TOLERANCE_M:
+            yield Finding(path, 0, "The phrase's bones are not as long as those of skeleton.bvh.", cure)
+        return
+    other = sorted(set(found.names) ^ set(wanted.names))
+    which = f"only one of them has {', '.join(other[:5])}" if other else "their order or parents differ"
+    yield Finding(path, 0, f"The phrase has other joints than skeleton.bvh: {which}.", cure)
+
+
+def _excerpt(show: Show, phrase: Recording) -> Iterator[Finding]:
+    """The excerpt that show.yaml asks for must lie within the phrase and fill one window."""
+    motion, lines = show.config.motion, show.file
+    if motion.end_s is not None and motion.end_s > phrase.seconds + 1 / RATE_HZ:
+        message = f"end_s ({motion.end_s:g}) is behind the phrase's end ({phrase.seconds:.2f} s)."
+        yield Finding(lines.path, lines.line(("motion", "end_s")), message, "Write an earlier end, or null.")
+    excerpt = phrase.excerpt(motion.start_s, motion.end_s)
+    if len(excerpt) * RATE_HZ / phrase.fps < WINDOW:
+        message = f"The excerpt has {len(excerpt)} poses; one window needs {WINDOW}."
+        where = lines.line(("motion", "start_s")) if motion.start_s or motion.end_s else 0
+        file = lines.path if where else show.phrase
+        yield Finding(file, where, message, "Use a longer phrase, or a wider start_s and end_s.")
+
+
+def _error(problem: Problem) -> Finding:
+    return Finding(problem.file, problem.line, problem.message, problem.cure)

@@ -1,0 +1,147 @@
+"""Is a network file a puppet's? Its inputs, outputs and facts, and whether one pass gives sound poses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from appliance.show.config_error import did_you_mean
+
+WINDOW = 8
+UNIT_TOLERANCE = 1e-3
+_EXPORT_AGAIN = "Export the network again with bunraku export."
+_COPY_AGAIN = "Copy the whole bundle again."
+
+Complaint = tuple[str, str]  # message, cure
+
+
+def moving_joints(facts: dict[str, str]) -> list[str]:
+    """The joints that a network moves, in its own order, from its metadata."""
+    return [name for name in facts.get("bunraku.joints", "").split(",") if name]
+
+
+def inspect_network(path: Path, skeleton_joints: Sequence[str]) -> tuple[list[str], list[Complaint]]:
+    """The joints that the network moves, and what is wrong with the file for this skeleton."""
+    import onnxruntime  # here, because a box that only reads its configuration does not need it
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    try:
+        session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime has its own exception for each way to be broken
+        why = str(error).splitlines()[0][:120]
+        return [], [(f"This cannot be read as a network ({why}).", _COPY_AGAIN)]
+    facts: dict[str, str] = session.get_modelmeta().custom_metadata_map
+    joints = moving_joints(facts)
+    complaints = list(_fact_complaints(facts, joints, skeleton_joints))
+    complaints += _port_complaints("input", session.get_inputs(), _inputs(len(joints)))
+    complaints += _port_complaints("output", session.get_outputs(), _outputs(len(joints)))
+    if not complaints:
+        complaints += _run_complaints(session, json.loads(facts["bunraku.rest"]))
+    return joints, complaints
+
+
+def _inputs(joints: int) -> dict[str, tuple[str, list[int]]]:
+    return {
+        "window": ("tensor(float)", [WINDOW, joints, 4]),
+        "mask": ("tensor(bool)", [joints]),
+        "targets": ("tensor(float)", [joints, 4]),
+        "weights": ("tensor(float)", [joints]),
+        "coding_iterations": ("tensor(int64)", []),
+        "interaction_iterations": ("tensor(int64)", []),
+    }
+
+
+def _outputs(joints: int) -> dict[str, tuple[str, list[int]]]:
+    return {"poses": ("tensor(float)", [WINDOW, joints, 4])}
+
+
+def _fact_complaints(
+    facts: dict[str, str], joints: list[str], skeleton_joints: Sequence[str]
+) -> Iterator[Complaint]:
+    """What is wrong with the metadata."""
+    if not joints:
+        yield "It does not say which joints it moves (bunraku.joints): it is not a puppet.", _EXPORT_AGAIN
+    if len(set(joints)) < len(joints):
+        yield "It names a joint twice.", _EXPORT_AGAIN
+    for name in joints:
+        if name not in skeleton_joints:
+            yield (
+                f"It moves the joint '{name}', which the show's skeleton does not have.",
+                f"{did_you_mean(name, skeleton_joints)} Use the skeleton of the recordings it learned from.",
+            )
+    if facts.get("bunraku.window") != str(WINDOW):
+        found = facts.get("bunraku.window", "nothing")
+        yield f"Its windows are {found} poses long; the box dances windows of {WINDOW}.", _EXPORT_AGAIN
+    if joints and not _is_rest_pose(facts.get("bunraku.rest", ""), len(joints)):
+        yield (
+            f"Its rest pose (bunraku.rest) is not one quaternion for each of {len(joints)} joints.",
+            _EXPORT_AGAIN,
+        )
+
+
+def _is_rest_pose(text: str, joints: int) -> bool:
+    try:
+        rest = np.array(json.loads(text), dtype=np.float32)
+    except (ValueError, TypeError):
+        return False
+    return rest.shape == (joints, 4) and bool(_are_unit(rest))
+
+
+def _port_complaints(
+    kind: str, found: Sequence[Any], wanted: dict[str, tuple[str, list[int]]]
+) -> Iterator[Complaint]:
+    """Inputs or outputs that are missing, unknown, of another type or another shape."""
+    by_name = {port.name: port for port in found}
+    for name in by_name.keys() - wanted.keys() if kind == "input" else ():
+        yield f"It has an {kind} '{name}' that the box does not know.", _EXPORT_AGAIN
+    for name, (dtype, shape) in wanted.items():
+        port = by_name.get(name)
+        if port is None:
+            yield f"It has no {kind} '{name}'.", _EXPORT_AGAIN
+        elif port.type != dtype:
+            yield f"Its {kind} '{name}' is a {port.type}, not a {dtype}.", _EXPORT_AGAIN
+        elif not _fits(port.shape, shape):
+            yield f"Its {kind} '{name}' has the shape {port.shape}, not {shape}.", _EXPORT_AGAIN
+
+
+def _fits(found: Sequence[int | str | None], wanted: Sequence[int]) -> bool:
+    """Dimensions that the file leaves open fit."""
+    return len(found) == len(wanted) and all(
+        not isinstance(size, int) or size == right for size, right in zip(found, wanted, strict=True)
+    )
+
+
+def _run_complaints(session: Any, rest: list[list[float]]) -> Iterator[Complaint]:
+    """One pass over the rest pose: a damaged file gives numbers that are no poses."""
+    joints = len(rest)
+    feed = {
+        "window": np.tile(np.array(rest, np.float32), (WINDOW, 1, 1)),
+        "mask": np.zeros(joints, bool),
+        "targets": np.array(rest, np.float32),
+        "weights": np.zeros(joints, np.float32),
+        "coding_iterations": np.array(1, np.int64),
+        "interaction_iterations": np.array(0, np.int64),
+    }
+    try:
+        (poses,) = session.run(["poses"], feed)
+    except Exception as error:
+        yield f"It fails when it runs ({str(error).splitlines()[0][:120]}).", _COPY_AGAIN
+        return
+    if poses.shape != (WINDOW, joints, 4):
+        yield f"It gives poses of the shape {poses.shape}, not {(WINDOW, joints, 4)}.", _EXPORT_AGAIN
+    elif not _are_unit(poses):
+        yield (
+            "It gives numbers that are no rotations (a damaged file, or one that learned nothing).",
+            _COPY_AGAIN,
+        )
+
+
+def _are_unit(quaternions: np.ndarray) -> bool:
+    """Whether all are finite and of length 1."""
+    return bool(np.all(np.abs(np.linalg.norm(quaternions, axis=-1) - 1.0) < UNIT_TOLERANCE))

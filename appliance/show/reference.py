@@ -1,0 +1,113 @@
+"""docs/configuration.md from the models: `python -m appliance.show.reference > docs/configuration.md`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from appliance.show import describe
+from appliance.show.box import BoxConfig
+from appliance.show.section import Section
+from appliance.show.show import ShowConfig
+
+_INTRODUCTION = """\
+# Configuration
+
+<!-- Made from the models by `python -m appliance.show.reference`; edit their descriptions, not this page. -->
+
+Two YAML files. `show.yaml` belongs to the artist and lies in the show bundle; `box.yaml` belongs to the
+venue and is given with `--box`. Every key may be left out unless it is marked **needed**. An unknown key, a
+word in place of a number or a value out of bounds is refused with file, line, the nearest known key and what
+to do; all faults of a file are listed at once. `bunraku check SHOW --box FILE` tells without dancing.
+
+Numbers are written without quotes and without an exponent (`0.001`). Orientations are unit quaternions in
+the order w, x, y, z. Axes are right-handed with Y up, lengths in metres. Addresses are IPv4 in numbers,
+because looking up a name could hold up the show.
+"""
+
+_SHOW_EXAMPLE = """\
+```yaml
+name: An evening with one sensor
+dancer:
+  coding_iterations: 10       # more: away from the phrase, towards the dancer's habits
+  interaction_iterations: 9   # the last pass is free, so nothing mirrors the hand
+motion:
+  crossfade_s: 0.5
+hands:
+  - sensor: left-wrist
+    joint: lShldr
+  - turning: {axis: [0, 1, 0], seconds_per_turn: 5}
+    joint: head
+    weight: 0.5
+```
+"""
+
+_BOX_EXAMPLE = """\
+```yaml
+sensors:
+  udp: {host: 0.0.0.0, port: 9750}
+  keys: sensors.keys
+outputs:
+  osc:
+    - {host: 192.168.0.20, port: 9004, dialect: ai-toolbox}
+    - {host: 192.168.0.21, port: 39539, dialect: vmc}
+```
+"""
+
+
+def reference() -> str:
+    """The whole page."""
+    parts = [
+        _INTRODUCTION,
+        "## show.yaml\n",
+        _SHOW_EXAMPLE,
+        *_tables(ShowConfig, ""),
+        "## box.yaml\n",
+        "Without a box file everything is at its default: all on this machine alone.\n",
+        _BOX_EXAMPLE,
+        *_tables(BoxConfig, ""),
+    ]
+    return "\n".join(parts)
+
+
+def _tables(model: type[Section], path: str) -> list[str]:
+    """This section's table and those of the sections in it."""
+    parts = [f"### {path}\n\n{model.__doc__}\n"] if path else []
+    rows = ["| key | value | default | meaning |", "|---|---|---|---|"]
+    rows += [_row(name, field) for name, field in model.model_fields.items()]
+    parts.append("\n".join(rows) + "\n")
+    for name, field in model.model_fields.items():
+        below = describe.section(field.annotation)
+        if below:
+            place = f"{path}.{name}" if path else name
+            parts += _tables(below, f"{place}[ ]" if describe.is_list(field.annotation) else place)
+    return parts
+
+
+def _row(name: str, field: FieldInfo) -> str:
+    limits = describe.bounds(field)
+    value = describe.kind(field.annotation) + (f", {limits}" if limits else "")
+    return f"| `{name}` | {value} | {_default(field)} | {field.description} |"
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "**needed**"
+    return _shown(field.get_default(call_default_factory=True, validated_data={}))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, BaseModel):
+        return "its own defaults"
+    if isinstance(value, list) and value:
+        return "one receiver with the defaults below"
+    if isinstance(value, tuple):
+        return f"`[{', '.join(f'{part:g}' for part in value)}]`"
+    words = {None: "null", True: "true", False: "false", "": '""'}
+    return f"`{words[value] if isinstance(value, bool) or value in (None, '') else value}`"
+
+
+if __name__ == "__main__":
+    print(reference(), end="")

@@ -1,0 +1,91 @@
+"""box.yaml: defaults on loopback, files beside it, faults with their line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.config_error import ConfigError
+
+
+def box(directory: Path, text: str) -> BoxConfig:
+    path = directory / "box.yaml"
+    path.write_text(text)
+    return load_box(path)
+
+
+def test_without_a_file_everything_is_on_this_machine() -> None:
+    config = load_box(None)
+    assert config.sensors.udp is not None and config.control is not None
+    (receiver,) = config.outputs.osc
+    assert {config.sensors.udp.host, config.control.host, receiver.host} == {"127.0.0.1"}
+    assert (config.sensors.udp.port, config.control.port, receiver.port) == (9750, 9002, 9004)
+    assert (receiver.dialect, receiver.frame_message) == ("ai-toolbox", False)
+    assert config.limits.tick_budget_ms == 10.0
+    assert config.realtime.enabled and config.realtime.priority == 70
+    assert config.sensors.keys is None and config.journal.file is None and config.phase_lock
+
+
+def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
+    assert box(tmp_path, "# nothing yet\n") == load_box(None)
+
+
+def test_everything_can_be_said(tmp_path: Path) -> None:
+    config = box(
+        tmp_path,
+        "sensors:\n"
+        "  udp: {host: 0.0.0.0, port: 9751}\n"
+        "  serial: [{device: /dev/ttyACM0, baud: 9600}]\n"
+        "  keys: state/sensors.keys\n"
+        "outputs:\n"
+        "  osc:\n"
+        "    - {host: localhost, port: 1234, dialect: vmc, frame_message: yes}\n"
+        "    - {host: 10.0.0.7, dialect: joint}\n"
+        "control: null\n"
+        "limits: {tick_budget_ms: 8, late_ms: 12.5}\n"
+        "realtime: {priority: 40, enabled: false}\n"
+        "phase_lock: off\n"
+        "journal: {file: /var/lib/bunraku/journal, minutes: 5}\n",
+    )
+    assert config.sensors.keys == tmp_path / "state" / "sensors.keys"
+    assert config.journal.file == Path("/var/lib/bunraku/journal")
+    assert [(r.host, r.port, r.dialect, r.frame_message) for r in config.outputs.osc] == [
+        ("127.0.0.1", 1234, "vmc", True),
+        ("10.0.0.7", 9004, "joint", False),
+    ]
+    assert config.control is None and not config.phase_lock and not config.realtime.enabled
+    assert config.sensors.serial[0].baud == 9600
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("sensors:\n  upd: null", 2, ["Unknown key 'upd' in 'sensors'", "Did you mean 'udp'?"]),
+        ("outputs:\n  osc:\n    - prot: 9004", 3, ["Unknown key 'prot' in 'outputs.osc[0]'", "'port'?"]),
+        ("outputs:\n  osc:\n    - port: 70000", 3, ["'outputs.osc[0].port' is 70000", "Write 1 to 65535."]),
+        ("outputs:\n  osc:\n    - port: 0", 3, ["is 0, out of range"]),
+        ("outputs:\n  osc:\n    - dialect: vcm", 3, ["not one of ai-toolbox, joint, vmc", "mean 'vmc'?"]),
+        ("outputs:\n  osc:\n    - host: touch.local", 3, ["'touch.local' is not an IPv4", "192.168.0.20"]),
+        ("outputs:\n  osc:\n    - host: 300.1.1.1", 3, ["is not an IPv4 address"]),
+        ("outputs: {osc: [{port: 1},\n {port: 1}]}", 2, ["stands here twice"]),
+        ("limits: {tick_budget_ms: 19}", 1, ["Write 0.5 to 18."]),
+        ("realtime:\n  priority: 100", 2, ["Write 1 to 99."]),
+        ("phase_lock: 1", 1, ["which is not true or false"]),
+        ("journal: {minutes: -1}", 1, ["Write 0.1 to 1440."]),
+        ("sensors: {keys: [a]}", 1, ["a list of 1, which is not a file name or null"]),
+        ("sensors: {serial: [{baud: 9600}]}", 1, ["'sensors.serial[0].device' is missing"]),
+    ],
+)
+def test_a_fault_is_named_with_its_line(tmp_path: Path, text: str, line: int, words: list[str]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        box(tmp_path, text + "\n")
+    assert (caught.value.file, caught.value.line) == (tmp_path / "box.yaml", line)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_missing_file_is_said(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_box(tmp_path / "box.yaml")
