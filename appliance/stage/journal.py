@@ -58,7 +58,7 @@ class Journal:
         self.path = path
         dtype = _record(len(skeleton.names), len(hands))
         self.capacity = max(_CHUNK_TICKS, int(minutes * 60.0 / TICK_S))
-        header = _header(skeleton, hands, self.capacity)
+        header = _header(skeleton, hands, self.capacity, dtype)
         self._map = _mapped(path, header, _HEADER_BYTES + self.capacity * dtype.itemsize)
         ring = np.frombuffer(self._map, dtype, self.capacity, _HEADER_BYTES)
         self._itemsize = dtype.itemsize
@@ -100,7 +100,7 @@ def read_journal(path: Path) -> JournalRecording:
         )
     try:
         header = json.loads(data[len(_MAGIC) : _HEADER_BYTES].rstrip(b"\0"))
-        dtype = _record(len(header["joints"]), len(header["hands"]))
+        dtype = np.dtype([(name, form, tuple(shape)) for name, form, shape in header["record"]])
     except (ValueError, KeyError, TypeError) as error:
         raise JournalError(f"{path}: its header is damaged ({error}). The journal cannot be read.") from error
     count = min(int(header["capacity"]), (len(data) - _HEADER_BYTES) // dtype.itemsize)
@@ -131,9 +131,15 @@ def _record(joints: int, hands: int) -> np.dtype[np.void]:
     )
 
 
-def _header(skeleton: Skeleton, hands: Sequence[dict[str, Any]], capacity: int) -> bytes:
+def _header(
+    skeleton: Skeleton, hands: Sequence[dict[str, Any]], capacity: int, record: np.dtype[np.void]
+) -> bytes:
+    """Facts of the run as JSON, with the record's fields: whoever reads the file needs no other knowledge."""
+    fields = [(name, record[name].base.str, record[name].shape) for name in record.names or ()]
     facts = {
         "capacity": capacity,
+        "header_bytes": _HEADER_BYTES,
+        "record": fields,
         "tick_s": TICK_S,
         "sections": SECTIONS,
         "hands": list(hands),

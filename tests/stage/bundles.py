@@ -33,7 +33,8 @@ WINDOW = 8
 
 
 def write_show(folder: Path, hands: list[dict[str, object]] | None = None, network: str = "plain") -> Path:
-    """A bundle with a phrase of three seconds. Networks: plain (shows the targets), broken (not a number)."""
+    """A bundle with a phrase of three seconds. Networks: plain (shows the targets), broken
+    (not a number), heavy (takes milliseconds)."""
     folder.mkdir(parents=True, exist_ok=True)
     phrase = swaying_phrase()
     write_bvh(folder / "phrase.bvh", phrase)
@@ -90,8 +91,16 @@ def _network(kind: str) -> onnx.ModelProto:
         helper.make_node("Cast", ["coding_iterations"], ["coding"], to=TensorProto.FLOAT),
         helper.make_node("Cast", ["interaction_iterations"], ["interaction"], to=TensorProto.FLOAT),
         helper.make_node("Add", ["coding", "interaction"], ["sum"]),
-        helper.make_node("Reshape", ["sum", "one"], ["latent"]),
+        helper.make_node("Reshape", ["sum", "one"], ["latent" if kind != "heavy" else "light"]),
     ]
+    if kind == "heavy":  # three products of 400 x 400 matrices: some milliseconds everywhere
+        constants.append(helper.make_tensor("square", TensorProto.INT64, [2], np.array([400, 400])))
+        nodes += [
+            helper.make_node("Expand", ["light", "square"], ["matrix0"]),
+            *(helper.make_node("MatMul", [f"matrix{k}", f"matrix{k}"], [f"matrix{k + 1}"]) for k in range(3)),
+            helper.make_node("ReduceMax", ["matrix3"], ["largest"], keepdims=0),
+            helper.make_node("Reshape", ["largest", "one"], ["latent"]),
+        ]
     graph = helper.make_graph(nodes, kind, inputs, outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
     model.ir_version = 9

@@ -1,0 +1,178 @@
+"""The command: what people can mend is one clear message and status 2; plug-ins cost only themselves."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+import typer
+
+from appliance.cli import main, plug_in
+from appliance.pose.bvh import write_bvh
+from appliance.show.bundle import write_checksums
+from appliance.stage.journal import Journal
+from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    assert ended.value.code == 2
+    words = capsys.readouterr().err
+    assert "Traceback" not in words
+    return words
+
+
+def succeeded(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    assert not ended.value.code
+    return capsys.readouterr().out
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert succeeded(capsys, "version").startswith("bunraku ")
+
+
+def test_help_names_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    words = succeeded(capsys, "--help")
+    assert all(command in words for command in ("play", "check", "filmstrip", "version"))
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "complaint"),
+    [
+        ("show.yaml", "name: x\ndancers: {}\n", r"show.yaml:2.*Unknown key 'dancers'.*'dancer'"),
+        (
+            "show.yaml",
+            "name: x\ndancer: {coding_iterations: 100}\n",
+            r"show.yaml:2.*coding_iterations' is 100",
+        ),
+        ("show.yaml", "name: x\nhands: [{sensor: a, joint: lShlder}]\n", "lShldr"),
+        ("show.yaml", "name: x\ndancer: {network: other.onnx}\n", "no file 'other.onnx'"),
+        ("puppet.onnx", "nonsense", "puppet.onnx.*cannot read this network"),
+        ("phrase.bvh", "HIERARCHY\n", "phrase.bvh"),
+    ],
+)
+def test_a_broken_show_is_refused_with_file_and_cause(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, text: str, complaint: str
+) -> None:
+    show = write_show(tmp_path / "show")
+    (show / file).write_text(text)
+    words = refused(capsys, "play", "--show", str(show), "--seconds", "1")
+    assert re.search(complaint, words.replace("\n", " "))
+
+
+def test_a_broken_box_file_is_refused_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    box = tmp_path / "box.yaml"
+    box.write_text("limits:\n  tick_budget: 5\n")
+    words = refused(capsys, "play", "--show", str(write_show(tmp_path / "show")), "--box", str(box))
+    assert "box.yaml:2" in words
+    assert "tick_budget_ms" in words
+
+
+def test_a_phrase_shorter_than_a_window_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    show = write_show(tmp_path / "show")
+    write_bvh(show / "phrase.bvh", swaying_phrase().excerpt(0.0, 0.1))
+    words = refused(capsys, "play", "--show", str(show), "--seconds", "1")
+    assert "5 poses" in words
+
+
+def test_check_passes_a_whole_show_and_says_what_it_costs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    show = write_show(tmp_path / "show")
+    write_checksums(show)
+    words = succeeded(capsys, "check", str(show))
+    assert "the bundle is whole" in words
+    assert "3 coding iterations cost" in words
+
+
+def test_check_refuses_a_changed_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    show = write_show(tmp_path / "show")
+    write_checksums(show)
+    (show / "phrase.bvh").write_text((show / "phrase.bvh").read_text() + "\n")
+    assert "phrase.bvh" in refused(capsys, "check", str(show))
+
+
+def test_check_refuses_iterations_that_the_budget_cannot_hold(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    show = write_show(tmp_path / "show", network="heavy")
+    write_checksums(show)
+    box = tmp_path / "box.yaml"
+    box.write_text("limits: {tick_budget_ms: 0.5}\n")
+    assert "3 coding iterations do not fit" in refused(capsys, "check", str(show), "--box", str(box))
+
+
+def test_a_filmstrip_of_a_recording_and_of_a_journal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    show = write_show(tmp_path / "show")
+    journal = Journal(tmp_path / "night.journal", FIGURE, [{"joint": "lShldr"}], minutes=0.2)
+    for tick in range(100):
+        journal.field["tick"][journal.row] = tick
+        journal.field["pose"][journal.row] = (1, 0, 0, 0)
+        journal.commit()
+    journal.close()
+    for source in (show / "phrase.bvh", tmp_path / "night.journal"):
+        picture = tmp_path / "picture.png"
+        assert str(picture) in succeeded(
+            capsys, "filmstrip", str(source), "--out", str(picture), "--seconds", "1"
+        )
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        picture.unlink()
+
+
+def test_a_filmstrip_of_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "cannot be read" in refused(capsys, "filmstrip", str(tmp_path / "absent.journal"))
+    show = write_show(tmp_path / "show")
+    assert "nothing was danced" in refused(capsys, "filmstrip", str(show / "phrase.bvh"), "--start", "99")
+
+
+def test_a_broken_plug_in_costs_only_its_own_commands() -> None:
+    app, said = typer.Typer(), []
+    broken = EntryPoint("studio", "tests.stage.no_such_module:app", "bunraku.commands")
+    plug_in(app, [broken], said.append)
+    [words] = said
+    assert words.startswith("bunraku: the commands of 'studio' are not available here (No module named")
+
+
+def test_a_plug_in_adds_its_commands_beside_the_others() -> None:
+    app = typer.Typer()
+    plug_in(app, [EntryPoint("mine", "tests.stage.test_cli:plugged", "bunraku.commands")], print)
+    command = typer.main.get_command(app)
+    assert "emote" in command.commands
+
+
+plugged = typer.Typer()
+
+
+@plugged.command()
+def emote() -> None:
+    """A command of a plug-in."""
+
+
+@plugged.command()
+def rest() -> None:
+    """Another one."""
+
+
+def test_the_box_starts_without_torch_and_without_the_plug_ins() -> None:
+    code = (
+        "import sys; sys.modules['torch'] = None\n"
+        "from appliance.cli import main\n"
+        "try: main(['version'])\n"
+        "except SystemExit: pass\n"
+        "print(sorted(m for m in sys.modules if m.startswith(('hw_sim', 'appliance.studio', 'onnxruntime'))))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"

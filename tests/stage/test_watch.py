@@ -1,0 +1,75 @@
+"""Each change is said once: what happened, what the audience sees, what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from appliance.sensor.link import SensorReading
+from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
+from appliance.show.show import load_show
+from appliance.stage.cast import Cast, assemble
+from appliance.stage.watch import Watch
+from hw_sim.osc_receiver import OscReceiver
+from tests.stage.bundles import write_show
+
+
+@pytest.fixture
+def receiver() -> Iterator[OscReceiver]:
+    with OscReceiver("127.0.0.1") as receiver:
+        yield receiver
+
+
+@pytest.fixture
+def cast(tmp_path: Path, receiver: OscReceiver) -> Iterator[Cast]:
+    box = BoxConfig(
+        sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[OscConfig(port=receiver.port)])
+    )
+    cast = assemble(load_show(write_show(tmp_path / "show")), box)
+    yield cast
+    cast.close()
+
+
+def hear(cast: Cast, at: float) -> None:
+    cast.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, at, at, 90, 255))
+
+
+def test_a_silent_sensor_and_its_return(cast: Cast) -> None:
+    watch = Watch(cast)
+    assert list(watch.news(10.0)) == []  # never heard: the introduction and the status line say so
+    hear(cast, 11.0)
+    assert list(watch.news(11.1)) == []
+    assert list(watch.news(11.5 + 0.001)) == [
+        "Sensor left-wrist silent for 0.5 s. The dancer moves freely. Check its battery."
+    ]
+    assert list(watch.news(12.5)) == []
+    hear(cast, 13.0)
+    assert list(watch.news(13.1)) == ["Sensor left-wrist is back. It takes its joint again."]
+
+
+def test_a_receiver_that_goes_and_comes_back(cast: Cast, receiver: OscReceiver) -> None:
+    watch = Watch(cast)
+    counters = cast.outputs.receivers[0]
+    assert list(watch.news(1.0)) == []
+    counters.dropped += 3
+    counters.last_error = "nobody listens on that port"
+    [words] = watch.news(2.0)
+    assert f"127.0.0.1:{receiver.port}" in words
+    assert "nobody listens on that port" in words
+    counters.dropped += 3
+    assert list(watch.news(3.0)) == []
+    [words] = watch.news(4.0)
+    assert "gets the dance again" in words
+
+
+def test_a_network_that_fails_and_recovers(cast: Cast) -> None:
+    watch = Watch(cast)
+    cast.puppet.is_broken = True
+    [words] = watch.news(1.0)
+    assert "holds the last good pose" in words
+    assert list(watch.news(2.0)) == []
+    cast.puppet.is_broken = False
+    [words] = watch.news(3.0)
+    assert "gives poses again" in words
