@@ -1,0 +1,173 @@
+"""A lit figure: rounded cones met by parallel rays, in plain numpy.
+
+View coordinates are metres to the right, upwards and towards the viewer; there is no perspective.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from appliance.pose.body import Cones
+from appliance.pose.quaternion import Array
+
+
+def _unit(*v: float) -> Array:
+    unit: Array = np.array(v) / np.linalg.norm(v)
+    return unit
+
+
+KEY_LIGHT = _unit(-0.55, 0.62, 0.56)
+HALFWAY = _unit(*(KEY_LIGHT + np.array([0, 0, 1])))  # between the light and the eye: where it glosses
+KEY = np.array([1.0, 0.94, 0.84])
+SKY = np.array([0.30, 0.35, 0.46])
+GROUND = np.array([0.20, 0.14, 0.12])
+RIM = np.array([0.42, 0.58, 0.92])
+SUPERSAMPLE = 2
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture of width x height pixels; the one at (x0, y0) from the top left shows the origin."""
+
+    width: int
+    height: int
+    x0: float
+    y0: float
+    pixels_per_metre: float
+
+    def rays(self, finer: int) -> tuple[Array, Array]:
+        """Metres to the right (columns,) and upwards (rows,) of the centres of finer x finer subpixels."""
+        columns = (np.arange(self.width * finer) + 0.5) / finer - self.x0
+        rows = self.y0 - (np.arange(self.height * finer) + 0.5) / finer
+        return columns / self.pixels_per_metre, rows / self.pixels_per_metre
+
+
+def render(cones: Cones, colours: Array, frame: Frame) -> Array:
+    """Picture (height, width, 4), alpha premultiplied, of cones in view coordinates; colours (C, 3) 0..1."""
+    right, up = frame.rays(SUPERSAMPLE)
+    depth = np.full((len(up), len(right)), -np.inf)
+    normals = np.zeros((*depth.shape, 3))
+    paint = np.zeros((*depth.shape, 3))
+    for number in range(len(cones.joint)):
+        a, b = cones.start[number], cones.end[number]
+        ra, rb = cones.start_radius[number], cones.end_radius[number]
+        low, high = np.minimum(a - ra, b - rb), np.maximum(a + ra, b + rb)
+        columns = slice(*np.searchsorted(right, [low[0], high[0]]))
+        rows = slice(*np.searchsorted(-up, [-high[1], -low[1]]))
+        if columns.start == columns.stop or rows.start == rows.stop:
+            continue
+        x, y = np.meshgrid(right[columns], up[rows])
+        near, normal = _meet(x, y, a, b, float(ra), float(rb))
+        front = near > depth[rows, columns]
+        depth[rows, columns][front] = near[front]
+        normals[rows, columns][front] = normal[front]
+        paint[rows, columns][front] = colours[number]
+    if not (hit := np.isfinite(depth)).any():
+        return np.zeros((frame.height, frame.width, 4))
+    lit = np.zeros((*depth.shape, 4))
+    lit[hit, :3] = _shade(normals[hit], paint[hit]) * _openness(depth, frame)[hit, None]
+    lit[hit, 3] = 1.0
+    shape = (frame.height, SUPERSAMPLE, frame.width, SUPERSAMPLE, 4)
+    averaged: Array = lit.reshape(shape).mean(axis=(1, 3))
+    return averaged
+
+
+def floor_shadow(cones: Cones, floor: float, lift: float, frame: Frame) -> Array:
+    """Darkness (height, width) 0..1 that world cones (y up) throw on the floor; softer from higher up.
+
+    The rows of the frame run over the floor: a metre of depth is `lift` metres of the picture.
+    """
+    right, up = frame.rays(1)
+    x, z = np.meshgrid(right, -up / lift)
+    darkness = np.zeros(x.shape)
+    for number in range(len(cones.joint)):
+        ends = np.stack([cones.start[number], cones.end[number]])
+        above = ends[:, 1] - floor
+        (ax, az), (bx, bz) = ends[:, [0, 2]] + above[:, None] * np.array([0.30, -0.20])
+        length = (bx - ax) ** 2 + (bz - az) ** 2 + 1e-12
+        along = np.clip(((x - ax) * (bx - ax) + (z - az) * (bz - az)) / length, 0, 1)
+        distance = np.hypot(x - ax - along * (bx - ax), z - az - along * (bz - az))
+        radius = cones.start_radius[number] * (1 - along) + cones.end_radius[number] * along
+        softness = 0.03 + 0.22 * np.maximum(above[0] * (1 - along) + above[1] * along, 0)
+        edge = np.clip((radius + softness - distance) / (2 * softness), 0, 1)
+        strength = radius / (radius + 0.5 * softness)
+        darkness = np.maximum(darkness, strength * edge * edge * (3 - 2 * edge))
+    return darkness
+
+
+def _meet(x: Array, y: Array, a: Array, b: Array, ra: float, rb: float) -> tuple[Array, Array]:
+    """Nearest depth (..) and normal (.., 3) where rays along -z meet a rounded cone; -inf beside it.
+
+    The ray against the cone's side is a quadratic; the rounded ends are two spheres.
+    """
+    depth, normal = np.full(x.shape, -np.inf), np.zeros((*x.shape, 3))
+    for centre, radius in ((a, ra), (b, rb)):
+        dx, dy = x - centre[0], y - centre[1]
+        inside = radius * radius - dx * dx - dy * dy
+        dz = np.sqrt(np.maximum(inside, 0))
+        front = (inside > 0) & (centre[2] + dz > depth)
+        depth[front] = (centre[2] + dz)[front]
+        normal[front] = np.stack([dx, dy, dz], axis=-1)[front] / radius
+    bone = b - a
+    m0, rr = float(bone @ bone), ra - rb
+    d2 = m0 - rr * rr
+    if d2 <= 1e-12:
+        return depth, normal
+    far = max(a[2], b[2]) + ra + rb  # rays start here and run along -z
+    oa = np.stack([x - a[0], y - a[1], np.full(x.shape, far - a[2])], axis=-1)
+    m1, m2, m3, m5 = oa @ bone, -float(bone[2]), -oa[..., 2], np.sum(oa * oa, axis=-1)
+    k2 = d2 - m2 * m2
+    k1 = d2 * m3 - m1 * m2 + m2 * rr * ra
+    k0 = d2 * m5 - m1 * m1 + m1 * rr * ra * 2 - m0 * ra * ra
+    h = k1 * k1 - k0 * k2
+    if abs(k2) < 1e-12:
+        return depth, normal
+    t = (-np.sqrt(np.maximum(h, 0)) - k1) / k2
+    along = m1 - ra * rr + t * m2
+    front = (h >= 0) & (along > 0) & (along < d2) & (far - t > depth)
+    depth[front] = (far - t)[front]
+    oa[..., 2] -= t
+    side = d2 * oa[front] - bone * along[front][:, None]
+    normal[front] = side / np.linalg.norm(side, axis=-1, keepdims=True)
+    return depth, normal
+
+
+def _shade(normal: Array, paint: Array) -> Array:
+    """Colour (P, 3) of matt surfaces with a key light, sky and floor around, a cool rim and a soft gloss."""
+    facing = normal @ KEY_LIGHT
+    key = np.clip((facing + 0.25) / 1.25, 0, 1)[:, None] ** 1.4
+    upward = (0.5 + 0.5 * normal[:, 1])[:, None]
+    edge = np.clip(1 - normal[:, 2], 0, 1)[:, None]
+    rim = edge**3 * np.clip(0.35 + 0.65 * (normal @ _unit(0.8, 0.35, -0.3)), 0, 1)[:, None]
+    gloss = np.clip(normal @ HALFWAY, 0, 1)[:, None] ** 40
+    light = 0.95 * key * KEY + upward * SKY + (1 - upward) * GROUND
+    colour: Array = np.clip(paint * light + 0.55 * rim * RIM + 0.16 * gloss * KEY, 0, 1)
+    return colour
+
+
+def _openness(depth: Array, frame: Frame) -> Array:
+    """How much light reaches each subpixel past what stands in front of it, 0..1."""
+    near = depth.reshape(frame.height, SUPERSAMPLE, frame.width, SUPERSAMPLE).max(axis=(1, 3))
+    hit = np.isfinite(near)
+    surface = np.where(hit, near, near[hit].min() - 0.3)
+    openness = np.ones(near.shape)
+    for metres, strength in ((0.03, 0.3), (0.10, 0.4)):
+        around = surface
+        for axis in (0, 1, 0, 1):
+            around = _box_mean(around, max(1, round(metres * frame.pixels_per_metre)), axis)
+        openness *= 1 - strength * np.clip((around - surface) / (2 * metres), 0, 1)
+    return openness.repeat(SUPERSAMPLE, axis=0).repeat(SUPERSAMPLE, axis=1)
+
+
+def _box_mean(values: Array, reach: int, axis: int) -> Array:
+    """Mean over 2 * reach + 1 neighbours along an axis, the edges repeated."""
+    padding = [(0, 0)] * values.ndim
+    padding[axis] = (reach + 1, reach)
+    sums = np.cumsum(np.pad(values, padding, mode="edge"), axis=axis)
+    width = 2 * reach + 1
+    count = values.shape[axis]
+    upper = np.take(sums, np.arange(width, width + count), axis=axis)
+    mean: Array = (upper - np.take(sums, np.arange(count), axis=axis)) / width
+    return mean
