@@ -51,8 +51,8 @@ class Puppeteer(ABC):
         return self._target.weight > 0.0
 
     def pull(self, now: float) -> Target:
-        """The target at this moment; time never runs backwards from one pull to the next."""
-        elapsed = 0.0 if self._pulled_at is None else now - self._pulled_at
+        """The target at this moment; it stands still where the time does not go on."""
+        elapsed = 0.0 if self._pulled_at is None else max(0.0, now - self._pulled_at)
         self._pulled_at = now
         self._point(self._target.orientation, now, elapsed)
         if self._holds(now):

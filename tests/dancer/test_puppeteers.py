@@ -1,0 +1,238 @@
+"""Hands: what they hold, how they take it and let go, and what the puppet gets of it."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from appliance.dancer.puppeteers import FixedOrientation, HandError, Hands, Remote, TurningAxis, WornSensor
+from appliance.pose import quaternion
+from tests.dancer.conftest import random_quaternions
+
+TICK_S = 0.02
+JOINTS = ("hip", "lShldr", "rShldr", "head")
+LEFT = tuple(quaternion.from_axis_angle([0, 1, 0], 0.5).tolist())
+RIGHT = tuple(quaternion.from_axis_angle([0, 1, 0], -0.7).tolist())
+
+
+def weights(puppeteer: WornSensor | Remote, start_s: float, end_s: float) -> np.ndarray:
+    """Its weight at each tick of a time."""
+    ticks = np.arange(round(start_s / TICK_S), round(end_s / TICK_S))
+    return np.array([puppeteer.pull(tick * TICK_S).weight for tick in ticks])
+
+
+def worn(until_s: float, orientation: tuple[float, ...] = LEFT) -> WornSensor:
+    """A sensor that was heard at every tick up to a time."""
+    sensor = WornSensor("lShldr")
+    sensor.pull(0.0)
+    for tick in range(1, round(until_s / TICK_S) + 1):
+        sensor.hear(orientation, tick * TICK_S)
+        sensor.pull(tick * TICK_S)
+    return sensor
+
+
+def test_a_sensor_that_was_never_heard_holds_nothing() -> None:
+    assert weights(WornSensor("lShldr"), 0.0, 3.0).max() == 0.0
+
+
+def test_a_sensor_takes_its_joint_over_half_a_second() -> None:
+    sensor = WornSensor("lShldr")
+    sensor.pull(0.0)
+    course = []
+    for tick in range(1, 40):
+        sensor.hear(LEFT, tick * TICK_S)
+        course.append(sensor.pull(tick * TICK_S).weight)
+    assert course[12] == pytest.approx(0.5, abs=0.06)
+    assert course[24] == pytest.approx(1.0)
+    assert np.all(np.diff(course) >= 0)
+    assert np.diff(course).max() < 0.07
+
+
+def test_a_silent_sensor_holds_for_100_ms_then_gives_its_joint_back_over_one_second() -> None:
+    sensor = worn(1.0)
+    course = weights(sensor, 1.02, 3.0)
+    assert (course[:4] == 1.0).all()  # 1.10 s is on the edge of the 100 ms
+    assert course[4 + 25] == pytest.approx(0.5, abs=0.04)
+    assert course[4 + 46] > 0.0
+    assert (course[4 + 51 :] == 0.0).all()
+    assert np.all(np.diff(course) <= 0)
+    assert np.abs(np.diff(course)).max() < 0.04
+    assert quaternion.angle_between(sensor.pull(3.0).orientation, np.array(LEFT)) < 1e-3
+
+
+def test_a_short_silence_of_a_lifelike_network_is_hardly_seen() -> None:
+    sensor = worn(1.0)
+    assert weights(sensor, 1.02, 1.1).min() == 1.0
+    assert weights(sensor, 1.1, 1.24).min() > 0.9
+
+
+def test_after_a_silence_the_joint_is_taken_again_and_led_to_the_new_readings() -> None:
+    sensor = worn(1.0)
+    weights(sensor, 1.02, 1.6)
+    before = sensor.pull(1.6)
+    weight, orientation = before.weight, before.orientation.copy()
+    assert 0.2 < weight < 0.8
+    turns = []
+    for tick in range(81, 81 + 30):
+        sensor.hear(RIGHT, tick * TICK_S)
+        target = sensor.pull(tick * TICK_S)
+        turns.append(float(quaternion.angle_between(target.orientation, orientation)))
+        assert target.weight >= weight
+        weight, orientation = target.weight, target.orientation.copy()
+    assert weight == pytest.approx(1.0)
+    assert max(turns) < 2 * 1.2 / 25  # 1.2 rad, spread evenly over half a second
+    assert quaternion.angle_between(orientation, np.array(RIGHT)) < 1e-3
+
+
+def test_while_it_is_heard_the_target_is_the_newest_reading_at_once() -> None:
+    sensor = worn(1.0)
+    sensor.hear(RIGHT, 1.02)
+    assert quaternion.angle_between(sensor.pull(1.02).orientation, np.array(RIGHT)) < 1e-3
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_reading_counts_from_the_neutral_orientation(seed: int) -> None:
+    neutral, turn = random_quaternions(np.random.default_rng(seed), 2)
+    sensor = WornSensor("lShldr", neutral=neutral.tolist())
+    sensor.hear(quaternion.multiply(turn, neutral), 0.0)
+    assert quaternion.angle_between(sensor.pull(0.0).orientation, turn) < 1e-3
+    sensor.set_neutral(turn.tolist())
+    sensor.hear(turn, 0.02)
+    assert quaternion.angle_between(sensor.pull(0.02).orientation, quaternion.IDENTITY) < 1e-3
+
+
+@pytest.mark.parametrize("seconds", [1.0, 5.0, -2.0])
+def test_a_turning_axis_turns_at_a_constant_rate(seconds: float) -> None:
+    turning = TurningAxis("head", (0.0, 2.0, 0.0), seconds)
+    course = np.array([turning.pull(100.0 + tick * TICK_S).orientation.copy() for tick in range(1000)])
+    steps = quaternion.angle_between(course[1:], course[:-1])
+    assert steps == pytest.approx(math.tau / abs(seconds) * TICK_S, rel=1e-2)
+    after_one_turn = round(abs(seconds) / TICK_S)
+    assert quaternion.angle_between(course[after_one_turn], course[0]) < 1e-2
+    axis, _ = quaternion.to_axis_angle(course[3])
+    assert axis == pytest.approx([0.0, math.copysign(1.0, seconds), 0.0], abs=1e-5)
+
+
+def test_time_that_does_not_go_on_changes_nothing() -> None:
+    sensor = worn(1.0)
+    for now in (1.0, 0.5, 1.0):
+        assert sensor.pull(now).weight == 1.0
+
+
+def test_a_fixed_orientation_is_taken_smoothly_and_kept() -> None:
+    fixed = FixedOrientation("head", [2.0, 0.0, 0.0, 2.0], weight=0.6)
+    course = [fixed.pull(tick * TICK_S).weight for tick in range(60)]
+    assert course[0] == 0.0
+    assert course[-1] == pytest.approx(0.6)
+    assert np.diff(course).max() < 0.05
+    assert fixed.pull(2.0).orientation == pytest.approx([math.sqrt(0.5), 0, 0, math.sqrt(0.5)])
+
+
+def test_a_remote_hand_takes_and_releases() -> None:
+    remote = Remote("head")
+    assert weights(remote, 0.0, 0.5).max() == 0.0
+    remote.hold_axis_angle((0.0, 0.0, 3.0), math.pi / 2)
+    assert weights(remote, 0.5, 1.2)[-1] == pytest.approx(1.0)
+    expected = quaternion.from_axis_angle([0, 0, 1], math.pi / 2)
+    assert quaternion.angle_between(remote.pull(1.2).orientation, expected) < 1e-3
+    remote.hold(RIGHT)
+    assert quaternion.angle_between(remote.pull(1.22).orientation, np.array(RIGHT)) < 1e-3
+    remote.release()
+    course = weights(remote, 1.24, 2.4)
+    assert course[24] == pytest.approx(0.5, abs=0.05)
+    assert course[-1] == 0.0
+    assert np.abs(np.diff(course)).max() < 0.04
+    assert not remote.is_holding
+
+
+@pytest.mark.parametrize("orientation", [[0, 0, 0, 0], [1, 0, 0], [math.nan, 0, 0, 1], [math.inf, 0, 0, 0]])
+def test_what_is_no_orientation_is_refused(orientation: list[float]) -> None:
+    remote = Remote("head")
+    with pytest.raises(ValueError, match="no orientation"):
+        remote.hold(orientation)
+    assert weights(remote, 0.0, 1.0).max() == 0.0
+
+
+@pytest.mark.parametrize(("axis", "angle"), [((0, 0, 0), 1.0), ((0, 1), 1.0), ((0, 1, 0), math.inf)])
+def test_what_is_no_rotation_is_refused(axis: tuple[float, ...], angle: float) -> None:
+    with pytest.raises(ValueError, match="no rotation"):
+        Remote("head").hold_axis_angle(axis, angle)
+
+
+@pytest.mark.parametrize(("axis", "seconds"), [((0, 0, 0), 1.0), ((0, 1), 1.0), ((0, 1, 0), 0.0)])
+def test_an_axis_that_cannot_turn_is_refused(axis: tuple[float, ...], seconds: float) -> None:
+    with pytest.raises(ValueError, match=r"direction|0 seconds"):
+        TurningAxis("head", axis, seconds)
+
+
+def test_a_new_weight_is_reached_gradually() -> None:
+    fixed = FixedOrientation("head", LEFT, weight=1.0)
+    weights(fixed, 0.0, 1.0)
+    fixed.weight = 0.2
+    course = weights(fixed, 1.0, 2.0)
+    assert np.abs(np.diff(course)).max() < 0.05
+    assert course[-1] == pytest.approx(0.2)
+
+
+def test_a_remote_set_from_another_thread_is_never_seen_half() -> None:
+    remote = Remote("head")
+    hands = Hands([remote], JOINTS)
+    stop = threading.Event()
+
+    def move() -> None:
+        rng = np.random.default_rng(1)
+        while not stop.is_set():
+            remote.hold(random_quaternions(rng).tolist())
+
+    thread = threading.Thread(target=move)
+    thread.start()
+    lengths = []
+    for tick in range(3000):
+        hands.pull(tick * TICK_S)
+        lengths.append(float(np.linalg.norm(hands.targets[3])))
+    stop.set()
+    thread.join()
+    assert np.array(lengths) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_hands_gather_mask_targets_and_weights() -> None:
+    sensor = worn(1.0)
+    hands = Hands([FixedOrientation("head", RIGHT, weight=0.5), sensor, Remote("rShldr")], JOINTS)
+    for tick in range(51, 100):
+        sensor.hear(LEFT, tick * TICK_S)
+        hands.pull(tick * TICK_S)
+    assert hands.mask.tolist() == [False, True, False, True]
+    assert hands.weights == pytest.approx([0.0, 1.0, 0.0, 0.5])
+    assert hands.targets[1] == pytest.approx(LEFT)
+    assert hands.targets[3] == pytest.approx(RIGHT)
+    assert np.linalg.norm(hands.targets, axis=1) == pytest.approx(1.0)
+    assert (hands.mask.dtype, hands.targets.dtype, hands.weights.dtype) == (bool, np.float32, np.float32)
+
+
+def test_targets_have_no_sign_jumps_whatever_sign_the_readings_have() -> None:
+    rng = np.random.default_rng(2)
+    sensor, turning = WornSensor("lShldr"), TurningAxis("head", (1.0, 1.0, 0.0), 1.0)
+    hands = Hands([sensor, turning], JOINTS)
+    before = None
+    for tick in range(400):
+        reading = quaternion.from_axis_angle([0, 0, 1], 0.03 * tick).astype(np.float32)
+        sensor.hear(reading * rng.choice([-1, 1]), tick * TICK_S)
+        hands.pull(tick * TICK_S)
+        if before is not None:
+            assert np.sum(before * hands.targets, axis=1).min() > 0.9
+        before = hands.targets.copy()
+
+
+def test_a_joint_that_the_network_does_not_move_is_refused_with_the_nearest_one() -> None:
+    with pytest.raises(HandError, match=r"'lshoulder'.*'lShldr'.*hip, lShldr, rShldr, head"):
+        Hands([WornSensor("lshoulder")], JOINTS)
+
+
+def test_two_hands_on_one_joint_are_refused() -> None:
+    with pytest.raises(HandError, match="Two hands hold 'head'"):
+        Hands([Remote("head"), FixedOrientation("head", LEFT)], JOINTS)
