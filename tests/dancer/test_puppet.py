@@ -1,0 +1,199 @@
+"""The puppet's session: what goes in and comes out, and what a damaged network file does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from onnx import numpy_helper
+
+from appliance.dancer.motion_source import Playback
+from appliance.dancer.puppet import Puppet, PuppetError
+from appliance.pose import quaternion
+from appliance.pose.bvh import read_bvh
+from appliance.pose.recording import Recording
+from tests.dancer.conftest import random_quaternions
+
+
+@pytest.fixture(scope="module")
+def phrase(tiny_show: Path) -> Recording:
+    return read_bvh(tiny_show / "phrase.bvh")
+
+
+@pytest.fixture
+def puppet(tiny_show: Path, phrase: Recording) -> Puppet:
+    return Puppet(tiny_show / "puppet.onnx", phrase.skeleton)
+
+
+def free(puppet: Puppet) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mask, targets and weights of no hand at all."""
+    count = len(puppet.joints)
+    return np.zeros(count, bool), np.tile(quaternion.IDENTITY, (count, 1)), np.zeros(count, np.float32)
+
+
+def holding(puppet: Puppet, joint: str, target: np.ndarray, weight: float = 1.0) -> tuple[np.ndarray, ...]:
+    mask, targets, weights = free(puppet)
+    place = puppet.joints.index(joint)
+    mask[place], targets[place], weights[place] = True, target, weight
+    return mask, targets, weights
+
+
+def altered(source: Path, folder: Path, change: Callable[[onnx.ModelProto], object]) -> Path:
+    """A copy of a network file with something changed in it."""
+    model = onnx.load(source)
+    change(model)
+    onnx.save(model, str(folder / "altered.onnx"))
+    return folder / "altered.onnx"
+
+
+def fill_weights_with(value: float) -> Callable[[onnx.ModelProto], None]:
+    """Damage that leaves a readable file: the largest weight matrix becomes one value."""
+
+    def change(model: onnx.ModelProto) -> None:
+        largest = max(model.graph.initializer, key=lambda tensor: int(np.prod(tensor.dims)))
+        weights = np.full_like(numpy_helper.to_array(largest), value)
+        largest.CopyFrom(numpy_helper.from_array(weights, largest.name))
+
+    return change
+
+
+def test_windows_of_all_joints_go_to_the_moving_ones_and_back(puppet: Puppet, phrase: Recording) -> None:
+    window = Playback(phrase).window()
+    moving = puppet.select(window)
+    assert moving.shape == (8, len(puppet.joints), 4)
+    for place, name in enumerate(puppet.joints):
+        assert np.array_equal(moving[:, place], window[:, phrase.skeleton.index(name)])
+    whole = window[0].copy()
+    changed = random_quaternions(np.random.default_rng(0), len(puppet.joints))
+    puppet.restore(changed, whole)
+    for joint, name in enumerate(phrase.skeleton.names):
+        expected = changed[puppet.joints.index(name)] if name in puppet.joints else window[0, joint]
+        assert np.array_equal(whole[joint], expected)
+
+
+@pytest.mark.parametrize("times", [1, 3, 10])
+def test_a_dance_gives_unit_quaternions_without_sign_jumps(
+    puppet: Puppet, phrase: Recording, times: int
+) -> None:
+    poses = puppet.dance(puppet.select(Playback(phrase).window()), *free(puppet), times, times)
+    assert poses.shape == (8, len(puppet.joints), 4)
+    assert poses.dtype == np.float32
+    assert np.linalg.norm(poses, axis=-1) == pytest.approx(1.0, abs=1e-4)
+    assert np.sum(poses[1:] * poses[:-1], axis=-1).min() >= 0.0
+    assert not puppet.is_broken
+
+
+def test_iteration_counts_are_live(puppet: Puppet, phrase: Recording) -> None:
+    window = puppet.select(Playback(phrase).window())
+    once, twice, again = (puppet.dance(window, *free(puppet), times, 0) for times in (1, 2, 1))
+    assert quaternion.angle_between(once, twice).max() > 0.01
+    assert np.array_equal(once, again)
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.5])
+def test_the_held_orientation_shows_when_the_last_pass_is_held(
+    puppet: Puppet, phrase: Recording, weight: float
+) -> None:
+    window = puppet.select(Playback(phrase).window())
+    target = random_quaternions(np.random.default_rng(3))
+    hands = holding(puppet, "lShldr", target, weight)
+    place = puppet.joints.index("lShldr")
+    shown = puppet.dance(window, *hands, 3, 3)[:, place]
+    if weight == 1.0:
+        assert quaternion.angle_between(shown, target).max() < 0.01
+    free_last = puppet.dance(window, *hands, 3, 2)[:, place]
+    assert quaternion.angle_between(free_last, target).min() > 0.05
+    assert quaternion.angle_between(shown, target).max() < quaternion.angle_between(free_last, target).max()
+
+
+def test_the_mask_and_the_weight_both_release_a_joint(puppet: Puppet, phrase: Recording) -> None:
+    window = puppet.select(Playback(phrase).window())
+    untouched = puppet.dance(window, *free(puppet), 3, 2)
+    mask, targets, weights = holding(puppet, "head", random_quaternions(np.random.default_rng(4)))
+    assert (
+        quaternion.angle_between(puppet.dance(window, mask, targets, weights, 3, 2), untouched).max() > 1e-3
+    )
+    for released in ((~mask & False, targets, weights), (mask, targets, weights * 0)):
+        assert np.allclose(puppet.dance(window, *released, 3, 2), untouched, atol=1e-5)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_network_that_gives_no_numbers_is_noticed_and_the_input_goes_through(
+    tiny_show: Path, phrase: Recording, tmp_path: Path, value: float
+) -> None:
+    path = altered(tiny_show / "puppet.onnx", tmp_path, fill_weights_with(value))
+    broken = Puppet(path, phrase.skeleton)
+    window = broken.select(Playback(phrase).window())
+    poses = broken.dance(window, *free(broken), 10, 9)
+    assert broken.is_broken
+    assert np.array_equal(poses, window)
+
+
+def test_after_a_failure_the_last_sound_window_is_given(puppet: Puppet, phrase: Recording) -> None:
+    window = puppet.select(Playback(phrase).window())
+    sound = puppet.dance(window, *free(puppet), 2, 0).copy()
+    poses = puppet.dance(np.full_like(window, np.nan), *free(puppet), 2, 0)
+    assert puppet.is_broken
+    assert np.array_equal(poses, sound)
+    puppet.dance(window, *free(puppet), 2, 0)
+    assert not puppet.is_broken
+
+
+def test_facts_come_from_the_file(puppet: Puppet) -> None:
+    assert puppet.window == 8
+    assert len(puppet.joints) == 17
+    assert puppet.rest.shape == (17, 4)
+    assert np.linalg.norm(puppet.rest, axis=-1) == pytest.approx(1.0, abs=1e-4)
+    assert (puppet.architecture, puppet.precision) == ("mlp", "fp32")
+
+
+def test_a_missing_file_is_refused(tmp_path: Path, phrase: Recording) -> None:
+    with pytest.raises(PuppetError, match="no such network file"):
+        Puppet(tmp_path / "none.onnx", phrase.skeleton)
+
+
+@pytest.mark.parametrize("content", [b"", b"this is no network", bytes(range(256)) * 100])
+def test_a_file_that_is_no_network_is_refused(tmp_path: Path, phrase: Recording, content: bytes) -> None:
+    (tmp_path / "puppet.onnx").write_bytes(content)
+    with pytest.raises(PuppetError, match=r"puppet\.onnx: .*(cannot read|this network takes)"):
+        Puppet(tmp_path / "puppet.onnx", phrase.skeleton)
+
+
+def test_a_truncated_file_is_refused(tiny_show: Path, tmp_path: Path, phrase: Recording) -> None:
+    whole = (tiny_show / "puppet.onnx").read_bytes()
+    (tmp_path / "puppet.onnx").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(PuppetError, match="copy the bundle again"):
+        Puppet(tmp_path / "puppet.onnx", phrase.skeleton)
+
+
+def test_a_network_with_other_inputs_is_refused(tiny_show: Path, tmp_path: Path, phrase: Recording) -> None:
+    def rename(model: onnx.ModelProto) -> None:
+        for node in [*model.graph.input, *model.graph.node]:
+            if isinstance(node, onnx.ValueInfoProto):
+                node.name = "pose_window" if node.name == "window" else node.name
+            else:
+                node.input[:] = ["pose_window" if name == "window" else name for name in node.input]
+
+    with pytest.raises(PuppetError, match=r"takes .*pose_window.*bunraku export"):
+        Puppet(altered(tiny_show / "puppet.onnx", tmp_path, rename), phrase.skeleton)
+
+
+@pytest.mark.parametrize("key", ["bunraku.joints", "bunraku.window", "bunraku.rest"])
+def test_a_network_that_does_not_say_what_it_moves_is_refused(
+    tiny_show: Path, tmp_path: Path, phrase: Recording, key: str
+) -> None:
+    def forget(model: onnx.ModelProto) -> None:
+        kept = [fact for fact in model.metadata_props if fact.key != key]
+        del model.metadata_props[:]
+        model.metadata_props.extend(kept)
+
+    with pytest.raises(PuppetError, match="does not say what it moves"):
+        Puppet(altered(tiny_show / "puppet.onnx", tmp_path, forget), phrase.skeleton)
+
+
+def test_a_network_of_another_skeleton_is_refused_with_the_joint(tiny_show: Path, swaying: Recording) -> None:
+    with pytest.raises(PuppetError, match=r"'abdomen'.*trained on"):
+        Puppet(tiny_show / "puppet.onnx", swaying.skeleton)
