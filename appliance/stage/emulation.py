@@ -30,7 +30,7 @@ class Emulation:
         create_keys(keys, names)
         udp = box.sensors.udp or UdpConfig()
         self._command = [
-            *(sys.executable, "-m", "hw_sim", "emulate", "--keys", str(keys)),
+            *(sys.executable, "-m", "hw_sim", "emulate", "--keys", str(keys), "--motion", "dance"),
             *("--host", udp.host, "--port", str(udp.port)),
         ]
         sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})

@@ -23,7 +23,7 @@ class LossWeights:
     pace: float = 1.0
     unit_norm: float = 0.1
     position: float = 1.0
-    prior: float = 0.003
+    prior: float = 0.001
 
 
 def reconstruction_losses(

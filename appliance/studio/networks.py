@@ -257,7 +257,7 @@ class LstmAutoregressive(Network):
 
 
 NETWORKS: dict[str, tuple[Callable[[Shape], Network], dict[str, int]]] = {
-    "mlp": (Mlp, {"latent": 64, "width": 512, "depth": 1}),
+    "mlp": (Mlp, {"latent": 64, "width": 384, "depth": 1}),
     "conv": (Conv, {"latent": 64, "width": 160}),
     "lstm": (Lstm, {"latent": 32, "width": 512}),
     "lstm-autoregressive": (LstmAutoregressive, {"latent": 32, "width": 512}),

@@ -29,9 +29,9 @@ class Settings:
     width: int = 0
     depth: int = 0
     seed: int = 1
-    minutes: float = 90.0
+    minutes: float = 50.0
     steps: int = 0
-    batch: int = 512
+    batch: int = 256
     learning_rate: float = 1e-3
     critic_learning_rate: float = 5e-4
     smoothing: float = 0.999  # of the averaged weights that are kept

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -101,3 +102,12 @@ def test_bundles_are_as_few_as_they_can_be_in_order(sizes: list[int]) -> None:
     for earlier, later in itertools.pairwise(datagrams):
         first_of_later = 4 + int.from_bytes(later[16:20], "big")
         assert len(earlier) + first_of_later > MAX_DATAGRAM
+
+
+@pytest.mark.parametrize("dialect", sorted(DIALECTS))
+def test_the_documentation_names_every_address(dialect: str, skeleton: Skeleton, frame: JointFrame) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "osc.md").read_text(encoding="utf-8")
+    names = {f"/{name}/" for name in skeleton.names}
+    for address, _ in read(DIALECTS[dialect](skeleton).encode(frame)):
+        spoken = next((address.replace(name, "/<joint>/") for name in names if name in address), address)
+        assert f"`{spoken}`" in page
