@@ -9,7 +9,8 @@ import pytest
 from pydantic import ValidationError
 
 from appliance.show.config_error import ConfigError
-from appliance.show.show import DancerConfig, HandConfig, ShowConfig, load_show
+from appliance.show.dance import DancerConfig
+from appliance.show.show import HandConfig, ShowConfig, load_show
 from tests.show.conftest import NAMES
 
 ShowYaml = Callable[[str], Path]
