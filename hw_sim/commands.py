@@ -1,0 +1,153 @@
+"""`bunraku emulate`: sensors without sensors, for developers, tests and technicians."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, nullcontext
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from hw_sim import motions
+from hw_sim.casting import MOST_SENSORS, MotionKind, cast_sensors, choose_keys, name_and_motion, parse_axis
+from hw_sim.emulator import Emulator
+from hw_sim.network import PROFILES, VenueNetwork
+from hw_sim.senders import Sender, SendLog, SerialSender, UdpSender
+from hw_sim.status import StatusLine
+from hw_sim.traces import read_trace
+
+REFUSED = 2
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+
+class NetworkKind(StrEnum):
+    """What the network does."""
+
+    venue = "venue"
+    perfect = "perfect"
+    bad = "bad"
+
+
+@app.command()
+def emulate(
+    sensor: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Sensor to be, by its name; repeat for more. NAME=MOTION gives it a motion of its own."
+        ),
+    ] = None,
+    count: Annotated[
+        int | None,
+        typer.Option(min=1, max=MOST_SENSORS, help="Be the first so many sensors of the key file; else all."),
+    ] = None,
+    motion: Annotated[MotionKind, typer.Option(help="How the sensors move.")] = MotionKind.turning,
+    axis: Annotated[str, typer.Option(help="Axis x,y,z of turning and step.")] = "0,1,0",
+    seconds_per_turn: Annotated[float, typer.Option(help="Pace of turning; negative: the other way.")] = 5.0,
+    step_degrees: Annotated[float, typer.Option(help="How far a step jumps, at most 40.")] = 30.0,
+    step_every: Annotated[float, typer.Option(min=0.04, help="Seconds from step to step.")] = 1.0,
+    trace: Annotated[
+        Path | None, typer.Option(help="Recording for the motion trace: BVH, or CSV with time_s,w,x,y,z.")
+    ] = None,
+    joint: Annotated[str | None, typer.Option(help="Which joint of the BVH.")] = None,
+    host: Annotated[str, typer.Option(help="Where the box is.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Its UDP port for sensors.")] = 9750,
+    serial: Annotated[Path | None, typer.Option(help="Serial device instead of the network.")] = None,
+    baud: Annotated[int, typer.Option(min=1200, help="Speed of the serial device.")] = 115200,
+    network: Annotated[
+        NetworkKind,
+        typer.Option(
+            help="venue: Wi-Fi as measured in a theatre; perfect; bad: everything goes wrong at once."
+        ),
+    ] = NetworkKind.venue,
+    keys: Annotated[
+        Path,
+        typer.Option(help="Key file, the one that the box reads; written with fresh keys if there is none."),
+    ] = Path("sensors.keys"),
+    reboot_every: Annotated[
+        float | None, typer.Option(min=1.0, help="Seconds after which each sensor is switched off and on.")
+    ] = None,
+    drift_ppm: Annotated[
+        float, typer.Option(min=-5000, max=5000, help="How much too fast the sensors' clocks are.")
+    ] = 0.0,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.0, help="End after so long; else Ctrl-C ends it.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same dance and the same network.")] = 1,
+    log: Annotated[
+        Path | None, typer.Option(help="Write a CSV line for each datagram as it was sent.")
+    ] = None,
+) -> None:
+    """Be one to eight wearable sensors: real signed datagrams, 50 a second each, over a lifelike network.
+
+    \b
+    Try the box without a sensor (it must read the same key file):
+      bunraku emulate --sensor left-wrist --seconds-per-turn 5
+    Two dancers on a network that misbehaves:
+      bunraku emulate --sensor left-wrist=dance --sensor head=still --network bad
+    A recorded arm, over a cable:
+      bunraku emulate --motion trace --trace dance.bvh --joint lShldr --serial /dev/ttyUSB0
+    """
+
+    def motion_of(number: int, name: str) -> motions.Motion:
+        match kinds.get(name) or motion:
+            case MotionKind.turning:
+                return motions.turning(parse_axis(axis), seconds_per_turn)
+            case MotionKind.dance:
+                return motions.dance(seed + number)
+            case MotionKind.step:
+                return motions.step(parse_axis(axis), step_degrees, step_every)
+            case MotionKind.trace:
+                return read_trace(trace, joint)
+            case _:
+                return motions.still()
+
+    try:
+        wanted = [name_and_motion(words) for words in sensor or []]
+        kinds = dict(wanted)
+        chosen = choose_keys(
+            keys, [name for name, _ in wanted], count, lambda words: typer.echo(words, err=True)
+        )
+        sensors = cast_sensors(chosen, motion_of, seed, drift_ppm, reboot_every)
+        sender: Sender = UdpSender(host, port) if serial is None else SerialSender(str(serial), baud)
+    except (ValueError, OSError) as error:
+        _refuse(error)
+    where = f"{host}:{port}" if serial is None else str(serial)
+    on_air = VenueNetwork(PROFILES[network.value], seed)
+    try:
+        with (
+            _stopped_by_signals() as should_stop,
+            closing(sender),
+            SendLog(log) if log is not None else nullcontext() as on_sent,
+            StatusLine(where) as status,
+        ):
+            emulator = Emulator(sensors, sender.send, network=on_air, on_sent=on_sent)
+            emulator.run(seconds, should_stop, lambda: status.show(emulator, time.monotonic()))
+            status.end(emulator)
+    except OSError as error:
+        _refuse(error)
+
+
+@contextmanager
+def _stopped_by_signals() -> Iterator[Callable[[], bool]]:
+    """SIGTERM and Ctrl-C end the run after the datagram that is being sent."""
+    stopped: list[int] = []
+    before = {
+        number: signal.signal(number, lambda number, _: stopped.append(number))
+        for number in (signal.SIGTERM, signal.SIGINT)
+    }
+    try:
+        yield lambda: bool(stopped)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _refuse(error: Exception) -> NoReturn:
+    typer.echo(f"bunraku emulate: {error}", err=True)
+    sys.exit(REFUSED)

@@ -1,0 +1,65 @@
+"""One line on the terminal while the emulator runs, and one at its end."""
+
+from __future__ import annotations
+
+from types import TracebackType
+
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from hw_sim.emulator import Emulator
+
+NOTED = ("lost", "reordered", "duplicated", "corrupted", "unsent")
+
+
+class StatusLine:
+    """A context. The running line is drawn once a second and on a terminal only; `end` prints in any case."""
+
+    def __init__(self, where: str, console: Console | None = None) -> None:
+        self._where = where
+        self._console = console or Console(stderr=True, highlight=False)
+        self._live = Live(console=self._console, auto_refresh=False, transient=True)
+        self._next_at = 0.0
+        self._sent = 0
+        self._shown_at: float | None = None
+
+    def __enter__(self) -> StatusLine:
+        if self._console.is_terminal:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.stop()
+
+    def show(self, emulator: Emulator, now: float) -> None:
+        """Draws the line if it is a second old. `now` in seconds."""
+        if not self._console.is_terminal or now < self._next_at:
+            return
+        sent = emulator.counts["sent"]
+        rate_hz = (sent - self._sent) / (now - self._shown_at) if self._shown_at is not None else 0.0
+        names = ", ".join(sensor.name for sensor in emulator.sensors)
+        self._live.update(
+            Text(f"{names} -> {self._where}  {rate_hz:.0f}/s  {_totals(emulator)}"), refresh=True
+        )
+        self._next_at, self._sent, self._shown_at = now + 1.0, sent, now
+
+    def end(self, emulator: Emulator) -> None:
+        """Says what was sent; and, when nothing could be, what to look at."""
+        self._live.stop()
+        self._console.print(
+            f"{len(emulator.sensors)} sensor(s) -> {self._where}: {_totals(emulator)}", soft_wrap=True
+        )
+        if emulator.counts["unsent"] and not emulator.counts["sent"]:
+            self._console.print(
+                f"Nothing could be sent to {self._where}. Is it plugged in, and is the address right?"
+            )
+
+
+def _totals(emulator: Emulator) -> str:
+    counts = emulator.counts
+    parts = [f"{counts['sent']} sent", *(f"{counts[note]} {note}" for note in NOTED if counts[note])]
+    reboots = sum(sensor.reboots for sensor in emulator.sensors)
+    return ", ".join(parts + ([f"{reboots} reboots"] if reboots else []))
