@@ -81,6 +81,8 @@ class SensorLink:
         """What came since the last drain: the newest believed reading of each sensor that has one."""
         newest = self._newest
         newest.clear()
+        for sensor in self._by_device.values():
+            sensor.arrivals.clear()
         counts = self._counts
         for intake in self.intakes:
             for _ in range(DATAGRAMS_PER_DRAIN):
@@ -104,6 +106,11 @@ class SensorLink:
     def newest_arrival(self, sensor: str) -> float | None:
         """When this sensor's newest believed reading arrived, in monotonic seconds; None before the first."""
         return self._by_name[sensor].believed_arrival
+
+    def arrivals(self, sensor: str) -> Sequence[float]:
+        """When each believed reading of the last drain arrived, the overtaken ones too; none for a stranger."""
+        known = self._by_name.get(sensor)
+        return known.arrivals if known is not None else ()
 
     def close(self) -> None:
         for intake in self.intakes:
@@ -146,6 +153,7 @@ class _Sensor:
         self.name = key.name
         self.tagger = wire.Tagger(key.key)
         self.believed_arrival: float | None = None
+        self.arrivals: list[float] = []
         self.rebooted = False
         self._boot_nonce: int | None = None
         self._past_boots: dict[int, int] = {}  # boot nonce -> its newest sequence
@@ -207,6 +215,7 @@ class _Sensor:
             unit = (-w, -x, -y, -z)
         self._orientation = unit
         self.believed_arrival = arrival
+        self.arrivals.append(arrival)
         return (
             SensorReading(
                 self.name,

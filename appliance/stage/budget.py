@@ -13,7 +13,8 @@ PACED = (
     2.0  # a paced tick costs twice a back-to-back run: caches and clocks cool down in the pause (measured)
 )
 MOST_ITERATIONS = 64
-_WARM_UP = 5
+_WARM_UP = 3
+_REPEATS = 3
 _RUNS = 60
 _FEWEST_RUNS = 8
 _PATIENCE_S = 0.15  # a start may take 1.5 s in all
@@ -65,12 +66,17 @@ def admit(
 
     The free passes (coding - interaction) are kept when iterations are lowered; one iteration always runs.
     """
-    p50_ms, p99_ms = cost_ms(dance, coding, interaction, clock)
-    one_ms = p99_ms if coding == 1 else min(cost_ms(dance, 1, min(1, interaction), clock)[1], p99_ms)
+    p50_ms, p99_ms = cost_ms(dance, coding, interaction, budget_ms, clock)
+    one_ms = p99_ms
+    if coding > 1:
+        one_ms = min(cost_ms(dance, 1, min(1, interaction), budget_ms, clock)[1], p99_ms)
     most = _most_that_fits(coding, one_ms, p99_ms, budget_ms)
     if p99_ms > budget_ms and coding > 1:
         most = min(most, coding - 1)
-        while most > 1 and cost_ms(dance, most, _free_kept(coding, interaction, most), clock)[1] > budget_ms:
+        while most > 1:
+            lowered = cost_ms(dance, most, _free_kept(coding, interaction, most), budget_ms, clock)
+            if lowered[1] <= budget_ms:
+                break
             most -= max(1, most // 8)
     allowed = min(coding, most)
     return Admission(
@@ -85,8 +91,25 @@ def admit(
     )
 
 
-def cost_ms(dance: Dance, coding: int, interaction: int, clock: Callable[[], float]) -> tuple[float, float]:
-    """Median and p99 of warm runs, in milliseconds, times the price of pacing."""
+def cost_ms(
+    dance: Dance, coding: int, interaction: int, budget_ms: float, clock: Callable[[], float]
+) -> tuple[float, float]:
+    """Median and p99 of warm runs, in milliseconds, times the price of pacing.
+
+    Where the usual run fits the budget and the slowest does not, another program may have come between: the
+    measurement is repeated and the best one counts. A network that is slow now and then is slow each time.
+    """
+    best = _measured_ms(dance, coding, interaction, clock)
+    for _ in range(_REPEATS):
+        if best[1] <= budget_ms or best[0] > budget_ms:
+            break
+        best = min(best, _measured_ms(dance, coding, interaction, clock), key=lambda cost: cost[1])
+    return best
+
+
+def _measured_ms(
+    dance: Dance, coding: int, interaction: int, clock: Callable[[], float]
+) -> tuple[float, float]:
     for _ in range(_WARM_UP):
         dance(coding, interaction)
     costs: list[float] = []

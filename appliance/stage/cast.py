@@ -31,6 +31,7 @@ from appliance.sensor.udp import PortError
 from appliance.show.box import BoxConfig
 from appliance.show.show import HandConfig, Show
 from appliance.stage.budget import Admission, admit
+from appliance.stage.realtime import borrowed_priority
 from appliance.stage.stage_error import StageError
 
 
@@ -116,7 +117,10 @@ def admission(cast: Cast, show: Show, box: BoxConfig) -> Admission:
         return cast.puppet.dance(window, mask, targets, weights, coding, interaction)
 
     dancer = show.config.dancer
-    return admit(dance, dancer.coding_iterations, dancer.interaction_iterations, box.limits.tick_budget_ms)
+    with borrowed_priority(box.realtime.priority if box.realtime.enabled else None):
+        return admit(
+            dance, dancer.coding_iterations, dancer.interaction_iterations, box.limits.tick_budget_ms
+        )
 
 
 def _puppeteer(hand: HandConfig) -> Puppeteer:

@@ -7,6 +7,7 @@ import ctypes
 import gc
 import os
 import sys
+from collections.abc import Iterator
 
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 _PR_SET_TIMERSLACK = 29
@@ -33,6 +34,18 @@ def enter_realtime(priority: int) -> tuple[str, ...]:
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     missing = (_take_priority(priority), _lock_memory(), _sharpen_timers())
     return tuple(words for words in missing if words)
+
+
+@contextlib.contextmanager
+def borrowed_priority(priority: int | None) -> Iterator[None]:
+    """Real-time priority for a measurement, where it can be had (None: leave it); ordinary again after it."""
+    if priority is None or _take_priority(priority):
+        yield
+        return
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def leave_realtime() -> None:

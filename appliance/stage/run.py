@@ -118,7 +118,8 @@ class Stage:
         newest = self.cast.newest_primary
         if self.lock is None or newest is None:
             return 0.0
-        self.lock.observe(newest.arrival)
+        for arrival in self.cast.link.arrivals(newest.sensor):
+            self.lock.observe(arrival)
         if slot.started - newest.arrival > _FORGET_PHASE_S:
             self.lock.forget()
         return self.lock.shift_s(slot.deadline)
