@@ -66,10 +66,10 @@ debian-for-tests:
 	fi
 
 lock: | $(VENV)/bin/python ## choose the newest versions that pyproject.toml allows and pin them
-	@rm -rf build/lock && $(BIN)/python -m venv build/lock
+	@rm -rf build && $(BIN)/python -m venv build/lock
 	@$(call pin,pictures,requirements.txt,make run: the box and pictures)
 	@$(call pin,pictures$(comma)studio$(comma)test,requirements-test.txt,make test and make bench: everything)
-	@rm -rf build/lock
+	@rm -rf build
 
 comma := ,
 define pin

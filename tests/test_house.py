@@ -1,0 +1,147 @@
+"""The house stands: imports run one way, the box never needs torch, names and locks are as agreed."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parents[1]
+BIN = Path(sys.executable).parent
+PACKAGES = ("appliance", "hw_sim")
+LOCKS = ("requirements.txt", "requirements-test.txt")
+TOP_LEVEL = {
+    *("appliance", "firmware", "hw_sim", "deploy", "tests", "docs", ".ci"),
+    *("pyproject.toml", "README.md", "Makefile", "LICENSE", "CHANGELOG.md", ".gitignore", *LOCKS),
+}
+
+
+def tracked_files() -> list[str]:
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode != 0:
+        pytest.skip("this is no git checkout")
+    return listed.stdout.splitlines()
+
+
+def modules_of(package: str) -> list[str]:
+    paths = sorted((ROOT / package).rglob("*.py"))
+    return [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in paths
+    ]
+
+
+def test_imports_run_one_way() -> None:
+    done = subprocess.run([BIN / "lint-imports"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert re.search(r"Contracts: [1-9]\d* kept, 0 broken", done.stdout)
+
+
+# Everything that a box does not have: importing any of it fails as it would there.
+BLOCK = """
+import importlib, sys
+from importlib.abc import MetaPathFinder
+BLOCKED = {"torch", "onnx", "onnxscript", "matplotlib", "pybvh", "pytest", "hypothesis"}
+class Absent(MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in BLOCKED:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Absent())
+"""
+REPORT = """
+assert not BLOCKED & set(sys.modules), BLOCKED & set(sys.modules)
+print("imported", len(sys.argv) - 1)
+"""
+
+
+def run_blocked(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", BLOCK + code, *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_every_module_of_the_box_and_the_simulation_loads_without_torch() -> None:
+    box = [name for name in modules_of("appliance") if not name.startswith("appliance.studio")]
+    names = [name for name in [*box, *modules_of("hw_sim")] if not name.endswith("__main__")]
+    assert "appliance.stage.tick" in names
+    done = run_blocked("for name in sys.argv[1:]:\n    importlib.import_module(name)\n" + REPORT, *names)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == f"imported {len(names)}\n"
+
+
+def test_the_trap_for_torch_works() -> None:
+    assert "No module named 'torch'" in run_blocked("import torch").stderr
+
+
+def test_the_command_answers_without_torch() -> None:
+    done = run_blocked("from appliance.cli import main\nmain(['--help'])")
+    assert done.returncode == 0, done.stderr
+    for command in ("play", "check", "filmstrip", "emulate"):
+        assert re.search(rf"\b{command}\b", done.stdout), done.stdout
+
+
+def test_top_level_names_are_as_agreed() -> None:
+    assert {name.partition("/")[0] for name in tracked_files()} <= TOP_LEVEL
+
+
+@pytest.mark.parametrize("name", [name for package in PACKAGES for name in modules_of(package)])
+def test_every_module_says_in_one_line_what_it_is_for(name: str) -> None:
+    path = ROOT / Path(*name.split("."))
+    source = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+    docstring = ast.get_docstring(ast.parse(source))
+    assert docstring
+    assert docstring.splitlines()[0].endswith((".", ":", "?"))
+
+
+def pins(lock: str) -> dict[str, str]:
+    lines = [line for line in (ROOT / lock).read_text().splitlines() if not line.startswith("#")]
+    assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[A-Za-z0-9.]+", line) for line in lines), lines
+    return {canonicalize_name(name): version for name, version in (line.split("==") for line in lines)}
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_locks_pin_exactly_and_name_no_host(lock: str) -> None:
+    text = (ROOT / lock).read_text()
+    assert "://" not in text
+    assert "index" not in text.casefold()
+    assert len(pins(lock)) > 10
+
+
+@pytest.mark.parametrize(
+    ("lock", "extras"), [("requirements.txt", ["pictures"]), (LOCKS[1], ["pictures", "studio", "test"])]
+)
+def test_locks_hold_what_the_project_asks_for(lock: str, extras: list[str]) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [
+        *project["dependencies"],
+        *(r for extra in extras for r in project["optional-dependencies"][extra]),
+    ]
+    pinned = pins(lock)
+    for requirement in map(Requirement, wanted):
+        name = canonicalize_name(requirement.name)
+        assert name in pinned, f"{requirement}: run 'make lock'"
+        assert requirement.specifier.contains(pinned[name]), f"{requirement}: run 'make lock'"
+
+
+def test_both_locks_agree_and_only_one_has_torch() -> None:
+    box, everything = (pins(lock) for lock in LOCKS)
+    assert box.items() <= everything.items()
+    assert "torch" in everything
+    assert "torch" not in box
+
+
+def test_make_explains_itself_and_knows_its_targets() -> None:
+    shown = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for target in ("run", "test", "bench", "lock", "clean", "help"):
+        assert re.search(rf"^  make {target} +\S", shown, re.MULTILINE), shown
+
+
+def test_continuous_integration_runs_make_test_and_nothing_after_it() -> None:
+    lines = [line for line in (ROOT / ".ci" / "run").read_text().splitlines() if line.strip()]
+    assert "set -euo pipefail" in lines
+    assert lines[-1] == "make test"
