@@ -1,0 +1,168 @@
+"""`python -m hw_sim emulate` as people run it: a process, real sockets, a pseudo-terminal, real signals."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from appliance.sensor.keys import create_keys, load_keys
+from appliance.sensor.link import SensorLink, SensorReading, open_link
+from appliance.sensor.serial import SerialIntake
+from appliance.sensor.udp import UdpIntake
+from tests.sensor.test_serial import Cable, await_that
+
+pytestmark = pytest.mark.realtime
+
+
+def emulate(*options: object, **process: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "hw_sim", "emulate", *map(str, options)]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **process)  # type: ignore[call-overload,no-any-return]
+
+
+@pytest.fixture
+def keys_path(tmp_path: Path) -> Path:
+    path = tmp_path / "sensors.keys"
+    create_keys(path, ["left-wrist", "head"])
+    return path
+
+
+@pytest.fixture
+def link(keys_path: Path) -> Iterator[SensorLink]:
+    link = open_link(load_keys(keys_path), udp=("127.0.0.1", 0))
+    yield link
+    link.close()
+
+
+def port_of(link: SensorLink) -> int:
+    intake = link.intakes[0]
+    assert isinstance(intake, UdpIntake)
+    return intake.address[1]
+
+
+def hear_until_it_ends(link: SensorLink, process: subprocess.Popen[str]) -> list[SensorReading]:
+    readings: list[SensorReading] = []
+    while process.poll() is None:
+        readings += link.drain(time.monotonic())
+        time.sleep(0.004)
+    readings += link.drain(time.monotonic())
+    return readings
+
+
+def test_the_box_hears_what_the_log_says_was_sent(link: SensorLink, keys_path: Path, tmp_path: Path) -> None:
+    log = tmp_path / "sent.csv"
+    process = emulate(
+        "--keys", keys_path, "--port", port_of(link), "--seconds", 1.5, "--log", log,
+        "--sensor", "left-wrist=dance", "--sensor", "head=still",
+    )  # fmt: skip
+    readings = hear_until_it_ends(link, process)
+    assert process.returncode == 0
+    assert {reading.sensor for reading in readings} == {"left-wrist", "head"}
+    with log.open() as file:
+        sent = {(row["sensor"], int(row["sequence"])): row for row in csv.DictReader(file)}
+    assert len(sent) > 100
+    for reading in readings:
+        row = sent[reading.sensor, reading.sequence]
+        assert reading.arrival >= float(row["sent_s"]) - 0.001
+        alike = sum(a * float(row[name]) for a, name in zip(reading.orientation, "wxyz", strict=True))
+        assert abs(alike) > 0.9999
+    counts = {reason: count for reason, count in link.counts.items() if count}
+    assert counts.pop("accepted") == len(sent)
+    assert set(counts) <= {"lost"}
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_it_cleanly(link: SensorLink, keys_path: Path, number: signal.Signals) -> None:
+    process = emulate("--keys", keys_path, "--port", port_of(link))
+    await_that(lambda: bool(link.drain(time.monotonic())))
+    process.send_signal(number)
+    _, said = process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert "sent" in said
+    assert "Traceback" not in said
+
+
+def test_over_a_cable(keys_path: Path, tmp_path: Path) -> None:
+    cable = Cable(tmp_path / "sensor")
+    cable.plug_in()
+    # Two pseudo-terminals, joined by this test: the box and the emulator each have a device of their own.
+    intake = SerialIntake(str(cable.name))
+    link = SensorLink(load_keys(keys_path), [intake])
+    await_that(lambda: intake.trouble is None)
+    far_end, near_end = os.openpty()
+    process = emulate(
+        "--keys", keys_path, "--serial", os.ttyname(near_end), "--sensor", "head", "--network", "perfect"
+    )
+    os.set_blocking(far_end, False)
+
+    def passed_on() -> bool:
+        with contextlib.suppress(BlockingIOError):
+            cable.write(os.read(far_end, 4096))
+        return any(reading.sensor == "head" for reading in link.drain(time.monotonic()))
+
+    await_that(passed_on)
+    process.terminate()
+    assert process.wait(timeout=20) == 0
+    link.close()
+    cable.pull_out()
+    os.close(far_end)
+    os.close(near_end)
+
+
+def test_the_first_run_writes_a_key_file_for_its_owner_alone(tmp_path: Path) -> None:
+    path = tmp_path / "new.keys"
+    process = emulate("--keys", path, "--count", 3, "--seconds", 0.1, "--port", 9)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert list(load_keys(path)) == ["left-wrist", "sensor-2", "sensor-3"]
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert "The box must read the same file" in said
+    assert all(sensor.key.hex() not in said for sensor in load_keys(path).values())
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--sensor", "left-wirst"], "Did you mean 'left-wrist'?"),
+        (["--sensor", "head=waltz"], "there are: turning, dance, still, step, trace"),
+        (["--sensor", "head", "--sensor", "head"], "different sensors"),
+        (["--sensor", "head", "--count", "1"], "either --sensor or --count"),
+        (["--count", "5"], "has 2 sensor(s), not 5"),
+        (["--motion", "step", "--step-degrees", "90"], "Give at most 40"),
+        (["--motion", "trace"], "--trace"),
+        (["--axis", "up"], "three numbers"),
+        (["--axis", "0,0,0"], "length zero"),
+        (["--seconds-per-turn", "0"], "stand still"),
+        (["--host", "no.such.host.invalid"], "bunraku emulate: "),
+        (["--log", "/no/such/folder/log.csv"], "No such file or directory"),
+    ],
+)
+def test_a_wish_that_cannot_be_met_is_one_clear_line(
+    keys_path: Path, options: list[str], message: str
+) -> None:
+    process = emulate("--keys", keys_path, "--seconds", 0, *options)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert message in said
+    assert len(said.strip().splitlines()) == 1
+
+
+def test_no_box_and_no_cable_are_no_reason_to_end(keys_path: Path, tmp_path: Path) -> None:
+    process = emulate("--keys", keys_path, "--serial", tmp_path / "absent", "--seconds", 0.3)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert "Nothing could be sent" in said
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as unused:
+        unused.bind(("127.0.0.1", 0))
+        port = unused.getsockname()[1]
+    process = emulate("--keys", keys_path, "--port", port, "--seconds", 0.3)
+    assert process.wait(timeout=30) == 0
