@@ -16,6 +16,7 @@ import typer
 from hw_sim import motions
 from hw_sim.casting import MOST_SENSORS, MotionKind, cast_sensors, choose_keys, name_and_motion, parse_axis
 from hw_sim.emulator import Emulator
+from hw_sim.measure import measure
 from hw_sim.network import PROFILES, VenueNetwork
 from hw_sim.senders import Sender, SendLog, SerialSender, UdpSender
 from hw_sim.status import StatusLine
@@ -24,6 +25,7 @@ from hw_sim.traces import read_trace
 REFUSED = 2
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app.command()(measure)
 
 
 class NetworkKind(StrEnum):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import json
 import mmap
@@ -74,6 +75,12 @@ class Journal:
         if self.row % _CHUNK_TICKS == 0:
             self._let_go()
 
+    def unlock(self) -> None:
+        """Call after memory was locked: the journal alone must not be, or all of it would stay resident."""
+        anchor = ctypes.c_char.from_buffer(self._map)
+        address, size = ctypes.c_void_p(ctypes.addressof(anchor)), ctypes.c_size_t(len(self._map))
+        ctypes.CDLL(None).munlock(address, size)
+
     def close(self) -> None:
         """Unmap; what was written stays in the file."""
         self.field.clear()
@@ -83,7 +90,8 @@ class Journal:
         """Drop the last pieces from resident memory; the kernel keeps them for the file."""
         last = _HEADER_BYTES + ((self.row - 1) % self.capacity) * self._itemsize
         first = max(0, last - 2 * _CHUNK_TICKS * self._itemsize) // mmap.PAGESIZE * mmap.PAGESIZE
-        self._map.madvise(mmap.MADV_DONTNEED, first, last - first)
+        with contextlib.suppress(OSError):
+            self._map.madvise(mmap.MADV_DONTNEED, first, last - first)
 
 
 def read_journal(path: Path) -> JournalRecording:
@@ -171,11 +179,4 @@ def _mapped(path: Path, header: bytes, size: int) -> mmap.mmap:
             f"{path}: no journal ({error.strerror}; it needs {size / 1e6:.0f} MB). "
             "The dance runs without one. Free the disk, choose another place or lower journal.minutes."
         ) from error
-    _unlock(mapped, size)
     return mapped
-
-
-def _unlock(mapped: mmap.mmap, size: int) -> None:
-    """The journal is the one thing that must not be locked in memory: it would stay resident for good."""
-    anchor = ctypes.c_char.from_buffer(mapped)
-    ctypes.CDLL(None).munlock(ctypes.c_void_p(ctypes.addressof(anchor)), ctypes.c_size_t(size))

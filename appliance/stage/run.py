@@ -58,6 +58,8 @@ class Stage:
             return
         for words in enter_realtime(self.box.realtime.priority):
             self.say(words)
+        if self.journal is not None:
+            self.journal.unlock()
         try:
             self._tick_on(seconds, stopped)
         finally:

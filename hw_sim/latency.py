@@ -1,0 +1,121 @@
+"""What a run was like, in numbers: pure functions from what was sent and what was received."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+BEFORE_STEP_S = 0.1  # the joint's orientation before a step is its mean over this long
+SETTLED_S = (0.3, 0.45)  # and after it over this part
+
+
+class Reading(NamedTuple):
+    """A reading as the emulator's log has it; times in monotonic seconds."""
+
+    sequence: int
+    sent_at: float
+    sampled_at: float
+    orientation: tuple[float, float, float, float]
+
+
+class Frame(NamedTuple):
+    """A frame as the receiver has it. `joint` is the held joint's local rotation (4,), w, x, y, z."""
+
+    arrived_at: float
+    tick: int
+    sensor_sequence: int
+    late: bool
+    joint: Floats
+
+
+class Transport(NamedTuple):
+    """Each carried reading's way: when it was sent (s), how long until a frame with it arrived (ms)."""
+
+    sent_at: Floats
+    latency_ms: Floats
+    overtaken: int  # readings that no frame carries: a newer one came before the next tick
+
+
+def transport(readings: Sequence[Reading], frames: Sequence[Frame]) -> Transport:
+    """Datagram in to datagram out: from a reading's sending to the first frame that carries its sequence."""
+    arrived: dict[int, float] = {}
+    for frame in frames:
+        arrived.setdefault(frame.sensor_sequence, frame.arrived_at)
+    sent: dict[int, float] = {}
+    for reading in readings:
+        sent.setdefault(reading.sequence, reading.sent_at)
+    if not arrived or not sent:
+        return Transport(np.zeros(0), np.zeros(0), 0)
+    newest_carried = max(arrived)
+    carried = {number: at for number, at in sent.items() if number in arrived and arrived[number] >= at}
+    overtaken = sum(number < newest_carried and number not in arrived for number in sent)
+    times = np.array(list(carried.values()))
+    arrivals = np.array([arrived[number] for number in carried])
+    return Transport(times, 1000.0 * (arrivals - times), overtaken)
+
+
+def missing_frames(frames: Sequence[Frame]) -> int:
+    """Ticks between the first and the last frame of which no frame arrived: skipped or lost."""
+    ticks = {frame.tick for frame in frames}
+    return max(ticks) - min(ticks) + 1 - len(ticks) if ticks else 0
+
+
+def steps(readings: Sequence[Reading]) -> list[float]:
+    """The moments (s) at which the sensor's orientation jumped."""
+    in_order = sorted({reading.sequence: reading for reading in readings}.values())
+    return [
+        after.sampled_at
+        for before, after in pairwise(in_order)
+        if abs(float(np.dot(before.orientation, after.orientation))) < 0.9999
+    ]
+
+
+def response_ms(step_times: Sequence[float], frames: Sequence[Frame]) -> Floats:
+    """From each step of the sensor to half of the step in the output joint, ms; only steps that show.
+
+    The way from the orientation before to that after is a line; each frame's place on it is the part of its
+    rotation that lies along it. Between two frames the joint is taken to stand as in the earlier one.
+    """
+    times = np.array([frame.arrived_at for frame in frames])
+    if not len(times):
+        return np.zeros(0)
+    joints = _continuous(np.array([frame.joint for frame in frames]))
+    found = []
+    for moment in step_times:
+        before = (times >= moment - BEFORE_STEP_S) & (times < moment)
+        after = (times >= moment + SETTLED_S[0]) & (times < moment + SETTLED_S[1])
+        if before.sum() < 2 or after.sum() < 2:
+            continue
+        start, end = joints[before].mean(0), joints[after].mean(0)
+        way = end - start
+        noise = max(joints[before].std(0).max(), joints[after].std(0).max())
+        if np.linalg.norm(way) < 0.02 or noise > 0.2 * np.linalg.norm(way):
+            continue
+        during = (times >= moment) & (times < moment + SETTLED_S[0])
+        share = (joints[during] - start) @ way / (way @ way)
+        beyond = np.flatnonzero(share >= 0.5)
+        if len(beyond):
+            found.append(1000.0 * (times[during][beyond[0]] - moment))
+    return np.array(found)
+
+
+def percentiles(values: Floats, which: Mapping[str, float]) -> dict[str, float | None]:
+    """Named percentiles, rounded to microseconds of the given milliseconds; None without values."""
+    if not len(values):
+        return dict.fromkeys(which)
+    return {name: round(float(np.percentile(values, share)), 3) for name, share in which.items()}
+
+
+def _continuous(quaternions: Floats) -> Floats:
+    """The same rotations without sign jumps."""
+    signs = np.sign(np.einsum("nk,nk->n", quaternions[1:], quaternions[:-1]))
+    signs[signs == 0] = 1.0
+    result: Floats = quaternions.copy()
+    result[1:] *= np.cumprod(signs)[:, None]
+    return result

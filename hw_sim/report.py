@@ -1,0 +1,75 @@
+"""The picture of a measurement: how long readings were on their way, over time and against running free."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hw_sim.latency import Transport
+from hw_sim.probe import Run
+
+IVORY, VERMILION, SLATE, BACKDROP = "#efe6d8", "#f5452a", "#8f9bb3", "#14151b"
+LONGEST_SHOWN_MS = 45.0
+
+
+def draw_report(path: Path, locked: Run, ways: tuple[Transport, Transport]) -> Path:
+    """Write the PNG; `ways` are those of the phase-locked and of the free run. Needs matplotlib."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    way, free = ways
+    look: Any = {
+        "figure.facecolor": BACKDROP,
+        "axes.facecolor": BACKDROP,
+        "text.color": IVORY,
+        "axes.labelcolor": IVORY,
+        "axes.edgecolor": SLATE,
+        "xtick.color": SLATE,
+        "ytick.color": SLATE,
+        "font.size": 10,
+    }
+    with matplotlib.rc_context(look):
+        figure, axes = pyplot.subplots(3, 1, figsize=(11, 11), layout="constrained")
+        _histogram(axes[0], way, free)
+        _timeline(axes[1], way)
+        _sections(axes[2], locked)
+        for one in axes:
+            one.spines[["top", "right"]].set_visible(False)
+        figure.savefig(path, dpi=110)
+        pyplot.close(figure)
+    return path
+
+
+def _histogram(axes: Any, way: Transport, free: Transport) -> None:
+    edges = np.arange(0.0, LONGEST_SHOWN_MS, 0.5)
+    for one, colour, name in ((free, SLATE, "running free"), (way, VERMILION, "in phase with the sensor")):
+        if len(one.latency_ms):
+            share = np.full(len(one.latency_ms), 100.0 / len(one.latency_ms))
+            shown = np.minimum(one.latency_ms, edges[-1] - 0.01)
+            median = np.median(one.latency_ms)
+            axes.hist(
+                shown, edges, weights=share, color=colour, alpha=0.85, label=f"{name}: median {median:.2f} ms"
+            )
+    axes.set(title="Datagram in to datagram out", xlabel="ms (the last bar: longer)", ylabel="% of readings")
+    axes.legend(frameon=False)
+
+
+def _timeline(axes: Any, way: Transport) -> None:
+    if len(way.sent_at):
+        axes.plot(way.sent_at - way.sent_at[0], way.latency_ms, ".", color=VERMILION, markersize=3)
+    axes.set(title="In phase, reading by reading", xlabel="s", ylabel="ms", ylim=(0.0, LONGEST_SHOWN_MS))
+
+
+def _sections(axes: Any, locked: Run) -> None:
+    parts = locked.ticks["sections_ms"]
+    median, p99 = np.median(parts, axis=0), np.percentile(parts, 99, axis=0)
+    place = np.arange(len(locked.sections))
+    axes.bar(place, p99, color=SLATE, label="p99")
+    axes.bar(place, median, color=VERMILION, label="median")
+    axes.set_xticks(place, locked.sections)
+    axes.set(title=f"A tick by section ({len(parts)} ticks)", ylabel="ms")
+    axes.legend(frameon=False)
