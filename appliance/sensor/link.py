@@ -108,7 +108,7 @@ class SensorLink:
         return self._by_name[sensor].believed_arrival
 
     def arrivals(self, sensor: str) -> Sequence[float]:
-        """When each believed reading of the last drain arrived, the overtaken ones too; none for a stranger."""
+        """When each believed reading of the last drain arrived, not only the newest; none for a stranger."""
         known = self._by_name.get(sensor)
         return known.arrivals if known is not None else ()
 

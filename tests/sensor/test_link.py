@@ -92,6 +92,18 @@ def test_the_newest_of_a_burst_wins_for_each_sensor() -> None:
     assert stage.counted() == {"accepted": 24}
 
 
+def test_every_believed_arrival_of_a_drain_is_kept_for_the_phase() -> None:
+    stage = Stage()
+    stage.queue.waiting.extend(
+        [(datagram(0), 99.95), (datagram(1), 99.97), (datagram(2, degrees=170), 99.99)]
+    )
+    stage.hear(datagram(3))
+    assert list(stage.link.arrivals("left-wrist")) == [99.95, 99.97, 100.0]
+    assert list(stage.link.arrivals("nobody")) == []
+    stage.hear()
+    assert list(stage.link.arrivals("left-wrist")) == []
+
+
 def test_overtaken_repeated_and_long_gone_readings_are_told_apart() -> None:
     stage = Stage()
     stage.hear(datagram(100), datagram(103))
