@@ -39,6 +39,7 @@ class Body:
         self._trunk = self._trunk_joints()
         self._radius = self.height * np.clip(0.042 * (self._reach / self.height) ** 0.62 * 1.36, 0.011, None)
         self._radius[list(self._trunk)] = 0.055 * self.height
+        self._radius[0] *= 0.7  # where the legs part
         self._head = next(
             (j for j in reversed(range(joints)) if "head" in skeleton.names[j].casefold()), None
         )
