@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from appliance.studio import rotation
 from appliance.studio.networks import Network, Shape
 
-NEAR = 1.0 - 1e-7  # cosine above which two rotations count as this far apart, so that no weight vanishes
+NEAR = 1.0 - 1e-6  # length of a goal: its cosine with a pose stays below 1, so that no weight vanishes
 
 
 class Autoencoder(nn.Module):
@@ -68,10 +68,10 @@ class Autoencoder(nn.Module):
         x = self.without_heading(windows, facing)
         latents = x.new_zeros(len(x), self.shape.latent)
         held = x.new_zeros(1, 1, self.shape.joints, 1)
-        goal = x
+        goal = NEAR * x
         if mask is not None and targets is not None and weights is not None:
             held = (mask.float() * weights)[None, None, :, None]
-            goal = self.without_heading(targets[None, None].expand(len(x), 1, -1, -1), facing)
+            goal = NEAR * self.without_heading(targets[None, None].expand(len(x), 1, -1, -1), facing)
         for k in range(coding_iterations):
             if k < interaction_iterations:
                 x = slerp_towards(x, goal, held)
@@ -87,9 +87,9 @@ class Autoencoder(nn.Module):
 
 
 def slerp_towards(x: Tensor, goal: Tensor, weight: Tensor) -> Tensor:
-    """SLERP the short way from x to goal by weight; weight 0 gives x, 1 gives +-goal."""
+    """SLERP the short way from x to goal (NEAR long) by weight; weight 0 gives x, 1 gives +-goal."""
     dot = (x * goal).sum(-1, keepdim=True)
-    angle = torch.acos(dot.abs().clamp(max=NEAR))
+    angle = torch.acos(dot.abs())
     towards = torch.where(dot < 0, -goal, goal)
     mixed = torch.sin(angle * (1 - weight)) * x + torch.sin(angle * weight) * towards
     return rotation.normalize(mixed)

@@ -14,21 +14,21 @@ from appliance.studio.graph import Graph, Layers, lstm_weights
 from appliance.studio.networks import Network, Shape
 
 
-def encode(graph: Graph, layers: Layers, network: Network, shape: Shape, window: str) -> str:
-    """Nodes of the encoder: window (T, M, 4) -> latent (1, Z)."""
+def encode(graph: Graph, layers: Layers, network: Network, shape: Shape, window: str, out: str) -> str:
+    """Nodes of the encoder: window (T, M, 4) -> latent (1, Z), named out."""
     encoder = network.encoder
     if isinstance(encoder, networks._MlpEncoder):
         steps = _reshaped(graph, window, shape.window, shape.pose)
         basis = graph.constant("curves", encoder.time.curves.numpy())
         amounts = _reshaped(graph, graph.op("MatMul", basis, steps), 1, shape.curves * shape.pose)
-        return _dense_stack(graph, layers, encoder.stack, amounts, "encoder")
+        return _dense_stack(graph, layers, encoder.stack, amounts, "encoder", out)
     if isinstance(encoder, networks._ConvEncoder):
-        return _conv_encoder(graph, layers, encoder, shape, window)
+        return _conv_encoder(graph, layers, encoder, shape, window, out)
     if isinstance(encoder, networks._LstmEncoder):
         steps = _reshaped(graph, window, shape.window, 1, shape.pose)
         last = layers.lstm(graph, steps, encoder.lstm, "encoder.lstm", "last")
         inner = layers.elu(graph, layers.linear(graph, last, encoder.dense, "encoder.dense"))
-        return layers.linear(graph, inner, encoder.last, "encoder.last")
+        return layers.linear(graph, inner, encoder.last, "encoder.last", out)
     raise TypeError(f"No ONNX form is known for the encoder {type(encoder).__name__}.")
 
 
@@ -60,34 +60,40 @@ def _reshaped(graph: Graph, x: str, *sizes: int) -> str:
     return graph.op("Reshape", x, graph.constant(name, sizes, np.int64))
 
 
-def _dense_stack(graph: Graph, layers: Layers, stack: nn.Sequential, x: str, side: str) -> str:
-    for place, layer in enumerate(stack):
+def _dense_stack(
+    graph: Graph, layers: Layers, stack: nn.Sequential, x: str, side: str, out: str | None = None
+) -> str:
+    """Linear, residual, norm and ELU layers in their order; the sum of a residual goes with the next norm."""
+    steps = list(stack)
+    skipped = ""  # what must still be added to x
+    for place, layer in enumerate(steps):
         name = f"{side}.{place}"
         if isinstance(layer, nn.Linear):
-            x = layers.linear(graph, x, layer, name)
+            x = layers.linear(graph, x, layer, name, out if place == len(steps) - 1 else None)
         elif isinstance(layer, nn.LayerNorm):
-            x = layers.layer_norm(graph, x, layer, name)
+            x, _ = layers.layer_norm(graph, x, layer, name, skipped)
+            skipped = ""
         elif isinstance(layer, nn.ELU):
             x = layers.elu(graph, x)
         elif isinstance(layer, networks.Residual):
-            inner = layers.elu(graph, layers.layer_norm(graph, x, layer.norm, f"{name}.norm"))
-            x = graph.op("Add", x, layers.linear(graph, inner, layer.dense, f"{name}.dense"))
+            normed, summed = layers.layer_norm(graph, x, layer.norm, f"{name}.norm", skipped)
+            x = layers.linear(graph, layers.elu(graph, normed), layer.dense, f"{name}.dense")
+            skipped = summed
         else:
             raise TypeError(f"No ONNX form is known for {type(layer).__name__}.")
     return x
 
 
 def _conv_encoder(
-    graph: Graph, layers: Layers, encoder: networks._ConvEncoder, shape: Shape, window: str
+    graph: Graph, layers: Layers, encoder: networks._ConvEncoder, shape: Shape, window: str, out: str
 ) -> str:
     rows = _reshaped(graph, window, shape.window, shape.pose)
     x = layers.elu(graph, layers.conv_as_matmul(graph, rows, encoder.first, "encoder.first", shape.window))
     more = layers.conv_as_matmul(graph, x, encoder.second, "encoder.second", shape.window)
     x = graph.op("Add", x, layers.elu(graph, more))
     channels_first = graph.op("Transpose", x, perm=[1, 0])  # torch flattens channels before time
-    return layers.linear(
-        graph, _reshaped(graph, channels_first, 1, shape.width * shape.window), encoder.last, "encoder.last"
-    )
+    flat = _reshaped(graph, channels_first, 1, shape.width * shape.window)
+    return layers.linear(graph, flat, encoder.last, "encoder.last", out)
 
 
 def _conv_decoder(

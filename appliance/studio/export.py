@@ -30,14 +30,14 @@ def export(
     poses = main.op("Concat", "window", _as_pose(main), axis=0)
     level = _turned_root(main, poses, facing, inverse=True)
     x, goal = _split_goal(main, _aligned(main, level, autoencoder.rest.cpu().numpy()), shape.window)
+    goal = main.op("Mul", goal, main.constant("near", NEAR))
     held = _held(main, shape.joints)
     shares = _shares(main, held)
 
     body = Graph("pass_", main.constants)
     layers = Layers(int8)
     overwritten = _slerp(body, "x", goal, body.op("Gather", shares, "iteration", axis=0))
-    latent = emit.encode(body, layers, autoencoder.network, shape, overwritten)
-    body.op("Identity", latent, out="latent_out")
+    latent = emit.encode(body, layers, autoencoder.network, shape, overwritten, "latent_out")
     raw = emit.decode(body, layers, autoencoder.network, shape, latent)
     body.op("LpNormalization", raw, out="x_out", axis=-1, p=2)
     body.op("Identity", "going_on", out="going_on_out")
@@ -174,7 +174,7 @@ def _slerp(graph: Graph, x: str, goal: str, shares: str) -> str:
     dot = graph.op(
         "ReduceSum", graph.op("Mul", x, goal), graph.constant("axis_last", [-1], np.int64), keepdims=1
     )
-    angle = graph.op("Acos", graph.op("Min", graph.op("Abs", dot), graph.constant("near", NEAR)))
+    angle = graph.op("Acos", graph.op("Abs", dot))
     sines = graph.op("Sin", graph.op("Mul", angle, shares))
     of_x, of_goal = graph.name("of_x"), graph.name("of_goal")
     graph.ops("Split", [sines], [of_x, of_goal], axis=2, num_outputs=2)

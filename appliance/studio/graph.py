@@ -40,7 +40,9 @@ class Graph:
         self.nodes.append(helper.make_node(kind, list(inputs), [out], domain=domain, **attributes))
         return out
 
-    def ops(self, kind: str, inputs: list[str], outputs: list[str], domain: str = "", **attributes: Any) -> None:
+    def ops(
+        self, kind: str, inputs: list[str], outputs: list[str], domain: str = "", **attributes: Any
+    ) -> None:
         """Add a node with any number of outputs ('' leaves one out)."""
         self.nodes.append(helper.make_node(kind, inputs, outputs, domain=domain, **attributes))
 
@@ -60,19 +62,27 @@ class Layers:
     def __init__(self, int8: bool) -> None:
         self.int8 = int8
 
-    def linear(self, graph: Graph, x: str, layer: nn.Linear, name: str) -> str:
+    def linear(self, graph: Graph, x: str, layer: nn.Linear, name: str, out: str | None = None) -> str:
         """(B, in) -> (B, out)."""
         weight = _array(layer.weight).T
         bias = graph.constant(f"{name}.bias", _array(layer.bias))
         if not self.int8:
-            return graph.op("Gemm", x, graph.constant(f"{name}.weight", weight), bias)
+            return graph.op("Gemm", x, graph.constant(f"{name}.weight", weight), bias, out=out)
         quantized = _quantized(graph, f"{name}.weight", weight)
-        return graph.op("DynamicQuantizeMatMul", x, *quantized, bias, domain=MICROSOFT)
+        return graph.op("DynamicQuantizeMatMul", x, *quantized, bias, out=out, domain=MICROSOFT)
 
-    def layer_norm(self, graph: Graph, x: str, layer: nn.LayerNorm, name: str) -> str:
+    def layer_norm(
+        self, graph: Graph, x: str, layer: nn.LayerNorm, name: str, skipped: str = ""
+    ) -> tuple[str, str]:
+        """Norm of x, or of x + skipped in one node: (norm, what was normed)."""
         scale = graph.constant(f"{name}.scale", _array(layer.weight))
         bias = graph.constant(f"{name}.bias", _array(layer.bias))
-        return graph.op("LayerNormalization", x, scale, bias, axis=-1, epsilon=layer.eps)
+        if not skipped:
+            return graph.op("LayerNormalization", x, scale, bias, axis=-1, epsilon=layer.eps), x
+        normed, summed = graph.name("normed"), graph.name("summed")
+        inputs, outputs = [x, skipped, scale, bias], [normed, "", "", summed]
+        graph.ops("SkipLayerNormalization", inputs, outputs, MICROSOFT, epsilon=layer.eps)
+        return normed, summed
 
     def elu(self, graph: Graph, x: str) -> str:
         return graph.op("Elu", x, alpha=1.0)
@@ -88,7 +98,9 @@ class Layers:
         rows = np.arange(steps)[:, None] + np.arange(taps)
         at = graph.constant(f"taps{taps}x{steps}", rows, np.int64)
         wide = graph.op("Gather", padded, at, axis=0)  # (steps, taps, in)
-        shape = graph.constant(f"wide{steps}x{taps * layer.in_channels}", [steps, taps * layer.in_channels], np.int64)
+        shape = graph.constant(
+            f"wide{steps}x{taps * layer.in_channels}", [steps, taps * layer.in_channels], np.int64
+        )
         flat = graph.op("Reshape", wide, shape)
         weight = _array(layer.weight).transpose(2, 1, 0).reshape(taps * layer.in_channels, layer.out_channels)
         dense = nn.Linear(weight.shape[0], weight.shape[1])
