@@ -1,0 +1,117 @@
+"""Every command that the README and the pages for people show is run as it stands."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = ("README.md", "docs/choreographer.md", "docs/dancer.md", "docs/technician.md", "docs/touring.md")
+RECURSIVE = re.compile(r"^make (test|bench|lock|clean)\b")  # would run these tests in these tests
+
+
+@dataclass(frozen=True)
+class Block:
+    """One fenced block of commands."""
+
+    page: str
+    line: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.page}:{self.line}"
+
+
+def blocks_of(page: str) -> list[Block]:
+    """Blocks fenced as sh, in the order in which a reader meets them; other fences are no commands."""
+    blocks, started, fence = [], 0, None
+    lines = (ROOT / page).read_text().splitlines()
+    for number, line in enumerate(lines, start=1):
+        if line.startswith("```"):
+            if fence == "sh":
+                blocks.append(Block(page, started, "\n".join(lines[started : number - 1])))
+            fence, started = (line[3:].strip() if fence is None else None), number
+    assert fence is None, f"{page}: a fence is not closed"
+    return blocks
+
+
+BLOCKS = {page: blocks_of(page) for page in PAGES}
+
+
+@pytest.fixture(scope="module", params=PAGES)
+def page(request: pytest.FixtureRequest) -> str:
+    name: str = request.param
+    return name
+
+
+@pytest.fixture(scope="module")
+def checkout(page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the checkout for one page, with this environment as its ready-made .venv."""
+    copy = tmp_path_factory.mktemp("checkout")
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if listed.returncode != 0:
+        pytest.skip("this is no git checkout")
+    for name in filter(lambda name: (ROOT / name).is_file(), listed.stdout.splitlines()):
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, copy / name)
+    (copy / ".venv").mkdir()
+    (copy / ".venv" / "bin").symlink_to(Path(sys.executable).parent)
+    for stamp in (".ready-to-run", ".ready-to-test"):  # after the copies: nothing is installed again
+        (copy / ".venv" / stamp).touch()
+    return copy
+
+
+def test_every_command_of_a_page_works(page: str, checkout: Path) -> None:
+    assert BLOCKS[page], f"{page} shows no command"
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    environment["PATH"] = f"{checkout / '.venv' / 'bin'}:{environment['PATH']}"
+    for block in BLOCKS[page]:
+        script = "\n".join(RECURSIVE.sub(r"make --dry-run \1", line) for line in block.text.splitlines())
+        done = subprocess.run(
+            ["bash", "-euo", "pipefail", "-c", script],
+            cwd=checkout,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{block}\n{block.text}\n{done.stdout}\n{done.stderr}"
+        assert "Traceback" not in done.stderr, f"{block}\n{block.text}\n{done.stderr}"
+
+
+def test_the_readme_names_every_command_and_no_other() -> None:
+    table = re.findall(r"^\| `bunraku ([a-z]+)` \|", (ROOT / "README.md").read_text(), re.MULTILINE)
+    shown = subprocess.run(
+        [Path(sys.executable).parent / "bunraku", "--help"], capture_output=True, text=True, check=True
+    ).stdout
+    offered = re.findall(r"^│ ([a-z]+) ", shown[shown.index("Commands") :], re.MULTILINE)
+    assert sorted(table) == sorted(offered)
+
+
+@pytest.mark.parametrize("page", [*PAGES, "docs/osc.md", "docs/wire.md", "docs/configuration.md"])
+def test_links_lead_somewhere(page: str) -> None:
+    source = ROOT / page
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", source.read_text()):
+        if "://" not in target:
+            assert (source.parent / target).exists(), f"{page}: {target}"
+
+
+def test_the_first_thing_to_see_is_a_picture() -> None:
+    readme = (ROOT / "README.md").read_text()
+    picture = re.search(r"!\[.+\]\((.+?)\)", readme)
+    assert picture
+    assert readme.index(picture[0]) < 200
+    assert (ROOT / picture[1]).read_bytes().startswith(b"\x89PNG")
