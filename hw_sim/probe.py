@@ -86,7 +86,8 @@ def run(setting: Setting, course: Course) -> Run:
         with _process(_play(setting, box), folder / "box.txt") as stage:
             first = _first_frame(receiver, stage, folder / "box.txt")
             emulate = _emulate(setting, folder, course, sensors)
-            with _process(emulate, folder / "emulator.txt"):
+            with _process(emulate, folder / "emulator.txt") as emulator:
+                _first_reading(emulator, folder)
                 datagrams, rss_mb, stood_from = _watch(receiver, stage, course, control)
             _stop(stage, folder / "box.txt")
     header, ticks = _read_journal(folder / "run.journal")
@@ -138,6 +139,17 @@ def _first_frame(receiver: OscReceiver, stage: subprocess.Popen[bytes], words: P
         if stage.poll() is not None:
             raise ProbeError(f"The box does not dance:\n{words.read_text().strip()}")
     raise ProbeError(f"No frame came within {STARTS_WITHIN_S:g} s:\n{words.read_text().strip()}")
+
+
+def _first_reading(emulator: subprocess.Popen[bytes], folder: Path) -> None:
+    """Wait for it; then the emulator stands for what it emulates: hardware that waits for no processor."""
+    log, until = folder / "sent.csv", time.monotonic() + STARTS_WITHIN_S
+    while not (log.exists() and log.read_bytes().count(b"\n") > 1):
+        if emulator.poll() is not None or time.monotonic() > until:
+            raise ProbeError(f"The emulator does not send:\n{(folder / 'emulator.txt').read_text().strip()}")
+        time.sleep(0.02)
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(emulator.pid, os.SCHED_FIFO, os.sched_param(PRIORITY))
 
 
 def _watch(

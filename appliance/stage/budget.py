@@ -22,13 +22,17 @@ _PATIENCE_S = 0.15  # a start may take 1.5 s in all
 
 @dataclass(frozen=True)
 class Admission:
-    """What the box will dance with, and why. Times are milliseconds of one puppet run as paced on stage."""
+    """What the box will dance with, and why.
+
+    Times are milliseconds of one puppet run as paced on stage; `one_ms` is the p99 of a single iteration.
+    """
 
     asked_coding: int
     asked_interaction: int
     coding: int
     interaction: int
     most_coding: int
+    one_ms: float
     p50_ms: float
     p99_ms: float
     budget_ms: float
@@ -85,6 +89,7 @@ def admit(
         coding=allowed,
         interaction=_free_kept(coding, interaction, allowed),
         most_coding=most,
+        one_ms=one_ms,
         p50_ms=p50_ms,
         p99_ms=p99_ms,
         budget_ms=budget_ms,

@@ -42,8 +42,12 @@ class TickClock:
         self._sleep = sleep
         self._slot = Slot(deadline=monotonic())
 
-    def wait(self, shift_s: float = 0.0) -> Slot:
+    def wait(
+        self, shift_s: float = 0.0, lead_s: float = 0.0, warm_up: Callable[[], object] | None = None
+    ) -> Slot:
         """Sleep until the next deadline, moved by `shift_s` (the phase lock's bounded correction).
+
+        `warm_up` is called `lead_s` before the deadline, unless that moment is over: it costs no slot.
 
         Slots whose whole time has passed are skipped, whether the last tick was too long or the sleep
         overshot: the slot returned is always the newest one that is due, less than one period late.
@@ -54,6 +58,10 @@ class TickClock:
         slot.skipped = 0
         self._skip_what_is_over()
         wait_s = slot.deadline - self.now()
+        if warm_up is not None and wait_s > lead_s:
+            self._sleep(wait_s - lead_s)
+            warm_up()
+            wait_s = slot.deadline - self.now()
         if wait_s > 0.0:
             self._sleep(wait_s)
         self._skip_what_is_over()

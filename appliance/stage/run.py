@@ -23,6 +23,8 @@ from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
 
 _COMMANDS_A_TICK = 4
+_WARM_UP_MARGIN_MS = 0.5
+_LONGEST_WARM_UP_MS = 3.0  # a network this heavy comes from memory each time: warming it up gains nothing
 _FORGET_PHASE_S = 5.0  # a sensor silent for longer may come back anywhere: the phase is learnt anew
 
 
@@ -48,6 +50,8 @@ class Stage:
         )
         latest_start_s = max(0.0, box.limits.late_ms - box.limits.tick_budget_ms) / 1000.0
         self.tick = Tick(self.cast, self.iterations, latest_start_s)
+        lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
+        self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         self.lock = PhaseLock() if box.phase_lock and self.cast.primary else None
         self.watch = Watch(self.cast)
 
@@ -75,7 +79,7 @@ class Stage:
         begun = clock.now()
         self.health.begin(begun)
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
-            slot = clock.wait(shift_s)
+            slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self.tick.run(slot)
             self._note(slot)
             self._obey()

@@ -70,6 +70,17 @@ class Tick:
         cast.outputs.send(frame)
         ends[SEND] = now()
 
+    def warm_up(self) -> None:
+        """One pass over the last window, right before the deadline; its poses go nowhere.
+
+        In 18 ms of pause the caches cool down: ten iterations of the default then took 1.45 ms (p50) and 2.1
+        (p99), after this 1.1 and 1.5, against 0.87 and 1.3 back to back.
+        """
+        cast, hands = self.cast, self.cast.hands
+        if cast.blending.is_due:
+            window = cast.puppet.select(cast.motion.window())
+            cast.puppet.dance(window, hands.mask, hands.targets, hands.weights, 1, 0)
+
     def after(self, slot: Slot) -> float:
         """What can wait until the frame has left: the motion moves on, times are noted. The cost in ms."""
         if not self.frame.late:

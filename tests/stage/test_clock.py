@@ -77,3 +77,28 @@ def test_the_machine_suspended_for_a_minute_costs_slots_and_nothing_else() -> No
     slot = clock.wait()
     assert slot.skipped == 2999
     assert clock.wait().skipped == 0
+
+
+def test_the_warm_up_comes_before_the_deadline_and_the_tick_stays_on_it() -> None:
+    time = FakeTime()
+    clock = clock_on(time)
+    warmed: list[float] = []
+
+    def warm_up() -> None:
+        warmed.append(time.now)
+        time.work(0.0004)
+
+    slot = clock.wait(lead_s=0.001, warm_up=warm_up)
+    assert warmed == [pytest.approx(1000.0 + TICK_S - 0.001)]
+    assert slot.started == pytest.approx(1000.0 + TICK_S)
+
+
+def test_no_warm_up_when_its_moment_is_over() -> None:
+    time = FakeTime()
+    clock = clock_on(time)
+    clock.wait()
+    time.work(TICK_S - 0.0005)
+    warmed: list[float] = []
+    slot = clock.wait(lead_s=0.001, warm_up=lambda: warmed.append(time.now))
+    assert not warmed
+    assert slot.lateness_s == pytest.approx(0.0)

@@ -163,3 +163,14 @@ def test_section_times_add_up_to_the_cost(stage: Callable[..., Tick]) -> None:
     cost_ms = tick.after(slot)
     assert cost_ms == pytest.approx(float(tick.sections_ms.sum()), abs=1e-3)
     assert (tick.sections_ms[1:] > 0.9).all()
+
+
+def test_warming_up_changes_nothing_that_is_danced(stage: Callable[..., Tick], receiver: OscReceiver) -> None:
+    tick = stage(hands=[{"turning": {"seconds_per_turn": 2.0}, "joint": "lShldr"}])
+    dance(tick, range(40))
+    plain = poses(receiver)
+    warmed = stage(hands=[{"turning": {"seconds_per_turn": 2.0}, "joint": "lShldr"}])
+    for number in range(40):
+        warmed.warm_up()
+        dance(warmed, range(number, number + 1))
+    np.testing.assert_array_equal(poses(receiver), plain)
