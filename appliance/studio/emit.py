@@ -1,6 +1,10 @@
 """Each architecture's encoder and decoder as ONNX nodes.
 
 A window enters as (T, M, 4) and leaves as (T, M, 4) before normalisation; the latent is (1, Z).
+
+The dense layer that sees the pose itself stays in float, also in int8 files: eight bits over the range of
+whole orientations are a step of 1.2 degrees. Quantized, it alone made 0.59 of 0.61 degrees of difference to
+float after one iteration of the default (4.3 after ten); without it 0.18 (1.0) remain, for 0.05 ms more.
 """
 
 from __future__ import annotations
@@ -12,6 +16,8 @@ from torch import nn
 from appliance.studio import networks
 from appliance.studio.graph import Graph, Layers, lstm_weights
 from appliance.studio.networks import Network, Shape
+
+EXACT = Layers(int8=False)
 
 
 def encode(graph: Graph, layers: Layers, network: Network, shape: Shape, window: str, out: str) -> str:
@@ -69,7 +75,8 @@ def _dense_stack(
     for place, layer in enumerate(steps):
         name = f"{side}.{place}"
         if isinstance(layer, nn.Linear):
-            x = layers.linear(graph, x, layer, name, out if place == len(steps) - 1 else None)
+            kind = EXACT if side == "encoder" and place == 0 else layers
+            x = kind.linear(graph, x, layer, name, out if place == len(steps) - 1 else None)
         elif isinstance(layer, nn.LayerNorm):
             x, _ = layers.layer_norm(graph, x, layer, name, skipped)
             skipped = ""
@@ -88,7 +95,7 @@ def _conv_encoder(
     graph: Graph, layers: Layers, encoder: networks._ConvEncoder, shape: Shape, window: str, out: str
 ) -> str:
     rows = _reshaped(graph, window, shape.window, shape.pose)
-    x = layers.elu(graph, layers.conv_as_matmul(graph, rows, encoder.first, "encoder.first", shape.window))
+    x = layers.elu(graph, EXACT.conv_as_matmul(graph, rows, encoder.first, "encoder.first", shape.window))
     more = layers.conv_as_matmul(graph, x, encoder.second, "encoder.second", shape.window)
     x = graph.op("Add", x, layers.elu(graph, more))
     channels_first = graph.op("Transpose", x, perm=[1, 0])  # torch flattens channels before time
