@@ -15,6 +15,7 @@ from appliance.stage.run import Stage, stop_signals
 from appliance.stage.speaker import Speaker
 
 _PICTURED_S = 10.0
+_NO_REFUSAL = ("accepted", "relocated", "lost", "reboot", "drain_limit")
 
 
 def play_show(
@@ -47,7 +48,8 @@ def play_show(
             stage.dance(seconds, stopped)
         finally:
             stage.close()
-        speaker.say(_conclusion(stage))
+        for line in _conclusion(stage):
+            speaker.say(line)
         if filmstrip is not None and journal is not None:
             from appliance.stage.pictures import picture_of_journal
 
@@ -73,10 +75,26 @@ def _introduction(stage: Stage) -> list[str]:
     return lines
 
 
-def _conclusion(stage: Stage) -> str:
+def _conclusion(stage: Stage) -> list[str]:
     health = stage.health
     trouble = "".join(f", {name} {count}" for name, count in health.trouble() if count)
-    return f"Danced {health.ticks} ticks: late {health.late}, longest tick {health.worst_ms:.1f} ms{trouble}."
+    lines = [
+        f"Danced {health.ticks} ticks: late {health.late}, longest tick {health.worst_ms:.1f} ms{trouble}."
+    ]
+    if stage.cast.worn:
+        lines.append(_readings(stage.cast.link.counts))
+    if stage.control is not None and stage.control.refused:
+        lines.append(f"Commands: {stage.control.refused} refused, the last one: {stage.control.reason}")
+    return lines
+
+
+def _readings(counts: dict[str, int]) -> str:
+    """What became of the sensors' datagrams, refusals by reason."""
+    accepted = counts["accepted"] + counts["relocated"]
+    refused = {reason: count for reason, count in counts.items() if count and reason not in _NO_REFUSAL}
+    reasons = ", ".join(f"{reason} {count}" for reason, count in refused.items())
+    lost = f", {counts['lost']} lost on the way" if counts["lost"] else ""
+    return f"Readings: {accepted} accepted{lost}" + (f"; refused: {reasons}." if refused else ".")
 
 
 def _with_short_journal(box: BoxConfig) -> BoxConfig:

@@ -1,0 +1,109 @@
+"""The real box as a process of its own, with its own ports and a receiver that listens."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from appliance.sensor.keys import SensorKey, create_keys
+from hw_sim.osc_receiver import OscReceiver
+
+HOST = "127.0.0.1"
+PATIENCE_S = 60.0  # for a machine that is busy with other things; nothing here waits without a reason
+PLAY = (sys.executable, "-m", "appliance.cli", "play")
+
+
+@dataclass
+class Box:
+    """A running `bunraku play`; `sensors` and `control` are its ports, `words` what it says."""
+
+    process: subprocess.Popen[bytes]
+    receiver: OscReceiver
+    sensors: int
+    control: int
+    key: SensorKey
+    words_file: Path
+
+    @property
+    def words(self) -> str:
+        return self.words_file.read_text()
+
+    def frames(self, count: int) -> list[list[Any]]:
+        """The next `count` frame messages: tick, frame time, sensor sequence, late."""
+        found: list[list[Any]] = []
+        until = time.monotonic() + PATIENCE_S
+        while len(found) < count:
+            assert time.monotonic() < until, self.words
+            assert self.process.poll() is None or found, self.words
+            found += [arguments for _, address, arguments in self.receiver.poll(0.05) if "frame" in address]
+        return found
+
+    def end(self, number: int = signal.SIGTERM) -> int:
+        """Send a signal and give the exit status."""
+        self.process.send_signal(number)
+        return self.process.wait(PATIENCE_S)
+
+
+@contextlib.contextmanager
+def playing(
+    show: Path,
+    folder: Path,
+    *arguments: str,
+    settings: dict[str, Any] | None = None,
+    more_receivers: Sequence[dict[str, Any]] = (),
+    command: Sequence[str] = PLAY,
+) -> Iterator[Box]:
+    """A box that dances this show, with the sensor left-wrist in its key file."""
+    key = create_keys(folder / "sensors.keys", ["left-wrist"])["left-wrist"]
+    sensors, control = free_ports(2)
+    with OscReceiver(HOST) as receiver, (folder / "words.txt").open("wb") as words:
+        frames = {"host": HOST, "port": receiver.port, "frame_message": True}
+        box = {
+            "sensors": {"udp": {"host": HOST, "port": sensors}, "keys": "sensors.keys"},
+            "outputs": {"osc": [*more_receivers, frames]},
+            "control": {"host": HOST, "port": control},
+            **(settings or {}),
+        }
+        (folder / "box.yaml").write_text(yaml.safe_dump(box))
+        process = subprocess.Popen(
+            [*command, "--show", str(show), "--box", str(folder / "box.yaml"), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=words,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+        try:
+            yield Box(process, receiver, sensors, control, key, folder / "words.txt")
+        finally:
+            process.kill()
+            process.wait()
+
+
+def free_ports(count: int) -> list[int]:
+    with contextlib.ExitStack() as opened:
+        sockets = [
+            opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)
+        ]
+        for one in sockets:
+            one.bind((HOST, 0))
+        return [one.getsockname()[1] for one in sockets]
+
+
+def is_free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        try:
+            one.bind((HOST, port))
+        except OSError:
+            return False
+        return True

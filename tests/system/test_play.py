@@ -1,0 +1,226 @@
+"""The real box over real sockets: it dances at 50 Hz, ends when told to, and nothing sent to it hurts."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pythonosc.udp_client import SimpleUDPClient
+
+from appliance.stage.journal import LATE, NOT_FINITE, read_journal
+from hw_sim.emulated_sensor import EmulatedSensor
+from hw_sim.emulator import Emulator
+from hw_sim.motions import dance
+from hw_sim.network import VENUE, VenueNetwork
+from hw_sim.senders import UdpSender
+from tests.stage.bundles import write_show
+from tests.system.box import HOST, PATIENCE_S, PLAY, Box, free_ports, is_free, playing
+
+pytestmark = pytest.mark.realtime
+
+JOURNAL = {"journal": {"file": "run.journal", "minutes": 1}}
+# Takes the rights away that a box needs for real time, root's too, and becomes the box.
+WITHOUT_RIGHTS = (
+    sys.executable,
+    "-c",
+    "import ctypes, os, resource, sys\n"
+    "resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))\n"
+    "resource.setrlimit(resource.RLIMIT_MEMLOCK, (65536, 65536))\n"
+    "for capability in (14, 23): ctypes.CDLL(None).prctl(24, capability, 0, 0, 0)\n"
+    f"os.execv({sys.executable!r}, [{sys.executable!r}, '-m', 'appliance.cli', 'play', *sys.argv[1:]])",
+)
+WITHOUT_TORCH = (
+    sys.executable,
+    "-c",
+    "import sys\n"
+    "for name in ('torch', 'onnx', 'hw_sim', 'appliance.studio'): sys.modules[name] = None\n"
+    "from appliance.cli import main\n"
+    "main(['play', *sys.argv[1:]])",
+)
+
+
+@pytest.fixture(scope="module")
+def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_show(tmp_path_factory.mktemp("bundle") / "show")
+
+
+def send_readings(box: Box, seconds: float) -> Emulator:
+    """A dancer on a venue's network, in a thread; returns at once."""
+    sender = UdpSender(HOST, box.sensors)
+    sensor = EmulatedSensor(box.key, dance(1))
+    emulator = Emulator([sensor], sender.send, network=VenueNetwork(VENUE, 1))
+    threading.Thread(target=emulator.run, args=(seconds,), daemon=True).start()
+    return emulator
+
+
+def test_frames_leave_on_a_grid_of_20_ms_and_carry_the_readings(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, settings=JOURNAL) as box:
+        box.frames(1)
+        send_readings(box, 30.0)
+        frames = box.frames(150)
+        assert box.end() == 0
+    numbers = [frame[0] for frame in frames]
+    assert numbers == sorted(set(numbers))
+    ticks = read_journal(tmp_path / "run.journal").ticks
+    periods = np.diff(ticks["frame_time"]) / np.diff(ticks["tick"])
+    assert (
+        np.abs(periods - 0.02).max() <= 0.0002 + 1e-9
+    )  # whatever the machine does: the grid keeps its place
+    assert max(frame[2] for frame in frames) > 20
+    assert "Hz  tick" in box.words
+    assert "left-wrist holds lShldr" in box.words
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_in_the_middle_ends_the_dance_cleanly(show: Path, tmp_path: Path, number: int) -> None:
+    with playing(show, tmp_path) as box:
+        box.frames(20)
+        assert not is_free(box.sensors)
+        assert box.end(number) == 0
+        assert is_free(box.sensors)
+        assert is_free(box.control)
+        assert "Danced" in box.words
+        assert "Traceback" not in box.words
+
+
+def test_ends_by_itself_after_its_seconds(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, "--seconds", "0.5") as box:
+        assert box.process.wait(PATIENCE_S) == 0
+    assert "Danced" in box.words
+
+
+@pytest.mark.parametrize("taken", ["sensors", "control"])
+def test_a_port_that_is_taken_is_named_with_what_to_do(show: Path, tmp_path: Path, taken: str) -> None:
+    with playing(show, tmp_path) as first:
+        first.frames(1)
+        [other] = free_ports(1)
+        ports = {"sensors": other, "control": other, taken: getattr(first, taken)}
+        [ports["control" if taken == "sensors" else "sensors"]] = free_ports(1)
+        second = tmp_path / "second"
+        second.mkdir()
+        settings = {
+            "sensors": {"udp": {"host": HOST, "port": ports["sensors"]}},
+            "control": {"host": HOST, "port": ports["control"]},
+        }
+        with playing(show, second, settings=settings) as refused:
+            assert refused.process.wait(PATIENCE_S) == 2
+            assert f"UDP port {ports[taken]}" in refused.words
+            assert "second bunraku" in refused.words
+            assert "Traceback" not in refused.words
+        first.frames(5)
+
+
+def test_a_receiver_that_nobody_runs_does_not_disturb_the_other(show: Path, tmp_path: Path) -> None:
+    [nobody] = free_ports(1)
+    with playing(show, tmp_path, more_receivers=[{"host": HOST, "port": nobody}]) as box:
+        frames = box.frames(120)
+        assert box.end() == 0
+    assert len({frame[0] for frame in frames}) == len(frames)
+    assert f"{HOST}:{nobody} (ai-toolbox) does not get the dance" in box.words
+
+
+def test_without_real_time_rights_it_dances_and_says_what_that_costs(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, command=WITHOUT_RIGHTS) as box:
+        box.frames(20)
+        assert box.end() == 0
+    assert "No real-time priority" in box.words
+    assert "Memory is not locked" in box.words
+
+
+def test_the_whole_box_runs_where_torch_and_the_simulation_cannot_be_imported(
+    show: Path, tmp_path: Path
+) -> None:
+    with playing(show, tmp_path, command=WITHOUT_TORCH) as box:
+        box.frames(20)
+        assert box.end() == 0, box.words
+
+
+def test_a_flood_of_bad_datagrams_moves_nothing(show: Path, tmp_path: Path) -> None:
+    noise = random.Random(7)
+    lengths = [0, 1, 3, 20, 45, 60, 400, 1400]
+    bad = [noise.randbytes(noise.choice(lengths)) for _ in range(1000)]
+    with playing(show, tmp_path, settings=JOURNAL) as box:
+        box.frames(1)
+        send_readings(box, 60.0)
+        box.frames(50)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as flood:
+            for number in range(100_000):
+                flood.sendto(bad[number % len(bad)], (HOST, box.sensors))
+        before = box.frames(1)[0][2]
+        after = box.frames(100)[-1][2]
+        assert box.end() == 0
+    assert after > before  # readings come through again
+    assert "Traceback" not in box.words
+    ticks = read_journal(tmp_path / "run.journal").ticks
+    assert not (ticks["flags"] & NOT_FINITE).any()
+    assert np.isfinite(ticks["pose"]).all()
+    assert float(np.median(ticks["sections_ms"].sum(axis=1))) < 20.0
+    assert "refused" in box.words  # counted, and said at the end
+
+
+def test_a_network_that_gives_no_numbers_holds_the_last_good_pose(tmp_path: Path) -> None:
+    broken = write_show(tmp_path / "show", network="broken")
+    with playing(broken, tmp_path, settings=JOURNAL) as box:
+        box.frames(80)
+        assert box.end() == 0
+    ticks = read_journal(tmp_path / "run.journal").ticks
+    danced = (ticks["flags"] & LATE) == 0
+    assert (ticks["flags"][danced] & NOT_FINITE).all()
+    assert np.isfinite(ticks["pose"]).all()
+    assert "network not finite" in box.words
+    assert "holds the last good pose" in box.words
+
+
+def test_commands_change_the_running_show(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, settings=JOURNAL) as box:
+        box.frames(30)
+        client = SimpleUDPClient(HOST, box.control)
+        client.send_message("/player/stop", [])
+        client.send_message("/iterations", [5, 4])
+        client.send_message("/mocap/setjointrot", ["Chest", 1.0, 0.0, 0.0, 1.0])
+        box.frames(80)
+        assert box.end() == 0
+    ticks = read_journal(tmp_path / "run.journal").ticks
+    assert (ticks["coding_iterations"][-1], ticks["interaction_iterations"][-1]) == (5, 4)
+    np.testing.assert_array_equal(ticks["pose"][-1], ticks["pose"][-2])  # the phrase stands still
+    assert "No hand of this show holds 'Chest' by OSC" in box.words
+
+
+def test_a_killed_box_leaves_a_journal_that_can_be_read(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, settings=JOURNAL) as box:
+        box.frames(60)
+        assert box.end(signal.SIGKILL) == -signal.SIGKILL
+    assert len(read_journal(tmp_path / "run.journal").ticks) >= 50
+
+
+def test_emulated_sensors_come_and_go_with_the_run(show: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "dance.png"
+    arguments = ("--emulate", "--seconds", "3", "--filmstrip", str(picture))
+    with playing(show, tmp_path, *arguments) as box:
+        frames = box.frames(100)
+        assert box.process.wait(PATIENCE_S) == 0
+    assert max(frame[2] for frame in frames) > 5
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert str(picture) in box.words
+    emulators = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
+    assert f"--port {box.sensors}" not in emulators
+
+
+def test_nobody_reading_what_it_says_does_not_stop_the_dance(show: Path, tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    command = [*PLAY, "--show", str(show), "--box", str(tmp_path / "box.yaml"), "--seconds", "3"]
+    with playing(show, tmp_path) as box:
+        box.frames(1)
+        assert box.end() == 0
+        os.close(reading)
+        process = subprocess.Popen(command, stdout=writing, stderr=subprocess.DEVNULL)
+        os.close(writing)
+        assert process.wait(PATIENCE_S) == 0
