@@ -132,7 +132,7 @@ def test_the_root_goes_back_to_its_path(hopping: Recording) -> None:
     poses[:300] = swinging
     away = np.linalg.norm((grounded(phrase, poses) - phrase.roots)[:, [0, 2]], axis=1)
     assert away[290:330].max() > 0.02
-    assert away[-1] < 0.1 * away[330]
+    assert away[-1] < 0.15 * away[330]  # after 23 s
     assert np.abs(np.diff(away[330:])).max() < 0.005
 
 

@@ -1,0 +1,208 @@
+"""What 'Puppeteering an AI' found about iterative autoencoding holds for the default show's dancer.
+
+Each finding is stated on the default show's own phrase and on recordings that the network was not trained on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import appliance.show
+from appliance.dancer.blending import Blending
+from appliance.dancer.grounding import Grounding, measure_standing, survey
+from appliance.dancer.motion_source import Playback
+from appliance.dancer.puppet import Puppet
+from appliance.dancer.puppeteers import FixedOrientation, Hands, Puppeteer, TurningAxis
+from appliance.pose import quaternion
+from appliance.pose.bvh import read_bvh
+from appliance.pose.recording import Recording
+
+DEFAULT_SHOW = Path(appliance.show.__file__).parent / "default_show"
+HELD_OUT = {"salsa_29": 60.0, "indian_13": 120.0}  # takes kept apart from training, with their true rates
+SETTLING = 50  # ticks until every hand has taken its joint
+TICKS = 250
+
+
+@dataclass(frozen=True)
+class Dance:
+    """What was danced and the phrase beside it: moving joints (ticks, M, 4), and all joints with the root."""
+
+    danced: np.ndarray
+    phrase: np.ndarray
+    poses: np.ndarray
+    roots: np.ndarray
+    grounded_roots: np.ndarray
+    lifts: np.ndarray
+
+
+class Dancer:
+    """The whole dancer without a stage: phrase, hands, puppet, blending and grounding in a tick's order."""
+
+    def __init__(self, puppet: Puppet, phrase: Recording) -> None:
+        self.puppet, self.recording = puppet, phrase
+        self.floor = survey(phrase)
+        self.held_dances: dict[tuple[int, int, str], Dance] = {}
+
+    def dance(
+        self, coding: int, interaction: int, hand: Puppeteer | None = None, ticks: int = TICKS
+    ) -> Dance:
+        puppet = self.puppet
+        motion = Playback(self.recording, lifts=self.floor.lifts)
+        hands = Hands([hand] if hand else [], puppet.joints)
+        blending = Blending(len(puppet.joints), puppet.window)
+        grounding = Grounding(self.recording.skeleton, self.floor)
+        rows = []
+        for tick in range(ticks):
+            hands.pull(tick * 0.02)
+            window = puppet.select(motion.window())
+            blending.add(puppet.dance(window, hands.mask, hands.targets, hands.weights, coding, interaction))
+            assert not puppet.is_broken
+            pose = motion.window()[0].copy()
+            moved = blending.take().copy()
+            puppet.restore(moved, pose)
+            root, lift = motion.roots()[0].copy(), motion.lift
+            grounding.stand(pose, root, lift)
+            rows.append((moved, window[0].copy(), pose, root, grounding.root.copy(), lift))
+            motion.advance()
+        columns = (np.array(column[SETTLING:]) for column in zip(*rows, strict=True))
+        return Dance(*columns)
+
+    def place(self, joint: str) -> int:
+        return self.puppet.joints.index(joint)
+
+    def others(self, joint: str) -> list[int]:
+        """Places of the joints that the hand does not hold."""
+        return [place for place in range(len(self.puppet.joints)) if place != self.place(joint)]
+
+    def far_target(self, joint: str) -> np.ndarray:
+        """An orientation about 60 degrees from how the dancer usually carries a joint."""
+        turn = quaternion.from_axis_angle([1.0, 0.5, 0.3], 1.0).astype(np.float32)
+        return quaternion.multiply(turn, self.puppet.rest[self.place(joint)])
+
+    def hold(self, coding: int, interaction: int, joint: str) -> Dance:
+        """A dance with one joint held at its far target; each is danced once."""
+        key = coding, interaction, joint
+        if key not in self.held_dances:
+            hand = FixedOrientation(joint, self.far_target(joint).tolist())
+            self.held_dances[key] = self.dance(coding, interaction, hand)
+        return self.held_dances[key]
+
+
+def degrees(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.degrees(quaternion.angle_between(a, b))
+
+
+def pace(poses: np.ndarray) -> float:
+    """Mean angular speed of the joints, degrees a second."""
+    return float(degrees(poses[1:], poses[:-1]).mean() * 50)
+
+
+def dominant_frequency(poses: np.ndarray) -> float:
+    """Frequency in Hz with the most power over all joints."""
+    steady = quaternion.continuous(poses)
+    power = (np.abs(np.fft.rfft(steady - steady.mean(axis=0), axis=0)) ** 2).sum(axis=(1, 2))
+    return float(np.fft.rfftfreq(len(poses), 0.02)[1 + power[1:].argmax()])
+
+
+@pytest.fixture(scope="module")
+def default_show() -> Path:
+    if not (DEFAULT_SHOW / "puppet.onnx").is_file():
+        pytest.skip("the default show has not been made yet")
+    return DEFAULT_SHOW
+
+
+@pytest.fixture(scope="module", params=["the default phrase", *HELD_OUT])
+def dancer(request: pytest.FixtureRequest, default_show: Path) -> Dancer:
+    """The default show's puppet on a phrase."""
+    if request.param in HELD_OUT:
+        path = request.getfixturevalue("recordings_dir") / "train" / f"{request.param}.bvh"
+        phrase = read_bvh(path, true_fps=HELD_OUT[request.param], drop_tpose=True).resampled(50.0)
+    else:
+        phrase = read_bvh(default_show / "phrase.bvh")
+    return Dancer(Puppet(default_show / "puppet.onnx", phrase.skeleton), phrase)
+
+
+@pytest.fixture(scope="module")
+def still(dancer: Dancer) -> Dancer:
+    """The same puppet on one pose of the phrase that never moves."""
+    phrase = dancer.recording
+    poses = np.repeat(phrase.poses[300:301], 100, axis=0)
+    roots = np.repeat(phrase.roots[300:301], 100, axis=0)
+    return Dancer(dancer.puppet, Recording(phrase.skeleton, poses, roots, 50.0))
+
+
+@pytest.mark.parametrize("joint", ["lShldr", "rForeArm"])
+def test_one_coding_and_one_interaction_leave_the_other_joints_nearly_untouched(
+    dancer: Dancer, joint: str
+) -> None:
+    others, held = dancer.others(joint), dancer.place(joint)
+    free = dancer.dance(1, 0)
+    once = dancer.hold(1, 1, joint)
+    hand = degrees(once.danced[:, held], free.danced[:, held]).mean()
+    touched = degrees(once.danced[:, others], free.danced[:, others]).mean()
+    assert hand > 30
+    assert touched < 0.08 * hand
+    through = dancer.hold(10, 9, joint)
+    assert degrees(through.danced[:, others], through.phrase[:, others]).mean() > 2 * touched
+
+
+def test_the_held_orientation_shows_when_every_pass_is_interactive_and_not_otherwise(dancer: Dancer) -> None:
+    off_free = []
+    for joint in ("lShldr", "rForeArm", "chest"):
+        held, target = dancer.place(joint), dancer.far_target(joint)
+        for times in (1, 4):
+            mirrored = dancer.hold(times, times, joint).danced[:, held]
+            assert degrees(mirrored, target).max() < 0.5
+        let_go = dancer.hold(10, 9, joint).danced[:, held]
+        off_free.append(degrees(let_go, target).mean())
+    assert min(off_free) > 1.0
+    assert np.mean(off_free) > 8.0
+
+
+def test_the_deviation_from_the_phrase_grows_with_the_coding_iterations(dancer: Dancer) -> None:
+    deviation = []
+    for coding in (1, 2, 5, 10):
+        dance = dancer.dance(coding, 0)
+        deviation.append(float(degrees(dance.danced, dance.phrase).mean()))
+    assert np.all(np.diff(deviation) > 0.3), deviation
+
+
+def test_a_still_pose_stays_still(still: Dancer) -> None:
+    for dance in (still.dance(1, 0), still.dance(10, 0), still.hold(10, 9, "lShldr")):
+        assert pace(dance.danced) < 0.1
+
+
+@pytest.mark.parametrize("joint", ["lShldr", "head"])
+def test_a_turning_joint_sets_the_pace_of_a_still_dancer(still: Dancer, joint: str) -> None:
+    """One turn a second or one in five: all other joints take that period."""
+    others = still.others(joint)
+    fast = still.dance(10, 9, TurningAxis(joint, (0, 1, 0), 1.0), ticks=SETTLING + 500).danced[:, others]
+    slow = still.dance(10, 9, TurningAxis(joint, (0, 1, 0), 5.0), ticks=SETTLING + 500).danced[:, others]
+    assert dominant_frequency(fast) in (pytest.approx(1.0), pytest.approx(2.0))
+    assert dominant_frequency(slow) in (pytest.approx(0.2), pytest.approx(0.4))
+    assert pace(slow) > 1.0
+    assert pace(fast) > 2.0 * pace(slow)
+
+
+@pytest.mark.parametrize("joint", ["lShldr", "head"])
+def test_a_turning_joint_changes_the_pace_of_a_dancing_one(dancer: Dancer, joint: str) -> None:
+    others = dancer.others(joint)
+    fast = dancer.dance(10, 9, TurningAxis(joint, (0, 1, 0), 1.0), ticks=SETTLING + 500).danced[:, others]
+    slow = dancer.dance(10, 9, TurningAxis(joint, (0, 1, 0), 5.0), ticks=SETTLING + 400).danced[:, others]
+    assert pace(fast) > 1.05 * pace(slow)
+
+
+@pytest.mark.parametrize("joint", ["lShldr", "rForeArm"])
+def test_the_puppeteered_figure_stands_on_the_floor_and_hardly_slides(dancer: Dancer, joint: str) -> None:
+    dance = dancer.hold(10, 9, joint)
+    skeleton, floor = dancer.recording.skeleton, dancer.floor
+    before = measure_standing(skeleton, dance.poses, dance.roots, floor, dance.lifts)
+    after = measure_standing(skeleton, dance.poses, dance.grounded_roots, floor, dance.lifts)
+    assert after.float_cm + after.penetration_cm < 0.3
+    assert max(after.worst_float_cm, after.worst_penetration_cm) < 2.5
+    assert after.slide_cm_s < 0.35 * before.slide_cm_s
+    assert after.slide_cm_s < 20.0
