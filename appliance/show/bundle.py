@@ -10,6 +10,7 @@ from pathlib import Path
 from appliance.show.config_error import Problem
 
 CHECKSUMS = "SHA256SUMS"
+WORKSHOP = ("checkpoint.pt", "training.json", "pictures")  # a training leaves them there: no part of the show
 _LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
 _COPY_AGAIN = "Copy the whole bundle again."
 
@@ -20,12 +21,14 @@ def default_show_path() -> Path:
 
 
 def bundle_files(directory: Path) -> list[str]:
-    """Names of all files in a bundle, relative to it, sorted; without the checksums and hidden files."""
+    """Names of all files in a bundle, relative to it, sorted; without checksums, hidden files and a training's."""
     names = (path.relative_to(directory) for path in directory.rglob("*") if path.is_file())
     return sorted(
         name.as_posix()
         for name in names
-        if name.as_posix() != CHECKSUMS and not any(part.startswith(".") for part in name.parts)
+        if name.as_posix() != CHECKSUMS
+        and name.parts[0] not in WORKSHOP
+        and not any(part.startswith(".") for part in name.parts)
     )
 
 

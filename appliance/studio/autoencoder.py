@@ -44,7 +44,7 @@ class Autoencoder(nn.Module):
 
     def decode_raw(self, latents: Tensor) -> Tensor:
         """Latents -> heading-free windows before normalisation."""
-        return self.network.decode(latents).unflatten(1, (self.shape.window, self.shape.joints, 4))
+        return self.network.decode(latents).view(-1, self.shape.window, self.shape.joints, 4)
 
     def decode(self, latents: Tensor) -> Tensor:
         return rotation.normalize(self.decode_raw(latents))

@@ -48,6 +48,7 @@ class Catalogue:
     true_fps: dict[str, float] = field(default_factory=dict)
     take: dict[str, str] = field(default_factory=dict)
     held_out: tuple[str, ...] = ()
+    acknowledgement: str = ""  # whom to thank, in every show made of them
 
     def fps_of(self, name: str) -> float | None:
         return next((fps for pattern, fps in self.true_fps.items() if fnmatch.fnmatch(name, pattern)), None)
@@ -86,7 +87,6 @@ def load_dataset(
     catalogue = catalogue or find_catalogue(folder, files)
     takes = [load_take(file, catalogue) for file in progress(files)]
     skeleton = takes[0].recording.skeleton
-    moving = moving_joints(takes)
     for file, take in zip(files, takes, strict=True):
         if not take.recording.skeleton.same_joints(skeleton):
             raise DatasetError(
@@ -96,6 +96,7 @@ def load_dataset(
     held = {take.take for take in takes if any(fnmatch.fnmatch(take.name, p) for p in catalogue.held_out)}
     if not held and len({take.take for take in takes}) > 1:
         held = {sorted({take.take for take in takes})[-1]}
+    moving = moving_joints(takes)
     training = tuple(take for take in takes if take.take not in held)
     if not training:
         raise DatasetError("Every take is held out: nothing is left to train on.")
@@ -120,11 +121,13 @@ def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
 
 
 def read_catalogue(path: Path) -> Catalogue:
-    """Read a catalogue: true_fps (pattern: rate), takes (take: [names]), held_out (patterns)."""
+    """Read a catalogue: true_fps (pattern: rate), takes (take: [names]), held_out (patterns),
+    acknowledgement."""
     text = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
     takes = {name: take for take, names in (text.get("takes") or {}).items() for name in names}
     rates = {str(pattern): float(fps) for pattern, fps in (text.get("true_fps") or {}).items()}
-    return Catalogue(rates, takes, tuple(text.get("held_out") or ()))
+    thanks = str(text.get("acknowledgement") or "").strip()
+    return Catalogue(rates, takes, tuple(text.get("held_out") or ()), thanks)
 
 
 def load_take(file: Path, catalogue: Catalogue) -> Take:
@@ -148,7 +151,8 @@ def mean_pose(takes: Sequence[Take]) -> NDArray[np.float64]:
     poses = np.concatenate([take.recording.poses[take.sound] for take in takes])
     facing = quaternion.heading(poses[:, :1])
     poses = np.concatenate([quaternion.multiply(quaternion.inverse(facing), poses[:, :1]), poses[:, 1:]], 1)
-    return quaternion.normalize(quaternion.aligned(poses, poses[len(poses) // 2]).mean(axis=0))
+    mean = quaternion.aligned(poses, poses[len(poses) // 2]).mean(axis=0)
+    return quaternion.normalize(mean).astype(np.float64)
 
 
 def extremities(skeleton: Skeleton, moving: Sequence[int]) -> list[int]:
@@ -167,8 +171,7 @@ def plausible(tips: NDArray[np.floating], usual: NDArray[np.floating]) -> NDArra
     taken for each other (in the CMU dance takes: a head upside down for a whole take, hands, feet).
     """
     away = np.degrees(quaternion.angle_between(tips, usual))
-    sound: NDArray[np.bool_] = (away <= EXTREMITY_DEGREES).all(axis=-1)
-    return sound
+    return np.asarray((away <= EXTREMITY_DEGREES).all(axis=-1))
 
 
 def moving_joints(takes: Sequence[Take]) -> tuple[int, ...]:
@@ -201,13 +204,20 @@ def mirrored(recording: Recording) -> Recording:
     return Recording(recording.skeleton, poses, recording.roots * np.array([-1.0, 1.0, 1.0]), recording.fps)
 
 
+def window_starts(take: Take, hop: int = 1) -> NDArray[np.intp]:
+    """First frames of every hop-th of a take's windows in which each pose is sound."""
+    if len(take.sound) < WINDOW:
+        return np.zeros(0, dtype=np.intp)
+    whole = np.lib.stride_tricks.sliding_window_view(take.sound, WINDOW).all(axis=-1)
+    return np.flatnonzero(whole)[::hop]
+
+
 def windows(takes: Sequence[Take], moving: Sequence[int], mirror: bool = False) -> NDArray[np.float32]:
     """Every sound window of the takes, (N, 8, M, 4) float32, and after them their mirror images."""
     found = []
     for take in takes:
         recordings = [take.recording, mirrored(take.recording)] if mirror else [take.recording]
-        whole = np.lib.stride_tricks.sliding_window_view(take.sound, WINDOW).all(axis=-1)
-        starts = np.flatnonzero(whole)
+        starts = window_starts(take)
         for recording in recordings:
             poses = recording.poses[:, moving].astype(np.float32)
             found.append(poses[starts[:, None] + np.arange(WINDOW)])

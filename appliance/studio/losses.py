@@ -25,9 +25,7 @@ class LossWeights:
     prior: float = 0.001
 
 
-def reconstruction_losses(
-    raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton
-) -> dict[str, Tensor]:
+def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:
     """Losses of raw decoded quaternions (B, T, M, 4) against heading-free windows of the same shape.
 
     rotation: mean joint angle error in radians (the chord, twice: exact to 1 % below 25 degrees);

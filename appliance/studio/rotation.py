@@ -30,14 +30,16 @@ def inverse(q: Tensor) -> Tensor:
 
 def normalize(q: Tensor) -> Tensor:
     """Unit length along the last axis."""
-    return q / q.norm(dim=-1, keepdim=True)
+    unit: Tensor = q / q.norm(dim=-1, keepdim=True)
+    return unit
 
 
 def rotate(q: Tensor, v: Tensor) -> Tensor:
     """Turn vectors (..., 3)."""
     u = q[..., 1:]
     twice = 2 * torch.linalg.cross(u, v, dim=-1)
-    return v + q[..., :1] * twice + torch.linalg.cross(u, twice, dim=-1)
+    turned: Tensor = v + q[..., :1] * twice + torch.linalg.cross(u, twice, dim=-1)
+    return turned
 
 
 def heading(q: Tensor) -> Tensor:

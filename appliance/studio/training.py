@@ -72,17 +72,20 @@ class Training:
         network.start_at(rest.float().flatten().to(self.device))
         self.averaged = copy.deepcopy(self.autoencoder).requires_grad_(False).eval()
         self.critic = PriorCritic(shape.latent).to(self.device)
-        self.body = rotation.MovingSkeleton(
-            dataset.skeleton, dataset.moving, torch.tensor(still)
-        ).to(self.device)
+        self.body = rotation.MovingSkeleton(dataset.skeleton, dataset.moving, torch.tensor(still)).to(
+            self.device
+        )
         self.train_windows = self._heading_free(windows(dataset.training, dataset.moving, settings.mirror))
         self.held_windows = torch.tensor(windows(dataset.held_out, dataset.moving)).to(self.device)
-        self.optimizer = torch.optim.Adam(self.autoencoder.parameters(), lr=settings.learning_rate, fused=True)
+        self.optimizer = torch.optim.Adam(
+            self.autoencoder.parameters(), lr=settings.learning_rate, fused=True
+        )
         self.critic_optimizer = torch.optim.Adam(
             self.critic.parameters(), lr=settings.critic_learning_rate, betas=(0.5, 0.999), fused=True
         )
         self.step, self.seconds = 0, 0.0
         self.history: list[Report] = []
+        self.origin: dict[str, Any] = {}  # where the recordings lie and what is known of them
 
     @property
     def fraction(self) -> float:
@@ -176,6 +179,8 @@ class Training:
             "optimizer": self.optimizer.state_dict(),
             "critic_optimizer": self.critic_optimizer.state_dict(),
             "random": torch.get_rng_state(),
+            "random_gpu": torch.cuda.get_rng_state(self.device) if self.device.type == "cuda" else None,
+            "origin": self.origin,
             "step": self.step,
             "seconds": self.seconds,
             "history": [asdict(line) for line in self.history],
@@ -186,6 +191,9 @@ class Training:
         for name in ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer"):
             getattr(self, name).load_state_dict(state[name])
         torch.set_rng_state(state["random"].cpu())
+        if self.device.type == "cuda" and state.get("random_gpu") is not None:
+            torch.cuda.set_rng_state(state["random_gpu"].cpu(), self.device)
+        self.origin = state.get("origin", {})
         self.step, self.seconds = state["step"], state["seconds"]
         self.history = [Report(**line) for line in state["history"]]
 
@@ -193,7 +201,7 @@ class Training:
         return torch.cat(
             [
                 self.autoencoder.without_heading(part, self.autoencoder.facing(part))
-                for part in torch.tensor(poses).to(self.device).split(4096)
+                for part in torch.split(torch.tensor(poses).to(self.device), 4096)
             ]
         )
 
@@ -208,7 +216,8 @@ class Training:
     @torch.no_grad()
     def _average(self) -> None:
         keep = min(self.settings.smoothing, (self.step + 1) / (self.step + 10))
-        means, values = list(self.averaged.parameters()), list(self.autoencoder.parameters())
+        means: list[Tensor] = list(self.averaged.parameters())
+        values: list[Tensor] = list(self.autoencoder.parameters())
         torch._foreach_lerp_(means, values, 1 - keep)
 
 

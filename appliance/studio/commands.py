@@ -1,0 +1,169 @@
+"""`bunraku train`, `evaluate` and `export`: from a dancer's recordings to a show."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+REFUSED, INTERRUPTED = 2, 130
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+
+class NetworkName(StrEnum):
+    """Architectures, as networks.NETWORKS has them."""
+
+    mlp = "mlp"
+    conv = "conv"
+    lstm = "lstm"
+    lstm_autoregressive = "lstm-autoregressive"
+    lstm256 = "lstm256"
+
+
+class Device(StrEnum):
+    """Where to compute."""
+
+    auto = "auto"
+    cpu = "cpu"
+    cuda = "cuda"
+
+
+Recordings = Annotated[Path | None, typer.Option(help="Folder with the dancer's BVH recordings.")]
+Phrase = Annotated[
+    Path | None,
+    typer.Option(help="BVH that the show plays; left out: the folder's own, else an excerpt of a recording."),
+]
+
+
+@app.command()
+def train(
+    out: Annotated[Path, typer.Option(help="Folder of the show that comes out of it.")],
+    recordings: Recordings = None,
+    network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.mlp,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.01, help="How long to train.", show_default="90")
+    ] = None,
+    steps: Annotated[int | None, typer.Option(min=1, help="How many steps, instead of minutes.")] = None,
+    seed: Annotated[int, typer.Option(help="The same seed and steps give the same network.")] = 1,
+    latent: Annotated[int, typer.Option(min=0, help="Size of the latent; 0: the architecture's.")] = 0,
+    width: Annotated[int, typer.Option(min=0, help="Width of the layers; 0: the architecture's.")] = 0,
+    depth: Annotated[int, typer.Option(min=0, help="Blocks of an mlp; 0: its own.")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the training in --out.")] = False,
+    threads: Annotated[int, typer.Option(min=0, help="Processor cores to use; 0: all.")] = 0,
+    device: Annotated[Device, typer.Option(help="auto: the GPU if there is one.")] = Device.auto,
+    catalogue: Annotated[
+        Path | None, typer.Option(help="YAML: true rates, takes, what is held out; see docs/training.md.")
+    ] = None,
+    held_out: Annotated[
+        list[str] | None, typer.Option(help="Files to measure on, not to learn from ('solo_*'); repeatable.")
+    ] = None,
+    true_fps: Annotated[
+        list[str] | None, typer.Option(help="PATTERN=FPS where a header is wrong ('salsa_*=60'); repeatable.")
+    ] = None,
+    phrase: Phrase = None,
+    name: Annotated[
+        str | None, typer.Option(help="What the show is called; left out: as its folder.")
+    ] = None,
+) -> None:
+    """Train a dancer on recordings; at the end --out is a show that can be played."""
+    with _clear_errors("train"):
+        from appliance.studio import train_command
+
+        done = train_command.run(
+            train_command.Wish(
+                out=out,
+                recordings=recordings,
+                network=network.value,
+                minutes=minutes,
+                steps=steps,
+                seed=seed,
+                latent=latent,
+                width=width,
+                depth=depth,
+                resume=resume,
+                threads=threads,
+                device=device.value,
+                catalogue=catalogue,
+                held_out=tuple(held_out or ()),
+                true_fps=tuple(true_fps or ()),
+                phrase=phrase,
+                name=name,
+            )
+        )
+    if not done:
+        raise typer.Exit(INTERRUPTED)
+
+
+@app.command()
+def evaluate(
+    network: Annotated[Path, typer.Argument(help="Show folder, puppet.onnx or checkpoint.pt.")],
+    recordings: Annotated[list[Path], typer.Argument(help="BVH recordings with the same joint names.")],
+    true_fps: Annotated[
+        float | None, typer.Option(min=1, help="Rate of the recordings where their headers are wrong.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Figures as JSON on standard output.")] = False,
+    all_frames: Annotated[bool, typer.Option("--all-frames", help="Measure on glitches too.")] = False,
+) -> None:
+    """Measure how well a network knows a dance: degrees, centimetres, latents."""
+    with _clear_errors("evaluate"):
+        from appliance.studio import evaluate_command
+
+        evaluate_command.run(network, recordings, true_fps, json, all_frames)
+
+
+@app.command()
+def export(
+    checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a training.")],
+    out: Annotated[Path, typer.Option(help="Folder of the show; what the artist wrote there stays.")],
+    recordings: Recordings = None,
+    phrase: Phrase = None,
+    name: Annotated[
+        str | None, typer.Option(help="What the show is called; left out: as its folder.")
+    ] = None,
+) -> None:
+    """Make a show of a checkpoint: network file, quantization gate, report, skeleton, phrase, checksums."""
+    with _clear_errors("export"):
+        from appliance.studio import export_command
+
+        export_command.run(checkpoint, out, recordings, phrase, name)
+
+
+@contextmanager
+def _clear_errors(command: str) -> Iterator[None]:
+    """What people can mend is one message and status 2."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] not in ("torch", "onnx", "matplotlib"):
+            raise
+        _refuse(
+            f"bunraku {command} needs {error.name}, which is not installed here. The box dances without it. "
+            "Install the studio with: pip install 'bunraku[studio]'"
+        )
+    except (ValueError, RuntimeError, OSError) as error:
+        if not _is_for_people(error):
+            raise
+        _refuse(str(error))
+
+
+def _is_for_people(error: Exception) -> bool:
+    from appliance.pose.bvh import BvhError
+    from appliance.pose.filmstrip import MissingPicturesError
+    from appliance.show.config_error import ConfigError
+    from appliance.studio.dataset import DatasetError
+    from appliance.studio.studio_error import StudioError
+
+    return isinstance(
+        error, BvhError | ConfigError | DatasetError | MissingPicturesError | StudioError | OSError
+    )
+
+
+def _refuse(words: str) -> None:
+    print(f"bunraku: {words}", file=sys.stderr)
+    raise typer.Exit(REFUSED)

@@ -1,0 +1,180 @@
+"""How well a network knows a dance: joint angles and positions after so many iterations, its latents."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pose import quaternion
+from appliance.pose.skeleton import UnknownJointError
+from appliance.studio.coders import Coder, Poses
+from appliance.studio.dataset import (
+    WINDOW,
+    Catalogue,
+    Take,
+    extremities,
+    find_catalogue,
+    load_take,
+    plausible,
+    window_starts,
+)
+from appliance.studio.studio_error import StudioError
+
+ITERATIONS = (1, 2, 5, 10)
+POSITION_ITERATIONS = (1, 10)
+Figures = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Errors of N windows of 8 poses. degrees[k], centimetres[k]: (N, 8, M) after k iterations;
+    latents (N, Z) of the first iteration."""
+
+    joints: tuple[str, ...]
+    degrees: dict[int, Figures]
+    centimetres: dict[int, Figures]
+    latents: Figures
+    frames: int
+    masked_frames: int
+    hop: int
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys degrees.{1,2,5,10}.{mean,p95,max}, centimetres.{1,10}.{mean,max}, latent.{mean,std} and more.
+
+        latent.mean and latent.std are those of all values together; mean_of_each_size averages how far each
+        dimension's own mean is from 0, std_of_each the dimensions' own standard deviations.
+        """
+        z = self.latents.astype(np.float64)
+        return {
+            "degrees": {str(k): _spread(v, p95=True) for k, v in self.degrees.items()},
+            "centimetres": {str(k): _spread(v) for k, v in self.centimetres.items()},
+            "latent": {
+                "mean": round(float(z.mean()), 5),
+                "std": round(float(z.std()), 5),
+                "mean_of_each_size": round(float(np.abs(z.mean(axis=0)).mean()), 5),
+                "std_of_each": round(float(z.std(axis=0).mean()), 5),
+            },
+            "by_joint_degrees": {
+                str(k): {name: round(float(v[..., j].mean()), 4) for j, name in enumerate(self.joints)}
+                for k, v in self.degrees.items()
+            },
+            "windows": len(self.latents),
+            "hop": self.hop,
+            "frames": self.frames,
+            "masked_frames": self.masked_frames,
+        }
+
+
+def load_takes(
+    files: Sequence[Path], coder: Coder, true_fps: float | None = None, all_frames: bool = False
+) -> list[Take]:
+    """Recordings as training reads them: at their true rate, T-pose dropped, glitches masked, 50 Hz.
+
+    Without true_fps a catalogue that knows the file says its rate, else its header.
+    """
+    takes = []
+    for file in files:
+        if not file.is_file():
+            raise StudioError(f"{file} does not exist. Give BVH files to evaluate on.")
+        known = Catalogue({"*": true_fps}) if true_fps else find_catalogue(file.parent, [file])
+        take = load_take(file, known)
+        if all_frames:
+            take.sound[:] = True
+        else:
+            places = _places(take, coder)
+            tips = [j for j in extremities(take.recording.skeleton, sorted(places)) if j in places]
+            usual = coder.rest[[places.index(j) for j in tips]]
+            take.sound[:] &= plausible(take.recording.poses[:, tips], usual)
+        takes.append(take)
+    return takes
+
+
+def evaluate(
+    coder: Coder,
+    takes: Sequence[Take],
+    hop: int = 1,
+    progress: Callable[[Iterable[NDArray[np.intp]], int], Iterable[NDArray[np.intp]]] = lambda parts, _: (
+        parts
+    ),
+    iterations: Sequence[int] = ITERATIONS,
+) -> Evaluation:
+    """Every hop-th sound window of the takes through the network.
+
+    Positions are those of the network's joints, the root at its recorded place, in centimetres.
+    progress(parts, count) wraps the work. Raises StudioError where joints are missing or no window is left.
+    """
+    degrees: dict[int, list[Figures]] = {k: [] for k in iterations}
+    centimetres: dict[int, list[Figures]] = {k: [] for k in POSITION_ITERATIONS if k in iterations}
+    latents: list[Figures] = []
+    work = [(take, part) for take in takes for part in _parts(take, hop, coder.batch)]
+    if not work:
+        raise StudioError(
+            "No window of 8 sound poses is left to evaluate. Give a longer or cleaner recording."
+        )
+    done = progress((part for _, part in work), len(work))
+    for (take, _), starts in zip(work, done, strict=True):
+        places = _places(take, coder)
+        frames = starts[:, None] + np.arange(WINDOW)
+        whole = take.recording.poses[frames]
+        windows = whole[:, :, places].astype(np.float32)
+        for k in iterations:
+            made, found = coder.iterate(windows, k)
+            if not np.isfinite(made).all():
+                raise StudioError(f"{coder.facts['file']} gives numbers that are no poses: a damaged file.")
+            degrees[k].append(np.degrees(quaternion.angle_between(made, windows)).astype(np.float32))
+            if k in centimetres:
+                centimetres[k].append(_distances(take, frames, whole, places, made))
+            if k == iterations[0]:
+                latents.append(found)
+    return Evaluation(
+        coder.joints,
+        {k: np.concatenate(v) for k, v in degrees.items()},
+        {k: np.concatenate(v) for k, v in centimetres.items()},
+        np.concatenate(latents),
+        sum(len(take.recording) for take in takes),
+        sum(int((~take.sound).sum()) for take in takes),
+        hop,
+    )
+
+
+def _parts(take: Take, hop: int, batch: int) -> list[NDArray[np.intp]]:
+    starts = window_starts(take, hop)
+    return [starts[at : at + batch] for at in range(0, len(starts), batch)]
+
+
+def _places(take: Take, coder: Coder) -> list[int]:
+    """Where the network's joints stand in the recording's skeleton."""
+    try:
+        return [take.recording.skeleton.index(name) for name in coder.joints]
+    except UnknownJointError as error:
+        raise StudioError(
+            f"{take.name}: the network moves a joint that this recording lacks. {error} "
+            "Evaluate on recordings with the joint names that it learned from."
+        ) from None
+
+
+def _distances(
+    take: Take, frames: NDArray[np.intp], whole: NDArray[Any], places: list[int], made: Poses
+) -> Figures:
+    """(B, 8, M) centimetres between each joint's recorded place and where the made pose puts it."""
+    recording = take.recording
+    changed = whole.copy()
+    changed[:, :, places] = made
+    bones = None if recording.translations is None else recording.translations[frames]
+    recorded, _ = recording.skeleton.forward_kinematics(whole, recording.roots[frames], bones)
+    put, _ = recording.skeleton.forward_kinematics(changed, recording.roots[frames], bones)
+    distances = np.linalg.norm(recorded[:, :, places] - put[:, :, places], axis=-1)
+    return np.asarray(100 * distances, dtype=np.float32)
+
+
+def _spread(values: Figures, p95: bool = False) -> dict[str, float]:
+    spread = {"mean": float(values.mean(dtype=np.float64))}
+    if p95:
+        spread["p95"] = float(np.percentile(values, 95))
+    spread["max"] = float(values.max())
+    return {name: round(value, 4) for name, value in spread.items()}

@@ -1,0 +1,128 @@
+"""Pictures while it trains: the losses as curves, and a dance beside what the network makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pose.filmstrip import draw_filmstrip
+from appliance.pose.recording import Recording
+from appliance.studio.coders import Coder
+from appliance.studio.dataset import FPS, WINDOW, Take
+
+BACKDROP, PANEL, INK, FAINT = "#0f1015", "#191a21", "#efe6d8", "#9a948c"
+VERMILION, SLATE, IVORY = "#f54521", "#9eb3cc", "#edddc7"
+STRIP_S = 4.0
+CURVES = {
+    "rotation": ("rotation (radians)", VERMILION),
+    "pace": ("pace (radians a step)", "#e8a33d"),
+    "position": ("position (metres)", IVORY),
+    "unit_norm": ("unit norm", "#7d8a5a"),
+    "prior": ("prior: the encoder's", SLATE),
+    "critic": ("prior: the critic's", "#5f7fa8"),
+}
+
+
+def draw_losses(path: Path, history: Sequence[dict[str, Any]]) -> Path:
+    """Two panels over the minutes: every loss, and the error on held-out takes. history: training reports."""
+    figure = new_figure(12, 5.2)
+    left, right = panels(figure, 1, 2)
+    minutes = [line["seconds"] / 60 for line in history]
+    for name, (label, colour) in CURVES.items():
+        values = [line["losses"].get(name) for line in history]
+        if any(value is not None for value in values):
+            left.semilogy(minutes, values, label=label, color=colour, linewidth=1.6)
+    left.set_title("Losses", color=INK, loc="left")
+    left.legend(
+        facecolor=PANEL,
+        edgecolor=PANEL,
+        labelcolor=INK,
+        fontsize=8,
+        ncols=3,
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.13),
+    )
+    held = [(m, line["held_out_degrees"]) for m, line in zip(minutes, history, strict=True)]
+    known = [(m, degrees) for m, degrees in held if degrees is not None]
+    if known:
+        right.plot(*zip(*known, strict=True), color=VERMILION, linewidth=2)
+        right.set_ylim(0, min(max(d for _, d in known), 4 * known[-1][1]) * 1.1)
+        title = f"Error on takes kept apart: {known[-1][1]:.2f} degrees a joint"
+        right.set_title(title, color=INK, loc="left")
+    for axes in (left, right):
+        axes.set_xlabel("minutes of training", color=FAINT)
+    return save(figure, path)
+
+
+def draw_reconstruction(path: Path, coder: Coder, take: Take, title: str, iterations: int = 1) -> Path:
+    """A filmstrip of a take above what the network makes of it after so many iterations."""
+    excerpt = longest_sound(take, STRIP_S)
+    made = reconstructed(coder, excerpt, iterations)
+    return draw_filmstrip(
+        path,
+        excerpt.skeleton,
+        excerpt.poses[: len(made)],
+        excerpt.roots[: len(made)],
+        FPS,
+        title=title,
+        columns=9,
+        against=made,
+        labels=("recorded", "coded once" if iterations == 1 else f"coded {iterations} times"),
+    )
+
+
+def reconstructed(coder: Coder, recording: Recording, iterations: int) -> NDArray[np.float64]:
+    """(N, J, 4): the recording in windows of 8 side by side through the network; a last rest is left out."""
+    places = [recording.skeleton.index(name) for name in coder.joints]
+    count = len(recording) // WINDOW * WINDOW
+    windows = recording.poses[:count, places].astype(np.float32).reshape(-1, WINDOW, len(places), 4)
+    made, _ = coder.iterate(windows, iterations)
+    whole = np.array(recording.poses[:count], dtype=np.float64)
+    whole[:, places] = made.reshape(count, len(places), 4)
+    return whole
+
+
+def longest_sound(take: Take, most_s: float) -> Recording:
+    """The longest stretch of a take without a glitch, at most most_s long, cut from its middle."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], take.sound.astype(int), [0]])))
+    starts, ends = edges[::2], edges[1::2]
+    longest = int(np.argmax(ends - starts)) if len(starts) else 0
+    first, last = (int(starts[longest]), int(ends[longest])) if len(starts) else (0, len(take.sound))
+    spare = max(0, last - first - round(most_s * FPS)) // 2
+    return take.recording.excerpt((first + spare) / FPS, (last - spare) / FPS)
+
+
+def new_figure(width: float, height: float) -> Any:
+    """A dark figure, inches, drawn without a window."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), facecolor=BACKDROP, dpi=100, layout="constrained")
+
+
+def panels(figure: Any, rows: int, columns: int) -> list[Any]:
+    """Axes of a figure, row by row, in the studio's colours."""
+    return [dressed(axes) for axes in np.ravel(figure.subplots(rows, columns))]
+
+
+def dressed(axes: Any) -> Any:
+    """Axes in the studio's colours."""
+    axes.set_facecolor(PANEL)
+    axes.tick_params(colors=FAINT, labelsize=8)
+    for spine in axes.spines.values():
+        spine.set_color(PANEL)
+    axes.grid(color=BACKDROP, linewidth=0.8)
+    axes.set_axisbelow(True)
+    return axes
+
+
+def save(figure: Any, path: Path) -> Path:
+    """Write a PNG whole or not at all: somebody may be looking at the old one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".partial")
+    with partial.open("wb") as stream:
+        figure.savefig(stream, format="png", facecolor=BACKDROP)
+    return partial.replace(path)

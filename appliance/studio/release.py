@@ -1,0 +1,162 @@
+"""From a checkpoint to a show: export, the gate, the report, and everything that a bundle needs."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from appliance.pose import quaternion
+from appliance.pose.recording import Recording
+from appliance.studio import packing
+from appliance.studio.coders import OnnxCoder, Poses, TorchCoder, load_checkpoint
+from appliance.studio.dataset import Catalogue, Dataset, Take, find_catalogue, load_take
+from appliance.studio.evaluation import evaluate
+from appliance.studio.export import export
+from appliance.studio.gate import judge, median_ms, sample_windows
+from appliance.studio.pictures import longest_sound
+from appliance.studio.report import write_up
+from appliance.studio.report_picture import draw_report
+from appliance.studio.studio_error import StudioError
+
+EQUALITY = 1e-4  # in any component of any quaternion after 10 iterations
+EQUALITY_WINDOWS = 16
+PHRASE_S = 60.0
+FIRST_HANDS = (
+    "lshldr",
+    "leftshoulder",
+    "leftarm",
+    "leftupperarm",
+    "lforearm",
+    "leftforearm",
+    "lhand",
+    "lefthand",
+)
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to make a show of. phrase: a BVH file, or None for the bundle's own or an excerpt of a take."""
+
+    checkpoint: Path
+    recordings: Path
+    out: Path
+    name: str
+    phrase: Path | None = None
+
+
+def release(
+    request: Request, dataset: Dataset, catalogue: Catalogue, say: Callable[[str], None]
+) -> dict[str, Any]:
+    """Write the whole bundle and return its report. Raises StudioError where export and training differ."""
+    coder, state = load_checkpoint(request.checkpoint)
+    missing = [name for name in coder.joints if name not in dataset.skeleton.names]
+    if missing:
+        raise StudioError(
+            f"The recordings lack joints that {request.checkpoint} moves ({', '.join(missing)}). "
+            "Give the folder that it was trained on with --recordings."
+        )
+    places = [dataset.skeleton.index(name) for name in coder.joints]
+    judged_on = dataset.held_out or dataset.training
+    request.out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".export-", dir=request.out) as folder:
+        files = _export_both(coder, state, Path(folder))
+        coders = {precision: OnnxCoder(file) for precision, file in files.items()}
+        windows = sample_windows(judged_on, places)
+        difference = _difference(coder, coders["fp32"], windows)
+        say(f"The network file computes what was trained (to {difference:.0e} after 10 iterations).")
+        verdict = judge(coders["fp32"], coders["int8"], windows)
+        say(verdict.sentence())
+        times = {precision: median_ms(one, windows[0]) for precision, one in coders.items()}
+        shutil.copyfile(files[verdict.precision], request.out / "puppet.onnx")
+    evaluation = evaluate(coder, judged_on)
+    names = sorted(take.name for take in judged_on)
+    report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
+    _write_texts(request, coder, dataset, catalogue, report, say)
+    shown = max(judged_on, key=lambda take: len(longest_sound(take, PHRASE_S)))
+    draw_report(request.out / "report.png", request.name, report, evaluation, coder, shown)
+    packing.seal(request.out)
+    return report
+
+
+def _write_texts(
+    request: Request,
+    coder: TorchCoder,
+    dataset: Dataset,
+    catalogue: Catalogue,
+    report: dict[str, Any],
+    say: Callable[[str], None],
+) -> None:
+    """Everything but network and picture: skeleton, phrase, show.yaml, report.json."""
+    packing.write_skeleton(request.out, dataset.skeleton, dataset.still_pose())
+    phrase = _phrase(request, dataset, catalogue, say)
+    if phrase is not None:
+        packing.write_phrase(request.out, phrase)
+    hand = {"sensor": "left-wrist", "joint": first_hand(coder.joints)}
+    packing.write_show_yaml(request.out, request.name, [hand], catalogue.acknowledgement)
+    (request.out / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
+def first_hand(joints: tuple[str, ...]) -> str:
+    """The joint that a new show gives to its sensor: the left upper arm where it is named so."""
+    folded = {name.casefold().replace("_", ""): name for name in joints}
+    return next((folded[name] for name in FIRST_HANDS if name in folded), joints[-1])
+
+
+def _export_both(coder: TorchCoder, state: dict[str, Any], folder: Path) -> dict[str, Path]:
+    files = {precision: folder / f"{precision}.onnx" for precision in ("fp32", "int8")}
+    for precision, file in files.items():
+        export(
+            coder.autoencoder,
+            list(coder.joints),
+            file,
+            int8=precision == "int8",
+            architecture=state["settings"]["network"],
+        )
+    return files
+
+
+def _difference(coder: TorchCoder, exported: OnnxCoder, windows: Poses) -> float:
+    """Largest difference of a component after 10 iterations; raises StudioError above EQUALITY."""
+    few = windows[np.linspace(0, len(windows) - 1, min(EQUALITY_WINDOWS, len(windows))).astype(int)]
+    if not len(few):
+        raise StudioError("No window of 8 sound poses is in the recordings: nothing to check the export on.")
+    trained, played = coder.iterate(few, 10)[0], exported.iterate(few, 10)[0]
+    difference = float(np.abs(quaternion.aligned(played, trained) - trained).max())
+    if not difference <= EQUALITY:
+        raise StudioError(
+            f"The exported network differs from the trained one by {difference:.1g} after 10 iterations "
+            f"(at most {EQUALITY:g} is let pass). No show was made. This is a fault of the export: report it."
+        )
+    return difference
+
+
+def _phrase(
+    request: Request, dataset: Dataset, catalogue: Catalogue, say: Callable[[str], None]
+) -> Recording | None:
+    """The phrase to write; None where the bundle keeps its own."""
+    if request.phrase is not None:
+        beside = request.phrase.resolve().parent == request.recordings.resolve()
+        known = catalogue if beside else find_catalogue(request.phrase.parent, [request.phrase])
+        found = load_take(request.phrase, known).recording
+        if not found.skeleton.same_joints(dataset.skeleton):
+            raise StudioError(
+                f"{request.phrase} has another skeleton than the recordings. Give a phrase of theirs."
+            )
+        return found
+    if (request.out / "phrase.bvh").exists():
+        return None
+    takes: tuple[Take, ...] = dataset.held_out or dataset.training
+    longest = max(takes, key=lambda take: len(longest_sound(take, PHRASE_S)))
+    phrase = longest_sound(longest, PHRASE_S)
+    say(
+        f"phrase.bvh is {phrase.seconds:.0f} s of the recording {longest.name}: the bundle contains a "
+        "recording. Give your own with --phrase, or replace the file and run bunraku export again."
+    )
+    return phrase

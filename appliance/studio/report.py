@@ -1,0 +1,98 @@
+"""What a show says about its own dancer: report.json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from appliance.studio import rotation
+from appliance.studio.autoencoder import Autoencoder
+from appliance.studio.coders import TorchCoder
+from appliance.studio.dataset import Dataset, windows
+from appliance.studio.evaluation import Evaluation
+from appliance.studio.gate import LIMITS_DEGREES, Verdict
+
+RANDOM_LATENTS = 4096
+LISTED = ("network", "seed", "batch", "learning_rate", "mirror", "weights")
+
+
+def write_up(
+    coder: TorchCoder,
+    state: dict[str, Any],
+    dataset: Dataset,
+    evaluation: Evaluation,
+    evaluated_on: Sequence[str],
+    verdict: Verdict,
+    difference: float,
+    median_ms: dict[str, float],
+) -> dict[str, Any]:
+    """The report as JSON. difference: largest between ONNX and PyTorch in any quaternion component."""
+    ranges = joint_ranges(coder.autoencoder, windows(dataset.training, _places(coder, dataset), mirror=True))
+    return {
+        "network": {
+            "architecture": state["settings"]["network"],
+            **{name: state["shape"][name] for name in ("window", "joints", "latent", "width", "depth")},
+            "parameters": sum(p.numel() for p in coder.autoencoder.network.parameters()),
+            "ships": verdict.precision,
+        },
+        "training": {
+            "minutes": round(state["seconds"] / 60, 2),
+            "steps": state["step"],
+            **{name: state["settings"][name] for name in LISTED},
+            "takes": sorted(take.name for take in dataset.training),
+            "held_out": sorted(take.name for take in dataset.held_out),
+        },
+        "evaluated_on": list(evaluated_on),
+        **evaluation.as_json(),
+        "quantization": {
+            "passed": verdict.passed,
+            "words": verdict.sentence(),
+            "limits_degrees": {str(k): limit for k, limit in LIMITS_DEGREES.items()},
+            "degrees": {
+                str(k): {"mean": round(verdict.mean[k], 4), "max": round(verdict.largest[k], 4)}
+                for k in LIMITS_DEGREES
+            },
+        },
+        "equality_with_pytorch": {"iterations": 10, "largest_difference": float(f"{difference:.2g}")},
+        "median_ms_of_ten_iterations": {name: round(ms, 3) for name, ms in median_ms.items()},
+        "joint_range_degrees": {
+            name: round(float(r), 2) for name, r in zip(coder.joints, ranges, strict=True)
+        },
+        "random_latents": random_dance(coder.autoencoder, ranges),
+    }
+
+
+def joint_ranges(autoencoder: Autoencoder, training: np.ndarray[Any, np.dtype[np.float32]]) -> Tensor:
+    """(M,): how far each joint turns from its rest orientation in the training windows, in degrees."""
+    widest = [torch.zeros(autoencoder.shape.joints)]
+    for part in torch.split(torch.from_numpy(training), 4096):
+        level = autoencoder.without_heading(part, autoencoder.facing(part))
+        widest.append(_degrees_from_rest(autoencoder, level).amax(dim=(0, 1)))
+    return torch.stack(widest).amax(dim=0)
+
+
+def random_dance(autoencoder: Autoencoder, ranges: Tensor, seed: int = 0) -> dict[str, float]:
+    """Poses decoded from the prior's noise: how many of their joint angles lie in the recordings' range."""
+    noise = torch.randn(
+        RANDOM_LATENTS, autoencoder.shape.latent, generator=torch.Generator().manual_seed(seed)
+    )
+    with torch.no_grad():
+        angles = _degrees_from_rest(autoencoder, autoencoder.decode(noise))
+    beyond = (angles - ranges).clamp_min(0)
+    return {
+        "decoded": RANDOM_LATENTS,
+        "share_within_range": round(float((beyond == 0).float().mean()), 6),
+        "furthest_beyond_degrees": round(float(beyond.max()), 2),
+    }
+
+
+def _degrees_from_rest(autoencoder: Autoencoder, poses: Tensor) -> Tensor:
+    return torch.rad2deg(rotation.angle_between(poses, autoencoder.rest.expand_as(poses)))
+
+
+def _places(coder: TorchCoder, dataset: Dataset) -> list[int]:
+    return [dataset.skeleton.index(name) for name in coder.joints]

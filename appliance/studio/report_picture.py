@@ -1,0 +1,124 @@
+"""report.png: what a dancer knows and does not know, on one page for the artist."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from appliance.studio.coders import Coder
+from appliance.studio.dataset import Take
+from appliance.studio.evaluation import Evaluation
+from appliance.studio.pictures import (
+    FAINT,
+    INK,
+    IVORY,
+    PANEL,
+    SLATE,
+    VERMILION,
+    draw_reconstruction,
+    dressed,
+    new_figure,
+    save,
+)
+
+STRIP_SHARE = 0.58  # height of the filmstrip by its width
+
+
+def draw_report(
+    path: Path, name: str, report: dict[str, Any], evaluation: Evaluation, coder: Coder, take: Take
+) -> Path:
+    """Filmstrip of a take and its reconstruction; errors by joint and by iterations; latents; int8."""
+    import matplotlib.image
+
+    figure = new_figure(15, 15 * STRIP_SHARE + 8.4)
+    figure.suptitle(_headline(name, report), color=INK, fontsize=15, x=0.01, ha="left")
+    figure.get_layout_engine().set(w_pad=0.15, h_pad=0.12)
+    grid = figure.add_gridspec(3, 3, height_ratios=[15 * STRIP_SHARE, 3.6, 3.6])
+    with tempfile.TemporaryDirectory() as folder:
+        title = (
+            f"{take.name}, a take that it never saw"
+            if take.name in report["training"]["held_out"]
+            else take.name
+        )
+        strip = matplotlib.image.imread(draw_reconstruction(Path(folder) / "strip.png", coder, take, title))
+    axes = figure.add_subplot(grid[0, :])
+    axes.imshow(strip, interpolation="antialiased")
+    axes.set_axis_off()
+    _by_joint(dressed(figure.add_subplot(grid[1, :])), report)
+    _by_iterations(dressed(figure.add_subplot(grid[2, 0])), report)
+    _latents(dressed(figure.add_subplot(grid[2, 1])), evaluation)
+    _quantization(dressed(figure.add_subplot(grid[2, 2])), report)
+    return save(figure, path)
+
+
+def _headline(name: str, report: dict[str, Any]) -> str:
+    once, often = report["degrees"]["1"]["mean"], report["degrees"]["10"]["mean"]
+    return (
+        f"{name}: coded once, a joint is {once:.1f} degrees from the dancer's; ten times, {often:.1f}: "
+        f"that is how far it goes its own way"
+    )
+
+
+def _by_joint(axes: Any, report: dict[str, Any]) -> None:
+    once, often = report["by_joint_degrees"]["1"], report["by_joint_degrees"]["10"]
+    places = np.arange(len(once))
+    axes.bar(places - 0.2, list(often.values()), 0.4, color=SLATE, label="coded ten times")
+    axes.bar(places + 0.2, list(once.values()), 0.4, color=VERMILION, label="coded once")
+    axes.set_xticks(places, list(once), color=INK)
+    _titled(axes, "Which joints it knows best (mean error in degrees)")
+    _legend(axes)
+
+
+def _by_iterations(axes: Any, report: dict[str, Any]) -> None:
+    counts = [int(k) for k in report["degrees"]]
+    for key, colour, label in (("mean", VERMILION, "mean"), ("p95", IVORY, "95 of 100 are below")):
+        values = [figures[key] for figures in report["degrees"].values()]
+        axes.plot(counts, values, "o-", color=colour, label=label)
+    axes.set_xticks(counts)
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("coding iterations", color=FAINT)
+    _titled(axes, "More iterations, further from the phrase (degrees)")
+    _legend(axes)
+
+
+def _latents(axes: Any, evaluation: Evaluation) -> None:
+    z = evaluation.latents.ravel()
+    axes.hist(z, bins=np.linspace(-4, 4, 81), density=True, color=SLATE, label="latents of the takes")
+    x = np.linspace(-4, 4, 200)
+    axes.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color=VERMILION, label="the prior, a Gaussian")
+    axes.set_yticks([])
+    _titled(axes, f"Latents: mean {z.mean():.2f}, standard deviation {z.std():.2f}")
+    _legend(axes)
+
+
+def _quantization(axes: Any, report: dict[str, Any]) -> None:
+    gate, times = report["quantization"], report["median_ms_of_ten_iterations"]
+    counts = list(gate["degrees"])
+    places = np.arange(len(counts))
+    axes.bar(
+        places - 0.2,
+        list(gate["limits_degrees"].values()),
+        0.4,
+        color=PANEL,
+        edgecolor=FAINT,
+        label="allowed",
+    )
+    axes.bar(
+        places + 0.2, [gate["degrees"][k]["mean"] for k in counts], 0.4, color=VERMILION, label="int8 to fp32"
+    )
+    axes.set_xticks(places, [f"after {k}" for k in counts], color=INK)
+    took = " and ".join(f"{ms:.2f} ms in {name}" for name, ms in times.items())
+    _titled(axes, f"{report['network']['ships']} ships: ten iterations take {took}")
+    axes.set_ylabel("degrees apart", color=FAINT)
+    _legend(axes)
+
+
+def _titled(axes: Any, title: str) -> None:
+    axes.set_title(title, color=INK, loc="left", fontsize=11)
+
+
+def _legend(axes: Any) -> None:
+    axes.legend(facecolor=PANEL, edgecolor=PANEL, labelcolor=INK, fontsize=8)

@@ -1,0 +1,65 @@
+"""Where a training's recordings lie and what is known of them: from the command line, or remembered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from appliance.studio.dataset import Catalogue, Dataset, find_catalogue, load_dataset, read_catalogue
+from appliance.studio.studio_error import StudioError
+
+
+@dataclass(frozen=True)
+class Sources:
+    """A folder of recordings and its catalogue; a checkpoint carries them along."""
+
+    recordings: Path
+    catalogue: Catalogue
+
+    def as_state(self) -> dict[str, Any]:
+        """Plain values for a checkpoint."""
+        return {"recordings": str(self.recordings.resolve()), "catalogue": asdict(self.catalogue)}
+
+    def load(self, progress: Callable[[Sequence[Path]], Sequence[Path]]) -> Dataset:
+        """Read every recording. Raises DatasetError or BvhError."""
+        return load_dataset(self.recordings, self.catalogue, progress)
+
+
+def given(
+    recordings: Path, catalogue: Path | None, held_out: Sequence[str], true_fps: Sequence[str]
+) -> Sources:
+    """Sources from options; what is said by hand goes before what a catalogue knows."""
+    files = sorted(recordings.glob("*.bvh"))
+    if not files:
+        raise StudioError(f"{recordings} has no .bvh files. Give the folder that holds your recordings.")
+    known = read_catalogue(catalogue) if catalogue else find_catalogue(recordings, files)
+    rates = dict(_rate(words) for words in true_fps)
+    known = replace(known, true_fps={**rates, **known.true_fps})
+    return Sources(recordings, replace(known, held_out=tuple(held_out)) if held_out else known)
+
+
+def remembered(state: dict[str, Any], recordings: Path | None, checkpoint: Path) -> Sources:
+    """Sources that a checkpoint was trained on; `recordings` where they have moved since."""
+    origin = state.get("origin") or {}
+    if recordings is None and "recordings" not in origin:
+        raise StudioError(f"{checkpoint} does not say which recordings it learned from: give --recordings.")
+    folder = recordings or Path(origin["recordings"])
+    if not folder.is_dir():
+        raise StudioError(f"The recordings are no longer in {folder}: say where with --recordings.")
+    if "catalogue" not in origin:
+        return given(folder, None, [], [])
+    known = origin["catalogue"]
+    return Sources(folder, Catalogue(**{**known, "held_out": tuple(known["held_out"])}))
+
+
+def _rate(words: str) -> tuple[str, float]:
+    pattern, separator, fps = words.partition("=")
+    try:
+        rate = float(fps)
+    except ValueError:
+        rate = 0.0
+    if not separator or not 1 <= rate <= 1000:
+        raise StudioError(f"'{words}' is no rate: write PATTERN=FPS, for example 'salsa_*=60'.")
+    return pattern, rate

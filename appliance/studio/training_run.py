@@ -1,0 +1,142 @@
+"""A training as people see it: progress, checkpoints, pictures, and a stop that loses nothing."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn
+from torch import nn
+
+from appliance.studio.coders import TorchCoder
+from appliance.studio.dataset import window_starts
+from appliance.studio.pictures import draw_losses, draw_reconstruction
+from appliance.studio.training import Report, Training, save_checkpoint
+
+FIRST_STRIP_S, STRIP_SHARE = 60.0, 0.1  # a filmstrip after a minute and at every tenth of the training
+
+
+class TrainingRun:
+    """Runs a training in its folder: checkpoint.pt, training.json, pictures/."""
+
+    def __init__(self, training: Training, folder: Path, console: Console) -> None:
+        self.training, self.folder, self.console = training, folder, console
+        self.checkpoint = folder / "checkpoint.pt"
+        self._strip_at: float | None = None
+        self._line = ""
+
+    def run(self) -> bool:
+        """Train until done or asked to stop (Ctrl-C, SIGTERM). True when done; the checkpoint is written."""
+        with stop_signals() as stop_asked, self._progress() as progress:
+            bar = progress.add_task("training", total=1.0, words="")
+            steps_at_start, began = self.training.step, time.monotonic()
+
+            def stop() -> bool:
+                done = self.training.step - steps_at_start
+                if done % 10 == 0:
+                    words = self._words(done / max(time.monotonic() - began, 1e-6))
+                    progress.update(bar, completed=self.training.fraction, words=words)
+                return stop_asked()
+
+            self.training.run(self._report, self._save, stop=stop)
+            progress.update(bar, completed=self.training.fraction)
+        return self.training.fraction >= 1.0
+
+    def _progress(self) -> Progress:
+        words = TextColumn("{task.fields[words]}")
+        columns = [SpinnerColumn(), TextColumn("training"), BarColumn(), TaskProgressColumn(), words]
+        return Progress(*columns, console=self.console, disable=not self.console.is_terminal)
+
+    def _words(self, steps_a_second: float) -> str:
+        left = time_left_s(self.training.seconds, self.training.fraction)
+        return f"{steps_a_second:.1f} steps/s, {_clock(left)} left. {self._line}"
+
+    def _report(self, report: Report) -> None:
+        """Every quarter of a minute: a line of history; a filmstrip when its time has come."""
+        held = (
+            ""
+            if report.held_out_degrees is None
+            else f"{report.held_out_degrees:.2f} degrees on held-out takes, "
+        )
+        parts = [f"{name} {value:.3g}" for name, value in report.losses.items()]
+        self._line = held + ", ".join(parts[:3])
+        if not self.console.is_terminal:
+            self.console.print(
+                f"{100 * report.fraction:5.1f} %  step {report.step}  {held}{', '.join(parts)}",
+                soft_wrap=True,
+            )
+        self._write_history()
+        if self._strip_is_due(report):
+            self._strip_at = report.fraction
+            self._draw_strip(report)
+
+    def _strip_is_due(self, report: Report) -> bool:
+        if self._strip_at is None:
+            return report.seconds >= FIRST_STRIP_S
+        return report.fraction - self._strip_at >= STRIP_SHARE
+
+    def _draw_strip(self, report: Report) -> None:
+        dataset = self.training.dataset
+        take = max(dataset.held_out or dataset.training, key=lambda take: len(window_starts(take)))
+        title = f"{take.name} after {report.seconds / 60:.0f} minutes ({report.step} steps)"
+        path = self.folder / "pictures" / f"filmstrip_{round(100 * report.fraction):03d}.png"
+        coder = TorchCoder(self.training.averaged, dataset.moving_names, {})
+        draw_reconstruction(path, coder, take, title)
+
+    def _save(self) -> None:
+        save_checkpoint(self.training, self.checkpoint)
+        self._write_history()
+        if self.training.history:
+            history = [asdict(line) for line in self.training.history]
+            draw_losses(self.folder / "pictures" / "losses.png", history)
+
+    def _write_history(self) -> None:
+        told = {
+            "settings": asdict(self.training.settings),
+            "parameters": parameters(self.training.autoencoder.network),
+            "history": [asdict(line) for line in self.training.history],
+        }
+        partial = self.folder / ".training.json"
+        partial.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+        partial.replace(self.folder / "training.json")
+
+
+def parameters(network: nn.Module) -> int:
+    """How many numbers a network learns."""
+    return sum(parameter.numel() for parameter in network.parameters())
+
+
+def time_left_s(seconds: float, fraction: float) -> float:
+    """Seconds to go if it goes on as it went."""
+    return seconds * (1 - fraction) / fraction if fraction > 0 else 0.0
+
+
+@contextmanager
+def stop_signals() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C or SIGTERM came; a second one stops at once."""
+    asked = False
+
+    def ask(number: int, frame: object) -> None:
+        nonlocal asked
+        if asked:
+            raise KeyboardInterrupt
+        asked = True
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
