@@ -48,7 +48,8 @@ class Stage:
         self.iterations = Iterations(
             self.admission.coding, self.admission.interaction, self.admission.most_coding
         )
-        latest_start_s = max(0.0, box.limits.late_ms - box.limits.tick_budget_ms) / 1000.0
+        needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
+        latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
         self.tick = Tick(self.cast, self.iterations, latest_start_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0

@@ -19,7 +19,7 @@ DRAIN, HANDS, MOTION, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
 class Tick:
     """Runs the cast once a slot. Nothing here waits, logs, or allocates for the collector.
 
-    A tick that starts so late that its budget would no longer fit does not dance: it sends the last pose
+    A tick that starts so late that its frame could not leave in time does not dance: it sends the last pose
     again, marked late. The phrase stands still meanwhile, so nothing is jumped over and nothing is replayed.
     Where the network gives no sound poses, the last good pose stays.
     """
