@@ -11,7 +11,7 @@ TEST_ARGS ?=
 DEBIAN_FOR_TESTS := liblo-tools:oscdump
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint bench lock clean debian-for-tests
+.PHONY: help run studio test lint bench lock clean debian-for-tests
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -20,6 +20,8 @@ help: ## show this list
 run: $(VENV)/.ready-to-run ## dance with an emulated sensor and draw a picture of it
 	@mkdir -p $(dir $(PICTURE))
 	@$(BIN)/bunraku play --emulate --filmstrip $(PICTURE) $(ARGS)
+
+studio: $(VENV)/.ready-to-test ## add what training needs (PyTorch) to the environment
 
 test: $(VENV)/.ready-to-test debian-for-tests lint ## style, types, import contracts and all tests
 	@$(BIN)/pytest $(TEST_ARGS)
