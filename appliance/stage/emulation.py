@@ -35,12 +35,18 @@ class Emulation:
         ]
         sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
         self.box = box.model_copy(update={"sensors": sensors})
+        self._words = scratch / "emulator.txt"
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> Emulation:
-        self._process = subprocess.Popen(
-            self._command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
-        )
+        with self._words.open("wb") as words:
+            self._process = subprocess.Popen(
+                self._command,
+                stdin=subprocess.DEVNULL,
+                stdout=words,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C is for the box, which then ends the emulator
+            )
         return self
 
     def __exit__(
@@ -49,6 +55,8 @@ class Emulation:
         process = self._process
         if process is None:
             return
+        if process.poll():
+            print(f"The emulated sensors ended by themselves: {self._words.read_text()}", file=sys.stderr)
         process.terminate()
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(_LAST_WORDS_S)

@@ -23,7 +23,7 @@ class PhaseLock:
         self,
         period_s: float = TICK_S,
         *,
-        in_time: float = 0.85,
+        in_time: float = 0.8,
         margin_s: float = 0.0001,
         gain: float = 0.05,
         most_s: float = 0.0002,
