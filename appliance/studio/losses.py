@@ -22,7 +22,7 @@ class LossWeights:
     pace: float = 1.0
     unit_norm: float = 0.1
     position: float = 1.0
-    prior: float = 0.001
+    prior: float = 0.003
 
 
 def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:
@@ -49,12 +49,19 @@ def prior_loss(critic: PriorCritic, latents: Tensor) -> Tensor:
     return functional.binary_cross_entropy_with_logits(logits, torch.ones_like(logits))
 
 
-def critic_loss(critic: PriorCritic, latents: Tensor, noise: Tensor) -> Tensor:
-    """What the critic pays for taking latents (detached here) for the prior's noise or the reverse."""
+def critic_loss(critic: PriorCritic, latents: Tensor, noise: Tensor, steepness: float = 1.0) -> Tensor:
+    """What the critic pays for taking latents (detached here) for the prior's noise or the reverse.
+
+    steepness weighs a penalty on its slope at the prior's samples (R1, Mescheder et al. 2018): without it the
+    critic grows ever steeper, wins every time, and drags the latents about instead of shaping them.
+    """
+    noise = noise.detach().requires_grad_()
     made, true = critic(latents.detach()), critic(noise)
-    return 0.5 * (
-        functional.binary_cross_entropy_with_logits(true, torch.ones_like(true))
-        + functional.binary_cross_entropy_with_logits(made, torch.zeros_like(made))
+    (slope,) = torch.autograd.grad(true.sum(), noise, create_graph=True)
+    return (
+        0.5 * functional.binary_cross_entropy_with_logits(true, torch.ones_like(true))
+        + 0.5 * functional.binary_cross_entropy_with_logits(made, torch.zeros_like(made))
+        + 0.5 * steepness * slope.square().sum(-1).mean()
     )
 
 

@@ -29,7 +29,7 @@ class Settings:
     width: int = 0
     depth: int = 0
     seed: int = 1
-    minutes: float = 50.0
+    minutes: float = 45.0
     steps: int = 0
     batch: int = 256
     learning_rate: float = 1e-3
