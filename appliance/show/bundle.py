@@ -21,7 +21,7 @@ def default_show_path() -> Path:
 
 
 def bundle_files(directory: Path) -> list[str]:
-    """Names of all files in a bundle, relative to it, sorted; without checksums, hidden files and a training's."""
+    """Names of all files of a show, relative to it, sorted; without checksums, hidden and training files."""
     names = (path.relative_to(directory) for path in directory.rglob("*") if path.is_file())
     return sorted(
         name.as_posix()

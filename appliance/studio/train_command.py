@@ -141,5 +141,5 @@ def _plan(training: Training, device: str) -> str:
     count = parameters(training.autoencoder.network)
     return (
         f"{settings.network}, latent {shape.latent}, width {shape.width}: {count / 1e6:.2f} million "
-        f"parameters; {bound} on {where}{begun}. Ctrl-C stops without losing anything."
+        f"parameters; {bound} on {where}{begun}."
     )

@@ -34,6 +34,7 @@ class TrainingRun:
     def run(self) -> bool:
         """Train until done or asked to stop (Ctrl-C, SIGTERM). True when done; the checkpoint is written."""
         with stop_signals() as stop_asked, self._progress() as progress:
+            self.console.print("Ctrl-C stops without losing anything.")
             bar = progress.add_task("training", total=1.0, words="")
             steps_at_start, began = self.training.step, time.monotonic()
 

@@ -1,0 +1,36 @@
+"""A folder of small recordings, and a show trained on them by the command itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+from typer.testing import CliRunner, Result
+
+from appliance.studio.commands import app
+from tests.studio.tiny import write_recordings
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+def bunraku(*arguments: object) -> Result:
+    """Run a command of the studio as from a shell."""
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=False)
+
+
+@pytest.fixture(scope="session")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three takes of four seconds."""
+    return write_recordings(tmp_path_factory.mktemp("recordings") / "dancer")
+
+
+@pytest.fixture(scope="session")
+def trained(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> tuple[Path, Result]:
+    """A show after 150 steps of a tiny mlp, and what the command said."""
+    show = tmp_path_factory.mktemp("trained") / "evening"
+    options = ["--steps", 150, "--width", 48, "--latent", 16, "--threads", 1, "--device", "cpu"]
+    return show, bunraku("train", "--recordings", recordings, "--out", show, *options)

@@ -1,0 +1,120 @@
+"""The iteration in PyTorch: headings, held joints, and the prior that shapes the latent."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from appliance.studio import losses, rotation
+from appliance.studio.autoencoder import Autoencoder, PriorCritic
+from appliance.studio.networks import NETWORKS
+from tests.studio.tiny import moving, swaying, untrained
+
+
+def some_windows(count: int = 6) -> Tensor:
+    poses = swaying(3.0).poses[:, moving()].astype(np.float32)
+    starts = np.linspace(0, len(poses) - 8, count).astype(int)
+    return torch.from_numpy(poses[starts[:, None] + np.arange(8)])
+
+
+def turned(windows: Tensor, degrees: float) -> Tensor:
+    """The same dance seen from another side: its root turned about the vertical."""
+    half = np.radians(degrees) / 2
+    turn = torch.tensor([np.cos(half), 0.0, np.sin(half), 0.0], dtype=torch.float32)
+    root = rotation.multiply(turn.expand_as(windows[:, :, 0]), windows[:, :, 0])
+    return torch.cat([root[:, :, None], windows[:, :, 1:]], dim=2)
+
+
+def held(autoencoder: Autoencoder) -> dict[str, Tensor]:
+    mask = torch.zeros(autoencoder.shape.joints, dtype=torch.bool)
+    mask[6] = True
+    targets = rotation.normalize(torch.randn(autoencoder.shape.joints, 4))
+    return {"mask": mask, "targets": targets, "weights": torch.ones(autoencoder.shape.joints)}
+
+
+@pytest.mark.parametrize("degrees", [30.0, 90.0, 179.0, -120.0])
+def test_a_dance_turned_about_the_vertical_gives_the_same_dance_turned(degrees: float) -> None:
+    """Why no training data has to be turned about the vertical: every heading is the same to the network."""
+    autoencoder = untrained()
+    windows, hand = some_windows(), held(autoencoder)
+    straight, latents = autoencoder.iterate(windows, 3, 2, **hand)
+    made, same = autoencoder.iterate(turned(windows, degrees), 3, 2, **hand)
+    apart = rotation.angle_between(made, turned(straight, degrees))
+    assert torch.rad2deg(apart).max() < 0.05
+    torch.testing.assert_close(same, latents, atol=1e-4, rtol=0)
+
+
+def test_a_free_last_pass_does_not_show_the_held_orientation() -> None:
+    autoencoder = untrained()
+    hand = held(autoencoder)
+    shown, _ = autoencoder.iterate(some_windows(), 4, 4, **hand)
+    free, _ = autoencoder.iterate(some_windows(), 4, 3, **hand)
+    goal = hand["targets"][6].expand(6, 8, 4)
+    assert torch.rad2deg(rotation.angle_between(shown[:, :, 6], goal)).max() < 0.1
+    assert torch.rad2deg(rotation.angle_between(free[:, :, 6], goal)).min() > 5.0
+
+
+def test_a_weight_of_a_half_goes_half_the_way() -> None:
+    autoencoder = untrained()
+    hand = held(autoencoder)
+    firm, _ = autoencoder.iterate(some_windows(), 1, 1, **hand)
+    loose, _ = autoencoder.iterate(some_windows(), 1, 1, **{**hand, "weights": hand["weights"] * 0.0})
+    half, _ = autoencoder.iterate(some_windows(), 1, 1, **{**hand, "weights": hand["weights"] * 0.5})
+    way = rotation.angle_between(loose[:, :, 6], firm[:, :, 6])
+    assert way.max() > 0.5
+    # The pass in between sees the half-held joint, so the ends of the two ways are not quite the same.
+    torch.testing.assert_close(
+        rotation.angle_between(half[:, :, 6], firm[:, :, 6]), way / 2, atol=0.05, rtol=0
+    )
+
+
+@pytest.mark.parametrize("network", sorted(NETWORKS))
+def test_the_priors_gradient_reaches_every_layer_of_the_encoder(network: str) -> None:
+    """The published code of the paper's line has exactly zero here: its critic runs without gradients."""
+    autoencoder = untrained(network).requires_grad_(True)
+    critic = PriorCritic(autoencoder.shape.latent)
+    losses.prior_loss(critic, autoencoder.encode(some_windows())).backward()
+    for name, parameter in autoencoder.network.encoder.named_parameters():
+        assert parameter.grad is not None and parameter.grad.abs().max() > 0, name
+    assert all(p.grad is None for p in autoencoder.network.decoder.parameters())
+
+
+def test_the_critics_own_loss_leaves_the_encoder_alone() -> None:
+    autoencoder = untrained().requires_grad_(True)
+    latents = autoencoder.encode(some_windows())
+    losses.critic_loss(PriorCritic(autoencoder.shape.latent), latents, torch.randn_like(latents)).backward()
+    assert all(p.grad is None for p in autoencoder.parameters())
+
+
+def test_the_critic_learns_to_tell_latents_from_the_prior() -> None:
+    torch.manual_seed(3)
+    critic = PriorCritic(8)
+    optimizer = torch.optim.Adam(critic.parameters(), lr=1e-3)
+    for _ in range(60):
+        loss = losses.critic_loss(critic, 0.3 * torch.randn(64, 8) + 0.5, torch.randn(64, 8))
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    made, true = critic(0.3 * torch.randn(256, 8) + 0.5), critic(torch.randn(256, 8))
+    assert ((made < 0).float().mean() + (true > 0).float().mean()) / 2 > 0.9
+
+
+def test_the_figure_of_moving_joints_is_the_whole_figure() -> None:
+    """Forward kinematics for the losses folds still joints in; the box's own says where joints really are."""
+    dance = swaying(1.0)
+    dance.poses[:, [5, 9]] = rotation.normalize(torch.tensor([1.0, 0.1, -0.2, 0.3])).numpy()  # the collars
+    body = rotation.MovingSkeleton(dance.skeleton, moving(), torch.tensor(dance.poses[0]))
+    found = body(torch.from_numpy(dance.poses[:, moving()].astype(np.float32)))
+    places, _ = dance.skeleton.forward_kinematics(dance.poses, np.zeros_like(dance.roots))
+    np.testing.assert_allclose(found.numpy(), places[:, moving()], atol=1e-5)
+
+
+def test_a_perfect_reconstruction_costs_nothing() -> None:
+    windows = some_windows()
+    body = rotation.MovingSkeleton(swaying(1.0).skeleton, moving(), torch.tensor(swaying(1.0).poses[0]))
+    for name, loss in losses.reconstruction_losses(windows, windows, body).items():
+        assert float(loss) < 3e-4, name
+    for name, loss in losses.reconstruction_losses(1.2 * windows.flip(0), windows, body).items():
+        assert float(loss) > 1e-3, name

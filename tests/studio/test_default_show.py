@@ -1,0 +1,99 @@
+"""The show that comes with the box: its network knows the dances, and its latent is the prior's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+from onnx import TensorProto, helper
+
+from appliance.pose import quaternion
+from appliance.show.bundle import default_show_path
+from appliance.studio.coders import OnnxCoder
+from appliance.studio.evaluation import evaluate, load_takes
+
+RANDOM_LATENTS = 2000
+
+
+@pytest.fixture(scope="module")
+def show() -> Path:
+    folder = default_show_path()
+    if not (folder / "puppet.onnx").exists():
+        pytest.skip("there is no default show in this checkout")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def report(show: Path) -> dict[str, Any]:
+    text: dict[str, Any] = json.loads((show / "report.json").read_text(encoding="utf-8"))
+    return text
+
+
+def decoder_of(path: Path) -> onnxruntime.InferenceSession:
+    """The part of a puppet's loop from the latent to the poses, as a network of its own."""
+    model = onnx.load(path)
+    loop = next(node for node in model.graph.node if node.op_type == "Loop").attribute[0].g
+    _, poses, latent = (output.name for output in loop.output)
+    made_by = {output: node for node in loop.node for output in node.output}
+    if made_by[latent].op_type == "Identity":  # the loop's output may be a copy of what the decoder reads
+        latent = made_by[latent].input[0]
+    needed, open_names = [], [poses]
+    while open_names:
+        name = open_names.pop()
+        if name != latent and name in made_by and made_by[name] not in needed:
+            needed.append(made_by[name])
+            open_names += made_by[name].input
+    nodes = [node for node in loop.node if node in needed]
+    size = next(int(entry.value) for entry in model.metadata_props if entry.key == "bunraku.latent")
+    inputs = [helper.make_tensor_value_info(latent, TensorProto.FLOAT, [1, size])]
+    graph = helper.make_graph(nodes, "decoder", inputs, [loop.output[1]], model.graph.initializer)
+    alone = helper.make_model(graph, opset_imports=model.opset_import, ir_version=model.ir_version)
+    return onnxruntime.InferenceSession(alone.SerializeToString(), providers=["CPUExecutionProvider"])
+
+
+def test_latents_of_takes_kept_apart_follow_the_prior(report: dict[str, Any]) -> None:
+    assert abs(report["latent"]["mean"]) < 0.05
+    assert report["latent"]["mean_of_each_size"] < 0.3
+    assert 0.85 < report["latent"]["std"] < 1.15
+    assert 0.8 < report["latent"]["std_of_each"] < 1.2
+
+
+def test_random_latents_decode_to_poses_within_the_range_of_the_recordings(
+    show: Path, report: dict[str, Any]
+) -> None:
+    coder, decoder = OnnxCoder(show / "puppet.onnx"), decoder_of(show / "puppet.onnx")
+    ranges = np.array([report["joint_range_degrees"][name] for name in coder.joints])
+    name, size = decoder.get_inputs()[0].name, decoder.get_inputs()[0].shape[1]
+    noise = np.random.default_rng(0).standard_normal((RANDOM_LATENTS, 1, size)).astype(np.float32)
+    poses = np.stack([decoder.run(None, {name: latent})[0] for latent in noise])
+    angles = np.degrees(quaternion.angle_between(poses, coder.rest))
+    assert angles.max() > 30.0, "the dancer stands still whatever the latent"
+    beyond = np.maximum(angles - ranges, 0.0)
+    assert (beyond == 0).mean() > 0.999
+    assert beyond.max() < 30.0
+
+
+def test_the_report_is_about_this_network(show: Path, report: dict[str, Any]) -> None:
+    coder = OnnxCoder(show / "puppet.onnx")
+    assert report["network"]["ships"] == coder.facts["precision"]
+    assert report["network"]["architecture"] == coder.facts["architecture"]
+    assert tuple(report["joint_range_degrees"]) == coder.joints
+    assert not set(report["training"]["takes"]) & set(report["training"]["held_out"])
+    assert report["quantization"]["passed"] == (report["network"]["ships"] == "int8")
+
+
+def test_the_error_on_takes_kept_apart_meets_the_bar(
+    show: Path, report: dict[str, Any], recordings_dir: Path
+) -> None:
+    """What plays on stage, on every eighth window; the bar is 1.5 degrees after one iteration."""
+    coder = OnnxCoder(show / "puppet.onnx")
+    files = [recordings_dir / "train" / f"{name}.bvh" for name in report["training"]["held_out"]]
+    assert files
+    found = evaluate(coder, load_takes(files, coder), hop=8, iterations=(1,)).as_json()
+    assert found["degrees"]["1"]["mean"] <= 1.5
+    assert found["degrees"]["1"]["mean"] == pytest.approx(report["degrees"]["1"]["mean"], abs=0.1)

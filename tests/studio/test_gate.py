@@ -1,0 +1,63 @@
+"""int8 ships only where it stays near fp32."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from appliance.studio import gate
+from appliance.studio.autoencoder import Autoencoder
+from appliance.studio.coders import OnnxCoder
+from appliance.studio.dataset import load_dataset
+from appliance.studio.export import export
+from tests.studio.test_autoencoder import some_windows
+from tests.studio.test_export import NAMES
+from tests.studio.tiny import untrained
+
+
+def judged(autoencoder: Autoencoder, folder: Path) -> gate.Verdict:
+    for precision in ("fp32", "int8"):
+        path = folder / f"{precision}.onnx"
+        export(autoencoder, NAMES, path, int8=precision == "int8", architecture="mlp")
+    coders = [OnnxCoder(folder / f"{precision}.onnx") for precision in ("fp32", "int8")]
+    return gate.judge(*coders, some_windows(8).numpy())
+
+
+def test_a_network_that_quantizes_badly_ships_as_fp32(tmp_path: Path) -> None:
+    """One large weight in each row leaves no levels for the others."""
+    autoencoder = untrained()
+    with torch.no_grad():
+        last = autoencoder.network.decoder.stack[-1]
+        last.weight[:] *= 4
+        last.weight[:, 0] = 60.0
+        last.bias -= 60.0 * autoencoder.network.decoder.stack[:-1](torch.zeros(1, 16))[0, 0]
+    verdict = judged(autoencoder, tmp_path)
+    assert verdict.mean[1] > 0.25
+    assert not verdict.passed and verdict.precision == "fp32"
+    assert (
+        "fp32 ships" in verdict.sentence() and f"{verdict.mean[1]:.2f} degrees after 1" in verdict.sentence()
+    )
+
+
+def test_a_network_that_quantizes_well_ships_as_int8(tmp_path: Path) -> None:
+    verdict = judged(untrained(), tmp_path)
+    assert verdict.passed and verdict.precision == "int8"
+    assert 0 < verdict.mean[1] <= verdict.largest[1]
+
+
+def test_both_limits_count() -> None:
+    assert gate.Verdict({1: 0.25, 10: 1.5}, {1: 1, 10: 1}).passed
+    assert not gate.Verdict({1: 0.26, 10: 1.0}, {1: 1, 10: 1}).passed
+    assert not gate.Verdict({1: 0.1, 10: 1.51}, {1: 1, 10: 1}).passed
+    assert not gate.Verdict({1: float("nan"), 10: 1.0}, {1: 1, 10: 1}).passed
+
+
+def test_the_sample_is_spread_over_all_takes(recordings: Path) -> None:
+    found = load_dataset(recordings)
+    windows = gate.sample_windows(found.training, found.moving, count=10)
+    assert windows.shape == (10, 8, 17, 4)
+    first, last = found.training[0].recording, found.training[-1].recording
+    np.testing.assert_allclose(windows[0], first.poses[:8, found.moving], atol=1e-6)
+    np.testing.assert_allclose(windows[-1], last.poses[-8:, found.moving], atol=1e-6)

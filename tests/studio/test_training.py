@@ -1,0 +1,136 @@
+"""Training: the error falls, the prior shapes the latent, and a stop loses nothing, bit for bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from appliance.studio import losses
+from appliance.studio.dataset import Dataset, load_dataset
+from appliance.studio.losses import LossWeights
+from appliance.studio.training import Settings, Training, load_autoencoder, save_checkpoint
+
+TINY = Settings(steps=40, width=32, latent=12, batch=32)
+
+
+@pytest.fixture(scope="module")
+def dancer(recordings: Path) -> Dataset:
+    return load_dataset(recordings)
+
+
+def run(training: Training, path: Path, until: int | None = None) -> None:
+    training.run(
+        lambda report: None,
+        lambda: save_checkpoint(training, path),
+        stop=lambda: until is not None and training.step >= until,
+    )
+
+
+def same(one: Any, other: Any) -> bool:
+    """Equal to the last bit, through dictionaries and lists."""
+    if isinstance(one, torch.Tensor):
+        return torch.equal(one, other)
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    return bool(one == other)
+
+
+LEARNED = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer", "random", "step")
+
+
+@pytest.mark.parametrize("network", ["mlp", "lstm"])
+def test_interrupted_and_resumed_is_uninterrupted_bit_for_bit(
+    dancer: Dataset, tmp_path: Path, network: str
+) -> None:
+    settings = replace(TINY, network=network)
+    whole = Training(dancer, settings)
+    run(whole, tmp_path / "whole.pt")
+
+    stopped = Training(dancer, settings)
+    run(stopped, tmp_path / "part.pt", until=17)
+    assert stopped.step == 17 and stopped.fraction < 1
+    torch.manual_seed(99)  # whatever happened in between
+    resumed = Training(dancer, settings)
+    resumed.restore(torch.load(tmp_path / "part.pt", weights_only=True))
+    run(resumed, tmp_path / "part.pt")
+
+    one, other = whole.state(), resumed.state()
+    assert one["step"] == other["step"] == 40
+    for name in LEARNED:
+        assert same(one[name], other[name]), name
+    assert one["history"][-1]["held_out_degrees"] == other["history"][-1]["held_out_degrees"]
+
+
+def test_the_seed_alone_decides(dancer: Dataset, tmp_path: Path) -> None:
+    weights = []
+    for seed in (1, 1, 2):
+        training = Training(dancer, replace(TINY, seed=seed, steps=5))
+        run(training, tmp_path / "seed.pt")
+        weights.append(training.state()["averaged"])
+    assert same(weights[0], weights[1]) and not same(weights[0], weights[2])
+
+
+def test_training_reduces_the_error(dancer: Dataset, tmp_path: Path) -> None:
+    training = Training(dancer, replace(TINY, steps=250, width=64))
+    training.held_windows = training.train_windows  # the tiny takes have nothing in common to generalise
+    before = training.held_out_degrees()
+    run(training, tmp_path / "checkpoint.pt")
+    after = training.held_out_degrees()
+    assert before is not None and after is not None
+    assert after < 0.7 * before
+    last = training.history[-1]
+    assert last.fraction == 1.0 and last.step == 250 and last.held_out_degrees == after
+    assert set(last.losses) >= {"rotation", "pace", "unit_norm", "position", "prior", "critic"}
+
+
+def test_only_a_prior_of_some_weight_moves_the_encoder(dancer: Dataset) -> None:
+    nothing = LossWeights(rotation=0.0, pace=0.0, unit_norm=0.0, position=0.0, prior=0.0)
+    for prior, moves in ((0.0, False), (0.01, True)):
+        training = Training(dancer, replace(TINY, weights=replace(nothing, prior=prior)))
+        before = {k: v.clone() for k, v in training.autoencoder.network.encoder.state_dict().items()}
+        training.train_step()
+        after = training.autoencoder.network.encoder.state_dict()
+        assert same(before, after) != moves
+
+
+def test_the_prior_draws_the_latent_to_a_standard_gaussian(dancer: Dataset) -> None:
+    """Encoder and critic alone, from latents that are far too narrow and off the middle."""
+    training = Training(dancer, replace(TINY, latent=4, width=64))
+    encoder, critic = training.autoencoder.network.encoder, training.critic
+    with torch.no_grad():
+        next(reversed(list(encoder.parameters()))).add_(1.5)
+
+    def off() -> float:
+        with torch.no_grad():
+            z = training.autoencoder.encode(training.train_windows)
+        return float(z.mean(0).abs().mean() + (z.std(0) - 1).abs().mean())
+
+    before = off()
+    slow = torch.optim.Adam(encoder.parameters(), lr=1e-3)
+    for _ in range(400):
+        rows = torch.randint(len(training.train_windows), (128,))
+        latents = training.autoencoder.encode(training.train_windows[rows])
+        paid = losses.critic_loss(critic, latents, torch.randn_like(latents))
+        training.critic_optimizer.zero_grad()
+        paid.backward()
+        training.critic_optimizer.step()
+        slow.zero_grad()
+        losses.prior_loss(critic, latents).backward()
+        slow.step()
+    assert before > 1.5
+    assert off() < 0.5
+
+
+def test_a_checkpoint_gives_the_averaged_network(dancer: Dataset, tmp_path: Path) -> None:
+    training = Training(dancer, replace(TINY, steps=5))
+    run(training, tmp_path / "checkpoint.pt")
+    autoencoder, joints, state = load_autoencoder(tmp_path / "checkpoint.pt")
+    windows = training.held_windows[:4]
+    torch.testing.assert_close(autoencoder.iterate(windows, 2), training.averaged.iterate(windows, 2))
+    assert tuple(joints) == dancer.moving_names and state["step"] == 5
