@@ -35,29 +35,34 @@ class Frame(NamedTuple):
 
 
 class Transport(NamedTuple):
-    """Each carried reading's way: when it was sent (s), how long until a frame with it arrived (ms)."""
+    """Each reading's way: when it was sent (s), how long until a frame with it or a newer one arrived (ms)."""
 
     sent_at: Floats
     latency_ms: Floats
-    overtaken: int  # readings that no frame carries: a newer one came before the next tick
+    overtaken: int  # of them, readings that no frame carries: a newer one came before the next tick
 
 
 def transport(readings: Sequence[Reading], frames: Sequence[Frame]) -> Transport:
-    """Datagram in to datagram out: from a reading's sending to the first frame that carries its sequence."""
-    arrived: dict[int, float] = {}
-    for frame in frames:
-        arrived.setdefault(frame.sensor_sequence, frame.arrived_at)
+    """Datagram in to datagram out: from a reading's sending to the first frame that knows it.
+
+    A reading that came too late for its tick and was overtaken by the next one counts with the frame that
+    carries the newer one: leaving it out would flatter the slow ones.
+    """
     sent: dict[int, float] = {}
     for reading in readings:
         sent.setdefault(reading.sequence, reading.sent_at)
-    if not arrived or not sent:
-        return Transport(np.zeros(0), np.zeros(0), 0)
-    newest_carried = max(arrived)
-    carried = {number: at for number, at in sent.items() if number in arrived and arrived[number] >= at}
-    overtaken = sum(number < newest_carried and number not in arrived for number in sent)
-    times = np.array(list(carried.values()))
-    arrivals = np.array([arrived[number] for number in carried])
-    return Transport(times, 1000.0 * (arrivals - times), overtaken)
+    in_order = sorted(frames, key=lambda frame: frame.arrived_at)
+    newest = np.maximum.accumulate([frame.sensor_sequence for frame in in_order] or [-1])
+    arrived_at = [frame.arrived_at for frame in in_order]
+    times, latencies = [], []
+    for number, at in sent.items():
+        first = int(np.searchsorted(newest, number))
+        if first < len(in_order) and arrived_at[first] >= at:
+            times.append(at)
+            latencies.append(1000.0 * (arrived_at[first] - at))
+    carried = {frame.sensor_sequence for frame in frames}
+    overtaken = sum(number <= int(newest[-1]) and number not in carried for number in sent)
+    return Transport(np.array(times), np.array(latencies), overtaken)
 
 
 def missing_frames(frames: Sequence[Frame]) -> int:

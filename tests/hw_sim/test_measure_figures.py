@@ -55,12 +55,13 @@ def test_transport_is_from_sending_to_the_first_frame_with_the_reading() -> None
     assert way.overtaken == 0
 
 
-def test_a_reading_that_no_frame_carries_is_overtaken_and_the_end_is_not() -> None:
+def test_an_overtaken_reading_counts_with_the_frame_of_the_newer_one_and_the_end_does_not() -> None:
     sent = readings(100)
     received = [frame for frame in frames(sent) if frame.sensor_sequence not in (40, 41, 98, 99)]
     way = transport(sent, received)
     assert way.overtaken == 2
-    assert len(way.latency_ms) == 96
+    assert len(way.latency_ms) == 98
+    np.testing.assert_allclose(way.latency_ms[[39, 40, 41, 42]], [2.5, 42.5, 22.5, 2.5], atol=1e-6)
 
 
 def test_frames_before_the_first_reading_carry_nothing() -> None:
