@@ -35,7 +35,7 @@ class Frame(NamedTuple):
 
 
 class Transport(NamedTuple):
-    """Each reading's way: when it was sent (s), how long until a frame with it or a newer one arrived (ms)."""
+    """Each reading's way: when it was sent (s), how long until a frame knew it (ms)."""
 
     sent_at: Floats
     latency_ms: Floats
