@@ -47,7 +47,7 @@ def train(
     recordings: Recordings = None,
     network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.mlp,
     minutes: Annotated[
-        float | None, typer.Option(min=0.01, help="How long to train.", show_default="90")
+        float | None, typer.Option(min=0.01, help="How long to train.", show_default="45")
     ] = None,
     steps: Annotated[int | None, typer.Option(min=1, help="How many steps, instead of minutes.")] = None,
     seed: Annotated[int, typer.Option(help="The same seed and steps give the same network.")] = 1,
