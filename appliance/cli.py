@@ -1,4 +1,4 @@
-"""The command `bunraku`: play, check, filmstrip, version; simulation and studio plug theirs in."""
+"""The command `bunraku`: play, check, pack, filmstrip, version; simulation and studio plug theirs in."""
 
 from __future__ import annotations
 
@@ -66,6 +66,14 @@ def check(
     from appliance.stage.check import check_show
 
     check_show(show, box)
+
+
+@app.command()
+def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you changed.")]) -> None:
+    """Verify a changed show bundle and vouch for its files with new checksums."""
+    from appliance.stage.check import pack_show
+
+    pack_show(show)
 
 
 @app.command()

@@ -1,11 +1,11 @@
-"""`bunraku check`: is the show bundle whole, is the box file right, and does the dance fit this machine?"""
+"""`bunraku check` and `pack`: is the bundle whole, is the box file right, does the dance fit this machine?"""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
-from appliance.show.bundle import default_show_path
+from appliance.show.bundle import CHECKSUMS, bundle_bytes, bundle_files, default_show_path, write_checksums
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
 from appliance.stage.cast import admission, assemble
@@ -16,12 +16,7 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
     """Print what was found; raises StageError or ConfigError with all that is wrong."""
     directory = directory or default_show_path()
     box = load_box(box_file)
-    findings = verify_bundle(directory)
-    for warning in (finding for finding in findings if finding.level == "warning"):
-        print(warning)
-    errors = [str(finding) for finding in findings if finding.level == "error"]
-    if errors:
-        raise StageError("\n".join(["This show cannot be danced.", *errors]))
+    _refuse_damage(directory)
     show = load_show(directory)
     cast = assemble(show, _without_ports(box))
     verdict = admission(cast, show, box)
@@ -30,6 +25,30 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
         raise StageError(verdict.sentence())
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
+
+
+def pack_show(directory: Path) -> None:
+    """Write new checksums over a changed bundle, then check it; the old ones return if it is not sound."""
+    checksums = directory / CHECKSUMS
+    before = checksums.read_bytes() if checksums.exists() else None
+    load_show(directory)
+    write_checksums(directory)
+    try:
+        _refuse_damage(directory)
+    except StageError:
+        checksums.unlink() if before is None else checksums.write_bytes(before)
+        raise
+    size_mb = bundle_bytes(directory) / 1e6
+    print(f"{directory}: {len(bundle_files(directory))} files, {size_mb:.1f} MB, packed in {CHECKSUMS}.")
+
+
+def _refuse_damage(directory: Path) -> None:
+    findings = verify_bundle(directory)
+    for warning in (finding for finding in findings if finding.level == "warning"):
+        print(warning)
+    errors = [str(finding) for finding in findings if finding.level == "error"]
+    if errors:
+        raise StageError("\n".join(["This show cannot be danced.", *errors]))
 
 
 def _without_ports(box: BoxConfig) -> BoxConfig:

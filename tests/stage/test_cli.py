@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from importlib.metadata import EntryPoint
@@ -176,3 +177,25 @@ def test_the_box_starts_without_torch_and_without_the_plug_ins() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_pack_vouches_for_a_changed_show(
+    tiny_show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    show = tmp_path / "mine"
+    shutil.copytree(tiny_show, show)
+    (show / "show.yaml").write_text((show / "show.yaml").read_text().replace("name: tiny", "name: mine"))
+    assert "show.yaml" in refused(capsys, "check", str(show))
+    assert "packed" in succeeded(capsys, "pack", str(show))
+    assert "mine: the bundle is whole" in succeeded(capsys, "check", str(show))
+
+
+def test_pack_refuses_a_show_that_cannot_be_danced(
+    tiny_show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    show = tmp_path / "mine"
+    shutil.copytree(tiny_show, show)
+    before = (show / "SHA256SUMS").read_text()
+    (show / "puppet.onnx").write_bytes(b"nonsense")
+    assert "puppet.onnx" in refused(capsys, "pack", str(show))
+    assert (show / "SHA256SUMS").read_text() == before
