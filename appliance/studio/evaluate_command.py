@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,12 +11,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from appliance.studio.coders import Coder, OnnxCoder, open_coder
-from appliance.studio.dataset import WINDOW, Take, window_starts
-from appliance.studio.evaluation import ITERATIONS, Evaluation, evaluate, load_takes
-
-PATIENCE_S = 40.0
-HOPS = (1, 2, 4, 8)
+from appliance.studio.coders import Coder, open_coder
+from appliance.studio.dataset import Take
+from appliance.studio.evaluation import Evaluation, evaluate, fitting_hop, load_takes
 
 
 def run(
@@ -38,24 +34,6 @@ def run(
         print(json.dumps({"network": coder.facts, **found.as_json()}, indent=1))
     else:
         _print_table(Console(), coder, found)
-
-
-def fitting_hop(coder: Coder, takes: Sequence[Take], patience_s: float = PATIENCE_S) -> int:
-    """Every window where that is quick; every 2nd, 4th or 8th where a network file is slow."""
-    if not isinstance(coder, OnnxCoder):
-        return 1
-    starts = [(take, start) for take in takes for start in window_starts(take)[:1]]
-    if not starts:
-        return 1
-    take, start = starts[0]
-    places = [take.recording.skeleton.index(name) for name in coder.joints]
-    window = take.recording.poses[start : start + WINDOW, places].astype("float32")
-    coder.run(window, sum(ITERATIONS))
-    began = time.perf_counter()
-    for _ in range(3):
-        coder.run(window, sum(ITERATIONS))
-    cost_s = (time.perf_counter() - began) / 3 * sum(len(window_starts(take)) for take in takes)
-    return next((hop for hop in HOPS if cost_s / hop <= patience_s), HOPS[-1])
 
 
 def _about(take: Take) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,8 @@ from appliance.studio.studio_error import StudioError
 
 ITERATIONS = (1, 2, 5, 10)
 POSITION_ITERATIONS = (1, 10)
+PATIENCE_S = 40.0
+HOPS = (1, 2, 4, 8)
 Figures = NDArray[np.float32]
 
 
@@ -140,6 +143,20 @@ def evaluate(
         sum(int((~take.sound).sum()) for take in takes),
         hop,
     )
+
+
+def fitting_hop(coder: Coder, takes: Sequence[Take]) -> int:
+    """1 where coding every window takes less than PATIENCE_S; 2, 4 or 8 where a network is slow."""
+    take = max(takes, key=lambda take: len(window_starts(take)))
+    first = window_starts(take)[: coder.batch]
+    if not len(first):
+        return 1
+    windows = take.recording.poses[first[:, None] + np.arange(WINDOW)][:, :, _places(take, coder)]
+    coder.iterate(windows.astype(np.float32), 1)
+    began = time.perf_counter()
+    coder.iterate(windows.astype(np.float32), sum(ITERATIONS))
+    cost_s = (time.perf_counter() - began) / len(first) * sum(len(window_starts(take)) for take in takes)
+    return next((hop for hop in HOPS if cost_s / hop <= PATIENCE_S), HOPS[-1])
 
 
 def _parts(take: Take, hop: int, batch: int) -> list[NDArray[np.intp]]:

@@ -17,7 +17,7 @@ from appliance.pose.recording import Recording
 from appliance.studio import packing
 from appliance.studio.coders import OnnxCoder, Poses, TorchCoder, load_checkpoint
 from appliance.studio.dataset import Catalogue, Dataset, Take, find_catalogue, load_take
-from appliance.studio.evaluation import evaluate
+from appliance.studio.evaluation import evaluate, fitting_hop
 from appliance.studio.export import export
 from appliance.studio.gate import judge, median_ms, sample_windows
 from appliance.studio.pictures import longest_sound
@@ -75,7 +75,7 @@ def release(
         say(verdict.sentence())
         times = {precision: median_ms(one, windows[0]) for precision, one in coders.items()}
         shutil.copyfile(files[verdict.precision], request.out / "puppet.onnx")
-    evaluation = evaluate(coder, judged_on)
+    evaluation = evaluate(coder, judged_on, fitting_hop(coder, judged_on))
     names = sorted(take.name for take in judged_on)
     report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
     _write_texts(request, coder, dataset, catalogue, report, say)

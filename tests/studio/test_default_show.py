@@ -51,7 +51,9 @@ def decoder_of(path: Path) -> onnxruntime.InferenceSession:
     nodes = [node for node in loop.node if node in needed]
     size = next(int(entry.value) for entry in model.metadata_props if entry.key == "bunraku.latent")
     inputs = [helper.make_tensor_value_info(latent, TensorProto.FLOAT, [1, size])]
-    graph = helper.make_graph(nodes, "decoder", inputs, [loop.output[1]], model.graph.initializer)
+    used = {name for node in nodes for name in node.input}
+    weights = [tensor for tensor in model.graph.initializer if tensor.name in used]
+    graph = helper.make_graph(nodes, "decoder", inputs, [loop.output[1]], weights)
     alone = helper.make_model(graph, opset_imports=model.opset_import, ir_version=model.ir_version)
     return onnxruntime.InferenceSession(alone.SerializeToString(), providers=["CPUExecutionProvider"])
 

@@ -12,6 +12,7 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
+from appliance.studio import evaluation
 from appliance.studio.coders import Poses, open_coder
 from appliance.studio.evaluation import Evaluation, evaluate, load_takes
 from appliance.studio.studio_error import StudioError
@@ -121,6 +122,17 @@ def test_a_missing_joint_is_named(tmp_path: Path) -> None:
 def test_a_recording_shorter_than_a_window_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StudioError, match="No window of 8 sound poses"):
         measured(tmp_path, swaying(0.1), Turning("head", 1.0))
+
+
+def test_a_slow_network_is_measured_on_fewer_windows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    coder = Turning("head", 1.0)
+    write_bvh(tmp_path / "dance.bvh", swaying(2.0))
+    takes = load_takes([tmp_path / "dance.bvh"], coder)
+    assert evaluation.fitting_hop(coder, takes) == 1
+    monkeypatch.setattr(evaluation, "PATIENCE_S", 0.0)
+    hop = evaluation.fitting_hop(coder, takes)
+    assert hop == 8
+    assert len(evaluate(coder, takes, hop).latents) == 12
 
 
 def test_show_file_and_network_file_are_the_same_coder(tiny_show: Path) -> None:
