@@ -110,8 +110,8 @@ def _quantization(axes: Any, report: dict[str, Any]) -> None:
         places + 0.2, [gate["degrees"][k]["mean"] for k in counts], 0.4, color=VERMILION, label="int8 to fp32"
     )
     axes.set_xticks(places, [f"after {k}" for k in counts], color=INK)
-    took = " and ".join(f"{ms:.2f} ms in {name}" for name, ms in times.items())
-    _titled(axes, f"{report['network']['ships']} ships: ten iterations take {took}")
+    took = ", ".join(f"{name} {ms:.2f}" for name, ms in times.items())
+    _titled(axes, f"{report['network']['ships']} ships. Ten iterations, ms: {took}")
     axes.set_ylabel("degrees apart", color=FAINT)
     _legend(axes)
 
