@@ -1,0 +1,156 @@
+"""From a pose autoencoder and recordings to an improviser, and from it to a phrase, as people see it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from rich.console import Console
+
+from appliance.pose.bvh import write_bvh
+from appliance.pose.filmstrip import draw_filmstrip
+from appliance.pose.recording import Recording
+from appliance.studio import sources
+from appliance.studio.autoencoder import Autoencoder
+from appliance.studio.dataset import Dataset
+from appliance.studio.improviser_training import (
+    ImproviserReport,
+    ImproviserSettings,
+    ImproviserTraining,
+    save_improviser,
+)
+from appliance.studio.moves import BEFORE, MOVE
+from appliance.studio.naturalness import Naturalness
+from appliance.studio.packing import PHRASE_DIGITS
+from appliance.studio.phrase import PhraseWish, make_phrase, verdict
+from appliance.studio.steps import ROOT, Steps, steps_of_takes
+from appliance.studio.studio_error import StudioError
+from appliance.studio.train_command import reading
+from appliance.studio.training import load_autoencoder
+from appliance.studio.training_run import stop_signals
+
+
+@dataclass(frozen=True)
+class Wish:
+    """The command line of bunraku improvise."""
+
+    checkpoint: Path
+    out: Path
+    recordings: Path | None = None
+    minutes: float = 12.0
+    steps: int = 0
+    begin_from: Path | None = None
+    threads: int = 0
+    phrase: PhraseWish = field(default_factory=PhraseWish)
+
+
+def run(wish: Wish) -> bool:
+    """Train, improvise, write the phrase. False when it was stopped before its end; raises StudioError."""
+    console = Console(stderr=True)
+    if wish.threads:
+        torch.set_num_threads(wish.threads)
+    autoencoder, joints, state = load_autoencoder(wish.checkpoint)
+    dataset = sources.remembered(state, wish.recordings, wish.checkpoint).load(reading(console))
+    if list(dataset.moving_names) != joints:
+        raise StudioError(
+            f"{wish.checkpoint} moves {', '.join(joints)}, the recordings {', '.join(dataset.moving_names)}. "
+            "Improvise with the recordings that the checkpoint was trained on."
+        )
+    heard = steps_of_takes(autoencoder, dataset.training, dataset.moving, BEFORE + MOVE)
+    kept_apart = steps_of_takes(autoencoder, dataset.held_out, dataset.moving, BEFORE + MOVE)
+    training = _training(wish, autoencoder, heard, kept_apart, console)
+    if not _train(training, improviser_file(wish.out), console):
+        return False
+
+    def say(words: str) -> None:
+        console.print(words, highlight=False, soft_wrap=True)
+
+    phrase, natural = make_phrase(autoencoder, training.averaged, dataset, heard, wish.phrase, say)
+    write(wish, phrase, natural, dataset, training)
+    say(f"{wish.out}: {verdict(natural)}")
+    return True
+
+
+def improviser_file(out: Path) -> Path:
+    """Where the improviser of a phrase is kept."""
+    return out.with_suffix(".improviser.pt")
+
+
+def write(
+    wish: Wish, phrase: Recording, natural: Naturalness, dataset: Dataset, training: ImproviserTraining
+) -> None:
+    """The phrase, its report (JSON) and a picture of it."""
+    wish.out.parent.mkdir(parents=True, exist_ok=True)
+    write_bvh(wish.out, phrase, digits=PHRASE_DIGITS)
+    told: dict[str, Any] = {
+        "phrase": asdict(wish.phrase),
+        "improviser": {"settings": asdict(training.settings), "steps": training.step},
+        "learned_from": [take.name for take in dataset.training if take.sound.any()],
+        "naturalness": natural.as_json(),
+    }
+    wish.out.with_suffix(".json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    title = f"{wish.out.stem}: {phrase.seconds:.0f} s, seed {wish.phrase.seed}"
+    picture = wish.out.with_suffix(".png")
+    draw_filmstrip(picture, phrase.skeleton, phrase.poses, phrase.roots, phrase.fps, title=title, rows=3)
+
+
+def _training(
+    wish: Wish, autoencoder: Autoencoder, heard: list[Steps], kept_apart: list[Steps], console: Console
+) -> ImproviserTraining:
+    """A new training, or the one that stands beside the phrase where it is for the same autoencoder."""
+    settings = ImproviserSettings(seed=wish.phrase.seed, minutes=wish.minutes, steps=wish.steps)
+    rows = BEFORE + MOVE * settings.moves
+    if not any(len(stretch) >= rows for stretch in heard):
+        raise StudioError(
+            f"No recording has {rows / 12.5:.0f} sound seconds in a row: too little to improvise from."
+        )
+    training = ImproviserTraining(
+        [torch.tensor(stretch.features) for stretch in heard],
+        [torch.tensor(stretch.features) for stretch in kept_apart],
+        ROOT,
+        settings,
+    )
+    training.origin = {"autoencoder": fingerprint(autoencoder)}
+    file = improviser_file(wish.out)
+    if file.exists():
+        state = torch.load(file, map_location="cpu", weights_only=True)
+        if state["origin"] == training.origin and state["shape"] == asdict(training.improviser.shape):
+            training.restore(state)
+            console.print(f"{file} goes on at {100 * training.fraction:.0f} %.", highlight=False)
+            return training
+        console.print(f"{file} belongs to another autoencoder; a new one takes its place.", highlight=False)
+    if wish.begin_from is not None:
+        training.begin_from(torch.load(wish.begin_from, map_location="cpu", weights_only=True))
+    return training
+
+
+def fingerprint(autoencoder: Autoencoder) -> str:
+    """Tells one autoencoder's weights from another's."""
+    digest = hashlib.sha256()
+    for value in autoencoder.state_dict().values():
+        digest.update(value.numpy().tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _train(training: ImproviserTraining, file: Path, console: Console) -> bool:
+    """Until done or stopped (Ctrl-C, SIGTERM); the improviser's file is written either way."""
+    if training.fraction >= 1.0:
+        return True
+    file.parent.mkdir(parents=True, exist_ok=True)
+
+    def report(line: ImproviserReport) -> None:
+        held = "".join(f", held-out {name} {value:.3g}" for name, value in line.held_out.items())
+        words = ", ".join(f"{name} {value:.3g}" for name, value in line.parts.items())
+        console.print(
+            f"{100 * line.fraction:5.1f} %  step {line.step}  {words}{held}", highlight=False, soft_wrap=True
+        )
+
+    with stop_signals() as stop_asked:
+        training.run(report, lambda: save_improviser(training, file), stop=stop_asked)
+    if training.fraction < 1.0:
+        console.print("Stopped; nothing is lost. The same command goes on.")
+    return training.fraction >= 1.0

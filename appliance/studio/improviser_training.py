@@ -1,0 +1,244 @@
+"""The training loop of the improviser, read top to bottom; seeded and resumable."""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from appliance.studio.improviser import Improviser
+from appliance.studio.moves import BEFORE, MOVE, MovesShape, divergence, draw, move_loss
+
+
+@dataclass(frozen=True)
+class ImproviserSettings:
+    """How to train. minutes bounds the wall time and paces the rest; steps does so where given."""
+
+    seed: int = 1
+    minutes: float = 12.0
+    steps: int = 0
+    kept: int = 64
+    code: int = 48
+    width: int = 448
+    lstm_width: int = 192
+    lstm_layers: int = 1
+    mixtures: int = 6
+    batch: int = 128
+    moves: int = 6  # in a row, 3.8 s: what the memory is trained over
+    learning_rate: float = 1.5e-3
+    dropout: float = 0.2
+    closeness: float = 0.35  # deviation that a move may have from the recorded one, in a step's own
+    input_noise: float = 0.1
+    own: float = 0.9  # share of moves that go on from its own steps, at the end of the training
+    smoothing: float = 0.995
+
+
+@dataclass
+class ImproviserReport:
+    """What the loop tells while it runs."""
+
+    step: int
+    seconds: float
+    fraction: float
+    parts: dict[str, float]
+    held_out: dict[str, float]
+
+
+class ImproviserTraining:
+    """State of a training: networks, averaged networks, optimiser, history."""
+
+    def __init__(
+        self, training: Sequence[Tensor], held_out: Sequence[Tensor], ways: int, settings: ImproviserSettings
+    ) -> None:
+        """training, held_out: stretches of steps (T, features); those shorter than a row are not used."""
+        torch.manual_seed(settings.seed)
+        self.settings = settings
+        latent = training[0].shape[1] - ways
+        shape = MovesShape(latent, min(settings.kept, latent), ways, settings.code, settings.width)
+        self.improviser = Improviser(shape, settings.lstm_width, settings.lstm_layers, settings.mixtures)
+        self.improviser.scale.learn(torch.cat(list(training)))
+        self.averaged = copy.deepcopy(self.improviser).requires_grad_(False)
+        self.rows, self.starts = self._laid_out(training)
+        self.held_rows, self.held_starts = self._laid_out(held_out)
+        self.optimizer = torch.optim.Adam(self.improviser.parameters(), lr=settings.learning_rate, fused=True)
+        self.step, self.seconds = 0, 0.0
+        self.history: list[ImproviserReport] = []
+        self.origin: dict[str, str] = {}  # which autoencoder's latents it dances in
+
+    @property
+    def fraction(self) -> float:
+        """How much of the training is done, 0..1."""
+        if self.settings.steps:
+            return min(self.step / self.settings.steps, 1.0)
+        return min(self.seconds / (self.settings.minutes * 60), 1.0)
+
+    def run(
+        self,
+        report: Callable[[ImproviserReport], None],
+        save: Callable[[], None],
+        report_every_s: float = 15.0,
+        save_every_s: float = 60.0,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Train until done or stop() says so; reports and saves at intervals of wall time."""
+        began, offset = time.monotonic(), self.seconds
+        last_report = last_save = began
+        sums: dict[str, float] = {}
+        counted = 0
+        while self.fraction < 1.0 and not stop():
+            for name, value in self.train_step().items():
+                sums[name] = sums.get(name, 0.0) + float(value)
+            counted += 1
+            now = time.monotonic()
+            self.seconds = offset + now - began
+            if now - last_report >= report_every_s or self.fraction >= 1.0:
+                means = {name: value / counted for name, value in sums.items()}
+                line = ImproviserReport(self.step, self.seconds, self.fraction, means, self.held_out())
+                self.history.append(line)
+                report(line)
+                sums, counted, last_report = {}, 0, now
+            if now - last_save >= save_every_s:
+                save()
+                last_save = now
+        save()
+
+    def train_step(self) -> dict[str, Tensor]:
+        """One step on a batch of rows of moves, each move made out of recorded or of own steps before it."""
+        settings = self.settings
+        for group in self.optimizer.param_groups:
+            cosine = 0.5 * (1 + math.cos(math.pi * self.fraction))
+            group["lr"] = settings.learning_rate * min(1.0, (self.step + 1) / 100) * max(cosine, 0.01)
+        chosen = self.starts[torch.randint(len(self.starts), (settings.batch,))]
+        truth = self.rows[chosen[:, None] + torch.arange(self._length)]
+        own = settings.own * min(1.0, 1.5 * self.fraction)
+        parts = self._danced(self.improviser, truth, own, settings.dropout, settings.input_noise)
+        numbers = MOVE * self.improviser.shape.inside
+        weight = numbers / (2 * settings.closeness**2)
+        loss = (weight * parts["moves"] + parts["divergence"]) / settings.code + parts["nats"]
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.improviser.moves.parameters(), 1.0)
+        torch.nn.utils.clip_grad_norm_(self.improviser.choreographer.parameters(), 1.0)
+        self.optimizer.step()
+        self._average()
+        self.step += 1
+        return {name: part.detach() for name, part in parts.items()}
+
+    @torch.no_grad()
+    def held_out(self, sample: int = 64) -> dict[str, float]:
+        """The losses of the averaged networks on takes kept apart, recorded steps before each move."""
+        if not len(self.held_starts):
+            return {}
+        picked = torch.linspace(0, len(self.held_starts) - 1, min(sample, len(self.held_starts))).long()
+        truth = self.held_rows[self.held_starts[picked][:, None] + torch.arange(self._length)]
+        with torch.random.fork_rng():
+            torch.manual_seed(0)
+            parts = self._danced(self.averaged, truth, 0.0, 0.0, 0.0)
+        return {name: float(part) for name, part in parts.items()}
+
+    def state(self) -> dict[str, Any]:
+        """Everything that a resumed training and the improvising need."""
+        return {
+            "settings": asdict(self.settings),
+            "shape": asdict(self.improviser.shape),
+            "origin": self.origin,
+            "improviser": self.improviser.state_dict(),
+            "averaged": self.averaged.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "random": torch.get_rng_state(),
+            "step": self.step,
+            "seconds": self.seconds,
+            "history": [asdict(line) for line in self.history],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on where a saved training stood."""
+        for name in ("improviser", "averaged", "optimizer"):
+            getattr(self, name).load_state_dict(state[name])
+        torch.set_rng_state(state["random"])
+        self.step, self.seconds = state["step"], state["seconds"]
+        self.history = [ImproviserReport(**line) for line in state["history"]]
+
+    def begin_from(self, state: dict[str, Any]) -> None:
+        """Take the networks and the scale of another training; the schedule begins anew.
+
+        For an autoencoder that was trained on a little: its latents have hardly turned.
+        """
+        raw = self.improviser.scale.features(torch.cat([self.rows, self.held_rows]))
+        self.improviser.load_state_dict(state["averaged"])
+        self.averaged.load_state_dict(state["averaged"])
+        inside = self.improviser.scale.inside(raw)
+        self.rows, self.held_rows = inside[: len(self.rows)], inside[len(self.rows) :]
+
+    @property
+    def _length(self) -> int:
+        return BEFORE + self.settings.moves * MOVE
+
+    def _danced(
+        self, improviser: Improviser, truth: Tensor, own: float, dropout: float, noise: float
+    ) -> dict[str, Tensor]:
+        """Losses over rows (B, 3 + 8 * moves, inside).
+
+        own: share of moves that go on from the steps that the networks made (scheduled sampling). The code of
+        such a move is that which leads from there back to the recording, so that mending is learned too.
+        """
+        moves, choreographer = improviser.moves, improviser.choreographer
+        state = choreographer.start(len(truth))
+        mixture = None
+        sums = {"moves": truth.new_zeros(()), "divergence": truth.new_zeros(()), "nats": truth.new_zeros(())}
+        made = truth[:, :BEFORE]
+        for number in range(self.settings.moves):
+            at = BEFORE + number * MOVE
+            keep = torch.rand(len(truth), 1, 1) < own
+            before = torch.where(keep, made[:, -BEFORE:], truth[:, at - BEFORE : at])
+            before = before + noise * torch.rand(len(truth), 1, 1) * torch.randn_like(before)
+            move = truth[:, at : at + MOVE]
+            mean, log_variance = moves.encode(before, move)
+            code = draw(mean, log_variance)
+            if mixture is not None:
+                sums["nats"] = sums["nats"] + mixture.negative_log_likelihood(code.detach()).mean()
+            made = moves.decode(before, code)
+            sums["moves"] = sums["moves"] + move_loss(made, move, before, improviser.scale.importance)
+            sums["divergence"] = sums["divergence"] + divergence(mean, log_variance)
+            mixture, state = choreographer(made[:, -BEFORE:].detach(), code.detach(), state, dropout)
+        return {name: value / (self.settings.moves - (name == "nats")) for name, value in sums.items()}
+
+    def _laid_out(self, stretches: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+        """All scaled steps after one another, and the rows at which a whole training row begins."""
+        starts, at = [], 0
+        for stretch in stretches:
+            starts.append(torch.arange(at, at + max(len(stretch) - self._length + 1, 0)))
+            at += len(stretch)
+        if not starts:
+            return torch.zeros(0, self.improviser.shape.inside), torch.zeros(0, dtype=torch.long)
+        return self.improviser.scale.inside(torch.cat(list(stretches))), torch.cat(starts)
+
+    @torch.no_grad()
+    def _average(self) -> None:
+        keep = min(self.settings.smoothing, (self.step + 1) / (self.step + 10))
+        torch._foreach_lerp_(list(self.averaged.parameters()), list(self.improviser.parameters()), 1 - keep)
+
+
+def save_improviser(training: ImproviserTraining, path: Path) -> None:
+    """Write the whole state; the old file stays until the new one is complete."""
+    partial = path.with_suffix(".partial")
+    torch.save(training.state(), partial)
+    partial.replace(path)
+
+
+def load_improviser(path: Path) -> tuple[Improviser, dict[str, Any]]:
+    """The averaged networks of a checkpoint and the whole state."""
+    state = torch.load(path, map_location="cpu", weights_only=True)
+    settings = state["settings"]
+    improviser = Improviser(
+        MovesShape(**state["shape"]), settings["lstm_width"], settings["lstm_layers"], settings["mixtures"]
+    )
+    improviser.load_state_dict(state["averaged"])
+    return improviser.requires_grad_(False), state

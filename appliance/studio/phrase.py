@@ -1,0 +1,178 @@
+"""The phrase: the best minute and a half of many that the improviser danced, made endless."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+
+from appliance.dancer.loop import turns_about_y, yaws
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.studio.autoencoder import Autoencoder
+from appliance.studio.dataset import FPS, Dataset
+from appliance.studio.footing import smoothed, stand
+from appliance.studio.improviser import Improviser
+from appliance.studio.moves import MOVE
+from appliance.studio.naturalness import Naturalness, Yardstick, measure
+from appliance.studio.steps import HOP, Steps, danced_again, motion_of
+from appliance.studio.stretches import best_stretches
+from appliance.studio.studio_error import StudioError
+
+SEAM_S = 0.8  # the end turns into the start over so long
+STAGE_M = 3.6  # the root's path stays within so wide and so deep; arms and steps need the rest of 4 m
+STROLL_FRAMES = 401  # what is slower than this is where on the stage, not how, the dancer steps
+HEARD = 35  # steps of a recording that the improviser hears before it dances: 2.8 s
+STEPS_S = FPS / HOP
+
+
+@dataclass(frozen=True)
+class PhraseWish:
+    """What is wanted of a phrase."""
+
+    seconds: float = 90.0
+    seed: int = 1
+    temperature: float = 1.2
+    dances: int = 16
+    minutes: float = 4.0  # of each dance
+    finalists: int = 4
+    settling: int = 250  # iterations of the feet's settling
+
+
+def make_phrase(
+    autoencoder: Autoencoder,
+    improviser: Improviser,
+    dataset: Dataset,
+    heard: Sequence[Steps],
+    wish: PhraseWish,
+    say: Callable[[str], None] = lambda words: None,
+) -> tuple[Recording, Naturalness]:
+    """Improvise several dances, take the stretches that close best, make them endless, keep the best.
+
+    heard: stretches of recordings, of which each dance goes on from one.
+    """
+    moving, still = dataset.moving, dataset.still_pose()
+    dances = [
+        _motion(autoencoder, dance, dataset, still) for dance in improvise(improviser, heard, wish, say)
+    ]
+    yardstick = Yardstick.of(dataset.training, moving)
+    stretches = best_stretches(dances, yardstick, wish.seconds, STAGE_M, SEAM_S, wish.finalists)
+    if not stretches:
+        raise StudioError("No dance is long enough for the phrase: ask for longer ones by --dance-minutes.")
+    best: tuple[float, Recording, Naturalness] | None = None
+    for number, stretch in enumerate(stretches, 1):
+        closed = closed_loop(dances[stretch.dance], stretch.first, stretch.last)
+        again = replace(closed, poses=danced_again(autoencoder, closed.poses, moving, cyclic=True))
+        phrase = on_stage(stand(on_stage(again), wish.settling))
+        natural = measure(phrase, yardstick)
+        say(f"candidate {number} of {len(stretches)}: {verdict(natural)}")
+        faults = faultiness(natural) + stretch.cost
+        if best is None or faults < best[0]:
+            best = faults, phrase, natural
+    assert best is not None
+    return best[1], best[2]
+
+
+def improvise(
+    improviser: Improviser, heard: Sequence[Steps], wish: PhraseWish, say: Callable[[str], None]
+) -> list[Steps]:
+    """The dances, each from another recorded start."""
+    chance = np.random.default_rng(wish.seed)
+    long = [stretch for stretch in heard if len(stretch) >= HEARD]
+    starts = []
+    for number in chance.choice(len(long), wish.dances, replace=len(long) < wish.dances):
+        first = int(chance.integers(len(long[number]) - HEARD + 1))
+        starts.append(torch.tensor(long[number].features[first : first + HEARD]))
+    moves = int(np.ceil(wish.minutes * 60 * STEPS_S / MOVE))
+    say(f"improvising {wish.dances} dances of {wish.minutes:g} minutes")
+    danced = improviser.improvise(torch.stack(starts), moves, wish.temperature, wish.seed)
+    return [Steps.of_features(dance.numpy()) for dance in danced]
+
+
+def _motion(autoencoder: Autoencoder, steps: Steps, dataset: Dataset, still: Array) -> Recording:
+    poses, roots = motion_of(autoencoder, steps, still, dataset.moving)
+    return Recording(dataset.skeleton, poses, roots, FPS)
+
+
+def closed_loop(dance: Recording, first: int, last: int) -> Recording:
+    """Frames first..last - 1 as a cycle: what follows the last one turns into the first ones.
+
+    What differs between the two ends is crossfaded in what the dancer does (pose without heading, turning and
+    way of each frame), so that neither place nor heading matters; the way and the turning that are then
+    missing from a whole cycle are spread over all of it.
+    """
+    count, fade = last - first, round(SEAM_S * FPS)
+    heading = np.unwrap(yaws(quaternion.heading(dance.poses[:, 0])))
+    level = dance.poses.copy()
+    level[:, 0] = quaternion.multiply(turns_about_y(-heading), level[:, 0])
+    way = quaternion.rotate(turns_about_y(-heading[:-1]), np.diff(dance.roots, axis=0))
+    turn = np.diff(heading)
+    share = (np.arange(fade) + 0.5) / fade
+    share = share * share * (3 - 2 * share)
+
+    def faded(values: Array) -> Array:
+        cycle = values[first:last].copy()
+        part = share.reshape(-1, *[1] * (values.ndim - 1))
+        cycle[:fade] = (1 - part) * values[last : last + fade] + part * cycle[:fade]
+        return cycle
+
+    poses = level[first:last].copy()
+    poses[:fade] = quaternion.slerp(level[last : last + fade], poses[:fade], share[:, None])
+    turn = faded(turn)
+    turn -= np.remainder(turn.sum() + np.pi, 2 * np.pi) / count - np.pi / count
+    heading = np.concatenate([[0.0], np.cumsum(turn)])[:-1]
+    step = quaternion.rotate(turns_about_y(heading), faded(way))
+    step -= step.mean(axis=0)
+    roots = np.concatenate([np.zeros((1, 3)), np.cumsum(step, axis=0)])[:-1]
+    roots[:, 1] = faded(dance.roots[:, 1:2])[:, 0]
+    poses[:, 0] = quaternion.multiply(turns_about_y(heading), poses[:, 0])
+    return Recording(dance.skeleton, quaternion.continuous(poses), roots, dance.fps)
+
+
+def on_stage(phrase: Recording) -> Recording:
+    """The path in the middle of the stage, its slow part narrowed to fit; steps stay as they are."""
+    roots = phrase.roots.copy()
+    ground = roots[:, [0, 2]]
+    stroll = smoothed(ground, min(STROLL_FRAMES, len(ground) // 2 * 2 - 1))
+    steps = ground - stroll
+    stroll -= (stroll.max(axis=0) + stroll.min(axis=0)) / 2
+    for axis in range(2):
+        shrink = 1.0
+        while np.ptp(shrink * stroll[:, axis] + steps[:, axis]) > STAGE_M and shrink > 0.05:
+            shrink *= 0.95
+        stroll[:, axis] *= shrink
+    ground = stroll + steps
+    roots[:, [0, 2]] = ground - (ground.max(axis=0) + ground.min(axis=0)) / 2
+    return replace(phrase, roots=roots)
+
+
+def faultiness(natural: Naturalness) -> float:
+    """One number for choosing between candidates: 0 is as the recordings are."""
+    pace, recorded = natural.pace, natural.recorded_pace
+    return float(
+        2 * abs(np.log(natural.liveliness))
+        + max(0.0, np.log(pace.jerk_p99 / recorded.jerk_p99))
+        + max(0.0, np.log(pace.trembling / recorded.trembling))
+        + max(0.0, pace.longest_still_s - 2.0)
+        + max(0.0, np.log(natural.slide_cm_s / natural.recorded_slide_cm_s))
+        + 2 * abs(np.log(natural.likeness.breadth))
+        + natural.likeness.strangeness
+    )
+
+
+def verdict(natural: Naturalness) -> str:
+    """The measures in one line for people."""
+    pace, recorded, likeness, seam = natural.pace, natural.recorded_pace, natural.likeness, natural.seam
+    wide, deep = natural.stage_m
+    return (
+        f"{natural.seconds:.1f} s, liveliness {natural.liveliness:.2f}, breadth {likeness.breadth:.2f}, "
+        f"coverage {likeness.coverage:.2f}, "
+        f"strangeness {likeness.strangeness:.2f}, jerk x{pace.jerk_p99 / recorded.jerk_p99:.2f}, "
+        f"above 8 Hz {100 * pace.trembling:.2f} % (recorded {100 * recorded.trembling:.2f} %), "
+        f"longest still {pace.longest_still_s:.1f} s, slide {natural.slide_cm_s:.0f} cm/s "
+        f"(recorded {natural.recorded_slide_cm_s:.0f}), path {wide:.1f} x {deep:.1f} m, "
+        f"seam {seam.degrees:.1f} of {seam.around_degrees:.1f} degrees"
+    )

@@ -1,0 +1,240 @@
+"""The phrase: closed without a seam, on its stage, on its feet; what it is measured by; the whole command."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from typer.testing import CliRunner
+
+from appliance.dancer.grounding import measure_standing, survey
+from appliance.dancer.loop import is_closed, turns_about_y, yaws
+from appliance.dancer.motion_source import Playback
+from appliance.pose import quaternion
+from appliance.pose.bvh import read_bvh
+from appliance.pose.recording import Recording
+from appliance.studio import improvise_command
+from appliance.studio.dataset import Take, load_dataset
+from appliance.studio.footing import smoothed, stand
+from appliance.studio.improvisation import Wish, run
+from appliance.studio.naturalness import Yardstick, distances, measure
+from appliance.studio.pace import pace
+from appliance.studio.phrase import STAGE_M, PhraseWish, closed_loop, on_stage
+from appliance.studio.stretches import best_stretches
+from appliance.studio.training import Settings, Training, save_checkpoint
+from tests.studio.tiny import moving, swaying, write_recordings
+
+
+def take_of(recording: Recording, name: str) -> Take:
+    return Take(name, name, recording, np.ones(len(recording), dtype=bool), 50.0, 50.0)
+
+
+def strolling(seconds: float, speed: float = 0.3, turn: float = 0.2) -> Recording:
+    """The swaying dancer walks off in a curve."""
+    sway = swaying(seconds)
+    time = np.arange(len(sway)) / sway.fps
+    poses = sway.poses.copy()
+    poses[:, 0] = quaternion.multiply(turns_about_y(turn * time), poses[:, 0])
+    roots = sway.roots + np.stack([speed * time, 0 * time, 0.2 * np.sin(time)], axis=1)
+    return Recording(sway.skeleton, quaternion.continuous(poses), roots, sway.fps)
+
+
+def steps_between(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Turns in degrees and moves in centimetres of each frame to the next, the last one to the first."""
+    poses, roots = recording.poses, recording.roots
+    turns = np.degrees(quaternion.angle_between(poses, np.roll(poses, -1, axis=0))).max(axis=1)
+    return turns, 100 * np.linalg.norm(np.roll(roots, -1, axis=0) - roots, axis=1)
+
+
+def test_a_stretch_becomes_a_cycle_whose_seam_is_a_step_like_any_other() -> None:
+    loop = closed_loop(strolling(12.0), 37, 437)
+    turns, moves = steps_between(loop)
+    assert len(loop) == 400
+    assert is_closed(loop.poses.astype(np.float32), loop.roots.astype(np.float32))
+    assert turns[-1] <= np.percentile(turns, 99) and moves[-1] <= np.percentile(moves, 99)
+
+
+def test_outside_its_seam_a_cycle_is_the_dance_itself_but_for_the_miss() -> None:
+    dance = strolling(12.0)
+    loop = closed_loop(dance, 37, 437)
+    own, true = loop.poses[60:, 1:], dance.poses[97:437, 1:]
+    assert np.degrees(quaternion.angle_between(own, true)).max() < 1e-3
+
+
+def test_what_is_missing_of_a_whole_turn_is_spread_over_the_cycle() -> None:
+    loop = closed_loop(strolling(12.0, turn=0.2), 37, 437)
+    heading = np.unwrap(yaws(quaternion.heading(loop.poses[:, 0])))
+    sway = np.unwrap(yaws(quaternion.heading(closed_loop(swaying(12.0), 37, 437).poses[:, 0])))
+    assert abs(heading[-1] - heading[0]) < np.radians(6)
+    assert np.abs(np.diff(heading)).max() < np.abs(np.diff(sway)).max() + np.radians(0.3)
+
+
+def test_the_box_plays_a_cycle_for_ever_on_the_same_spot() -> None:
+    loop = closed_loop(strolling(12.0), 37, 437)
+    playback = Playback(loop)
+    places = []
+    for _ in range(3 * len(loop)):
+        places.append(playback.roots()[0].copy())
+        playback.advance()
+    first, last = np.array(places[: len(loop)]), np.array(places[-len(loop) :])
+    np.testing.assert_allclose(first, last, atol=1e-4)
+
+
+def test_a_path_too_long_for_the_stage_is_narrowed_and_its_steps_are_kept() -> None:
+    time = np.arange(2000) / 50
+    sway = swaying(40.0)
+    far = np.stack([4 * np.sin(2 * np.pi * time / 40), 0 * time, 3 * np.cos(2 * np.pi * time / 40)], axis=1)
+    bounce = 0.05 * np.sin(2 * np.pi * 2 * time)[:, None]
+    phrase = on_stage(replace(sway, roots=far + bounce * [1, 0, 1] + [7, 0.8, 0]))
+    assert (np.ptp(phrase.roots[:, [0, 2]], axis=0) <= STAGE_M + 1e-9).all()
+    np.testing.assert_allclose(phrase.roots[:, 0].max() + phrase.roots[:, 0].min(), 0, atol=1e-9)
+    quick = np.abs(np.fft.rfft(phrase.roots[:, 0]))[80] * 2 / 2000
+    assert quick == pytest.approx(0.05, rel=0.05)
+
+
+def test_a_path_that_fits_is_only_moved_to_the_middle() -> None:
+    sway = swaying(9.0)
+    phrase = on_stage(replace(sway, roots=sway.roots + np.array([5.0, 0, 5.0])))
+    np.testing.assert_allclose(np.diff(phrase.roots, axis=0), np.diff(sway.roots, axis=0), atol=1e-12)
+
+
+def test_the_stretch_whose_end_meets_its_start_is_found() -> None:
+    dance = swaying(24.0)  # repeats itself every 3 seconds
+    yardstick = Yardstick.of([take_of(dance, "sway")], moving())
+    found = best_stretches([dance], yardstick, 9.0, STAGE_M, 0.8, 3)
+    length_s = (found[0].last - found[0].first) / 50
+    assert 8.1 <= length_s <= 9.9
+    assert abs(length_s / 3 - round(length_s / 3)) < 0.03
+    assert found[0].cost <= found[1].cost <= found[2].cost
+
+
+def test_feet_that_slid_stand_and_nothing_is_below_the_floor() -> None:
+    """A dancer who sways 20 cm from side to side on feet that ought to stand."""
+    time = np.arange(200) / 50
+    sway = swaying(4.0)
+    legs = [
+        j for j, name in enumerate(sway.skeleton.names) if "T" in name[1:] or name[1:] in ("Shin", "Foot")
+    ]
+    poses = sway.poses.copy()
+    poses[:, [0, *legs]] = quaternion.IDENTITY
+    poses[:, legs[0]] = quaternion.from_axis_angle([1, 0, 0], 0.02 * np.sin(2 * np.pi * time / 4))
+    poses[:, legs[1]] = quaternion.from_axis_angle([1, 0, 0], 0.02 + 0.02 * np.sin(2 * np.pi * time / 4))
+    roots = np.stack([0.04 * np.sin(2 * np.pi * time / 4), np.full(200, 0.79), 0 * time], axis=1)
+    phrase = Recording(sway.skeleton, quaternion.continuous(poses), roots, 50.0)
+    before, after = (
+        measure_standing(p.skeleton, p.poses, p.roots, survey(p)) for p in (phrase, stand(phrase, 60))
+    )
+    assert before.slide_cm_s > 3
+    assert after.slide_cm_s < 0.4 * before.slide_cm_s
+    assert after.worst_penetration_cm < 1.0
+
+
+def test_a_phrase_on_its_feet_is_still_a_cycle() -> None:
+    phrase = stand(closed_loop(swaying(10.0), 0, 300), 20)
+    assert is_closed(phrase.poses.astype(np.float32), phrase.roots.astype(np.float32))
+    np.testing.assert_allclose(np.linalg.norm(phrase.poses, axis=-1), 1.0, atol=1e-6)
+
+
+def test_smoothing_a_cycle_keeps_its_mean_and_knows_no_ends() -> None:
+    values = np.random.default_rng(0).normal(size=(40, 2))
+    np.testing.assert_allclose(smoothed(values, 9).mean(axis=0), values.mean(axis=0))
+    np.testing.assert_allclose(
+        smoothed(np.roll(values, 7, axis=0), 9), np.roll(smoothed(values, 9), 7, axis=0)
+    )
+    np.testing.assert_allclose(smoothed(np.full((20, 1), 3.0), 15), 3.0)
+
+
+def test_a_recording_measured_by_itself_is_as_natural_as_can_be() -> None:
+    takes = [take_of(swaying(9.0, seed), f"sway {seed}") for seed in range(3)]
+    natural = measure(takes[0].recording, Yardstick.of(takes, moving()))
+    assert natural.liveliness == pytest.approx(natural.pace.speed / natural.recorded_pace.speed)
+    assert natural.likeness.strangeness < 1e-3 and natural.likeness.nearest_second_cm < 1.0
+    assert natural.likeness.coverage >= 1 / 3
+    assert natural.seam.closed  # three seconds of sway, three times
+    json.dumps(natural.as_json())
+
+
+def test_trembling_freezing_and_haste_are_seen() -> None:
+    still_after = swaying(9.0)
+    frozen = replace(still_after, poses=still_after.poses.copy())
+    frozen.poses[200:] = frozen.poses[200]
+    usual = pace(still_after, moving(), 1.0).speed
+    assert pace(still_after, moving(), usual).longest_still_s < 1
+    assert 4 < pace(frozen, moving(), usual).longest_still_s <= 5.5
+    chance = np.random.default_rng(1)
+    shaken = quaternion.from_axis_angle(chance.normal(size=(*still_after.poses.shape[:2], 3)), 0.02)
+    trembling = replace(still_after, poses=quaternion.multiply(still_after.poses, shaken))
+    assert pace(trembling, moving(), usual).trembling > 10 * pace(still_after, moving(), usual).trembling
+    assert pace(trembling, moving(), usual).jerk_p99 > 10 * pace(still_after, moving(), usual).jerk_p99
+    twice = replace(still_after, poses=still_after.poses[::2], roots=still_after.roots[::2])
+    assert pace(twice, moving(), usual).speed == pytest.approx(2 * usual, rel=0.02)
+
+
+def test_figures_are_as_far_apart_as_their_joints_are_on_average() -> None:
+    a = np.zeros((1, 6))
+    b = np.array([[3.0, 4.0, 0.0, 0.0, 0.0, 5.0]])
+    assert distances(a, b)[0, 0] == pytest.approx(5.0)
+
+
+@pytest.fixture(scope="module")
+def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A pose autoencoder of a few steps, and the recordings that it saw."""
+    folder = tmp_path_factory.mktemp("improvise")
+    recordings = write_recordings(folder / "dancer", seconds=7.0)
+    torch.set_num_threads(1)
+    training = Training(load_dataset(recordings), Settings(steps=30, latent=8, width=32, batch=32))
+    training.run(lambda line: None, lambda: None)
+    save_checkpoint(training, folder / "checkpoint.pt")
+    return folder / "checkpoint.pt", recordings
+
+
+def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
+    checkpoint: tuple[Path, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    out = tmp_path / "phrase.bvh"
+    small = PhraseWish(seconds=4.0, seed=4, dances=2, minutes=0.2, finalists=1, settling=5)
+    wish = Wish(checkpoint[0], out, checkpoint[1], steps=2, threads=1, phrase=small)
+    assert run(wish)
+    phrase = read_bvh(out)
+    assert phrase.fps == pytest.approx(50.0) and 3.5 <= phrase.seconds <= 4.5
+    assert is_closed(phrase.poses.astype(np.float32), phrase.roots.astype(np.float32))
+    beside = {file.name for file in tmp_path.iterdir()}
+    assert beside == {"phrase.bvh", "phrase.json", "phrase.png", "phrase.improviser.pt"}
+    told = json.loads((tmp_path / "phrase.json").read_text())
+    assert told["improviser"]["steps"] == 2
+    assert told["naturalness"]["seconds"] == pytest.approx(phrase.seconds)
+    bytes_before = out.read_bytes()
+    capsys.readouterr()
+    monkeypatch.setattr("appliance.studio.improvisation.draw_filmstrip", lambda *_, **__: None)  # slow
+    assert run(wish)
+    assert "goes on at 100 %" in capsys.readouterr().err
+    assert out.read_bytes() == bytes_before
+
+
+def test_the_commands_options_are_what_is_wished(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    wishes: list[Wish] = []
+    monkeypatch.setattr("appliance.studio.improvisation.run", lambda wish: bool(wishes.append(wish)))
+    options = ["--seconds", "75", "--seed", "9", "--minutes", "3", "--temperature", "0.9", "--dances", "5"]
+    words = ["c.pt", "--out", str(tmp_path / "p.bvh"), *options, "--dance-minutes", "2"]
+    result = CliRunner().invoke(improvise_command.app, words)
+    assert result.exit_code == 130  # not done: stopped before its end
+    assert wishes == [
+        Wish(Path("c.pt"), tmp_path / "p.bvh", minutes=3.0, phrase=PhraseWish(75.0, 9, 0.9, 5, 2.0))
+    ]
+
+
+def test_recordings_of_another_dancer_are_refused(checkpoint: tuple[Path, Path], tmp_path: Path) -> None:
+    other = write_recordings(tmp_path / "other", seconds=3.0)
+    for file in other.glob("*.bvh"):
+        file.write_text(file.read_text().replace("lHand", "lPaw"))
+    words = [str(checkpoint[0]), "--recordings", str(other), "--out", str(tmp_path / "p.bvh")]
+    result = CliRunner().invoke(improvise_command.app, words)
+    assert result.exit_code == 2
+    assert not (tmp_path / "p.bvh").exists()
