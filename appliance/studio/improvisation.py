@@ -10,6 +10,7 @@ from typing import Any
 
 import torch
 from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 from appliance.pose.bvh import write_bvh
 from appliance.pose.filmstrip import draw_filmstrip
@@ -43,7 +44,6 @@ class Wish:
     recordings: Path | None = None
     minutes: float = 12.0
     steps: int = 0
-    begin_from: Path | None = None
     threads: int = 0
     phrase: PhraseWish = field(default_factory=PhraseWish)
 
@@ -123,8 +123,6 @@ def _training(
             console.print(f"{file} goes on at {100 * training.fraction:.0f} %.", highlight=False)
             return training
         console.print(f"{file} belongs to another autoencoder; a new one takes its place.", highlight=False)
-    if wish.begin_from is not None:
-        training.begin_from(torch.load(wish.begin_from, map_location="cpu", weights_only=True))
     return training
 
 
@@ -142,15 +140,32 @@ def _train(training: ImproviserTraining, file: Path, console: Console) -> bool:
         return True
     file.parent.mkdir(parents=True, exist_ok=True)
 
-    def report(line: ImproviserReport) -> None:
-        held = "".join(f", held-out {name} {value:.3g}" for name, value in line.held_out.items())
-        words = ", ".join(f"{name} {value:.3g}" for name, value in line.parts.items())
-        console.print(
-            f"{100 * line.fraction:5.1f} %  step {line.step}  {words}{held}", highlight=False, soft_wrap=True
-        )
+    with stop_signals() as stop_asked, _progress(console) as progress:
+        bar = progress.add_task("improviser", total=1.0, words="")
 
-    with stop_signals() as stop_asked:
-        training.run(report, lambda: save_improviser(training, file), stop=stop_asked)
+        def stop() -> bool:
+            progress.update(bar, completed=training.fraction)
+            return stop_asked()
+
+        def report(line: ImproviserReport) -> None:
+            words = _words(line)
+            progress.update(bar, completed=line.fraction, words=words)
+            if not console.is_terminal:
+                console.print(f"{100 * line.fraction:5.1f} %  {words}", highlight=False, soft_wrap=True)
+
+        training.run(report, lambda: save_improviser(training, file), stop=stop)
     if training.fraction < 1.0:
         console.print("Stopped; nothing is lost. The same command goes on.")
     return training.fraction >= 1.0
+
+
+def _progress(console: Console) -> Progress:
+    columns = [TextColumn("learning to improvise"), BarColumn(), TaskProgressColumn()]
+    words = TextColumn("{task.fields[words]}")
+    return Progress(*columns, words, console=console, disable=not console.is_terminal)
+
+
+def _words(line: ImproviserReport) -> str:
+    parts = ", ".join(f"{name} {value:.3g}" for name, value in line.parts.items())
+    held = ", ".join(f"{name} {value:.3g}" for name, value in line.held_out.items())
+    return f"step {line.step}  {parts}" + (f"; held-out takes: {held}" if held else "")

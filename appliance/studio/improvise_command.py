@@ -23,12 +23,9 @@ def improvise(
     steps: Annotated[int, typer.Option(min=0, help="How many steps to train, instead of minutes.")] = 0,
     temperature: Annotated[
         float, typer.Option(min=0.05, max=2.0, help="1: as free as learned; less: closer to its habits.")
-    ] = 1.2,
+    ] = 1.3,
     dances: Annotated[int, typer.Option(min=1, help="How many dances to choose the phrase from.")] = 16,
     dance_minutes: Annotated[float, typer.Option(min=0.05, help="How long each of them is.")] = 4.0,
-    begin_from: Annotated[
-        Path | None, typer.Option(help="Improviser to go on training from, made for an earlier checkpoint.")
-    ] = None,
     threads: Annotated[int, typer.Option(min=0, help="Processor cores to use; 0: all.")] = 0,
 ) -> None:
     """Train an improviser on a dancer's recordings and let it make an endless phrase.
@@ -48,7 +45,6 @@ def improvise(
             recordings=recordings,
             minutes=minutes,
             steps=steps,
-            begin_from=begin_from,
             threads=threads,
             phrase=PhraseWish(seconds, seed, temperature, dances, dance_minutes),
         )

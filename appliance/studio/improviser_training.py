@@ -166,17 +166,6 @@ class ImproviserTraining:
         self.step, self.seconds = state["step"], state["seconds"]
         self.history = [ImproviserReport(**line) for line in state["history"]]
 
-    def begin_from(self, state: dict[str, Any]) -> None:
-        """Take the networks and the scale of another training; the schedule begins anew.
-
-        For an autoencoder that was trained on a little: its latents have hardly turned.
-        """
-        raw = self.improviser.scale.features(torch.cat([self.rows, self.held_rows]))
-        self.improviser.load_state_dict(state["averaged"])
-        self.averaged.load_state_dict(state["averaged"])
-        inside = self.improviser.scale.inside(raw)
-        self.rows, self.held_rows = inside[: len(self.rows)], inside[len(self.rows) :]
-
     @property
     def _length(self) -> int:
         return BEFORE + self.settings.moves * MOVE

@@ -149,19 +149,6 @@ def test_a_resumed_training_is_the_same_training(tmp_path: Path) -> None:
         torch.testing.assert_close(resumed.averaged.state_dict()[name], value, msg=name)
 
 
-def test_beginning_from_another_improviser_keeps_its_networks_and_its_scale() -> None:
-    other = ImproviserTraining(waves(), [], 4, TINY)
-    other.train_step()
-    moved = [wave * 1.5 + 0.2 for wave in waves()]
-    training = ImproviserTraining(moved, [], 4, TINY)
-    training.begin_from(other.state())
-    assert training.step == 0
-    torch.testing.assert_close(training.improviser.scale.middle, other.improviser.scale.middle)
-    torch.testing.assert_close(
-        training.rows, other.improviser.scale.inside(torch.cat(moved)), atol=1e-3, rtol=1e-3
-    )
-
-
 def test_the_same_seed_dances_the_same_and_another_one_does_not(tmp_path: Path) -> None:
     training = ImproviserTraining(waves(), [], 4, TINY)
     training.run(lambda line: None, lambda: save_improviser(training, tmp_path / "i.pt"))
