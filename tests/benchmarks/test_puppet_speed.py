@@ -96,8 +96,6 @@ def test_exported(
 
 def test_the_default_as_it_ships(measured: Callable[..., Any]) -> None:
     show = default_show_path()
-    if not (show / "puppet.onnx").exists():
-        pytest.skip("there is no default show in this checkout")
     puppet = Puppet(show / "puppet.onnx", read_bvh(show / "skeleton.bvh").skeleton)
     benchmark = measured(f"default as it ships, {puppet.precision}", GROUP)
     arguments = (*inputs(len(puppet.joints)), 10, 9)

@@ -208,7 +208,5 @@ def test_no_text_raises_anything_but_a_config_error(tmp_path: Path, text: str) -
 
 
 def test_the_show_that_comes_with_the_box_is_sound() -> None:
-    if not (default_show_path() / "show.yaml").is_file():
-        pytest.skip("the show that comes with the box is not packed yet")
     assert verify_bundle(default_show_path()) == []
     assert np.sum([path.stat().st_size for path in default_show_path().iterdir()]) <= 25_000_000
