@@ -171,7 +171,7 @@ def table(figures: dict[str, Any], limits: Sequence[Limit]) -> list[str]:
     )
     lines = [
         "transport  " + "  ".join(f"{name} {_ms(value)}" for name, value in way.items()),
-        f"  ({figures['readings']} readings, {figures['overtaken_readings']} of them overtaken by newer ones)",
+        f"  ({figures['readings']} readings, {figures['overtaken_readings']} of them overtaken by newer)",
         f"  running free  p50 {_ms(free['p50'])}  p99 {_ms(free['p99'])}",
         f"response to a step, half of the way  p50 {_ms(response['p50'])}   ({figures['steps']} steps)",
         "tick by section, p50  "
