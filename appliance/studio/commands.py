@@ -1,17 +1,15 @@
-"""`bunraku train`, `evaluate` and `export`: from a dancer's recordings to a show."""
+"""`bunraku train`, `evaluate`, `export` and `improvise`: from a dancer's recordings to a show."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-REFUSED, INTERRUPTED = 2, 130
+from appliance.studio import improvise_command
+from appliance.studio.clear_errors import INTERRUPTED, clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -72,7 +70,7 @@ def train(
     ] = None,
 ) -> None:
     """Train a dancer on recordings; at the end --out is a show that can be played."""
-    with _clear_errors("train"):
+    with clear_errors("train"):
         from appliance.studio import train_command
 
         done = train_command.run(
@@ -111,7 +109,7 @@ def evaluate(
     all_frames: Annotated[bool, typer.Option("--all-frames", help="Measure on glitches too.")] = False,
 ) -> None:
     """Measure how well a network knows a dance: degrees, centimetres, latents."""
-    with _clear_errors("evaluate"):
+    with clear_errors("evaluate"):
         from appliance.studio import evaluate_command
 
         evaluate_command.run(network, recordings, true_fps, json, all_frames)
@@ -128,42 +126,10 @@ def export(
     ] = None,
 ) -> None:
     """Make a show of a checkpoint: network file, quantization gate, report, skeleton, phrase, checksums."""
-    with _clear_errors("export"):
+    with clear_errors("export"):
         from appliance.studio import export_command
 
         export_command.run(checkpoint, out, recordings, phrase, name)
 
 
-@contextmanager
-def _clear_errors(command: str) -> Iterator[None]:
-    """What people can mend is one message and status 2."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] not in ("torch", "onnx", "matplotlib"):
-            raise
-        _refuse(
-            f"bunraku {command} needs {error.name}, which is not installed here. The box dances without it. "
-            "Install the studio with: pip install 'bunraku[studio]'"
-        )
-    except (ValueError, RuntimeError, OSError) as error:
-        if not _is_for_people(error):
-            raise
-        _refuse(str(error))
-
-
-def _is_for_people(error: Exception) -> bool:
-    from appliance.pose.bvh import BvhError
-    from appliance.pose.filmstrip import MissingPicturesError
-    from appliance.show.config_error import ConfigError
-    from appliance.studio.dataset import DatasetError
-    from appliance.studio.studio_error import StudioError
-
-    return isinstance(
-        error, BvhError | ConfigError | DatasetError | MissingPicturesError | StudioError | OSError
-    )
-
-
-def _refuse(words: str) -> None:
-    print(f"bunraku: {words}", file=sys.stderr)
-    raise typer.Exit(REFUSED)
+app.add_typer(improvise_command.app)

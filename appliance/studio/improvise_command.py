@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from appliance.studio.clear_errors import INTERRUPTED, clear_errors
+
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
 
@@ -33,9 +35,7 @@ def improvise(
     The improviser is kept beside the phrase; the same command again goes on where it stood, and once it is
     trained only dances (another --seed gives another phrase).
     """
-    from appliance.studio.commands import INTERRUPTED, _clear_errors
-
-    with _clear_errors("improvise"):
+    with clear_errors("improvise"):
         from appliance.studio.improvisation import Wish, run
         from appliance.studio.phrase import PhraseWish
 
