@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +120,9 @@ def _training(
         state = torch.load(file, map_location="cpu", weights_only=True)
         if state["origin"] == training.origin and state["shape"] == asdict(training.improviser.shape):
             training.restore(state)
+            training.settings = replace(
+                settings, seed=state["settings"]["seed"]
+            )  # the phrase may have another
             console.print(f"{file} goes on at {100 * training.fraction:.0f} %.", highlight=False)
             return training
         console.print(f"{file} belongs to another autoencoder; a new one takes its place.", highlight=False)

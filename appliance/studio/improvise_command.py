@@ -25,7 +25,7 @@ def improvise(
     steps: Annotated[int, typer.Option(min=0, help="How many steps to train, instead of minutes.")] = 0,
     temperature: Annotated[
         float, typer.Option(min=0.05, max=2.0, help="1: as free as learned; less: closer to its habits.")
-    ] = 1.3,
+    ] = 1.2,
     dances: Annotated[int, typer.Option(min=1, help="How many dances to choose the phrase from.")] = 16,
     dance_minutes: Annotated[float, typer.Option(min=0.05, help="How long each of them is.")] = 4.0,
     threads: Annotated[int, typer.Option(min=0, help="Processor cores to use; 0: all.")] = 0,

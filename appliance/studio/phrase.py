@@ -35,7 +35,7 @@ class PhraseWish:
 
     seconds: float = 90.0
     seed: int = 1
-    temperature: float = 1.3
+    temperature: float = 1.2
     dances: int = 16
     minutes: float = 4.0  # of each dance
     finalists: int = 4
