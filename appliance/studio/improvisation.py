@@ -120,9 +120,8 @@ def _training(
         state = torch.load(file, map_location="cpu", weights_only=True)
         if state["origin"] == training.origin and state["shape"] == asdict(training.improviser.shape):
             training.restore(state)
-            training.settings = replace(
-                settings, seed=state["settings"]["seed"]
-            )  # the phrase may have another
+            # The phrase may have another seed than the one that the improviser learned with.
+            training.settings = replace(settings, seed=state["settings"]["seed"])
             console.print(f"{file} goes on at {100 * training.fraction:.0f} %.", highlight=False)
             return training
         console.print(f"{file} belongs to another autoencoder; a new one takes its place.", highlight=False)
