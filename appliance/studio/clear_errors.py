@@ -33,7 +33,7 @@ def _is_for_people(error: Exception) -> bool:
     from appliance.pose.bvh import BvhError
     from appliance.pose.filmstrip import MissingPicturesError
     from appliance.show.config_error import ConfigError
-    from appliance.studio.dataset import DatasetError
+    from appliance.studio.data.dataset import DatasetError
     from appliance.studio.studio_error import StudioError
 
     return isinstance(

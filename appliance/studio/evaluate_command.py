@@ -11,9 +11,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from appliance.studio.coders import Coder, open_coder
-from appliance.studio.dataset import Take
-from appliance.studio.evaluation import Evaluation, evaluate, fitting_hop, load_takes
+from appliance.studio.data.dataset import Take
+from appliance.studio.evaluation.coders import Coder, open_coder
+from appliance.studio.evaluation.evaluation import Evaluation, evaluate, fitting_hop, load_takes
 
 
 def run(

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from appliance.studio import sources
-from appliance.studio.coders import load_checkpoint
-from appliance.studio.release import Request, release
+from appliance.studio.data import sources
+from appliance.studio.evaluation.coders import load_checkpoint
+from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
 from appliance.studio.train_command import reading
 

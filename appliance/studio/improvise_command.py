@@ -36,8 +36,8 @@ def improvise(
     trained only dances (another --seed gives another phrase).
     """
     with clear_errors("improvise"):
-        from appliance.studio.improvisation import Wish, run
-        from appliance.studio.phrase import PhraseWish
+        from appliance.studio.improviser.improvisation import Wish, run
+        from appliance.studio.improviser.phrase import PhraseWish
 
         wish = Wish(
             checkpoint=checkpoint,

@@ -12,15 +12,15 @@ import torch
 from rich.console import Console
 from rich.progress import track
 
-from appliance.studio import sources
-from appliance.studio.coders import load_checkpoint
-from appliance.studio.findings import findings
-from appliance.studio.losses import LossWeights
-from appliance.studio.release import Request, release
-from appliance.studio.sources import Sources
+from appliance.studio.autoencoder.losses import LossWeights
+from appliance.studio.autoencoder.training import Settings, Training
+from appliance.studio.autoencoder.training_run import TrainingRun, parameters
+from appliance.studio.data import sources
+from appliance.studio.data.sources import Sources
+from appliance.studio.evaluation.coders import load_checkpoint
+from appliance.studio.evaluation.findings import findings
+from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
-from appliance.studio.training import Settings, Training
-from appliance.studio.training_run import TrainingRun, parameters
 
 
 @dataclass(frozen=True)

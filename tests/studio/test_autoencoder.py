@@ -7,9 +7,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from appliance.studio import losses, rotation
-from appliance.studio.autoencoder import Autoencoder, PriorCritic
-from appliance.studio.networks import NETWORKS
+from appliance.studio.autoencoder import losses, rotation
+from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
+from appliance.studio.autoencoder.networks import NETWORKS
 from tests.studio.tiny import moving, swaying, untrained
 
 

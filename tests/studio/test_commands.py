@@ -14,7 +14,7 @@ from typer.testing import Result
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
-from appliance.studio import gate
+from appliance.studio.export import gate
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import swaying
 

@@ -12,8 +12,8 @@ import yaml
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
-from appliance.studio import dataset
-from appliance.studio.dataset import Catalogue, DatasetError, load_dataset, load_take
+from appliance.studio.data import dataset
+from appliance.studio.data.dataset import Catalogue, DatasetError, load_dataset, load_take
 from tests.studio.tiny import STILL, moving, skeleton, swaying, write_recordings
 
 

@@ -14,8 +14,8 @@ from onnx import TensorProto, helper
 
 from appliance.pose import quaternion
 from appliance.show.bundle import default_show_path
-from appliance.studio.coders import OnnxCoder
-from appliance.studio.evaluation import evaluate, load_takes
+from appliance.studio.evaluation.coders import OnnxCoder
+from appliance.studio.evaluation.evaluation import evaluate, load_takes
 
 RANDOM_LATENTS = 2000
 

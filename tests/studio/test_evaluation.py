@@ -12,9 +12,9 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.studio import evaluation
-from appliance.studio.coders import Poses, open_coder
-from appliance.studio.evaluation import Evaluation, evaluate, load_takes
+from appliance.studio.evaluation import evaluation
+from appliance.studio.evaluation.coders import Poses, open_coder
+from appliance.studio.evaluation.evaluation import Evaluation, evaluate, load_takes
 from appliance.studio.studio_error import StudioError
 from tests.studio.test_export import NAMES
 from tests.studio.tiny import moving, swaying

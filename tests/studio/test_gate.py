@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from appliance.studio import gate
-from appliance.studio.autoencoder import Autoencoder
-from appliance.studio.coders import OnnxCoder
-from appliance.studio.dataset import load_dataset
-from appliance.studio.export import export
+from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.data.dataset import load_dataset
+from appliance.studio.evaluation.coders import OnnxCoder
+from appliance.studio.export import gate
+from appliance.studio.export.export import export
 from tests.studio.test_autoencoder import some_windows
 from tests.studio.test_export import NAMES
 from tests.studio.tiny import untrained

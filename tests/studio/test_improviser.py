@@ -12,16 +12,16 @@ import torch
 from appliance.dancer.loop import turns_about_y
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
-from appliance.studio import steps
-from appliance.studio.dataset import Take
-from appliance.studio.improviser import FARTHEST, Improviser, Mixture
-from appliance.studio.improviser_training import (
+from appliance.studio.data.dataset import Take
+from appliance.studio.improviser import steps
+from appliance.studio.improviser.improviser import FARTHEST, Improviser, Mixture
+from appliance.studio.improviser.improviser_training import (
     ImproviserSettings,
     ImproviserTraining,
     load_improviser,
     save_improviser,
 )
-from appliance.studio.moves import BEFORE, MOVE, MovesShape, divergence
+from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence
 from tests.studio.tiny import moving, swaying, untrained
 
 TINY = ImproviserSettings(

@@ -18,14 +18,14 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.studio import improvise_command
-from appliance.studio.dataset import Take, load_dataset
-from appliance.studio.footing import smoothed, stand
-from appliance.studio.improvisation import Wish, run
-from appliance.studio.naturalness import Yardstick, distances, measure
-from appliance.studio.pace import pace
-from appliance.studio.phrase import STAGE_M, PhraseWish, closed_loop, on_stage
-from appliance.studio.stretches import best_stretches
-from appliance.studio.training import Settings, Training, save_checkpoint
+from appliance.studio.autoencoder.training import Settings, Training, save_checkpoint
+from appliance.studio.data.dataset import Take, load_dataset
+from appliance.studio.improviser.footing import smoothed, stand
+from appliance.studio.improviser.improvisation import Wish, run
+from appliance.studio.improviser.naturalness import Yardstick, distances, measure
+from appliance.studio.improviser.pace import pace
+from appliance.studio.improviser.phrase import STAGE_M, PhraseWish, closed_loop, on_stage
+from appliance.studio.improviser.stretches import best_stretches
 from tests.studio.tiny import moving, swaying, write_recordings
 
 
@@ -212,7 +212,9 @@ def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
     assert told["naturalness"]["seconds"] == pytest.approx(phrase.seconds)
     bytes_before = out.read_bytes()
     capsys.readouterr()
-    monkeypatch.setattr("appliance.studio.improvisation.draw_filmstrip", lambda *_, **__: None)  # slow
+    monkeypatch.setattr(
+        "appliance.studio.improviser.improvisation.draw_filmstrip", lambda *_, **__: None
+    )  # slow
     assert run(wish)
     assert "goes on at 100 %" in capsys.readouterr().err
     assert out.read_bytes() == bytes_before
@@ -220,7 +222,9 @@ def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
 
 def test_the_commands_options_are_what_is_wished(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     wishes: list[Wish] = []
-    monkeypatch.setattr("appliance.studio.improvisation.run", lambda wish: bool(wishes.append(wish)))
+    monkeypatch.setattr(
+        "appliance.studio.improviser.improvisation.run", lambda wish: bool(wishes.append(wish))
+    )
     options = ["--seconds", "75", "--seed", "9", "--minutes", "3", "--temperature", "0.9", "--dances", "5"]
     words = ["c.pt", "--out", str(tmp_path / "p.bvh"), *options, "--dance-minutes", "2"]
     result = CliRunner().invoke(improvise_command.app, words)

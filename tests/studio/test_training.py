@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 import torch
 
-from appliance.studio import losses
-from appliance.studio.dataset import Dataset, load_dataset
-from appliance.studio.losses import LossWeights
-from appliance.studio.training import Settings, Training, load_autoencoder, save_checkpoint
+from appliance.studio.autoencoder import losses
+from appliance.studio.autoencoder.losses import LossWeights
+from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder, save_checkpoint
+from appliance.studio.data.dataset import Dataset, load_dataset
 
 TINY = Settings(steps=40, width=32, latent=12, batch=32)
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from appliance.studio import rotation
-from appliance.studio.networks import Network, Shape
+from appliance.studio.autoencoder import rotation
+from appliance.studio.autoencoder.networks import Network, Shape
 
 NEAR = 1.0 - 1e-6  # length of a goal: its cosine with a pose stays below 1, so that no weight vanishes
 

@@ -12,8 +12,8 @@ from appliance.dancer.loop import is_closed, turns_about_y, yaws
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.studio.dataset import FPS, Take
-from appliance.studio.pace import Pace, mean_pace, mean_speed, pace
+from appliance.studio.data.dataset import FPS, Take
+from appliance.studio.improviser.pace import Pace, mean_pace, mean_speed, pace
 
 EVERY_S = 0.2  # of poses that are compared with each other
 SECOND_S = 1.0  # length of the stretches that are searched for in the recordings

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.skeleton import UnknownJointError
-from appliance.studio.coders import Coder, Poses
-from appliance.studio.dataset import (
+from appliance.studio.data.dataset import (
     WINDOW,
     Catalogue,
     Take,
@@ -24,6 +23,7 @@ from appliance.studio.dataset import (
     plausible,
     window_starts,
 )
+from appliance.studio.evaluation.coders import Coder, Poses
 from appliance.studio.studio_error import StudioError
 
 ITERATIONS = (1, 2, 5, 10)

@@ -9,7 +9,7 @@ import numpy as np
 
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.studio.naturalness import Yardstick, distances, figure_shapes
+from appliance.studio.improviser.naturalness import Yardstick, distances, figure_shapes
 
 EVERY = 4  # frames; ends are looked for at each of these
 STARTS_EVERY = 2  # of them

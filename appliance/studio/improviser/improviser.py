@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from appliance.studio.moves import BEFORE, MOVE, Moves, MovesShape, Scale
+from appliance.studio.improviser.moves import BEFORE, MOVE, Moves, MovesShape, Scale
 
 NARROWEST = math.log(0.1)  # log scale; a narrower Gaussian learns takes by heart
 WIDEST = math.log(2.0)

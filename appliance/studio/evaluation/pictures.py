@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from appliance.pose.filmstrip import draw_filmstrip
 from appliance.pose.recording import Recording
-from appliance.studio.coders import Coder
-from appliance.studio.dataset import FPS, WINDOW, Take
+from appliance.studio.data.dataset import FPS, WINDOW, Take
+from appliance.studio.evaluation.coders import Coder
 
 BACKDROP, PANEL, INK, FAINT = "#0f1015", "#191a21", "#efe6d8", "#9a948c"
 VERMILION, SLATE, IVORY = "#f54521", "#9eb3cc", "#edddc7"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from appliance.studio.dataset import FPS, Dataset, Take, window_starts
+from appliance.studio.data.dataset import FPS, Dataset, Take, window_starts
 
 
 def findings(dataset: Dataset) -> list[str]:

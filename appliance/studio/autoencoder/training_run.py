@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn
 from torch import nn
 
-from appliance.studio.coders import TorchCoder
-from appliance.studio.dataset import window_starts
-from appliance.studio.pictures import draw_losses, draw_reconstruction
-from appliance.studio.training import Report, Training, save_checkpoint
+from appliance.studio.autoencoder.training import Report, Training, save_checkpoint
+from appliance.studio.data.dataset import window_starts
+from appliance.studio.evaluation.coders import TorchCoder
+from appliance.studio.evaluation.pictures import draw_losses, draw_reconstruction
 
 REPORT_S = 30.0  # measuring on held-out takes costs a large LSTM seconds
 FIRST_STRIP_S, STRIP_SHARE = 60.0, 0.1  # a filmstrip after a minute and at every tenth of the training

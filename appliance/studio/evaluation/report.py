@@ -9,12 +9,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from appliance.studio import rotation
-from appliance.studio.autoencoder import Autoencoder
-from appliance.studio.coders import TorchCoder
-from appliance.studio.dataset import Dataset, windows
-from appliance.studio.evaluation import Evaluation
-from appliance.studio.gate import LIMITS_DEGREES, Verdict
+from appliance.studio.autoencoder import rotation
+from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.data.dataset import Dataset, windows
+from appliance.studio.evaluation.coders import TorchCoder
+from appliance.studio.evaluation.evaluation import Evaluation
+from appliance.studio.export.gate import LIMITS_DEGREES, Verdict
 
 RANDOM_LATENTS = 4096
 LISTED = ("network", "seed", "batch", "learning_rate", "mirror", "weights")

@@ -14,15 +14,15 @@ import numpy as np
 
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
-from appliance.studio import packing
-from appliance.studio.coders import OnnxCoder, Poses, TorchCoder, load_checkpoint
-from appliance.studio.dataset import Catalogue, Dataset, Take, find_catalogue, load_take
-from appliance.studio.evaluation import evaluate, fitting_hop
-from appliance.studio.export import export
-from appliance.studio.gate import judge, median_ms, sample_windows
-from appliance.studio.pictures import longest_sound
-from appliance.studio.report import write_up
-from appliance.studio.report_picture import draw_report
+from appliance.studio.data.dataset import Catalogue, Dataset, Take, find_catalogue, load_take
+from appliance.studio.evaluation.coders import OnnxCoder, Poses, TorchCoder, load_checkpoint
+from appliance.studio.evaluation.evaluation import evaluate, fitting_hop
+from appliance.studio.evaluation.pictures import longest_sound
+from appliance.studio.evaluation.report import write_up
+from appliance.studio.evaluation.report_picture import draw_report
+from appliance.studio.export import packing
+from appliance.studio.export.export import export
+from appliance.studio.export.gate import judge, median_ms, sample_windows
 from appliance.studio.studio_error import StudioError
 
 EQUALITY = 1e-4  # in any component of any quaternion after 10 iterations

@@ -12,14 +12,14 @@ from appliance.dancer.loop import turns_about_y, yaws
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.studio.autoencoder import Autoencoder
-from appliance.studio.dataset import FPS, Dataset
-from appliance.studio.footing import smoothed, stand
-from appliance.studio.improviser import Improviser
-from appliance.studio.moves import MOVE
-from appliance.studio.naturalness import Naturalness, Yardstick, measure
-from appliance.studio.steps import HOP, Steps, danced_again, motion_of
-from appliance.studio.stretches import best_stretches
+from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.data.dataset import FPS, Dataset
+from appliance.studio.improviser.footing import smoothed, stand
+from appliance.studio.improviser.improviser import Improviser
+from appliance.studio.improviser.moves import MOVE
+from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
+from appliance.studio.improviser.steps import HOP, Steps, danced_again, motion_of
+from appliance.studio.improviser.stretches import best_stretches
 from appliance.studio.studio_error import StudioError
 
 SEAM_S = 0.8  # the end turns into the start over so long

@@ -14,7 +14,7 @@ from appliance.show.show import load_show
 from appliance.studio.studio_error import StudioError
 
 if TYPE_CHECKING:
-    from appliance.studio.autoencoder import Autoencoder
+    from appliance.studio.autoencoder.autoencoder import Autoencoder
 
 Poses = NDArray[np.float32]
 
@@ -106,7 +106,7 @@ class TorchCoder:
 
 def load_checkpoint(path: Path) -> tuple[TorchCoder, dict[str, Any]]:
     """The averaged network of a checkpoint and the checkpoint's whole state. Raises StudioError."""
-    from appliance.studio.training import load_autoencoder
+    from appliance.studio.autoencoder.training import load_autoencoder
 
     try:
         autoencoder, joints, state = load_autoencoder(path)

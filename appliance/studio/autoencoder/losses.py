@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from appliance.studio import rotation
-from appliance.studio.autoencoder import PriorCritic
+from appliance.studio.autoencoder import rotation
+from appliance.studio.autoencoder.autoencoder import PriorCritic
 
 POSITION_POSES = 2  # of a window's 8, drawn anew each step: as good a gradient at a quarter of the cost
 

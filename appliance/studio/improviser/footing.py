@@ -15,7 +15,7 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.studio import rotation
+from appliance.studio.autoencoder import rotation
 
 LOW_M = 0.04  # a point of the sole higher than this is in the air
 SLOW_M_S = 0.35  # a point of that speed is half planted

@@ -13,8 +13,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from appliance.studio.improviser import Improviser
-from appliance.studio.moves import BEFORE, MOVE, MovesShape, divergence, draw, move_loss
+from appliance.studio.improviser.improviser import Improviser
+from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence, draw, move_loss
 
 
 @dataclass(frozen=True)

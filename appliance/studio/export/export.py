@@ -9,9 +9,9 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper
 
-from appliance.studio import emit
-from appliance.studio.autoencoder import NEAR, Autoencoder
-from appliance.studio.graph import MICROSOFT, OPSET, Graph, Layers, info
+from appliance.studio.autoencoder.autoencoder import NEAR, Autoencoder
+from appliance.studio.export import emit
+from appliance.studio.export.graph import MICROSOFT, OPSET, Graph, Layers, info
 
 
 def export(

@@ -14,10 +14,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from appliance.studio import losses, rotation
-from appliance.studio.autoencoder import Autoencoder, PriorCritic
-from appliance.studio.dataset import WINDOW, Dataset, windows
-from appliance.studio.networks import build
+from appliance.studio.autoencoder import losses, rotation
+from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
+from appliance.studio.autoencoder.networks import build
+from appliance.studio.data.dataset import WINDOW, Dataset, windows
 
 
 @dataclass(frozen=True)

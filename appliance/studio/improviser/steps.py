@@ -14,8 +14,8 @@ from appliance.dancer.loop import turns_about_y, yaws
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.studio.autoencoder import Autoencoder
-from appliance.studio.dataset import FPS, WINDOW, Take, mirrored
+from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.data.dataset import FPS, WINDOW, Take, mirrored
 
 HOP = 4  # frames from one step to the next: 12.5 steps a second, half a window, so that two windows overlap
 MIDDLE = WINDOW // 2  # the frame of a window whose heading and place count as the window's own

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from appliance.studio.dataset import Catalogue, Dataset, find_catalogue, load_dataset, read_catalogue
+from appliance.studio.data.dataset import Catalogue, Dataset, find_catalogue, load_dataset, read_catalogue
 from appliance.studio.studio_error import StudioError
 
 

@@ -14,9 +14,9 @@ import numpy as np
 import torch
 from torch import nn
 
-from appliance.studio import networks
-from appliance.studio.graph import Graph, Layers, lstm_weights
-from appliance.studio.networks import Network, Shape
+from appliance.studio.autoencoder import networks
+from appliance.studio.autoencoder.networks import Network, Shape
+from appliance.studio.export.graph import Graph, Layers, lstm_weights
 
 EXACT = Layers(int8=False)
 

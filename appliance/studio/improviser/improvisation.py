@@ -15,24 +15,24 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from appliance.pose.bvh import write_bvh
 from appliance.pose.filmstrip import draw_filmstrip
 from appliance.pose.recording import Recording
-from appliance.studio import sources
-from appliance.studio.autoencoder import Autoencoder
-from appliance.studio.dataset import Dataset
-from appliance.studio.improviser_training import (
+from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.autoencoder.training import load_autoencoder
+from appliance.studio.autoencoder.training_run import stop_signals
+from appliance.studio.data import sources
+from appliance.studio.data.dataset import Dataset
+from appliance.studio.export.packing import PHRASE_DIGITS
+from appliance.studio.improviser.improviser_training import (
     ImproviserReport,
     ImproviserSettings,
     ImproviserTraining,
     save_improviser,
 )
-from appliance.studio.moves import BEFORE, MOVE
-from appliance.studio.naturalness import Naturalness
-from appliance.studio.packing import PHRASE_DIGITS
-from appliance.studio.phrase import PhraseWish, make_phrase, verdict
-from appliance.studio.steps import ROOT, Steps, steps_of_takes
+from appliance.studio.improviser.moves import BEFORE, MOVE
+from appliance.studio.improviser.naturalness import Naturalness
+from appliance.studio.improviser.phrase import PhraseWish, make_phrase, verdict
+from appliance.studio.improviser.steps import ROOT, Steps, steps_of_takes
 from appliance.studio.studio_error import StudioError
 from appliance.studio.train_command import reading
-from appliance.studio.training import load_autoencoder
-from appliance.studio.training_run import stop_signals
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
-from appliance.studio.coders import Coder, Poses
-from appliance.studio.dataset import WINDOW, Take, window_starts
+from appliance.studio.data.dataset import WINDOW, Take, window_starts
+from appliance.studio.evaluation.coders import Coder, Poses
 
 LIMITS_DEGREES = {1: 0.25, 10: 1.5}  # mean between int8 and fp32 after so many iterations
 SAMPLE = 256  # windows, evenly spread over the takes

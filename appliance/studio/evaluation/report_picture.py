@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from appliance.studio.coders import Coder
-from appliance.studio.dataset import Take
-from appliance.studio.evaluation import Evaluation
-from appliance.studio.pictures import (
+from appliance.studio.data.dataset import Take
+from appliance.studio.evaluation.coders import Coder
+from appliance.studio.evaluation.evaluation import Evaluation
+from appliance.studio.evaluation.pictures import (
     FAINT,
     INK,
     IVORY,

@@ -1,0 +1,1 @@
+"""The adversarial autoencoder: networks, losses, and the training loop."""

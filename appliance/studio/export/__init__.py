@@ -1,0 +1,1 @@
+"""From a checkpoint to a show: the ONNX graph, its gate, and the bundle."""
