@@ -75,8 +75,8 @@ def test_int8_weights_are_u8_around_128(network: str, exported: dict[str, Path])
     loop = next(node for node in model.graph.node if node.op_type == "Loop")
     kinds = [node.op_type for node in loop.attribute[0].g.node]
     assert "DynamicQuantizeMatMul" in kinds and "LSTM" not in kinds
-    # In float stay the layer that sees the pose, where int8 loses most, and the mlp's two small ones around the
-    # latent, where it gains nothing.
+    # In float stay the layer that sees the pose, where int8 loses most, and the mlp's two small ones around
+    # the latent, where it gains nothing.
     assert kinds.count("Gemm") == {"mlp": 3, "conv": 1}.get(network, 0)
 
 
