@@ -8,7 +8,7 @@ ARGS ?= --seconds 30
 TEST_ARGS ?=
 
 # What the tests need from the system, as package:command.
-DEBIAN_FOR_TESTS := liblo-tools:oscdump
+DEBIAN_FOR_TESTS := liblo-tools:oscdump iproute2:ip
 
 .DEFAULT_GOAL := help
 .PHONY: help run studio test lint bench lock clean debian-for-tests
