@@ -125,22 +125,6 @@ def test_windows_bring_their_mirror_images(tmp_path: Path) -> None:
     assert once.shape[1:] == (8, 17, 4) and once.dtype == np.float32
 
 
-def test_a_faster_pace_turns_further_in_each_frame_and_keeps_glitches_masked(tmp_path: Path) -> None:
-    found = load_dataset(write_recordings(tmp_path / "dancer", count=2))
-    (take,) = found.training
-    take.sound[100] = False
-    slower, faster = dataset.at_other_paces([take], (0.8, 1.25))
-    for danced, pace in ((slower, 0.8), (faster, 1.25)):
-        poses = danced.recording.poses
-        assert danced.recording.fps == 50 and len(poses) == pytest.approx(len(take.recording) / pace, abs=2)
-        np.testing.assert_allclose(
-            poses[40], take.recording.resampled(50 * 20).poses[int(40 * pace * 20)], atol=2e-3
-        )
-        glitch = round(100 / pace)
-        assert not danced.sound[glitch]
-        assert danced.sound[: glitch - 3].all() and danced.sound[glitch + 3 :].all()
-
-
 def test_recordings_of_two_skeletons_are_refused_by_name(tmp_path: Path) -> None:
     folder = write_recordings(tmp_path / "dancer", count=2)
     one = swaying(1.0)

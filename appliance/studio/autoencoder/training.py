@@ -17,7 +17,7 @@ from torch import Tensor
 from appliance.studio.autoencoder import losses, rotation
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
 from appliance.studio.autoencoder.networks import build
-from appliance.studio.data.dataset import WINDOW, Dataset, at_other_paces, windows
+from appliance.studio.data.dataset import WINDOW, Dataset, windows
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,6 @@ class Settings:
     latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
     input_noise_degrees: float = 0.0
     mirror: bool = True
-    paces: tuple[float, ...] = (0.85, 1.18)  # at which every take is learned besides its own
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
 
 
@@ -76,8 +75,7 @@ class Training:
         self.body = rotation.MovingSkeleton(dataset.skeleton, dataset.moving, torch.tensor(still)).to(
             self.device
         )
-        takes = (*dataset.training, *at_other_paces(dataset.training, settings.paces))
-        self.train_windows = self._heading_free(windows(takes, dataset.moving, settings.mirror))
+        self.train_windows = self._heading_free(windows(dataset.training, dataset.moving, settings.mirror))
         self.held_windows = torch.tensor(windows(dataset.held_out, dataset.moving)).to(self.device)
         self.optimizer = torch.optim.Adam(
             self.autoencoder.parameters(), lr=settings.learning_rate, fused=True

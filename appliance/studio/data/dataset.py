@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -210,18 +210,6 @@ def window_starts(take: Take, hop: int = 1) -> NDArray[np.intp]:
         return np.zeros(0, dtype=np.intp)
     whole = np.lib.stride_tricks.sliding_window_view(take.sound, WINDOW).all(axis=-1)
     return np.flatnonzero(whole)[::hop]
-
-
-def at_other_paces(takes: Sequence[Take], paces: Sequence[float]) -> tuple[Take, ...]:
-    """The takes danced slower and faster: a pace of 1.18 is that much faster. A dancer varies as much."""
-    return tuple(_at_pace(take, pace) for pace in paces for take in takes)
-
-
-def _at_pace(take: Take, pace: float) -> Take:
-    recording = replace(take.recording, fps=FPS * pace).resampled(FPS)
-    before = np.minimum((np.arange(len(recording)) * pace).astype(int), len(take.sound) - 1)
-    after = np.minimum(before + 1, len(take.sound) - 1)
-    return replace(take, recording=recording, sound=take.sound[before] & take.sound[after])
 
 
 def windows(takes: Sequence[Take], moving: Sequence[int], mirror: bool = False) -> NDArray[np.float32]:

@@ -17,7 +17,7 @@ from appliance.studio.evaluation.evaluation import Evaluation
 from appliance.studio.export.gate import LIMITS_DEGREES, Verdict
 
 RANDOM_LATENTS = 4096
-LISTED = ("network", "seed", "batch", "learning_rate", "mirror", "paces", "weights")
+LISTED = ("network", "seed", "batch", "learning_rate", "mirror", "weights")
 
 
 def write_up(
@@ -42,7 +42,7 @@ def write_up(
         "training": {
             "minutes": round(state["seconds"] / 60, 2),
             "steps": state["step"],
-            **{name: state["settings"].get(name) for name in LISTED},
+            **{name: state["settings"][name] for name in LISTED},
             "takes": sorted(take.name for take in dataset.training),
             "held_out": sorted(take.name for take in dataset.held_out),
         },
