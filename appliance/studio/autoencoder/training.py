@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-import time
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from torch import Tensor
 from appliance.studio.autoencoder import losses, rotation
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
 from appliance.studio.autoencoder.networks import build
+from appliance.studio.course import Course
 from appliance.studio.data.dataset import WINDOW, Dataset, windows
 
 
@@ -52,10 +52,11 @@ class Report:
     held_out_degrees: float | None = None
 
 
-class Training:
+class Training(Course[Report]):
     """State of a training: networks, optimisers, averages, history."""
 
     def __init__(self, dataset: Dataset, settings: Settings, device: str = "cpu") -> None:
+        super().__init__(settings)
         torch.manual_seed(settings.seed)
         self.settings, self.device, self.dataset = settings, torch.device(device), dataset
         still = dataset.still_pose()
@@ -83,52 +84,11 @@ class Training:
         self.critic_optimizer = torch.optim.Adam(
             self.critic.parameters(), lr=settings.critic_learning_rate, betas=(0.5, 0.999), fused=True
         )
-        self.step, self.seconds = 0, 0.0
-        self.history: list[Report] = []
         self.origin: dict[str, Any] = {}  # where the recordings lie and what is known of them
 
-    @property
-    def fraction(self) -> float:
-        """How much of the training is done, 0..1."""
-        if self.settings.steps:
-            return min(self.step / self.settings.steps, 1.0)
-        return min(self.seconds / (self.settings.minutes * 60), 1.0)
-
-    def run(
-        self,
-        report: Callable[[Report], None],
-        save: Callable[[], None],
-        report_every_s: float = 15.0,
-        save_every_s: float = 120.0,
-        stop: Callable[[], bool] = lambda: False,
-    ) -> None:
-        """Train until done or stop() says so; reports and saves at intervals of wall time."""
-        sums: dict[str, float] = {}
-        counted = 0
-        began, offset = time.monotonic(), self.seconds
-        last_report = last_save = began
-        while self.fraction < 1.0 and not stop():
-            values = self.train_step()
-            for name, value in values.items():
-                sums[name] = sums.get(name, 0.0) + float(value)
-            counted += 1
-            now = time.monotonic()
-            self.seconds = offset + now - began
-            if now - last_report >= report_every_s or self.fraction >= 1.0:
-                line = Report(
-                    self.step,
-                    self.seconds,
-                    self.fraction,
-                    {name: value / counted for name, value in sums.items()},
-                    self.held_out_degrees(),
-                )
-                self.history.append(line)
-                report(line)
-                sums, counted, last_report = {}, 0, now
-            if now - last_save >= save_every_s:
-                save()
-                last_save = now
-        save()
+    def line(self, means: Mapping[str, float]) -> Report:
+        """Mean losses since the last line, and the error on takes kept apart."""
+        return Report(self.step, self.seconds, self.fraction, dict(means), self.held_out_degrees())
 
     def train_step(self) -> dict[str, Tensor]:
         """One step of the critic and one of the autoencoder on a random batch."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from appliance.studio.course import Course
 from appliance.studio.improviser.improviser import Improviser
 from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence, draw, move_loss
 
@@ -51,13 +51,14 @@ class ImproviserReport:
     held_out: dict[str, float]
 
 
-class ImproviserTraining:
+class ImproviserTraining(Course[ImproviserReport]):
     """State of a training: networks, averaged networks, optimiser, history."""
 
     def __init__(
         self, training: Sequence[Tensor], held_out: Sequence[Tensor], ways: int, settings: ImproviserSettings
     ) -> None:
         """training, held_out: stretches of steps (T, features); those shorter than a row are not used."""
+        super().__init__(settings)
         torch.manual_seed(settings.seed)
         self.settings = settings
         latent = training[0].shape[1] - ways
@@ -68,46 +69,11 @@ class ImproviserTraining:
         self.rows, self.starts = self._laid_out(training)
         self.held_rows, self.held_starts = self._laid_out(held_out)
         self.optimizer = torch.optim.Adam(self.improviser.parameters(), lr=settings.learning_rate, fused=True)
-        self.step, self.seconds = 0, 0.0
-        self.history: list[ImproviserReport] = []
         self.origin: dict[str, str] = {}  # which autoencoder's latents it dances in
 
-    @property
-    def fraction(self) -> float:
-        """How much of the training is done, 0..1."""
-        if self.settings.steps:
-            return min(self.step / self.settings.steps, 1.0)
-        return min(self.seconds / (self.settings.minutes * 60), 1.0)
-
-    def run(
-        self,
-        report: Callable[[ImproviserReport], None],
-        save: Callable[[], None],
-        report_every_s: float = 15.0,
-        save_every_s: float = 60.0,
-        stop: Callable[[], bool] = lambda: False,
-    ) -> None:
-        """Train until done or stop() says so; reports and saves at intervals of wall time."""
-        began, offset = time.monotonic(), self.seconds
-        last_report = last_save = began
-        sums: dict[str, float] = {}
-        counted = 0
-        while self.fraction < 1.0 and not stop():
-            for name, value in self.train_step().items():
-                sums[name] = sums.get(name, 0.0) + float(value)
-            counted += 1
-            now = time.monotonic()
-            self.seconds = offset + now - began
-            if now - last_report >= report_every_s or self.fraction >= 1.0:
-                means = {name: value / counted for name, value in sums.items()}
-                line = ImproviserReport(self.step, self.seconds, self.fraction, means, self.held_out())
-                self.history.append(line)
-                report(line)
-                sums, counted, last_report = {}, 0, now
-            if now - last_save >= save_every_s:
-                save()
-                last_save = now
-        save()
+    def line(self, means: Mapping[str, float]) -> ImproviserReport:
+        """Mean losses since the last line, and those on takes kept apart."""
+        return ImproviserReport(self.step, self.seconds, self.fraction, dict(means), self.held_out())
 
     def train_step(self) -> dict[str, Tensor]:
         """One step on a batch of rows of moves, each move made out of recorded or of own steps before it."""
