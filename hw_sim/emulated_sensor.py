@@ -87,6 +87,10 @@ class EmulatedSensor:
             orientation,
             CALIBRATED,
             wire.BATTERY_UNKNOWN,
+            wire.ROUND_TRIP_UNKNOWN,
+            taps=0,
+            recoveries=0,
+            flags=0,
         )
         sample = Sample(
             self.name,

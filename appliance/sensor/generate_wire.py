@@ -1,4 +1,4 @@
-"""Writes what is made from the wire's declaration: the tables in docs/wire.md and the golden vectors.
+"""Writes what is made from the wire's declaration: wire.h, the tables in docs/wire.md, the golden vectors.
 
 `python -m appliance.sensor.generate_wire` in the repository writes them anew; a test fails when one is stale.
 """
@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from appliance.sensor import framing, wire
+from appliance.sensor.generate_header import header
 
 REPOSITORY = Path(__file__).parents[2]
 TABLES = REPOSITORY / "docs" / "wire.md"
+HEADER = REPOSITORY / "firmware" / "wearable" / "src" / "core" / "wire.h"
 VECTORS = REPOSITORY / "tests" / "golden" / "wire.json"
 FRAMES = REPOSITORY / "tests" / "golden" / "wire_framing.json"
 BEGIN, END = "<!-- generated: begin -->\n", "<!-- generated: end -->\n"
@@ -21,12 +23,17 @@ KEY = bytes(range(wire.KEY_BYTES))
 SIGN = (0x1A2B3C4D, 0xDEADBEEF, 7, 258)  # device id, boot nonce, session, sequence
 HALF = 0.5**0.5
 EXAMPLES: tuple[wire.Packet, ...] = (
-    wire.Hello(*SIGN, wire.WIRE_HASH, 1, 2, 3, battery=87, imu_id=bytes(range(0x50, 0x60))),
+    wire.Hello(
+        *SIGN, wire.WIRE_HASH, 1, 2, 3, battery=87, flags=wire.HAS_PROFILE, imu_id=bytes(range(0x50, 0x60))
+    ),
     wire.Assignment(*SIGN, hello_sequence=3, hand=1, rate_hz=50, led=1),
-    wire.Reading(*SIGN, 0xFFFFFFFF, orientation=(1.0, 0.0, 0.0, 0.0), calibration=0xFF, battery=87),
-    wire.Reading(*SIGN, 20_000, orientation=(HALF, 0.0, -HALF, 0.0), calibration=0, battery=255),
-    wire.Reading(*SIGN, 0, orientation=(-0.5, 0.5, -0.5, 0.5), calibration=0x3C, battery=0),
-    wire.Heartbeat(*SIGN, echo_sequence=0xFFFFFFFF, echo_held_us=1234, led=2),
+    wire.Reading(*SIGN, 0xFFFFFFFF, (1.0, 0.0, 0.0, 0.0), 0xFF, 87, 23, 0, 0, wire.HAS_PROFILE),
+    wire.Reading(*SIGN, 20_000, (HALF, 0.0, -HALF, 0.0), 0, 255, wire.ROUND_TRIP_UNKNOWN, 1, 2, 0),
+    wire.Reading(*SIGN, 0, (-0.5, 0.5, -0.5, 0.5), 0x3C, 0, 0, 255, 255, wire.IS_NDOF),
+    wire.Heartbeat(*SIGN, echo_sequence=0xFFFFFFFF, echo_held_us=1234, led=wire.LED_STROBE),
+    wire.Call(*SIGN),
+    wire.Profile(*SIGN, imu_id=bytes(range(0x50, 0x60)), offsets=bytes(range(0xE0, 0xF6))),
+    wire.Restore(*SIGN, imu_id=bytes(range(0x50, 0x60)), offsets=bytes(22)),
 )
 PAYLOADS = (
     b"\x01",
@@ -49,7 +56,12 @@ def generated() -> dict[Path, str]:
     """Each file and what it should hold."""
     before, _, rest = TABLES.read_text(encoding="utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
-    return {TABLES: before + BEGIN + tables() + END + after, VECTORS: vectors(), FRAMES: frames()}
+    return {
+        TABLES: before + BEGIN + tables() + END + after,
+        HEADER: header(),
+        VECTORS: vectors(),
+        FRAMES: frames(),
+    }
 
 
 def tables() -> str:

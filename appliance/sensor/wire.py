@@ -19,6 +19,9 @@ KEY_BYTES = 16
 TAG_BYTES = 8
 Q14 = 1 << 14  # the BNO055's quaternion scale: 16384 stands for 1.0
 BATTERY_UNKNOWN = 255
+ROUND_TRIP_UNKNOWN = 0xFFFF
+LED_OFF, LED_ON, LED_SLOW, LED_FAST, LED_STROBE = range(5)
+HAS_PROFILE, IS_NDOF = 1, 2  # bits of `flags` in hello and reading
 Buffer = bytes | bytearray | memoryview
 
 
@@ -47,6 +50,9 @@ class Coding:
 U8, U16, U32 = Coding("B", "uint8_t"), Coding("H", "uint16_t"), Coding("I", "uint32_t")
 QUATERNION = Coding("h", "int16_t", count=4, scale=Q14)
 IDENTITY16 = Coding("16s", "uint8_t[16]")
+OFFSETS22 = Coding("22s", "uint8_t[22]")
+LEDS = "0 off, 1 on, 2 slow, 3 fast, 4 strobe"
+FLAGS = "bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF)"
 
 
 @dataclass(slots=True)
@@ -68,6 +74,7 @@ class Hello(Packet):
     firmware_minor: Annotated[int, U8, ""]
     firmware_patch: Annotated[int, U8, ""]
     battery: Annotated[int, U8, "percent; 255 unknown"]
+    flags: Annotated[int, U8, FLAGS]
     imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055; its calibration is kept under it"]
 
 
@@ -78,7 +85,7 @@ class Assignment(Packet):
     hello_sequence: Annotated[int, U32, "sequence of the hello that is answered"]
     hand: Annotated[int, U8, "which hand of the show, from 0"]
     rate_hz: Annotated[int, U8, "readings a second"]
-    led: Annotated[int, U8, "0 off, 1 on, 2 slow, 3 fast"]
+    led: Annotated[int, U8, LEDS]
 
 
 @dataclass(slots=True)
@@ -91,6 +98,10 @@ class Reading(Packet):
         int, U8, "BNO055 register 0x35: system, gyro, accelerometer, magnetometer, 2 bits each"
     ]
     battery: Annotated[int, U8, "percent; 255 unknown"]
+    round_trip: Annotated[int, U16, "newest round trip by a heartbeat's echo, 0.1 ms; 65535 unknown"]
+    taps: Annotated[int, U8, "counts double taps since power-on; wraps"]
+    recoveries: Annotated[int, U8, "counts restarts of the BNO055 since power-on; wraps; its heading is lost"]
+    flags: Annotated[int, U8, FLAGS]
 
 
 @dataclass(slots=True)
@@ -99,7 +110,28 @@ class Heartbeat(Packet):
 
     echo_sequence: Annotated[int, U32, "sequence of the newest reading that arrived"]
     echo_held_us: Annotated[int, U32, "how long the box held that reading before this packet left"]
-    led: Annotated[int, U8, "0 off, 1 on, 2 slow, 3 fast"]
+    led: Annotated[int, U8, LEDS]
+
+
+@dataclass(slots=True)
+class Call(Packet):
+    """The box does not know the session of a reading, because it was started anew: say hello at once."""
+
+
+@dataclass(slots=True)
+class Profile(Packet):
+    """A calibration that the sensor has saved, for the box to keep: an update erases the sensor's own."""
+
+    imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055"]
+    offsets: Annotated[bytes, OFFSETS22, "BNO055 registers 0x55 to 0x6A"]
+
+
+@dataclass(slots=True)
+class Restore(Packet):
+    """A calibration that the box has kept, for a sensor that has none. Right after the assignment only."""
+
+    imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055; another one ignores it"]
+    offsets: Annotated[bytes, OFFSETS22, "BNO055 registers 0x55 to 0x6A"]
 
 
 class Layout:
@@ -155,6 +187,9 @@ LAYOUTS = {
         Layout(2, "box to sensor", Assignment),
         Layout(3, "sensor to box", Reading),
         Layout(4, "box to sensor", Heartbeat),
+        Layout(5, "box to sensor", Call),
+        Layout(6, "sensor to box", Profile),
+        Layout(7, "box to sensor", Restore),
     )
 }
 _BY_NAME = {layout.name: layout for layout in LAYOUTS.values()}

@@ -37,7 +37,7 @@ class Sensor:
         half = math.radians(self._sequence % 360) / 2
         turn = (math.cos(half), 0.0, math.sin(half), 0.0)
         moment_us = 20_000 * self._sequence
-        reading = wire.Reading(self._key.device_id, 1, 0, self._sequence, moment_us, turn, 0xFF, 80)
+        reading = wire.Reading(self._key.device_id, 1, 0, self._sequence, moment_us, turn, 0xFF, 80, 0, 0, 0, 0)
         self._socket.send(wire.pack(reading, self._tagger))
 
     def close(self) -> None:

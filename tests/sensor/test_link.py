@@ -61,7 +61,7 @@ def datagram(
     orientation = (cos(half), sin(half), 0.0, 0.0)
     key = KEYS[sensor]
     moment_us = 20_000 * sequence if time_us is None else time_us
-    reading = wire.Reading(key.device_id, boot, 0, sequence, moment_us, orientation, 0x3C, 80)
+    reading = wire.Reading(key.device_id, boot, 0, sequence, moment_us, orientation, 0x3C, 80, 0, 0, 0, 0)
     return wire.pack(reading, wire.Tagger(key.key))
 
 
@@ -200,7 +200,7 @@ def test_packets_of_other_kinds_are_counted() -> None:
 
 def test_one_sensors_key_does_not_speak_for_another() -> None:
     stage = Stage()
-    reading = wire.Reading(KEYS["head"].device_id, 1, 0, 1, 0, (1.0, 0.0, 0.0, 0.0), 0, 0)
+    reading = wire.Reading(KEYS["head"].device_id, 1, 0, 1, 0, (1.0, 0.0, 0.0, 0.0), 0, 0, 0, 0, 0, 0)
     assert stage.hear(wire.pack(reading, wire.Tagger(KEYS["left-wrist"].key))) == ()
     assert stage.counted() == {"tag": 1}
 

@@ -118,7 +118,7 @@ def test_no_sensors_no_port_no_trouble() -> None:
 
 def test_an_unknown_key_is_not_heard(link: SensorLink, sensor: socket.socket) -> None:
     stranger = SensorKey("stranger", 0x33, bytes(16))
-    reading = wire.Reading(stranger.device_id, 1, 0, 1, 0, (1.0, 0.0, 0.0, 0.0), 0, 0)
+    reading = wire.Reading(stranger.device_id, 1, 0, 1, 0, (1.0, 0.0, 0.0, 0.0), 0, 0, 0, 0, 0, 0)
     sensor.send(wire.pack(reading, wire.Tagger(stranger.key)))
     assert link.drain(time.monotonic()) == ()
     assert link.counts["device"] == 1

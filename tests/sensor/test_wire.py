@@ -16,7 +16,7 @@ from appliance.sensor import generate_wire, wire
 
 KEY = bytes(range(16))
 TAGGER = wire.Tagger(KEY)
-READING = wire.Reading(5, 6, 0, 7, 8, (1.0, 0.0, 0.0, 0.0), 0x3C, 90)
+READING = wire.Reading(5, 6, 0, 7, 8, (1.0, 0.0, 0.0, 0.0), 0x3C, 90, 23, 1, 2, 0)
 
 
 def tagger_of(device_id: int) -> wire.Tagger | None:
@@ -36,9 +36,11 @@ def test_every_packet_comes_back_as_it_went(packet: wire.Packet) -> None:
 
 def test_a_reading_is_what_the_documentation_says_byte_for_byte() -> None:
     data = wire.pack(READING, TAGGER)
-    signed = struct.pack("<HBBIIIII4hBB", 0x4B42, 1, 3, 5, 6, 0, 7, 8, 16384, 0, 0, 0, 0x3C, 90)
+    signed = struct.pack(
+        "<HBBIIIII4hBBHBBB", 0x4B42, 1, 3, 5, 6, 0, 7, 8, 16384, 0, 0, 0, 0x3C, 90, 23, 1, 2, 0
+    )
     assert data == signed + blake2s(signed, key=KEY, digest_size=8).digest()
-    assert len(data) == wire.READING.size == 42
+    assert len(data) == wire.READING.size == 47
 
 
 @pytest.mark.parametrize("path", generate_wire.generated(), ids=lambda path: path.name)

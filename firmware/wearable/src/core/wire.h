@@ -1,0 +1,325 @@
+// The packets between a wearable and the box. Made from appliance/sensor/wire.py; do not edit.
+// `python -m appliance.sensor.generate_wire` writes it anew.
+#pragma once
+
+#include <stdint.h>
+#include <string.h>
+
+namespace bunraku {
+namespace wire {
+
+constexpr uint16_t kMagic = 0x4b42;
+constexpr uint8_t kVersion = 1;
+constexpr uint32_t kWireHash = 0x2d20a5dfu;
+constexpr uint8_t kKeyBytes = 16;
+constexpr uint8_t kTagBytes = 8;
+constexpr uint8_t kHeadBytes = 20;  // magic, version, kind and the fields of every packet
+constexpr uint8_t kLargest = 66;
+constexpr uint8_t kBatteryUnknown = 255;
+constexpr uint16_t kRoundTripUnknown = 65535;
+constexpr uint8_t kHasProfile = 1, kIsNdof = 2;  // bits of `flags`
+enum Led : uint8_t { kLedOff, kLedOn, kLedSlow, kLedFast, kLedStrobe };
+
+inline void put(uint8_t*& at, uint8_t value) { *at++ = value; }
+inline void put(uint8_t*& at, uint16_t value) {
+  put(at, static_cast<uint8_t>(value));
+  put(at, static_cast<uint8_t>(value >> 8));
+}
+inline void put(uint8_t*& at, uint32_t value) {
+  put(at, static_cast<uint16_t>(value));
+  put(at, static_cast<uint16_t>(value >> 16));
+}
+inline void put(uint8_t*& at, int16_t value) { put(at, static_cast<uint16_t>(value)); }
+inline void get(const uint8_t*& at, uint8_t& value) { value = *at++; }
+inline void get(const uint8_t*& at, uint16_t& value) {
+  value = static_cast<uint16_t>(at[0] | at[1] << 8);
+  at += 2;
+}
+inline void get(const uint8_t*& at, uint32_t& value) {
+  value = at[0] | static_cast<uint32_t>(at[1]) << 8 | static_cast<uint32_t>(at[2]) << 16 |
+          static_cast<uint32_t>(at[3]) << 24;
+  at += 4;
+}
+inline void get(const uint8_t*& at, int16_t& value) {
+  uint16_t bits;
+  get(at, bits);
+  memcpy(&value, &bits, sizeof value);
+}
+template <typename Value, uint8_t count>
+void put(uint8_t*& at, const Value (&values)[count]) {
+  for (const Value& value : values) put(at, value);
+}
+template <typename Value, uint8_t count>
+void get(const uint8_t*& at, Value (&values)[count]) {
+  for (Value& value : values) get(at, value);
+}
+
+// The sensor is on and looks for its box: broadcast every 500 ms until assigned.
+// Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+struct Hello {
+  static constexpr uint8_t kKind = 1;
+  static constexpr uint8_t kSignedBytes = 45;
+  static constexpr uint8_t kSize = 53;
+  uint32_t device_id;  // which sensor, as in the key file
+  uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
+  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t wire_hash;  // hash of this declaration; a mismatch says which side to update
+  uint8_t firmware_major;  // firmware version
+  uint8_t firmware_minor;
+  uint8_t firmware_patch;
+  uint8_t battery;  // percent; 255 unknown
+  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF)
+  uint8_t imu_id[16];  // unique id of the BNO055; its calibration is kept under it
+
+  void write(uint8_t* at) const {
+    put(at, kMagic), put(at, kVersion), put(at, kKind);
+    put(at, device_id);
+    put(at, boot_nonce);
+    put(at, session);
+    put(at, sequence);
+    put(at, wire_hash);
+    put(at, firmware_major);
+    put(at, firmware_minor);
+    put(at, firmware_patch);
+    put(at, battery);
+    put(at, flags);
+    put(at, imu_id);
+  }
+  void read(const uint8_t* at) {
+    at += sizeof kMagic + sizeof kVersion + sizeof kKind;
+    get(at, device_id);
+    get(at, boot_nonce);
+    get(at, session);
+    get(at, sequence);
+    get(at, wire_hash);
+    get(at, firmware_major);
+    get(at, firmware_minor);
+    get(at, firmware_patch);
+    get(at, battery);
+    get(at, flags);
+    get(at, imu_id);
+  }
+};
+
+// The box takes the sensor: stream to the sender of this packet. Bound to the hello that it answers.
+// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+struct Assignment {
+  static constexpr uint8_t kKind = 2;
+  static constexpr uint8_t kSignedBytes = 27;
+  static constexpr uint8_t kSize = 35;
+  uint32_t device_id;  // which sensor, as in the key file
+  uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
+  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t hello_sequence;  // sequence of the hello that is answered
+  uint8_t hand;  // which hand of the show, from 0
+  uint8_t rate_hz;  // readings a second
+  uint8_t led;  // 0 off, 1 on, 2 slow, 3 fast, 4 strobe
+
+  void write(uint8_t* at) const {
+    put(at, kMagic), put(at, kVersion), put(at, kKind);
+    put(at, device_id);
+    put(at, boot_nonce);
+    put(at, session);
+    put(at, sequence);
+    put(at, hello_sequence);
+    put(at, hand);
+    put(at, rate_hz);
+    put(at, led);
+  }
+  void read(const uint8_t* at) {
+    at += sizeof kMagic + sizeof kVersion + sizeof kKind;
+    get(at, device_id);
+    get(at, boot_nonce);
+    get(at, session);
+    get(at, sequence);
+    get(at, hello_sequence);
+    get(at, hand);
+    get(at, rate_hz);
+    get(at, led);
+  }
+};
+
+// One orientation of the sensor, 50 times a second.
+// Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+struct Reading {
+  static constexpr uint8_t kKind = 3;
+  static constexpr uint8_t kSignedBytes = 39;
+  static constexpr uint8_t kSize = 47;
+  uint32_t device_id;  // which sensor, as in the key file
+  uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
+  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t sensor_time_us;  // device clock at the measurement; wraps after 71.6 minutes
+  int16_t orientation[4];  // w, x, y, z; 16384 stands for 1
+  uint8_t calibration;  // BNO055 register 0x35: system, gyro, accelerometer, magnetometer, 2 bits each
+  uint8_t battery;  // percent; 255 unknown
+  uint16_t round_trip;  // newest round trip by a heartbeat's echo, 0.1 ms; 65535 unknown
+  uint8_t taps;  // counts double taps since power-on; wraps
+  uint8_t recoveries;  // counts restarts of the BNO055 since power-on; wraps; its heading is lost
+  uint8_t flags;  // bit 0: a calibration profile is in use; bit 1: fusion with the magnetometer (NDOF)
+
+  void write(uint8_t* at) const {
+    put(at, kMagic), put(at, kVersion), put(at, kKind);
+    put(at, device_id);
+    put(at, boot_nonce);
+    put(at, session);
+    put(at, sequence);
+    put(at, sensor_time_us);
+    put(at, orientation);
+    put(at, calibration);
+    put(at, battery);
+    put(at, round_trip);
+    put(at, taps);
+    put(at, recoveries);
+    put(at, flags);
+  }
+  void read(const uint8_t* at) {
+    at += sizeof kMagic + sizeof kVersion + sizeof kKind;
+    get(at, device_id);
+    get(at, boot_nonce);
+    get(at, session);
+    get(at, sequence);
+    get(at, sensor_time_us);
+    get(at, orientation);
+    get(at, calibration);
+    get(at, battery);
+    get(at, round_trip);
+    get(at, taps);
+    get(at, recoveries);
+    get(at, flags);
+  }
+};
+
+// The box is there: once a second. Three seconds without it and the sensor says hello again.
+// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+struct Heartbeat {
+  static constexpr uint8_t kKind = 4;
+  static constexpr uint8_t kSignedBytes = 29;
+  static constexpr uint8_t kSize = 37;
+  uint32_t device_id;  // which sensor, as in the key file
+  uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
+  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t echo_sequence;  // sequence of the newest reading that arrived
+  uint32_t echo_held_us;  // how long the box held that reading before this packet left
+  uint8_t led;  // 0 off, 1 on, 2 slow, 3 fast, 4 strobe
+
+  void write(uint8_t* at) const {
+    put(at, kMagic), put(at, kVersion), put(at, kKind);
+    put(at, device_id);
+    put(at, boot_nonce);
+    put(at, session);
+    put(at, sequence);
+    put(at, echo_sequence);
+    put(at, echo_held_us);
+    put(at, led);
+  }
+  void read(const uint8_t* at) {
+    at += sizeof kMagic + sizeof kVersion + sizeof kKind;
+    get(at, device_id);
+    get(at, boot_nonce);
+    get(at, session);
+    get(at, sequence);
+    get(at, echo_sequence);
+    get(at, echo_held_us);
+    get(at, led);
+  }
+};
+
+// The box does not know the session of a reading, because it was started anew: say hello at once.
+// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+struct Call {
+  static constexpr uint8_t kKind = 5;
+  static constexpr uint8_t kSignedBytes = 20;
+  static constexpr uint8_t kSize = 28;
+  uint32_t device_id;  // which sensor, as in the key file
+  uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
+  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+
+  void write(uint8_t* at) const {
+    put(at, kMagic), put(at, kVersion), put(at, kKind);
+    put(at, device_id);
+    put(at, boot_nonce);
+    put(at, session);
+    put(at, sequence);
+  }
+  void read(const uint8_t* at) {
+    at += sizeof kMagic + sizeof kVersion + sizeof kKind;
+    get(at, device_id);
+    get(at, boot_nonce);
+    get(at, session);
+    get(at, sequence);
+  }
+};
+
+// A calibration that the sensor has saved, for the box to keep: an update erases the sensor's own.
+// Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+struct Profile {
+  static constexpr uint8_t kKind = 6;
+  static constexpr uint8_t kSignedBytes = 58;
+  static constexpr uint8_t kSize = 66;
+  uint32_t device_id;  // which sensor, as in the key file
+  uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
+  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint8_t imu_id[16];  // unique id of the BNO055
+  uint8_t offsets[22];  // BNO055 registers 0x55 to 0x6A
+
+  void write(uint8_t* at) const {
+    put(at, kMagic), put(at, kVersion), put(at, kKind);
+    put(at, device_id);
+    put(at, boot_nonce);
+    put(at, session);
+    put(at, sequence);
+    put(at, imu_id);
+    put(at, offsets);
+  }
+  void read(const uint8_t* at) {
+    at += sizeof kMagic + sizeof kVersion + sizeof kKind;
+    get(at, device_id);
+    get(at, boot_nonce);
+    get(at, session);
+    get(at, sequence);
+    get(at, imu_id);
+    get(at, offsets);
+  }
+};
+
+// A calibration that the box has kept, for a sensor that has none. Right after the assignment only.
+// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+struct Restore {
+  static constexpr uint8_t kKind = 7;
+  static constexpr uint8_t kSignedBytes = 58;
+  static constexpr uint8_t kSize = 66;
+  uint32_t device_id;  // which sensor, as in the key file
+  uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
+  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint8_t imu_id[16];  // unique id of the BNO055; another one ignores it
+  uint8_t offsets[22];  // BNO055 registers 0x55 to 0x6A
+
+  void write(uint8_t* at) const {
+    put(at, kMagic), put(at, kVersion), put(at, kKind);
+    put(at, device_id);
+    put(at, boot_nonce);
+    put(at, session);
+    put(at, sequence);
+    put(at, imu_id);
+    put(at, offsets);
+  }
+  void read(const uint8_t* at) {
+    at += sizeof kMagic + sizeof kVersion + sizeof kKind;
+    get(at, device_id);
+    get(at, boot_nonce);
+    get(at, session);
+    get(at, sequence);
+    get(at, imu_id);
+    get(at, offsets);
+  }
+};
+
+}  // namespace wire
+}  // namespace bunraku
