@@ -6,17 +6,18 @@ import random
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from math import cos, pi, radians, sin, sqrt
+from math import atan2, cos, pi, radians, sin, sqrt
 
 Quaternion = tuple[float, float, float, float]  # w, x, y, z, unit
 Motion = Callable[[float], Quaternion]  # seconds since the start -> orientation
 
+IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 LARGEST_STEP_DEGREES = (
     40.0  # the box believes 2000 degrees a second and 3 of slack: 43 degrees from one to the next
 )
 
 
-def still(orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)) -> Motion:
+def still(orientation: Quaternion = IDENTITY) -> Motion:
     """Standing still."""
     return lambda t_s: orientation
 
@@ -107,6 +108,19 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
         aw * by - ax * bz + ay * bw + az * bx,
         aw * bz + ax * by - ay * bx + az * bw,
     )
+
+
+def inverse(rotation: Quaternion) -> Quaternion:
+    """The rotation back."""
+    w, x, y, z = rotation
+    return w, -x, -y, -z
+
+
+def part_of(rotation: Quaternion, share: float) -> Quaternion:
+    """That share of the way from the identity to `rotation`, the short way round."""
+    w, x, y, z = rotation if rotation[0] >= 0 else tuple(-part for part in rotation)
+    sine = sqrt(x * x + y * y + z * z)
+    return about((x, y, z), 2 * atan2(sine, w) * share) if sine else IDENTITY
 
 
 def _between(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
