@@ -1,0 +1,39 @@
+// Can this be a hand? Zero, torn and impossibly fast orientations are kept from the box; integers only.
+#pragma once
+
+#include <stdint.h>
+
+namespace bunraku {
+
+// The rules of the box (appliance/sensor/plausibility.py), and one more: the first reading after a reset
+// or a long silence is believed only when the next one agrees with it.
+class ImuGate {
+ public:
+  enum class Verdict : uint8_t { kAccepted, kRelocated, kZero, kNorm, kTorn, kRate, kUnconfirmed };
+
+  void reset() { has_believed_ = has_refused_ = false; }  // fusion was started anew: forget what came before
+
+  // `orientation` w, x, y, z with 16384 for 1, as read at `now_us`. Every rule costs 0.5 s at most.
+  Verdict admit(const int16_t (&orientation)[4], uint32_t now_us);
+
+ private:
+  struct Reading {
+    int16_t orientation[4];
+    uint32_t at_us;
+  };
+
+  Verdict refusal(const Reading& reading) const;
+  bool has_moved(const Reading& reading, uint8_t needed);
+
+  Reading believed_ = {};
+  Reading refused_ = {};  // the newest of those that were not believed since
+  uint8_t agreeing_ = 0;  // refused readings in a row that agree with one another
+  bool has_believed_ = false;
+  bool has_refused_ = false;
+};
+
+inline bool is_believed(ImuGate::Verdict verdict) {
+  return verdict == ImuGate::Verdict::kAccepted || verdict == ImuGate::Verdict::kRelocated;
+}
+
+}  // namespace bunraku
