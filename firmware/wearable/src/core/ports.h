@@ -56,7 +56,8 @@ class SerialPort {
   ~SerialPort() = default;
 };
 
-// Small records that survive power-off; erased by an upload of new firmware.
+// Small records that survive power-off; erased by an upload of new firmware. Slots 0 to 3, each up to 192 bytes
+// and in an erase block of its own: a power cut while one is written loses that one alone.
 class FlashStore {
  public:
   virtual bool load(uint8_t slot, uint8_t* data, uint16_t count) = 0;  // false: never written
@@ -81,6 +82,7 @@ class Board {
   virtual void noise(uint8_t* data, uint8_t count) = 0;  // unpredictable bytes, as good as the board has them
   virtual void feed_watchdog() = 0;
   virtual void restart() = 0;  // does not return on the real board
+  virtual uint32_t serial_number() { return 0; }  // of the board's processor, folded; 0: it has none
 
  protected:
   ~Board() = default;

@@ -1,0 +1,62 @@
+// The console on the cable: provisioning for `bunraku provision`, status for people. One line in, one line out.
+//
+//   id                      ok bunraku-wearable 1.0.0 wire 2d20a5df imu <32 hex|none> board <8 hex>
+//   set device <8 hex>      ok            ... name <word>, key <32 hex>, network <rest of line>,
+//   set password <rest>     ok                port <n>, fusion imuplus|ndof, axes <2 hex> <2 hex>
+//   save                    ok saved      what was set counts from now on, and after power-off
+//   show                    ok name <word|none> device <8 hex|none> key set|none password set|none port <n>
+//                           fusion imuplus|ndof axes <2 hex> <2 hex> network <rest of line, may be empty>
+//   forget                  ok forgotten
+//   prove <16 hex>          ok <16 hex>   BLAKE2s-8 with the key over b"prove" and the 8 bytes
+//   status                  ok state <linked|greeting|joining|unprovisioned> way <wifi|cable|none> ...
+//   strobe                  ok
+//   calibration save        ok saving ...
+//   help                    ok <commands>
+//   restart                 ok restarting
+//
+// What is wrong is answered with `error: what, what to do`. A key or a password never leaves by the console.
+#pragma once
+
+#include <stdint.h>
+
+#include "settings.h"
+#include "status.h"
+
+namespace bunraku {
+
+// One line that is being written, without its end. What does not fit is cut off.
+class Answer {
+ public:
+  void clear() { count_ = 0, text_[0] = '\0'; }
+  Answer& add(const char* text);
+  Answer& add_number(uint32_t value);
+  Answer& add_hex(const uint8_t* bytes, uint8_t count);
+  Answer& add_hex(uint32_t value);  // 8 digits
+  const char* text() const { return text_; }
+  uint8_t count() const { return count_; }
+
+ private:
+  char text_[240] = "";
+  uint8_t count_ = 0;
+};
+
+// What a line asks for that the console cannot do by itself; the wearable does it and may write another answer.
+enum class Request : uint8_t { kNothing, kSave, kForget, kStrobe, kSaveCalibration, kRestart };
+
+class Console {
+ public:
+  // The settings that are in force; what `set` changes stays a draft until `save`.
+  void begin(const Settings& settings) { draft_ = settings; }
+  const Settings& draft() const { return draft_; }
+
+  Request execute(const char* line, const Status& status, uint32_t board_number, Answer& answer);
+
+ private:
+  void set(const char* what, Answer& answer);
+  void show(Answer& answer) const;
+  void prove(const char* nonce, Answer& answer) const;
+
+  Settings draft_;
+};
+
+}  // namespace bunraku
