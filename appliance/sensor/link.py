@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple, Protocol, cast
+from types import MappingProxyType
+from typing import Protocol, cast
 
 from appliance.sensor import wire
 from appliance.sensor.device_clock import DeviceClock
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.plausibility import Orientation, PlausibilityGate
 from appliance.sensor.serial import SerialIntake
+from appliance.sensor.state import SensorReading as SensorReading
+from appliance.sensor.state import SensorState as SensorState
 from appliance.sensor.udp import UdpIntake
 
 # More than the burst of eight sensors after the longest stall (8 x 13); in a flood at most 1.5 ms of a tick.
@@ -30,19 +33,6 @@ REASONS = (
 )
 
 
-class SensorReading(NamedTuple):
-    """One believed reading. `measured_at` and `arrival` are monotonic seconds of the box."""
-
-    sensor: str
-    orientation: Orientation  # w, x, y, z, unit, sign continuous from reading to reading
-    sequence: int
-    sensor_time_us: int  # device clock, without wraps
-    measured_at: float
-    arrival: float
-    battery: int  # percent; 255 unknown
-    calibration: int  # BNO055 register 0x35
-
-
 class Intake(Protocol):
     """Where datagrams come from: UdpIntake, SerialIntake."""
 
@@ -57,21 +47,32 @@ def open_link(
     keys: Mapping[str, SensorKey],
     udp: tuple[str, int] | None = None,
     serial: Iterable[tuple[str, int]] = (),
+    profiles: Mapping[bytes, bytes] = MappingProxyType({}),
+    hands: Sequence[str] = (),
 ) -> SensorLink:
     """A link over a UDP (host, port) and serial (device, baud)s.
 
+    `profiles`: kept calibrations by the IMU's unique id. `hands`: sensors in the order of the show's hands.
     Raises PortError when the UDP port cannot be opened; an absent serial device is waited for.
     """
     intakes: list[Intake] = [UdpIntake(*udp)] if udp is not None else []
     intakes += (SerialIntake(device, baud) for device, baud in serial)
-    return SensorLink(keys, intakes)
+    return SensorLink(keys, intakes, profiles, hands)
 
 
 class SensorLink:
     """All sensors of the box. Time is an argument; nothing here waits, raises or logs."""
 
-    def __init__(self, keys: Mapping[str, SensorKey], intakes: Sequence[Intake]) -> None:
+    def __init__(
+        self,
+        keys: Mapping[str, SensorKey],
+        intakes: Sequence[Intake],
+        profiles: Mapping[bytes, bytes] = MappingProxyType({}),
+        hands: Sequence[str] = (),
+    ) -> None:
         self.intakes = tuple(intakes)
+        self.wants_neutral: set[str] = set()  # names of sensors that should stand still: their light says so
+        self.light = True  # whether a linked sensor's light flashes now and then
         self._by_device = {key.device_id: _Sensor(key) for key in keys.values()}
         self._by_name = {sensor.name: sensor for sensor in self._by_device.values()}
         self._counts = dict.fromkeys(REASONS, 0)
@@ -93,6 +94,26 @@ class SensorLink:
             else:
                 counts["drain_limit"] += 1
         return tuple(newest.values())
+
+    def tend(self, now: float) -> None:
+        """Send what is due: assignments, calls, heartbeats, calibrations. Once a tick, after the frame.
+
+        `now` is the moment of this call: it goes into the echo from which a sensor takes its round trip.
+        """
+
+    def states(self, now: float) -> list[SensorState]:
+        """How each known sensor is, in the order of the key file."""
+        return []
+
+    def strobe(self, sensor: str, now: float, seconds: float = 10.0) -> None:
+        """Let this sensor's light flash brightly, so that a person finds it. A stranger is ignored."""
+
+    def admit(self, keys: Mapping[str, SensorKey]) -> None:
+        """Only these sensors from now on. Who keeps device id and key goes on, also under another name."""
+
+    def take_profiles(self) -> list[tuple[bytes, bytes]]:
+        """Calibrations that sensors have sent since the last call: (the IMU's unique id, offsets)."""
+        return []
 
     @property
     def counts(self) -> dict[str, int]:
@@ -226,6 +247,11 @@ class _Sensor:
                 arrival,
                 packet.battery,
                 packet.calibration,
+                packet.boot_nonce,
+                packet.taps,
+                packet.recoveries,
+                packet.flags,
+                None,
             ),
             fate,
         )

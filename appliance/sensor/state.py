@@ -1,0 +1,45 @@
+"""What the link tells of a reading and of a sensor."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from appliance.sensor.plausibility import Orientation
+
+
+class SensorReading(NamedTuple):
+    """One believed reading. `measured_at` and `arrival` are monotonic seconds of the box."""
+
+    sensor: str
+    orientation: Orientation  # w, x, y, z, unit, sensor axes, sign continuous from reading to reading
+    sequence: int
+    sensor_time_us: int  # device clock, without wraps
+    measured_at: float
+    arrival: float
+    battery: int  # percent; 255 unknown
+    calibration: int  # BNO055 register 0x35
+    boot_nonce: int = 0  # another one: the sensor was switched on again
+    taps: int = 0  # double taps since power-on; wraps at 256
+    recoveries: int = 0  # restarts of the IMU since power-on; wraps at 256; its heading is lost
+    flags: int = 0  # wire.HAS_PROFILE, wire.IS_NDOF
+    round_trip_s: float | None = None  # by the newest heartbeat's echo
+
+
+class SensorState(NamedTuple):
+    """One sensor as a technician sees it."""
+
+    name: str
+    device_id: int
+    state: str  # absent, greeted, linked, lost
+    way: str  # "192.168.4.7:2390", "/dev/ttyACM0", or "" before the first reading
+    rate_hz: float  # believed to be its own: readings a second, last 2 s
+    loss: float  # share of readings that never came, last 10 s
+    round_trip_s: float | None
+    age_s: float | None  # since the newest believed reading
+    battery: int  # percent; 255 unknown
+    calibration: int  # BNO055 register 0x35
+    firmware: str  # "1.0.0", or "" before the first hello
+    imu_id: str  # hexadecimal, or ""
+    flags: int  # wire.HAS_PROFILE, wire.IS_NDOF
+    boot_nonce: int
+    complaint: str  # a sentence for people, or ""
