@@ -42,12 +42,23 @@ class SensorKey:
 
 def load_keys(path: Path) -> dict[str, SensorKey]:
     """The sensors of a key file by name. Raises KeyFileError with the line, OSError when there is no file."""
+    return parse_keys(path, read_text(path))
+
+
+def read_text(path: Path) -> str:
+    """A key file's text. Raises KeyFileError when it cannot be one, OSError when there is no file."""
     if path.stat().st_size > LARGEST_FILE:
         raise KeyFileError(path, 1, f"is larger than {LARGEST_FILE // 1024} KiB, so it is no key file")
     try:
-        root = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+        return path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise KeyFileError(path, 1, "is not a text file in UTF-8, so it is no key file") from None
+
+
+def parse_keys(path: Path, text: str) -> dict[str, SensorKey]:
+    """The sensors in the text of the key file `path`, by name. Raises KeyFileError with the line."""
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         # The parser's own message may quote the file, and so a key: only its place is passed on.
@@ -82,23 +93,39 @@ def create_keys(path: Path, names: Iterable[str]) -> dict[str, SensorKey]:
     Raises FileExistsError rather than replace a file: the sensors out there hold the keys that are in it.
     """
     keys: dict[str, SensorKey] = {}
-    device_ids = {0}
     for name in names:
-        device_id = 0
-        while device_id in device_ids:
-            device_id = secrets.randbits(32)
-        device_ids.add(device_id)
-        keys[name] = SensorKey(name, device_id, secrets.token_bytes(KEY_BYTES))
-    text = HEADER + "".join(
-        f"{json.dumps(name)}: {{device: 0x{sensor.device_id:08x}, key: {sensor.key.hex()}}}\n"
-        for name, sensor in keys.items()
-    )
+        keys[name] = fresh_key(name, keys.values())
+    text = HEADER + "".join(entry(sensor) for sensor in keys.values())
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
     return keys
+
+
+def fresh_key(name: str, others: Iterable[SensorKey]) -> SensorKey:
+    """A sensor with a new random key and a device id that none of the others has."""
+    taken = {0, *(other.device_id for other in others)}
+    device_id = 0
+    while device_id in taken:
+        device_id = secrets.randbits(32)
+    return SensorKey(name, device_id, secrets.token_bytes(KEY_BYTES))
+
+
+def entry(sensor: SensorKey) -> str:
+    """The line of one sensor in a key file."""
+    return f"{json.dumps(sensor.name)}: {{device: 0x{sensor.device_id:08x}, key: {sensor.key.hex()}}}\n"
+
+
+def name_fault(name: str) -> str | None:
+    """What is wrong with a new sensor's name, for people; None when it will do, here and in the sensor."""
+    if not 0 < len(name) <= LONGEST_NAME or not all("!" <= letter <= "~" for letter in name):
+        return (
+            f"a sensor's name has 1 to {LONGEST_NAME} letters, digits or signs, "
+            "without spaces or accents, for instance left-wrist"
+        )
+    return None
 
 
 def exposure(path: Path) -> str | None:

@@ -1,0 +1,204 @@
+"""Changes to the key file: one writer at a time, comments stay, and a power cut leaves the old or the new."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+from appliance.sensor.keys import (
+    HEADER,
+    KeyFileError,
+    SensorKey,
+    entry,
+    name_fault,
+    parse_keys,
+    read_text,
+    unknown_sensor,
+)
+from appliance.sensor.private_file import put_in_place, write_beside
+
+_PATIENCE_S = 2.0  # another change of the file takes milliseconds; a provisioning, as long as its cable
+
+
+class KeyEditing:
+    """One change of a key file, made in memory; `prepare` and `commit` make it the file's.
+
+    A comment stays where it is, beside or above the same sensor. Only a file whose entries cannot be edited
+    in place (one line in braces, anchors) is written anew, without its comments.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._text = read_text(path) if path.exists() else HEADER
+        self.keys: Mapping[str, SensorKey] = parse_keys(path, self._text)
+        self._beside: Path | None = None
+
+    def put(self, sensor: SensorKey) -> None:
+        """Add a sensor, or replace the one of this name."""
+        self._require_good_name(sensor.name)
+        if sensor.name in self.keys:
+            self._change(
+                {name: sensor if name == sensor.name else key for name, key in self.keys.items()},
+                lambda text: _replaced(text, sensor),
+            )
+        else:
+            self._change(
+                {**self.keys, sensor.name: sensor},
+                lambda text: _added(text, sensor),
+            )
+
+    def remove(self, name: str) -> None:
+        """Take a sensor out. Raises KeyFileError when there is none of this name."""
+        self._require(name)
+        self._change(
+            {other: key for other, key in self.keys.items() if other != name},
+            lambda text: _removed(text, name),
+        )
+
+    def rename(self, name: str, new: str) -> None:
+        """Give a sensor another name. Raises KeyFileError when it is taken or no name."""
+        self._require(name)
+        self._require_good_name(new)
+        if new in self.keys:
+            raise KeyFileError(self.path, 1, f"there is a sensor {new!r} already; choose another name")
+        self._rename({name: new})
+
+    def swap(self, name: str, other: str) -> None:
+        """Exchange the names of two sensors. Raises KeyFileError when one of them is not there."""
+        self._require(name)
+        self._require(other)
+        self._rename({name: other, other: name})
+
+    def prepare(self) -> None:
+        """Write the changed file beside the old one, so that what can fail fails now. Raises OSError."""
+        self._beside = write_beside(self.path, self._text)
+
+    def commit(self) -> None:
+        """Let the changed file take the old one's place. Raises OSError."""
+        if self._beside is None:
+            self.prepare()
+        assert self._beside is not None
+        put_in_place(self._beside, self.path)
+        self._beside = None
+
+    def discard(self) -> None:
+        """Remove what was prepared and not committed."""
+        if self._beside is not None:
+            self._beside.unlink(missing_ok=True)
+            self._beside = None
+
+    def _rename(self, names: Mapping[str, str]) -> None:
+        renamed = {
+            names.get(name, name): replace(key, name=names.get(name, name)) for name, key in self.keys.items()
+        }
+        self._change(renamed, lambda text: _renamed(text, names))
+
+    def _change(self, wanted: Mapping[str, SensorKey], edit: Callable[[str], str]) -> None:
+        """Take the edited text if it reads as wanted; else write the file anew."""
+        try:
+            edited = edit(self._text)
+            as_wanted = parse_keys(self.path, edited) == wanted
+        except (KeyFileError, yaml.YAMLError):
+            as_wanted = False
+        self._text = edited if as_wanted else HEADER + "".join(entry(sensor) for sensor in wanted.values())
+        self.keys = wanted
+
+    def _require(self, name: str) -> None:
+        if name not in self.keys:
+            raise KeyFileError(self.path, 1, unknown_sensor(name, dict(self.keys)))
+
+    def _require_good_name(self, name: str) -> None:
+        fault = name_fault(name)
+        if fault:
+            raise KeyFileError(self.path, 1, fault)
+
+
+@contextmanager
+def editing(path: Path) -> Iterator[KeyEditing]:
+    """The key file's content, to be changed by one writer alone; what is not committed in here is discarded.
+
+    A file that does not exist yet has no sensors. Raises KeyFileError when another writer is at work or the
+    file is none, OSError when its folder cannot be written.
+    """
+    path = path.resolve()  # a link stays one
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        _lock(folder, path)
+        change = KeyEditing(path)
+        try:
+            yield change
+        finally:
+            change.discard()
+    finally:
+        os.close(folder)  # and so the lock
+
+
+def _lock(folder: int, path: Path) -> None:
+    """Lock the folder: the file itself gives way to another one at each change."""
+    until = time.monotonic() + _PATIENCE_S
+    while True:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            if time.monotonic() > until:
+                raise KeyFileError(
+                    path, 1, "another bunraku is changing this file; try again when it is done"
+                ) from None
+            time.sleep(0.05)
+
+
+class _Place(NamedTuple):
+    """Where an entry stands in the text: its name from `begin` to `name_end`, all of it to `end`."""
+
+    begin: int
+    name_end: int
+    end: int
+
+
+def _places(text: str) -> dict[str, _Place]:
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    assert isinstance(root, yaml.MappingNode)  # it was read before, and has sensors
+    return {
+        name.value: _Place(name.start_mark.index, name.end_mark.index, _end(value))
+        for name, value in root.value
+    }
+
+
+def _end(node: yaml.Node) -> int:
+    """Where a value ends; a block's own mark lies behind the comments that follow it."""
+    if isinstance(node, yaml.MappingNode) and not node.flow_style and node.value:
+        return _end(node.value[-1][1])
+    return int(node.end_mark.index)
+
+
+def _replaced(text: str, sensor: SensorKey) -> str:
+    place = _places(text)[sensor.name]
+    return text[: place.begin] + entry(sensor).rstrip("\n") + text[place.end :]
+
+
+def _added(text: str, sensor: SensorKey) -> str:
+    return text + ("" if text.endswith("\n") or not text else "\n") + entry(sensor)
+
+
+def _removed(text: str, name: str) -> str:
+    """Without the lines of this entry; the comment behind it goes with it."""
+    place = _places(text)[name]
+    begin, end = text.rfind("\n", 0, place.begin) + 1, text.find("\n", place.end)
+    return text[:begin] + (text[end + 1 :] if end >= 0 else "")
+
+
+def _renamed(text: str, names: Mapping[str, str]) -> str:
+    places = {name: place for name, place in _places(text).items() if name in names}
+    for name, place in sorted(places.items(), key=lambda item: item[1], reverse=True):
+        text = text[: place.begin] + json.dumps(names[name]) + text[place.name_end :]
+    return text
