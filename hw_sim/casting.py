@@ -9,7 +9,9 @@ from pathlib import Path
 
 from appliance.sensor.keys import SensorKey, create_keys, exposure, load_keys, unknown_sensor
 from hw_sim import motions
+from hw_sim.device import Device, DeviceMaker
 from hw_sim.emulated_sensor import PERIOD_US, EmulatedSensor
+from hw_sim.wearer import Wearer
 
 DEFAULT_SENSOR = "left-wrist"
 MOST_SENSORS = 8
@@ -57,15 +59,18 @@ def cast_sensors(
     keys: Sequence[SensorKey],
     motion_of: Callable[[int, str], motions.Motion],
     seed: int,
+    *,
+    stand_still_s: float = 0.0,
     drift_ppm: float = 0.0,
     reboot_every_s: float | None = None,
-) -> list[EmulatedSensor]:
+    make: DeviceMaker = EmulatedSensor,
+) -> list[Device]:
     """A sensor for each key, with a place in the 20 ms grid by the seed; motion_of(number, name) moves it."""
     phases = random.Random(f"phases {seed}")
     return [
-        EmulatedSensor(
+        make(
             key,
-            motion_of(number, key.name),
+            Wearer(motion_of(number, key.name), stand_still_s),
             phase_s=phases.uniform(0.0, PERIOD_US * 1e-6),
             drift_ppm=drift_ppm,
             reboot_every_s=reboot_every_s,

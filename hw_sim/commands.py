@@ -15,10 +15,11 @@ import typer
 
 from hw_sim import motions
 from hw_sim.casting import MOST_SENSORS, MotionKind, cast_sensors, choose_keys, name_and_motion, parse_axis
-from hw_sim.emulator import Emulator
+from hw_sim.device import Way
+from hw_sim.emulator import Emulator, Sender
 from hw_sim.measure import measure
 from hw_sim.network import PROFILES, VenueNetwork
-from hw_sim.senders import Sender, SendLog, SerialSender, UdpSender
+from hw_sim.senders import SendLog, SerialSender, UdpSender
 from hw_sim.status import StatusLine
 from hw_sim.traces import read_trace
 
@@ -61,6 +62,14 @@ def emulate(
     port: Annotated[int, typer.Option(min=1, max=65535, help="Its UDP port for sensors.")] = 9750,
     serial: Annotated[Path | None, typer.Option(help="Serial device instead of the network.")] = None,
     baud: Annotated[int, typer.Option(min=1200, help="Speed of the serial device.")] = 115200,
+    stand_still: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            help="Seconds that the dancer stands still once the sensor is heard: the box takes the neutral "
+            "pose. 0: dances at once.",
+        ),
+    ] = 2.0,
     network: Annotated[
         NetworkKind,
         typer.Option(
@@ -82,10 +91,12 @@ def emulate(
     ] = None,
     seed: Annotated[int, typer.Option(help="The same seed gives the same dance and the same network.")] = 1,
     log: Annotated[
-        Path | None, typer.Option(help="Write a CSV line for each datagram as it was sent.")
+        Path | None, typer.Option(help="Write a CSV line for each reading as it was sent.")
     ] = None,
 ) -> None:
-    """Be one to eight wearable sensors: real signed datagrams, 50 a second each, over a lifelike network.
+    """Be one to eight wearable sensors: they pair with the box, then send signed readings, 50 a second each.
+
+    Both ways over a lifelike network, each sensor from an address of its own.
 
     \b
     Try the box without a sensor (it must read the same key file):
@@ -115,8 +126,22 @@ def emulate(
         chosen = choose_keys(
             keys, [name for name, _ in wanted], count, lambda words: typer.echo(words, err=True)
         )
-        sensors = cast_sensors(chosen, motion_of, seed, drift_ppm, reboot_every)
-        sender: Sender = UdpSender(host, port) if serial is None else SerialSender(str(serial), baud)
+        if serial is not None and len(chosen) > 1:
+            raise ValueError(f"a cable carries one sensor, not {len(chosen)}; say which one with --sensor")
+        sensors = cast_sensors(
+            chosen,
+            motion_of,
+            seed,
+            stand_still_s=stand_still,
+            drift_ppm=drift_ppm,
+            reboot_every_s=reboot_every,
+        )
+        ways: list[dict[Way, Sender]] = [
+            {Way.NETWORK: UdpSender(host, port)}
+            if serial is None
+            else {Way.CABLE: SerialSender(str(serial), baud)}
+            for _ in sensors
+        ]
     except (ValueError, OSError) as error:
         _refuse(error)
     where = f"{host}:{port}" if serial is None else str(serial)
@@ -124,11 +149,10 @@ def emulate(
     try:
         with (
             _stopped_by_signals() as should_stop,
-            closing(sender),
             SendLog(log) if log is not None else nullcontext() as on_sent,
+            closing(Emulator(sensors, ways, network=on_air, on_sent=on_sent)) as emulator,
             StatusLine(where) as status,
         ):
-            emulator = Emulator(sensors, sender.send, network=on_air, on_sent=on_sent)
             emulator.run(seconds, should_stop, lambda: status.show(emulator, time.monotonic()))
             status.end(emulator)
     except OSError as error:

@@ -1,30 +1,33 @@
-"""One wearable as the box sees it: signed readings at 50 Hz on a clock of its own, now and then a reboot."""
+"""A wearable in Python: power, the IMU's start-up, a clock of its own, pairing, signed readings at 50 Hz."""
 
 from __future__ import annotations
 
 import secrets
 from collections.abc import Callable
-from typing import NamedTuple
+from hashlib import blake2s
 
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
-from hw_sim.motions import Motion, Quaternion
+from hw_sim.device import Outgoing, Sample, Way
+from hw_sim.motions import Quaternion
+from hw_sim.pairing import Pairing
+from hw_sim.wearer import Wearer
 
 PERIOD_US = 20_000
-BOOT_US = 700_000  # the IMU's start-up: the device clock at the first reading
-REBOOT_S = 1.5  # silence between two power-ons
+RATES_US = ((100, 10_000), (50, PERIOD_US), (0, 40_000))  # at least so many a second asked for -> period
+IMU_START_US = 700_000  # the BNO055 gives nothing earlier after power-on
+REBOOT_S = 1.5  # off so long between two power-ons
+ASLEEP_S = 0.5  # further behind than this and readings are left out instead of sent in a burst
+PROFILE_TIMES, PROFILE_EVERY_S = 3, 1.0
 CALIBRATED = 0xFF
-
-
-class Sample(NamedTuple):
-    """One reading as the sensor made it."""
-
-    sensor: str
-    boot_nonce: int
-    sequence: int
-    sampled_at: float  # seconds, the emulator's clock
-    orientation: Quaternion
-    datagram: bytes
+FIRMWARE = (1, 0, 0)
+LIGHTS = {
+    wire.LED_OFF: "off",
+    wire.LED_ON: "on",
+    wire.LED_SLOW: "slow",
+    wire.LED_FAST: "fast",
+    wire.LED_STROBE: "strobe",
+}
 
 
 def fresh_boot_nonce() -> int:
@@ -32,86 +35,208 @@ def fresh_boot_nonce() -> int:
     return secrets.randbits(32)
 
 
+def sensor_axes(stage: Quaternion) -> Quaternion:
+    """The same rotation in the BNO055's axes (z up, x to the front); stage: y up, z to the front."""
+    w, x, y, z = stage
+    return w, z, x, y
+
+
 class EmulatedSensor:
-    """Makes signed readings. Time is an argument: seconds on the emulator's clock.
+    """A Device that speaks the whole protocol. Time is an argument: seconds on the emulator's clock.
 
     phase_s: when in the 20 ms grid it measures. drift_ppm: how much too fast its clock is. device_time_us:
-    what its clock says at the first reading. reboot_every_s: switched off and on again that often; None:
-    never.
+    what its clock says at power-on. reboot_every_s: switched off and on again that often; None: never.
+    profile: the calibration that it has, the BNO055's 22 offset bytes. taps: double taps since power-on.
     """
 
     def __init__(
         self,
         key: SensorKey,
-        motion: Motion,
+        wearer: Wearer,
         *,
         phase_s: float = 0.0,
         drift_ppm: float = 0.0,
-        device_time_us: int = BOOT_US,
         reboot_every_s: float | None = None,
+        device_time_us: int = 0,
         boot_nonce: Callable[[], int] = fresh_boot_nonce,
     ) -> None:
         self.name = key.name
         self.reboots = 0
+        self.imu_id = blake2s(key.device_id.to_bytes(4, "little"), digest_size=16).digest()
+        self.profile: bytes | None = None
+        self.taps = 0
+        self.recoveries = 0
+        self.battery = wire.BATTERY_UNKNOWN
+        self.wire_hash = wire.WIRE_HASH
         self._device_id = key.device_id
         self._tagger = wire.Tagger(key.key)
-        self._motion = motion
+        self._wearer = wearer
         self._phase_s = phase_s
-        self._period_s = PERIOD_US * 1e-6 / (1 + drift_ppm * 1e-6)
-        self._device_time_us = device_time_us
+        self._clock_rate = 1 + drift_ppm * 1e-6
         self._reboot_every_s = reboot_every_s
+        self._device_time_us = device_time_us
         self._draw_nonce = boot_nonce
-        self._started: float | None = None
+        self._ways_up: set[Way] = set()
+        self._pairing: Pairing | None = None  # None: switched off
+        self._power_on_at = 0.0
+        self._power_change_at = float("inf")
+        self._grid_us = 0  # of the device clock, from power-on to the next measurement
+        self._readings = 0
+        self._profiles = 0  # sent of this power-on
+        self._profiles_due = 0
+        self._profile_at = 0.0
 
-    def start(self, now: float) -> None:
-        """Switched on at `now`."""
-        self._started = now
-        self._switch_on(now + self._phase_s)
+    @property
+    def boot_nonce(self) -> int:
+        """Of the present power-on; 0 while off."""
+        return self._pairing.boot_nonce if self._pairing else 0
+
+    @property
+    def is_linked(self) -> bool:
+        return self._pairing is not None and self._pairing.way is not None
+
+    @property
+    def light(self) -> str:
+        """What the lamp says: off, looking, or what the box wants."""
+        if self._pairing is None:
+            return "off"
+        return LIGHTS.get(self._pairing.led, "on") if self.is_linked else "looking"
 
     @property
     def next_at(self) -> float:
-        """When the next reading is due."""
-        return self._switched_on_at + self._readings * self._period_s
+        due = self._power_change_at
+        if self._pairing is not None:
+            due = min(due, self._reading_at, self._pairing.next_at)
+            if self._profiles_due and self.is_linked:
+                due = min(due, self._profile_at)
+        return due
 
-    def sample(self) -> Sample:
-        """The reading that is due at `next_at`."""
-        assert self._started is not None, "start() comes first"
-        sampled_at = self.next_at
-        orientation = self._motion(sampled_at - self._started)
+    def start(self, now: float) -> None:
+        self._wearer.start(now)
+        self.switch_on(now)
+
+    def switch_on(self, now: float) -> None:
+        """Power-on: nothing is left of the power-on before but its calibration."""
+        self._pairing = pairing = Pairing(self._draw_nonce())
+        for way in self._ways_up:
+            pairing.connect(way, True, now)
+        self._power_on_at = now
+        self._power_change_at = now + self._reboot_every_s if self._reboot_every_s else float("inf")
+        self._grid_us = IMU_START_US
+        self._readings = self._profiles = self.taps = self.recoveries = 0
+
+    def switch_off(self, now: float, seconds: float = float("inf")) -> None:
+        """Power off, and on again after `seconds`."""
+        self._pairing = None
+        self._power_change_at = now + seconds
+
+    def connect(self, way: Way, is_up: bool, now: float) -> None:
+        (self._ways_up.add if is_up else self._ways_up.discard)(way)
+        if self._pairing is not None:
+            self._pairing.connect(way, is_up, now)
+
+    def save_profile(self, offsets: bytes, now: float) -> None:
+        """As after a calibration: the 22 bytes are in use, and told to the box once linked."""
+        self.profile, self._profiles_due, self._profile_at = offsets, PROFILE_TIMES, now
+
+    def step(self, now: float) -> list[Outgoing]:
+        while self._power_change_at <= now:
+            at = self._power_change_at
+            if self._pairing is not None:
+                self.switch_off(at, REBOOT_S)
+            else:
+                self.reboots += 1
+                self._device_time_us = 0
+                self.switch_on(at)
+        if self._pairing is None:
+            return []
+        left = self._hellos(self._pairing, now)
+        left += self._measure(self._pairing, now)
+        left += self._tell_profile(self._pairing, now)
+        return left
+
+    def receive(self, data: bytes, now: float, way: Way) -> None:
+        pairing = self._pairing
+        if pairing is None:
+            return
+        try:
+            packet = wire.unpack(data, lambda device: self._tagger if device == self._device_id else None)
+        except wire.WireError:
+            return
+        if packet.boot_nonce != pairing.boot_nonce:
+            return
+        match packet:
+            case wire.Assignment():
+                pairing.take_assignment(packet, now, way)
+            case wire.Heartbeat():
+                pairing.take_heartbeat(packet, now)
+            case wire.Call():
+                pairing.take_call(now, way)
+            case wire.Restore() if packet.imu_id == self.imu_id and pairing.may_restore(now):
+                self.profile = self.profile or packet.offsets
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    @property
+    def _reading_at(self) -> float:
+        return self._power_on_at + self._phase_s + self._grid_us * 1e-6 / self._clock_rate
+
+    @property
+    def _flags(self) -> int:
+        return wire.HAS_PROFILE if self.profile is not None else 0
+
+    def _hellos(self, pairing: Pairing, now: float) -> list[Outgoing]:
+        left = []
+        for at, way, sequence in pairing.due_hellos(now):
+            head = self._device_id, pairing.boot_nonce, pairing.session, sequence
+            hello = wire.Hello(*head, self.wire_hash, *FIRMWARE, self.battery, self._flags, self.imu_id)
+            left.append(Outgoing(wire.pack(hello, self._tagger), way, at))
+        return left
+
+    def _measure(self, pairing: Pairing, now: float) -> list[Outgoing]:
+        """The readings that are due; the grid goes on while there is nobody to send them to."""
+        period_us = next(period for rate, period in RATES_US if pairing.rate_hz >= rate)
+        if now - self._reading_at > ASLEEP_S:
+            missed = int((now - self._reading_at) * 1e6 * self._clock_rate / period_us)
+            self._grid_us += missed * period_us
+            self._readings += missed if pairing.way is not None else 0
+        left = []
+        while (at := self._reading_at) <= now:
+            if pairing.way is not None:
+                left.append(self._reading(pairing, pairing.way, at))
+            self._grid_us += period_us
+        return left
+
+    def _reading(self, pairing: Pairing, way: Way, at: float) -> Outgoing:
+        self._wearer.heard(at)
+        orientation = self._wearer.orientation(at)
+        sequence, self._readings = self._readings, self._readings + 1
         reading = wire.Reading(
-            self._device_id,
-            self._boot_nonce,
-            0,
-            self._readings % (1 << 32),
-            (self._device_time_us + self._readings * PERIOD_US) % (1 << 32),
-            orientation,
-            CALIBRATED,
-            wire.BATTERY_UNKNOWN,
-            wire.ROUND_TRIP_UNKNOWN,
-            taps=0,
-            recoveries=0,
-            flags=0,
+            *(self._device_id, pairing.boot_nonce, pairing.session, sequence),
+            (self._device_time_us + self._grid_us) % (1 << 32),
+            sensor_axes(orientation),
+            *(
+                CALIBRATED,
+                self.battery,
+                pairing.round_trip,
+                self.taps % 256,
+                self.recoveries % 256,
+                self._flags,
+            ),
         )
-        sample = Sample(
-            self.name,
-            self._boot_nonce,
-            reading.sequence,
-            sampled_at,
-            orientation,
-            wire.pack(reading, self._tagger),
+        pairing.reading_sent(sequence, at)
+        sample = Sample(self.name, pairing.boot_nonce, sequence, at, orientation, self._power_on_at)
+        return Outgoing(wire.pack(reading, self._tagger), way, at, sample)
+
+    def _tell_profile(self, pairing: Pairing, now: float) -> list[Outgoing]:
+        if self.profile is None or pairing.way is None or not self._profiles_due or self._profile_at > now:
+            return []
+        self._profiles_due -= 1
+        self._profile_at = now + PROFILE_EVERY_S
+        packet = wire.Profile(
+            *(self._device_id, pairing.boot_nonce, pairing.session, self._profiles),
+            *(self.imu_id, self.profile),
         )
-        self._readings += 1
-        if self._reboot_every_s and self.next_at - self._switched_on_at > self._reboot_every_s:
-            self.reboots += 1
-            self._device_time_us = BOOT_US
-            self._switch_on(self.next_at + REBOOT_S)
-        return sample
-
-    def skip_to(self, now: float) -> None:
-        """Leaves out the readings before `now`, as if they had been lost: the machine was asleep."""
-        self._readings += max(0, int((now - self.next_at) / self._period_s))
-
-    def _switch_on(self, at: float) -> None:
-        self._switched_on_at = at
-        self._readings = 0
-        self._boot_nonce = self._draw_nonce()
+        self._profiles += 1
+        return [Outgoing(wire.pack(packet, self._tagger), pairing.way, now)]

@@ -1,24 +1,44 @@
-"""Wearables and the network between them and the box: readings are made, carried, and sent when due."""
+"""Wearables and the network between them and the box: packets are made, carried, and handed over when due."""
 
 from __future__ import annotations
 
 import heapq
+import select
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import count
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from hw_sim.emulated_sensor import EmulatedSensor, Sample
+from hw_sim.device import Device, Outgoing, Sample, Way
 from hw_sim.network import PERFECT, VenueNetwork
 
 LONGEST_SLEEP_S = 0.05  # a signal to stop is seen within this
-ASLEEP_S = 0.5  # further behind than this and readings are left out instead of sent in a burst
 IDLE_S = 0.006  # what is not urgent, such as a status line, is done when so much time is left
 
 
+class Sender(Protocol):
+    """One device's own way to the box, in both directions. Never waits, never raises."""
+
+    @property
+    def is_up(self) -> bool:
+        """The network is there, the cable is plugged in."""
+
+    @property
+    def descriptor(self) -> int | None:
+        """What to wait on for packets from the box; None when there is nothing to wait on."""
+
+    def send(self, data: bytes) -> bool:
+        """One packet; whether it could be sent."""
+
+    def receive(self) -> bytes | None:
+        """The next packet from the box; None when none waits."""
+
+    def close(self) -> None: ...
+
+
 class Sent(NamedTuple):
-    """A datagram as it was really sent, for whoever follows it."""
+    """A reading as it was really sent, for whoever follows it."""
 
     sample: Sample
     sent_at: float  # read from the clock just before sending
@@ -26,50 +46,55 @@ class Sent(NamedTuple):
 
 
 class Emulator:
-    """One to eight sensors on one network. `send` gets each datagram, and says whether it could send it.
+    """One to eight wearables on one network, each with ways of its own to the box.
 
-    `clock` and `sleep` stand in for the monotonic clock in tests. For a thread or a process of its own use
-    `run`; in step with something else use `start` and `step`.
+    `clock` and `sleep` stand in for the monotonic clock in tests; without `sleep` it listens while it waits.
+    For a thread or a process of its own use `run`; in step with something else use `start` and `step`.
+    counts: packets sent, readings among them, unsent, and what the network did to them.
     """
 
     def __init__(
         self,
-        sensors: Sequence[EmulatedSensor],
-        send: Callable[[bytes], bool],
+        devices: Sequence[Device],
+        ways: Sequence[Mapping[Way, Sender]],
         *,
         network: VenueNetwork | None = None,
         on_sent: Callable[[Sent], None] | None = None,
         clock: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
+        sleep: Callable[[float], None] | None = None,
     ) -> None:
-        self.sensors = tuple(sensors)
+        self.devices = tuple(devices)
         self.counts: Counter[str] = Counter()
-        self._send = send
+        self._ways = tuple(ways)
+        self._is_up = [dict.fromkeys(senders, False) for senders in ways]
         self._network = network or VenueNetwork(PERFECT, 0)
         self._on_sent = on_sent
         self._clock = clock
-        self._sleep = sleep
-        self._on_the_way: list[tuple[float, int, bytes, str, Sample]] = []
+        self._sleep = sleep or self._listen
+        self._to_the_box: list[tuple[float, int, int, Outgoing, str]] = []
+        self._to_the_devices: list[tuple[float, int, int, Way, bytes]] = []
         self._order = count()
 
     def start(self, now: float) -> None:
-        """All sensors are switched on at `now`."""
-        for sensor in self.sensors:
-            sensor.start(now)
+        """All devices are switched on at `now`."""
+        for device in self.devices:
+            device.start(now)
 
     def step(self, now: float) -> float:
-        """Makes and sends all that is due at `now`; gives when something is due next."""
-        for flow, sensor in enumerate(self.sensors):
-            if now - sensor.next_at > ASLEEP_S:
-                sensor.skip_to(now)
-            while sensor.next_at <= now:
-                self._put_on_the_way(flow, sensor.sample())
-        while self._on_the_way and self._on_the_way[0][0] <= now:
-            _, _, data, note, sample = heapq.heappop(self._on_the_way)
-            self._send_one(data, note, sample)
-        due = [sensor.next_at for sensor in self.sensors]
-        if self._on_the_way:
-            due.append(self._on_the_way[0][0])
+        """Makes, carries and hands over all that is due at `now`; gives when something is due next."""
+        for number in range(len(self.devices)):
+            self._look_at_ways(number, now)
+        while self._to_the_devices and self._to_the_devices[0][0] <= now:
+            _, _, number, way, data = heapq.heappop(self._to_the_devices)
+            self.devices[number].receive(data, now, way)
+        for number, device in enumerate(self.devices):
+            for outgoing in device.step(now):
+                self._put_on_the_way(number, outgoing)
+        while self._to_the_box and self._to_the_box[0][0] <= now:
+            _, _, number, outgoing, note = heapq.heappop(self._to_the_box)
+            self._send(number, outgoing, note)
+        due = [device.next_at for device in self.devices]
+        due += [waiting[0][0] for waiting in (self._to_the_box, self._to_the_devices) if waiting]
         return min(due)
 
     def run(
@@ -78,7 +103,7 @@ class Emulator:
         should_stop: Callable[[], bool] = lambda: False,
         when_idle: Callable[[], None] = lambda: None,
     ) -> None:
-        """Sends in real time, on absolute deadlines, for `seconds` or until `should_stop`."""
+        """Runs in real time, on absolute deadlines, for `seconds` or until `should_stop`."""
         now = self._clock()
         end = now + seconds if seconds is not None else float("inf")
         self.start(now)
@@ -91,22 +116,49 @@ class Emulator:
                 self._sleep(min(wait_s, LONGEST_SLEEP_S))
             now = self._clock()
 
-    def _put_on_the_way(self, flow: int, sample: Sample) -> None:
-        for delivery in self._network.carry(sample.datagram, sample.sampled_at, flow):
+    def close(self) -> None:
+        """Devices and their ways."""
+        for device in self.devices:
+            device.close()
+        for senders in self._ways:
+            for sender in senders.values():
+                sender.close()
+
+    def _look_at_ways(self, number: int, now: float) -> None:
+        """What the box sent to one device is on its way; a cable may have come or gone."""
+        for way, sender in self._ways[number].items():
+            while (data := sender.receive()) is not None:
+                for delivery in self._network.carry(data, now, number, to_box=False):
+                    if delivery.note != "lost":
+                        arrival = delivery.at, next(self._order), number, way, delivery.data
+                        heapq.heappush(self._to_the_devices, arrival)
+            if sender.is_up != self._is_up[number][way]:
+                self._is_up[number][way] = sender.is_up
+                self.devices[number].connect(way, sender.is_up, now)
+
+    def _put_on_the_way(self, number: int, outgoing: Outgoing) -> None:
+        for delivery in self._network.carry(outgoing.data, outgoing.at, number):
             if delivery.note == "lost":
                 self.counts["lost"] += 1
                 continue
-            heapq.heappush(
-                self._on_the_way, (delivery.at, next(self._order), delivery.data, delivery.note, sample)
-            )
+            carried = outgoing._replace(data=delivery.data)
+            heapq.heappush(self._to_the_box, (delivery.at, next(self._order), number, carried, delivery.note))
 
-    def _send_one(self, data: bytes, note: str, sample: Sample) -> None:
+    def _send(self, number: int, outgoing: Outgoing, note: str) -> None:
+        sender = self._ways[number].get(outgoing.way)
         sent_at = self._clock()
-        if not self._send(data):
+        if sender is None or not sender.send(outgoing.data):
             self.counts["unsent"] += 1
             return
         self.counts["sent"] += 1
         if note:
             self.counts[note] += 1
-        if self._on_sent is not None:
-            self._on_sent(Sent(sample, sent_at, note))
+        if outgoing.sample is not None:
+            self.counts["readings"] += 1
+            if self._on_sent is not None:
+                self._on_sent(Sent(outgoing.sample, sent_at, note))
+
+    def _listen(self, seconds: float) -> None:
+        """Waits, but not longer than until a packet comes: the box's answers shall not wait for a reading."""
+        descriptors = (sender.descriptor for senders in self._ways for sender in senders.values())
+        select.select([one for one in descriptors if one is not None], [], [], seconds)

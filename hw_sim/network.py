@@ -76,41 +76,44 @@ class VenueNetwork:
     def __init__(self, profile: NetworkProfile, seed: int) -> None:
         self.profile = profile
         self._random = random.Random(f"datagrams {seed}")
+        self._random_back = random.Random(f"answers {seed}")
         self._stalls = random.Random(f"stalls {seed}")
         self._stall: tuple[float, float] | None = None
         self._stall_number = self._stalls.randrange(profile.long_stall_each)
-        self._last: dict[int, float] = {}
+        self._last: dict[tuple[int, bool], float] = {}
 
-    def carry(self, data: bytes, now: float, flow: int = 0) -> list[Delivery]:
+    def carry(self, data: bytes, now: float, flow: int = 0, to_box: bool = True) -> list[Delivery]:
         """What becomes of a datagram sent at `now` (seconds, never going back) by the sensor number `flow`.
 
-        Each flow keeps its order, except for datagrams that are reordered on purpose.
+        Or to it by the box. Each flow and direction keeps its order, except for datagrams that are reordered
+        on purpose; what the box says does not change what becomes of the sensors' datagrams.
         """
-        profile, chance = self.profile, self._random.random
+        profile, source = self.profile, self._random if to_box else self._random_back
+        chance = source.random
         if chance() < profile.loss_share:
             return [Delivery(now, data, "lost")]
-        at = now + self._delay_s(now)
+        at = now + self._delay_s(now, source)
         note = ""
         if chance() < profile.reordered_share:
-            at += self._random.uniform(*OVERTAKING_S)
+            at += source.uniform(*OVERTAKING_S)
             note = "reordered"
         else:
-            at = max(at, self._last.get(flow, 0.0) + self._burst_spacing_s())
-            self._last[flow] = at
+            at = max(at, self._last.get((flow, to_box), 0.0) + self._burst_spacing_s(source))
+            self._last[flow, to_box] = at
         if chance() < profile.corrupted_share:
-            data, note = self._corrupted(data), "corrupted"
+            data, note = _corrupted(data, source), "corrupted"
         deliveries = [Delivery(at, data, note)]
         if chance() < profile.duplicated_share:
-            deliveries.append(Delivery(at + self._random.uniform(*OVERTAKING_S), data, "duplicated"))
+            deliveries.append(Delivery(at + source.uniform(*OVERTAKING_S), data, "duplicated"))
         return deliveries
 
-    def _delay_s(self, now: float) -> float:
+    def _delay_s(self, now: float, source: random.Random) -> float:
         profile = self.profile
         delay_s = profile.least_delay_s
         if profile.jitter_s:
-            delay_s += self._random.expovariate(1 / profile.jitter_s)
-        if self._random.random() < profile.hiccup_share:
-            delay_s += self._random.uniform(*profile.hiccup_s)
+            delay_s += source.expovariate(1 / profile.jitter_s)
+        if source.random() < profile.hiccup_share:
+            delay_s += source.uniform(*profile.hiccup_s)
         if profile.stall_every_s:
             start, end = self._stall_near(now + delay_s)
             if start <= now + delay_s < end:
@@ -136,11 +139,12 @@ class VenueNetwork:
         is_long = self._stall_number % profile.long_stall_each == 0
         return start, start + self._stalls.uniform(*(profile.long_stall_s if is_long else profile.stall_s))
 
-    def _burst_spacing_s(self) -> float:
-        return self._random.uniform(*IN_A_BURST_S) if self.profile.least_delay_s else 0.0
+    def _burst_spacing_s(self, source: random.Random) -> float:
+        return source.uniform(*IN_A_BURST_S) if self.profile.least_delay_s else 0.0
 
-    def _corrupted(self, data: bytes) -> bytes:
-        damaged = bytearray(data)
-        for _ in range(self._random.randint(1, 3)):
-            damaged[self._random.randrange(len(damaged))] ^= 1 << self._random.randrange(8)
-        return bytes(damaged) if damaged != data else bytes([data[0] ^ 1]) + data[1:]
+
+def _corrupted(data: bytes, source: random.Random) -> bytes:
+    damaged = bytearray(data)
+    for _ in range(source.randint(1, 3)):
+        damaged[source.randrange(len(damaged))] ^= 1 << source.randrange(8)
+    return bytes(damaged) if damaged != data else bytes([data[0] ^ 1]) + data[1:]

@@ -38,11 +38,11 @@ class StatusLine:
         """Draws the line if it is a second old. `now` in seconds."""
         if not self._console.is_terminal or now < self._next_at:
             return
-        sent = emulator.counts["sent"]
+        sent = emulator.counts["readings"]
         rate_hz = (sent - self._sent) / (now - self._shown_at) if self._shown_at is not None else 0.0
-        names = ", ".join(sensor.name for sensor in emulator.sensors)
+        lights = ", ".join(f"{device.name} (light {device.light})" for device in emulator.devices)
         self._live.update(
-            Text(f"{names} -> {self._where}  {rate_hz:.0f}/s  {_totals(emulator)}"), refresh=True
+            Text(f"{lights} -> {self._where}  {rate_hz:.0f}/s  {_totals(emulator)}"), refresh=True
         )
         self._next_at, self._sent, self._shown_at = now + 1.0, sent, now
 
@@ -50,16 +50,22 @@ class StatusLine:
         """Says what was sent; and, when nothing could be, what to look at."""
         self._live.stop()
         self._console.print(
-            f"{len(emulator.sensors)} sensor(s) -> {self._where}: {_totals(emulator)}", soft_wrap=True
+            f"{len(emulator.devices)} sensor(s) -> {self._where}: {_totals(emulator)}", soft_wrap=True
         )
-        if emulator.counts["unsent"] and not emulator.counts["sent"]:
+        if not emulator.counts["sent"]:
             self._console.print(
                 f"Nothing could be sent to {self._where}. Is it plugged in, and is the address right?"
+            )
+        elif not emulator.counts["readings"]:
+            self._console.print(
+                f"No box took these sensors at {self._where}. "
+                "Is it running, and does it read the same key file?"
             )
 
 
 def _totals(emulator: Emulator) -> str:
     counts = emulator.counts
-    parts = [f"{counts['sent']} sent", *(f"{counts[note]} {note}" for note in NOTED if counts[note])]
-    reboots = sum(sensor.reboots for sensor in emulator.sensors)
+    parts = [f"{counts['readings']} readings sent"]
+    parts += [f"{counts[note]} {note}" for note in NOTED if counts[note]]
+    reboots = sum(device.reboots for device in emulator.devices)
     return ", ".join(parts + ([f"{reboots} reboots"] if reboots else []))
