@@ -3,7 +3,7 @@
 
 #include <stdint.h>
 
-#include "../wearable/src/core/ports.h"
+#include "ports.h"
 
 namespace bunraku {
 
