@@ -1,0 +1,71 @@
+// Wi-Fi and one UDP socket over WiFi101.
+#include "wifi_link.h"
+
+#include <Arduino.h>
+
+namespace bunraku {
+namespace {
+
+constexpr unsigned long kJoinMs = 10000;   // begin() waits so long at most; its own default is a minute
+constexpr uint8_t kJoinsBeforeRestart = 3;  // then the Wi-Fi module is restarted: it can hang for good
+
+}  // namespace
+
+bool WifiLink::is_up() { return is_started_ && WiFi.status() == WL_CONNECTED; }
+
+bool WifiLink::join(const char* network, const char* password) {
+  board_.feed_watchdog();
+  is_started_ = true;
+  if (WiFi.status() == WL_NO_SHIELD) return false;
+  WiFi.setTimeout(kJoinMs);
+  board_.feed_watchdog();
+  const bool is_open = password[0] == '\0';
+  const uint8_t status = is_open ? WiFi.begin(network) : WiFi.begin(network, password);
+  board_.feed_watchdog();
+  if (status != WL_CONNECTED) {
+    if (++failed_joins_ >= kJoinsBeforeRestart) {
+      failed_joins_ = 0;
+      WiFi.end();
+    }
+    return false;
+  }
+  failed_joins_ = 0;
+  WiFi.noLowPowerMode();  // power save would hold packets back for up to a beacon interval, 100 ms
+  return true;
+}
+
+void WifiLink::leave() {
+  if (!is_started_) return;
+  udp_.stop();
+  WiFi.disconnect();
+}
+
+bool WifiLink::open(uint16_t port) {
+  udp_.stop();
+  return udp_.begin(port) == 1;
+}
+
+bool WifiLink::send(const Address& to, const uint8_t* data, uint16_t count) {
+  if (udp_.beginPacket(IPAddress(to.ip), to.port) != 1) return false;
+  return udp_.write(data, count) == count && udp_.endPacket() == 1;
+}
+
+// To the network's own broadcast address: a limited one (255.255.255.255) says nothing about the network.
+bool WifiLink::broadcast(uint16_t port, const uint8_t* data, uint16_t count) {
+  const Address everyone{WiFi.localIP() | ~WiFi.subnetMask(), port};
+  return send(everyone, data, count);
+}
+
+// The sender is asked before the bytes are read: reading them lets the next packet overwrite it.
+uint16_t WifiLink::receive(uint8_t* data, uint16_t room, Address& from) {
+  const int size = udp_.parsePacket();
+  if (size <= 0) return 0;
+  const uint32_t ip = udp_.remoteIP();
+  const uint16_t port = udp_.remotePort();
+  const int count = udp_.read(data, room);
+  if (count != size) return 0;  // longer than any packet of ours; the next call throws the rest away
+  from = Address{ip, port};
+  return static_cast<uint16_t>(count);
+}
+
+}  // namespace bunraku

@@ -1,0 +1,29 @@
+// Wi-Fi and one UDP socket over WiFi101. Which of its calls stop everything, and for how long: ports.h.
+#pragma once
+
+#include <WiFi101.h>
+#include <WiFiUdp.h>
+
+#include "../core/ports.h"
+
+namespace bunraku {
+
+class WifiLink final : public DatagramLink {
+ public:
+  explicit WifiLink(Board& board) : board_(board) {}
+  bool is_up() override;
+  bool join(const char* network, const char* password) override;
+  void leave() override;
+  bool open(uint16_t port) override;
+  bool send(const Address& to, const uint8_t* data, uint16_t count) override;
+  bool broadcast(uint16_t port, const uint8_t* data, uint16_t count) override;
+  uint16_t receive(uint8_t* data, uint16_t room, Address& from) override;
+
+ private:
+  Board& board_;
+  WiFiUDP udp_;
+  bool is_started_ = false;  // the module was spoken to: starting it blocks for about a second
+  uint8_t failed_joins_ = 0;
+};
+
+}  // namespace bunraku

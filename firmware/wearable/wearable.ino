@@ -1,0 +1,31 @@
+// The wearable on an Arduino MKR1000 with a BNO055: glue alone. What it does is in src/core.
+#include "src/arduino/board_clock.h"
+#include "src/arduino/mkr_board.h"
+#include "src/arduino/nvm_store.h"
+#include "src/arduino/usb_serial.h"
+#include "src/arduino/wifi_link.h"
+#include "src/arduino/wire_bus.h"
+#include "src/core/wearable.h"
+
+namespace {
+
+bunraku::BoardClock board_clock;
+bunraku::MkrBoard board;
+bunraku::BuiltinLed led;
+bunraku::NvmStore store;
+bunraku::UsbSerial cable;
+bunraku::WifiLink wifi(board);
+bunraku::WireBus bus;
+bunraku::Wearable wearable({board_clock, bus, wifi, cable, store, led, board});
+
+}  // namespace
+
+void setup() {
+  board.begin();
+  led.begin();
+  cable.begin();
+  bus.begin();
+  wearable.begin();
+}
+
+void loop() { wearable.step(); }
