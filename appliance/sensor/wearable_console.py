@@ -1,0 +1,225 @@
+"""The wearable's text console on its USB cable, from the box's side: one line asked, one line answered.
+
+Packets may travel on the same cable meanwhile (each between zero bytes); they are passed over.
+"""
+
+from __future__ import annotations
+
+import errno
+import re
+import secrets
+import time
+from dataclasses import dataclass
+from hashlib import blake2s
+from hmac import compare_digest
+
+import serial
+from serial.tools import list_ports
+
+from appliance.sensor.wire import TAG_BYTES
+
+BAUD = 115200  # USB: any speed is the same, but 1200 would start the bootloader
+PATIENCE_S = 15.0  # joining Wi-Fi keeps the wearable from answering for up to 10 s
+LONGEST_LINE = 128
+# Brings the wearable's reader from any state to text: ends a frame that was begun, then sends a void one.
+_TO_TEXT = b"\x00\x00\x01\x00\n"
+_ASK_AGAIN_S = 3.0
+_QUIET_S = 0.15
+_NOISE = 4096
+_IDENTITY = re.compile(
+    r"ok bunraku-wearable (?P<firmware>\S+) wire (?P<wire>[0-9a-f]{8}) "
+    r"imu (?P<imu>none|[0-9a-f]{32}) board (?P<board>\S+)"
+)
+# USB vendor and product of the MKR1000 (boards.txt of the Arduino SAMD core): running, and in its bootloader.
+_VENDOR = 0x2341
+_RUNNING, _BOOTLOADER = {0x804E, 0x824E}, {0x004E, 0x024E}
+
+
+class ConsoleError(Exception):
+    """The wearable could not be asked: what happened and what to do."""
+
+
+class UnpluggedError(ConsoleError):
+    """The cable is gone, or the wearable does not answer any more."""
+
+
+class RefusedError(ConsoleError):
+    """The wearable understood and said no."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What a wearable says of itself."""
+
+    firmware: str
+    wire_hash: int
+    imu_id: str  # hexadecimal; empty: it finds no IMU
+    board: str
+
+
+class WearableConsole:
+    """A wearable on a serial port. A context; raises ConsoleError with words for people."""
+
+    def __init__(self, device: str, patience_s: float = PATIENCE_S) -> None:
+        self.device = device
+        self._patience_s = patience_s
+        self._received = b""
+        try:
+            self._port = serial.Serial(device, BAUD, timeout=0.05, write_timeout=patience_s, exclusive=True)
+        except (OSError, ValueError) as error:  # pyserial's SerialException is an OSError
+            raise ConsoleError(_cannot_open(device, error)) from None
+
+    def __enter__(self) -> WearableConsole:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._port.close()
+
+    def identify(self) -> Identity:
+        """Find the wearable on this port and ask who it is."""
+        until = time.monotonic() + self._patience_s
+        while time.monotonic() < until:
+            self._write(_TO_TEXT + b"id\n")
+            ask_again_at = min(time.monotonic() + _ASK_AGAIN_S, until)
+            while (line := self._line(ask_again_at)) is not None:
+                found = _IDENTITY.fullmatch(line)
+                if found:
+                    self._settle()
+                    imu_id = "" if found["imu"] == "none" else found["imu"]
+                    return Identity(found["firmware"], int(found["wire"], 16), imu_id, found["board"])
+        raise ConsoleError(
+            f"Nothing on {self.device} answers as a bunraku wearable. Nothing was changed. Is it the right "
+            "port, and is the firmware on the board (docs/firmware.md)? "
+            "Press its reset button once and try again."
+        )
+
+    def ask(self, command: str, secret: str = "") -> str:
+        """What comes behind `ok` in the answer. Raises RefusedError, UnpluggedError.
+
+        `secret` follows the command and is in no error.
+        """
+        line = f"{command} {secret}" if secret else command
+        if len(line.encode()) > LONGEST_LINE or any(ord(sign) < 32 for sign in line):
+            raise RefusedError(
+                f"The wearable's console takes no such line: '{command}' is too long or has odd signs."
+            )
+        self._write(line.encode() + b"\n")
+        until = time.monotonic() + self._patience_s
+        while (answer := self._line(until)) is not None:
+            if answer == "ok" or answer.startswith("ok "):
+                return answer[3:]
+            if answer.startswith("error: "):
+                words = answer.removeprefix("error: ")
+                if secret and secret in words:
+                    words = "it repeated what is secret, as no bunraku wearable does; is this one?"
+                raise RefusedError(f"The wearable refused '{command}': {words}.")
+        raise UnpluggedError(f"The wearable on {self.device} stopped answering (asked: '{command}').")
+
+    def proves(self, key: bytes) -> bool:
+        """Whether the wearable has this key; neither the key nor anything that gives it away travels."""
+        nonce = secrets.token_bytes(8)
+        answer = self.ask(f"prove {nonce.hex()}")
+        return compare_digest(answer, blake2s(b"prove" + nonce, key=key, digest_size=TAG_BYTES).hexdigest())
+
+    def _line(self, until: float) -> str | None:
+        """The next line of text; None when none came in time. Packets and noise are passed over."""
+        while True:
+            line, end, rest = self._received.partition(b"\n")
+            if end:
+                self._received = rest
+                text = line.rpartition(b"\x00")[2].rstrip(b"\r")
+                if text and min(text) >= 32:
+                    return text.decode("utf-8", "replace")
+                continue
+            if time.monotonic() >= until:
+                return None
+            self._received = self._received[-_NOISE:] + self._read()
+
+    def _settle(self) -> None:
+        """Pass over answers to a question that was asked more than once."""
+        while self._line(time.monotonic() + _QUIET_S) is not None:
+            pass
+
+    def _read(self) -> bytes:
+        try:
+            return bytes(self._port.read(max(1, self._port.in_waiting)))
+        except OSError:
+            raise UnpluggedError(
+                f"The cable to {self.device} came loose, or the wearable lost its power."
+            ) from None
+
+    def _write(self, data: bytes) -> None:
+        try:
+            self._port.write(data)
+        except OSError:
+            raise UnpluggedError(
+                f"The cable to {self.device} came loose, or the wearable lost its power."
+            ) from None
+
+
+@dataclass(frozen=True)
+class FoundPort:
+    """A serial port of this machine, and whether a wearable's board is on it."""
+
+    device: str
+    description: str
+    is_wearable: bool
+    is_bootloader: bool = False
+
+    def __str__(self) -> str:
+        hint = "a wearable's board" if self.is_wearable else self.description
+        if self.is_bootloader:
+            hint = "a wearable's board that waits for firmware: press its reset button once"
+        return f"{self.device} ({hint})" if hint else self.device
+
+
+def found_ports() -> list[FoundPort]:
+    """The serial ports of this machine."""
+    return [
+        FoundPort(
+            port.device,
+            "" if port.description in ("n/a", None) else port.description,
+            port.vid == _VENDOR and port.pid in _RUNNING,
+            port.vid == _VENDOR and port.pid in _BOOTLOADER,
+        )
+        for port in sorted(list_ports.comports(), key=lambda port: port.device)
+    ]
+
+
+def only_wearable(ports: list[FoundPort]) -> str:
+    """The device of the one wearable that is plugged in. Raises ConsoleError that lists what there is."""
+    wearables = [port for port in ports if port.is_wearable]
+    if len(wearables) == 1:
+        return wearables[0].device
+    if wearables:
+        raise ConsoleError(
+            f"{len(wearables)} wearables are plugged in: {', '.join(port.device for port in wearables)}. "
+            "Leave one, or say which with --port."
+        )
+    raise ConsoleError(f"No wearable is plugged in. {_ports_sentence(ports)}")
+
+
+def _ports_sentence(ports: list[FoundPort]) -> str:
+    if not ports:
+        return (
+            "This machine has no serial port at all. Plug the wearable in with a USB cable that carries data "
+            "(many carry power alone) and switch it on."
+        )
+    return f"Serial ports here: {', '.join(map(str, ports))}. Say which one with --port."
+
+
+def _cannot_open(device: str, error: Exception) -> str:
+    number = getattr(error, "errno", None)
+    if number in (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK):
+        return (
+            f"{device} is in use by another program. Stop the running bunraku, or take this cable out of "
+            "`sensors: serial:` in its box file until the wearable is provisioned."
+        )
+    if number == errno.EACCES:
+        return (
+            f"{device} may not be opened by this user. Run: sudo usermod -aG dialout $USER, log in again, "
+            "and try again."
+        )
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return f"There is no serial port {device}. {_ports_sentence(found_ports())}"
+    return f"{device} cannot be opened as a serial port. {_ports_sentence(found_ports())}"
