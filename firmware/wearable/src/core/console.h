@@ -1,4 +1,4 @@
-// The console on the cable: provisioning for `bunraku provision`, status for people. One line in, one line out.
+// The console on the cable: provisioning for `bunraku provision`, status for people. A line in, a line out.
 //
 //   id                      ok bunraku-wearable 1.0.0 wire 2d20a5df imu <32 hex|none> board <8 hex>
 //   set device <8 hex>      ok            ... name <word>, key <32 hex>, network <rest of line>,
@@ -19,28 +19,13 @@
 
 #include <stdint.h>
 
+#include "answer.h"
 #include "settings.h"
 #include "status.h"
 
 namespace bunraku {
 
-// One line that is being written, without its end. What does not fit is cut off.
-class Answer {
- public:
-  void clear() { count_ = 0, text_[0] = '\0'; }
-  Answer& add(const char* text);
-  Answer& add_number(uint32_t value);
-  Answer& add_hex(const uint8_t* bytes, uint8_t count);
-  Answer& add_hex(uint32_t value);  // 8 digits
-  const char* text() const { return text_; }
-  uint8_t count() const { return count_; }
-
- private:
-  char text_[240] = "";
-  uint8_t count_ = 0;
-};
-
-// What a line asks for that the console cannot do by itself; the wearable does it and may write another answer.
+// What a line asks for that the console cannot do by itself: the wearable does it, and says so if it fails.
 enum class Request : uint8_t { kNothing, kSave, kForget, kStrobe, kSaveCalibration, kRestart };
 
 class Console {
@@ -52,7 +37,7 @@ class Console {
   Request execute(const char* line, const Status& status, uint32_t board_number, Answer& answer);
 
  private:
-  void set(const char* what, Answer& answer);
+  Request request(const char* line, Answer& answer) const;
   void show(Answer& answer) const;
   void prove(const char* nonce, Answer& answer) const;
 

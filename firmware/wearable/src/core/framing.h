@@ -1,5 +1,5 @@
-// Packets and text on one serial line. Packets travel as COBS(packet + CRC-16/XMODEM) between zero bytes; a line of
-// text holds no zero byte.
+// Packets and text on one serial line. Packets travel as COBS(packet + CRC-16/XMODEM) between zero bytes; a
+// line of text holds no zero byte.
 #pragma once
 
 #include <stdint.h>
@@ -11,7 +11,7 @@
 namespace bunraku {
 
 constexpr uint8_t kCrcBytes = 2;
-constexpr uint8_t kLongestStuffed = wire::kLargest + kCrcBytes + 1;  // COBS adds one byte to anything under 254
+constexpr uint8_t kLongestStuffed = wire::kLargest + kCrcBytes + 1;  // COBS adds one byte
 constexpr uint8_t kLongestFrame = kLongestStuffed + 2;               // with the zero bytes around it
 constexpr uint8_t kLongestLine = 128;
 
@@ -23,8 +23,9 @@ uint8_t frame(const uint8_t* packet, uint8_t count, uint8_t (&out)[kLongestFrame
 // Unstuffs in place and checks the CRC; the length of the packet, 0: damaged.
 uint8_t unframe(uint8_t* stuffed, uint8_t count);
 
-// Tells packets from text in what a host sends. A zero byte begins a packet and drops a line begun; the next one ends
-// it, and text is expected again. Silence of 0.25 s inside a packet returns to text, so that whoever types is heard.
+// Tells packets from text in what a host sends. A zero byte begins a packet and drops a line begun; the next one
+// ends it, and text is expected again. After silence of 0.25 s in a packet, text is expected too: whoever types
+// is heard.
 class CableInput {
  public:
   enum class Found : uint8_t { kNothing, kPacket, kLine, kOverlongLine };

@@ -40,18 +40,20 @@ enum class Received : uint8_t { kNothing, kAssignment, kHeartbeat, kCall, kResto
 
 class Pairing {
  public:
-  // Starts with no link and no session. Sequences go on where they were, so that no packet ever repeats.
+  // Starts with no link and no session; device 0 believes nobody. Sequences go on where they were, so that no
+  // packet ever repeats.
   void begin(uint32_t device_id, const uint8_t (&key)[wire::kKeyBytes], uint32_t boot_nonce);
 
   // A lane came up (greeted at once) or went down (a link on it is left at once). Call it as often as wished.
-  void set_lane(Lane lane, bool is_up, uint32_t now_us);
+  void set_lane(Lane lane, bool is_up);
 
-  // One packet from anyone. kRestore: authentic, in time, and for `condition.imu_id`; the caller reads and applies
-  // the wire::Restore in `data`.
-  Received receive(const uint8_t* data, uint16_t count, const Way& from, const Condition& condition, uint32_t now_us);
+  // One packet from anyone. kRestore: authentic, in time, for `condition.imu_id`, and wanted; the caller reads
+  // the wire::Restore in `data` and applies it.
+  Received receive(const uint8_t* data, uint16_t count_bytes, const Way& from, const Condition& condition,
+                   uint32_t now_us);
 
-  // The next packet that is due (hello, profile) and where it goes; 0: nothing is. Call until 0. Bounded: at most
-  // one a lane and one profile for each moment. Also notices that the box has gone silent.
+  // The next packet that is due (hello, profile) and where it goes; 0: nothing is. Call until 0: at most four
+  // packets a moment. Also notices that the box has gone silent.
   uint8_t next(const Condition& condition, uint32_t now_us, uint8_t (&packet)[wire::kLargest], Way& to);
 
   // One reading for the box; 0 while not linked.
@@ -85,7 +87,7 @@ class Pairing {
   uint8_t sign(const Packet& packet, uint8_t* data) const;
   template <typename Packet>
   void fill_head(Packet& packet, uint32_t sequence) const;
-  void unlink();
+  void leave();
 
   uint32_t device_id_ = 0, boot_nonce_ = 0;
   uint8_t key_[wire::kKeyBytes] = {};

@@ -56,8 +56,8 @@ class SerialPort {
   ~SerialPort() = default;
 };
 
-// Small records that survive power-off; erased by an upload of new firmware. Slots 0 to 3, each up to 192 bytes
-// and in an erase block of its own: a power cut while one is written loses that one alone.
+// Small records that survive power-off; erased by an upload of new firmware. Slots 0 to 3, each up to 192
+// bytes and in an erase block of its own: a power cut while one is written loses that one alone.
 class FlashStore {
  public:
   virtual bool load(uint8_t slot, uint8_t* data, uint16_t count) = 0;  // false: never written

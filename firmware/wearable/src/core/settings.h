@@ -1,4 +1,4 @@
-// What a wearable remembers over power-off: its settings, a calibration profile, how often it was switched on.
+// What a wearable remembers over power-off: settings, a calibration profile, how often it was switched on.
 #pragma once
 
 #include <stdint.h>

@@ -3,8 +3,6 @@
 
 #include <stdint.h>
 
-#include "timer.h"
-
 namespace bunraku {
 
 class Taps {
@@ -13,11 +11,16 @@ class Taps {
   bool feed(const int16_t (&linear)[3], uint32_t now_us);
 
  private:
-  enum class Phase : uint8_t { kRestless, kQuiet, kFirst, kSecond };
+  void begin_burst(uint32_t now_us);
+  void end_burst(uint32_t now_us);
+  bool rest(uint32_t now_us);
 
-  Phase phase_ = Phase::kRestless;
-  uint32_t phase_us_ = 0;  // when it began
-  uint32_t fed_us_ = 0;
+  uint8_t taps_ = 0;         // found so far
+  bool is_loud_ = false;     // a burst goes on
+  bool may_count_ = false;   // it began at the right moment for a tap
+  bool has_spike_ = false;   // and was strong enough
+  bool is_settled_ = false;  // it has been quiet for long enough
+  uint32_t burst_us_ = 0, quiet_us_ = 0, first_us_ = 0, fed_us_ = 0;  // when: burst, quiet, first tap, last sample
 };
 
 }  // namespace bunraku

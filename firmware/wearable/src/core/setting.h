@@ -1,0 +1,14 @@
+// What `set ...` says, checked and put into the settings.
+#pragma once
+
+#include "answer.h"
+#include "settings.h"
+
+namespace bunraku {
+
+// `what` is the setting's name, a space, its value. What breaks a rule changes nothing and is answered with the rule.
+void change_setting(const char* what, Settings& settings, Answer& answer);
+
+const char* fusion_name(Fusion fusion);
+
+}  // namespace bunraku
