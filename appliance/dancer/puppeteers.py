@@ -77,30 +77,35 @@ class WornSensor(Puppeteer):
     """A sensor that a dancer wears. Silent for 100 ms: its joint is given back over 1 s, taken again over
     0.5 s, and the target is led to the new readings over as long as the silence lasted (0.5 s at most).
 
-    neutral: the sensor's orientation at which the joint stands in its rest pose.
+    joint_from_reading: the matrix (4, 4) that makes a reading (w, x, y, z; sensor axes) the joint's local
+    orientation; where it keeps the length, so does the target. None: readings are such orientations already.
     """
 
     def __init__(
-        self, joint: str, weight: float = 1.0, neutral: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
+        self, joint: str, weight: float = 1.0, joint_from_reading: NDArray[np.float32] | None = None
     ) -> None:
         super().__init__(joint, weight)
-        self.set_neutral(neutral)
-        self._reading = quaternion.IDENTITY.copy()
+        self._joint_from_reading = (
+            np.eye(4, dtype=np.float32) if joint_from_reading is None else joint_from_reading
+        )
+        self._reading, self._local = quaternion.IDENTITY.copy(), quaternion.IDENTITY.copy()
         self._heard_at: float | None = None
         self._leading_s = 0.0
         self._slerp = Slerp(1)
 
-    def set_neutral(self, neutral: Sequence[float]) -> None:
-        """Take another orientation of the sensor as the one that means the joint's rest pose."""
-        back = quaternion.inverse(quaternion.normalize(np.array(neutral, dtype=np.float32)))
-        # Multiplying a reading by it from the right, as one matrix: a quarter of the time in the tick.
-        self._from_neutral = quaternion.multiply(np.eye(4, dtype=np.float32), back).T.copy()
+    def wear(self, joint_from_reading: NDArray[np.float32]) -> None:
+        """Take another matrix, for a new neutral pose; the joint is led over, as after a silence."""
+        self._joint_from_reading = joint_from_reading
+        if self._heard_at is not None:
+            np.matmul(joint_from_reading, self._reading, out=self._local)
+            self._leading_s = TAKE_S
 
     def hear(self, orientation: Sequence[float] | FloatArray, arrival: float) -> None:
         """Take a reading (unit quaternion w, x, y, z) that arrived at this time."""
-        np.matmul(self._from_neutral, np.asarray(orientation, dtype=np.float32), out=self._reading)
+        self._reading[:] = orientation
+        np.matmul(self._joint_from_reading, self._reading, out=self._local)
         if self._heard_at is not None and arrival - self._heard_at > HOLD_S:
-            self._leading_s = min(arrival - self._heard_at, TAKE_S)
+            self._leading_s = max(self._leading_s, min(arrival - self._heard_at, TAKE_S))
         self._heard_at = arrival
 
     def silent_s(self, now: float) -> float:
@@ -113,12 +118,12 @@ class WornSensor(Puppeteer):
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
         if self._leading_s <= elapsed:
             self._leading_s = 0.0
-            orientation[:] = self._reading
+            orientation[:] = self._local
             return
         share = elapsed / self._leading_s
         self._leading_s -= elapsed
         row = orientation[None]
-        self._slerp(row, self._reading[None], share, row)
+        self._slerp(row, self._local[None], share, row)
 
 
 class TurningAxis(Puppeteer):

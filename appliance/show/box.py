@@ -41,6 +41,11 @@ class SensorsConfig(Section):
         default=None,
         description="File with the sensors' keys, relative to the box file; null: none is let in.",
     )
+    light: bool = Field(
+        default=True,
+        description="A short flash of a sensor's lamp each 3 seconds says that it is linked; false: it stays "
+        "dark on stage. Lights that ask for something are shown all the same.",
+    )
 
 
 class OscConfig(Section):
@@ -120,6 +125,11 @@ class JournalConfig(Section):
 class BoxConfig(Section):
     """box.yaml."""
 
+    state: LocalFile | None = Field(
+        default=None,
+        description="Folder where the box keeps what it learns (neutral poses, sensors' calibrations), "
+        "relative to the box file; made when missing; null: the key file's folder.",
+    )
     sensors: SensorsConfig = Field(default_factory=SensorsConfig, description=str(SensorsConfig.__doc__))
     outputs: OutputsConfig = Field(default_factory=OutputsConfig, description=str(OutputsConfig.__doc__))
     control: ControlConfig | None = Field(
@@ -131,6 +141,11 @@ class BoxConfig(Section):
         default=True, description="Place each tick just after the primary sensor's usual arrival."
     )
     journal: JournalConfig = Field(default_factory=JournalConfig, description=str(JournalConfig.__doc__))
+
+    @property
+    def state_folder(self) -> Path | None:
+        """Where the box keeps what it learns; None: nowhere, it has neither a folder nor a key file."""
+        return self.state or (self.sensors.keys.parent if self.sensors.keys is not None else None)
 
 
 def load_box(path: Path | str | None) -> BoxConfig:

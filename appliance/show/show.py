@@ -19,6 +19,7 @@ from appliance.show.yaml_file import YamlFile, read_yaml
 
 MAX_HANDS = 8
 KINDS = ("sensor", "turning", "fixed", "osc")
+SENSOR_KEYS = ("facing", "at_neutral", "neutral", "primary")  # of a hand, for a worn sensor alone
 
 
 class TurningConfig(Section):
@@ -56,9 +57,20 @@ class HandConfig(Section):
         le=1,
         description="How firmly it is held: 0 not at all, 1 fully overwritten in each interaction.",
     )
+    facing: Axis = Field(
+        default=(1.0, 0.0, 0.0),
+        description="For sensors: the axis of the sensor (x, y, z; x is the arrow on its case, z comes out "
+        "of its lid) that points to the front while the dancer stands in the neutral pose.",
+    )
+    at_neutral: Orientation = Field(
+        default=(1.0, 0.0, 0.0, 0.0),
+        description="For sensors: the joint's orientation, local to its parent (w, x, y, z), while the "
+        "dancer stands in the neutral pose; [1, 0, 0, 0] is the skeleton's rest pose.",
+    )
     neutral: Orientation = Field(
         default=(1.0, 0.0, 0.0, 0.0),
-        description="For sensors: the orientation (w, x, y, z) at which the joint stands in its rest pose.",
+        description="For sensors: the sensor's own orientation (w, x, y, z in its axes: z up) that counts as "
+        "the neutral pose until the dancer has stood still for one.",
     )
     primary: bool = Field(
         default=False,
@@ -78,7 +90,7 @@ class HandConfig(Section):
                 "Say who holds the joint, and write a second hand for a second puppeteer.",
                 at=given[1] if given else None,
             )
-        for key in ("neutral", "primary"):
+        for key in SENSOR_KEYS:
             if key in values and given != ["sensor"]:
                 raise refusal(
                     f"'{key}' belongs to a sensor, and this hand is {given[0]}.", "Remove it.", at=key

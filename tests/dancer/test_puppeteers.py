@@ -95,15 +95,47 @@ def test_while_it_is_heard_the_target_is_the_newest_reading_at_once() -> None:
     assert quaternion.angle_between(sensor.pull(1.02).orientation, np.array(RIGHT)) < 1e-3
 
 
+def random_matrix(seed: int) -> np.ndarray:
+    """What turns a reading by two rotations and swaps its axes round, as a worn sensor's does."""
+    left, right = random_quaternions(np.random.default_rng(seed), 2)
+    axes = np.eye(4, dtype=np.float32)[:, [0, 2, 3, 1]]
+    return quaternion.multiply(quaternion.multiply(left, axes), right).T.astype(np.float32)
+
+
 @given(st.integers(0, 2**32 - 1))
-def test_a_reading_counts_from_the_neutral_orientation(seed: int) -> None:
-    neutral, turn = random_quaternions(np.random.default_rng(seed), 2)
-    sensor = WornSensor("lShldr", neutral=neutral.tolist())
-    sensor.hear(quaternion.multiply(turn, neutral), 0.0)
-    assert quaternion.angle_between(sensor.pull(0.0).orientation, turn) < 1e-3
-    sensor.set_neutral(turn.tolist())
-    sensor.hear(turn, 0.02)
-    assert quaternion.angle_between(sensor.pull(0.02).orientation, quaternion.IDENTITY) < 1e-3
+def test_a_reading_goes_through_the_matrix_of_how_it_is_worn(seed: int) -> None:
+    matrix, reading = random_matrix(seed), random_quaternions(np.random.default_rng(seed + 1))
+    sensor = WornSensor("lShldr", joint_from_reading=matrix)
+    sensor.hear(reading.tolist(), 0.0)
+    assert sensor.pull(0.0).orientation == pytest.approx(matrix @ reading, abs=1e-6)
+
+
+def test_worn_anew_before_it_is_heard_it_counts_at_once() -> None:
+    sensor, matrix = WornSensor("lShldr"), random_matrix(1)
+    sensor.wear(matrix)
+    sensor.hear(LEFT, 0.0)
+    sensor.pull(0.0)
+    sensor.hear(LEFT, 0.02)
+    assert sensor.pull(0.02).orientation == pytest.approx(matrix @ np.array(LEFT, np.float32), abs=1e-6)
+
+
+@pytest.mark.parametrize("silence_s", [0.0, 0.14])
+def test_worn_anew_while_it_dances_the_joint_is_led_over(silence_s: float) -> None:
+    sensor, matrix = worn(1.0), random_matrix(3)
+    before = sensor.pull(1.0).orientation.copy()
+    after = matrix @ np.array(LEFT, np.float32)
+    apart = float(quaternion.angle_between(before, after))
+    assert apart > 1.0
+    sensor.wear(matrix)
+    assert (sensor.pull(1.0).orientation == before).all()
+    shown = [before]
+    for tick in range(51, 90):
+        if tick > 50 + silence_s / TICK_S:
+            sensor.hear(LEFT, tick * TICK_S)
+        shown.append(sensor.pull(tick * TICK_S).orientation.copy())
+    steps = quaternion.angle_between(np.array(shown[1:]), np.array(shown[:-1]))
+    assert steps.max() < 1.3 * apart / 25  # evenly over half a second
+    assert shown[-1] == pytest.approx(after, abs=1e-5)
 
 
 @pytest.mark.parametrize("seconds", [1.0, 5.0, -2.0])
