@@ -19,6 +19,7 @@ from appliance.pose import quaternion
 Quaternion = tuple[float, float, float, float]
 Vector = tuple[float, float, float]
 
+NO_BOOT = -1  # boot_nonce of a pose that no power-on gave
 STILL_S = 1.5  # so long must a dancer stand still after switching on
 _STILL_COSINE = math.cos(math.radians(3.0) / 2)  # of half the angle, as the product of two quaternions has it
 _GAP_S = 0.25  # after a longer silence nobody knows whether the sensor was still
@@ -51,6 +52,11 @@ class Mounting:
     facing: Vector = _ARROW
     at_neutral: Quaternion = (1.0, 0.0, 0.0, 0.0)
     assumed: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+    @property
+    def assumed_pose(self) -> NeutralPose:
+        """The neutral pose until one was taken."""
+        return NeutralPose(self.assumed, 0.0, NO_BOOT)
 
 
 class Stillness:

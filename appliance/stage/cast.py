@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.sensor.keys import KeyFileError, SensorKey, load_keys, unknown_sensor
 from appliance.sensor.link import SensorLink, SensorReading, open_link
+from appliance.sensor.neutral import Mounting, joint_from_reading
 from appliance.sensor.udp import PortError
 from appliance.show.box import BoxConfig
 from appliance.show.show import HandConfig, Show
@@ -48,7 +50,8 @@ class Iterations:
 class Cast:
     """Everything that dances, hears and speaks.
 
-    `hand_places`: where the hands' joints stand among the moving ones; `worn`: which joints a sensor holds.
+    `hand_places`: where the hands' joints stand among the moving ones; `worn`: which joints a sensor holds;
+    `mountings`: how it is worn for each of these joints.
     """
 
     skeleton: Skeleton
@@ -59,6 +62,7 @@ class Cast:
     hands: Hands
     hand_places: list[int]
     worn: dict[str, list[WornSensor]]
+    mountings: dict[str, Mounting]
     primary: str | None
     link: SensorLink
     outputs: OscOutputs
@@ -77,8 +81,11 @@ class Cast:
         self.outputs.close()
 
 
-def assemble(show: Show, box: BoxConfig) -> Cast:
-    """Open every port and file of a show. Raises StageError or ConfigError before anything dances."""
+def assemble(show: Show, box: BoxConfig, profiles: Mapping[bytes, bytes] = MappingProxyType({})) -> Cast:
+    """Open every port and file of a show; `profiles`: the sensors' calibrations that the box has kept.
+
+    Raises StageError or ConfigError before anything dances.
+    """
     try:
         puppet = Puppet(show.network, show.skeleton)
         show.require_moving(puppet.joints)
@@ -89,9 +96,11 @@ def assemble(show: Show, box: BoxConfig) -> Cast:
         raise StageError(str(error)) from error
     puppeteers = [_puppeteer(hand) for hand in show.config.hands]
     worn: dict[str, list[WornSensor]] = {}
+    mountings: dict[str, Mounting] = {}
     for hand, puppeteer in zip(show.config.hands, puppeteers, strict=True):
         if hand.sensor is not None and isinstance(puppeteer, WornSensor):
             worn.setdefault(hand.sensor, []).append(puppeteer)
+            mountings[hand.joint] = _mounting(hand)
     return Cast(
         skeleton=show.skeleton,
         puppet=puppet,
@@ -101,8 +110,9 @@ def assemble(show: Show, box: BoxConfig) -> Cast:
         hands=Hands(puppeteers, puppet.joints),
         hand_places=[puppet.joints.index(hand.joint) for hand in show.config.hands],
         worn=worn,
+        mountings=mountings,
         primary=show.config.primary_sensor,
-        link=_link(box, list(worn)),
+        link=_link(box, list(worn), profiles),
         outputs=OscOutputs(box.outputs.osc, show.skeleton),
     )
 
@@ -125,12 +135,17 @@ def admission(cast: Cast, show: Show, box: BoxConfig) -> Admission:
 
 def _puppeteer(hand: HandConfig) -> Puppeteer:
     if hand.sensor is not None:
-        return WornSensor(hand.joint, hand.weight, hand.neutral)
+        mounting = _mounting(hand)
+        return WornSensor(hand.joint, hand.weight, joint_from_reading(mounting.assumed_pose, mounting))
     if hand.turning is not None:
         return TurningAxis(hand.joint, hand.turning.axis, hand.turning.seconds_per_turn, hand.weight)
     if hand.fixed is not None:
         return FixedOrientation(hand.joint, hand.fixed.orientation, hand.weight)
     return Remote(hand.joint, hand.weight)
+
+
+def _mounting(hand: HandConfig) -> Mounting:
+    return Mounting(hand.facing, hand.at_neutral, hand.neutral)
 
 
 def _phrase(show: Show) -> Recording:
@@ -156,17 +171,21 @@ def _playback(show: Show, phrase: Recording, window: int, lifts: NDArray[np.floa
     )
 
 
-def _link(box: BoxConfig, sensors: Sequence[str]) -> SensorLink:
+def _link(box: BoxConfig, sensors: Sequence[str], profiles: Mapping[bytes, bytes]) -> SensorLink:
     keys = _keys(box.sensors.keys, sensors)
     udp = box.sensors.udp
     try:
-        return open_link(
+        link = open_link(
             keys,
             (udp.host, udp.port) if udp is not None and sensors else None,
             [(line.device, line.baud) for line in box.sensors.serial],
+            profiles,
+            sensors,
         )
     except PortError as error:
         raise StageError(str(error)) from error
+    link.light = box.sensors.light
+    return link
 
 
 def _keys(path: Path | None, sensors: Sequence[str]) -> dict[str, SensorKey]:

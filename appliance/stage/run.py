@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.budget import Admission
@@ -21,6 +22,7 @@ from appliance.stage.realtime import enter_realtime, leave_realtime
 from appliance.stage.stage_error import StageError
 from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
+from appliance.stage.wearing import Wearing
 
 _COMMANDS_A_TICK = 4
 _WARM_UP_MARGIN_MS = 0.5
@@ -35,7 +37,9 @@ class Stage:
         self.show, self.box, self.say = show, box, say
         self.health = Health()
         with ExitStack() as opened:
-            self.cast: Cast = assemble(show, box)
+            self.memory = SensorMemory(box.state_folder, say)
+            opened.callback(self.memory.close)
+            self.cast: Cast = assemble(show, box, self.memory.profiles)
             opened.callback(self.cast.close)
             self.control = _open_control(box)
             if self.control is not None:
@@ -50,7 +54,8 @@ class Stage:
         )
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
-        self.tick = Tick(self.cast, self.iterations, latest_start_s)
+        self.wearing = Wearing(self.cast, self.memory, say)
+        self.tick = Tick(self.cast, self.wearing, self.iterations, latest_start_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         self.lock = PhaseLock() if box.phase_lock and self.cast.primary else None
@@ -152,6 +157,8 @@ class Stage:
         self.say(self.health.line(now, times.coding, times.interaction, age_s, locked))
         for sentence in self.watch.news(now):
             self.say(sentence)
+        for imu_id, offsets in self.cast.link.take_profiles():
+            self.memory.keep_profile(imu_id, offsets)
 
     def _open_journal(self, path: Path | None) -> Journal | None:
         """The flight recorder, if one is wanted and can be had: a full disk does not stop the show."""

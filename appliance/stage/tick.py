@@ -12,6 +12,7 @@ from appliance.outputs.joint_frame import JointFrame
 from appliance.stage.cast import Cast, Iterations
 from appliance.stage.clock import Slot
 from appliance.stage.journal import SECTIONS
+from appliance.stage.wearing import Wearing
 
 DRAIN, HANDS, MOTION, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
 
@@ -27,11 +28,13 @@ class Tick:
     def __init__(
         self,
         cast: Cast,
+        wearing: Wearing,
         iterations: Iterations,
         latest_start_s: float,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self.cast = cast
+        self.wearing = wearing
         self.iterations = iterations
         self.latest_start_s = latest_start_s
         self.frame = JointFrame(len(cast.skeleton))
@@ -49,6 +52,7 @@ class Tick:
         frame.late = slot.lateness_s > self.latest_start_s
 
         for reading in cast.link.drain(slot.started):
+            self.wearing.hear(reading)
             cast.hear(reading)
         ends[DRAIN] = ends[HANDS] = ends[MOTION] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
 
@@ -82,9 +86,13 @@ class Tick:
             cast.puppet.dance(window, hands.mask, hands.targets, hands.weights, 1, 0)
 
     def after(self, slot: Slot) -> float:
-        """What can wait until the frame has left: the motion moves on, times are noted. The cost in ms."""
+        """What can wait until the frame has left: the motion moves on, sensors are answered and looked at,
+        times are noted. The cost of what came before, in ms.
+        """
         if not self.frame.late:
             self.cast.motion.advance()
+        self.cast.link.tend(self._monotonic())
+        self.wearing.look(slot.started)
         begin = slot.started
         for section, end in enumerate(self._section_ends):
             self.sections_ms[section] = 1000.0 * (end - begin)

@@ -13,6 +13,7 @@ import pytest
 
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey, create_keys
+from appliance.sensor.memory import SensorMemory
 from appliance.sensor.udp import UdpIntake
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig, UdpConfig
 from appliance.show.bundle import default_show_path
@@ -20,6 +21,7 @@ from appliance.show.show import load_show
 from appliance.stage.cast import Cast, Iterations, assemble
 from appliance.stage.clock import TICK_S, Slot
 from appliance.stage.tick import Tick
+from appliance.stage.wearing import Wearing
 
 SENSOR = "left-wrist"
 
@@ -79,7 +81,8 @@ def test_the_whole_tick(measured: Callable[..., Any], cast: Cast, key: SensorKey
     intake = cast.link.intakes[0]
     assert isinstance(intake, UdpIntake)
     sensor = Sensor(key, intake.address)
-    tick = Tick(cast, Iterations(10, 9, 10), latest_start_s=TICK_S)
+    wearing = Wearing(cast, SensorMemory(None, print), print)
+    tick = Tick(cast, wearing, Iterations(10, 9, 10), latest_start_s=TICK_S)
     slot, ran = Slot(), 0
 
     def next_slot() -> tuple[tuple[Slot], dict[str, object]]:

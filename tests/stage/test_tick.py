@@ -11,16 +11,19 @@ import pytest
 
 from appliance.pose import quaternion
 from appliance.sensor.link import SensorReading
+from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import Cast, Iterations, assemble
 from appliance.stage.clock import TICK_S, Slot
 from appliance.stage.tick import Tick
+from appliance.stage.wearing import Wearing
 from hw_sim.osc_receiver import OscReceiver
 from tests.stage.bundles import FIGURE, write_show
 
 SHOULDER, CHEST = FIGURE.index("lShldr"), FIGURE.index("Chest")
-TURNED = (0.8, 0.6, 0.0, 0.0)
+TURNED = (0.8, 0.6, 0.0, 0.0)  # about the sensor's x, which points to the front
+LEANS = np.array((0.8, 0.0, 0.0, 0.6))  # the same about the stage's z
 
 
 @pytest.fixture
@@ -40,11 +43,15 @@ def stage(tmp_path: Path, receiver: OscReceiver) -> Iterator[Callable[..., Tick]
             outputs=OutputsConfig(osc=[OscConfig(port=receiver.port, frame_message=True)]),
         )
         casts.append(assemble(show, box))
-        return Tick(casts[-1], Iterations(3, 2, 10), latest_start_s=0.005)
+        return Tick(casts[-1], worn(casts[-1]), Iterations(3, 2, 10), latest_start_s=0.005)
 
     yield made
     for cast in casts:
         cast.close()
+
+
+def worn(cast: Cast) -> Wearing:
+    return Wearing(cast, SensorMemory(None, print), print)
 
 
 def dance(tick: Tick, slots: range, late_s: float = 0.0, heard: tuple[float, ...] | None = None) -> None:
@@ -52,6 +59,7 @@ def dance(tick: Tick, slots: range, late_s: float = 0.0, heard: tuple[float, ...
         deadline = 100.0 + number * TICK_S
         if heard is not None:
             reading = SensorReading("left-wrist", heard, number, 0, deadline, deadline - 0.001, 90, 255)
+            tick.wearing.hear(reading)
             tick.cast.hear(reading)
         slot = Slot(number, deadline, deadline + late_s)
         tick.run(slot)
@@ -90,7 +98,7 @@ def test_a_worn_sensor_turns_its_joint_and_the_frame_names_the_reading(
     dance(tick, range(60), heard=TURNED)
     assert tick.frame.sensor_sequence == 59
     assert tick.frame.sensor_arrival == pytest.approx(100.0 + 59 * TICK_S - 0.001)
-    assert quaternion.angle_between(tick.frame.pose[SHOULDER], np.array(TURNED)) < 0.01
+    assert quaternion.angle_between(tick.frame.pose[SHOULDER], LEANS) < 0.01
     assert frames(receiver)[-1][2] == 59
 
 
@@ -98,6 +106,19 @@ def test_the_neutral_orientation_of_a_sensor_means_the_rest_pose(stage: Callable
     tick = stage(hands=[{"sensor": "left-wrist", "joint": "lShldr", "neutral": list(TURNED)}])
     dance(tick, range(60), heard=TURNED)
     assert quaternion.angle_between(tick.frame.pose[SHOULDER], quaternion.IDENTITY) < 0.01
+
+
+def test_a_neutral_pose_taken_in_stillness_leads_the_joint_over(stage: Callable[..., Tick]) -> None:
+    hanging = [0.8, 0.0, 0.0, -0.6]
+    tick = stage(hands=[{"sensor": "left-wrist", "joint": "lShldr", "at_neutral": hanging}])
+    shown = []
+    for number in range(110):
+        dance(tick, range(number, number + 1), heard=TURNED)
+        shown.append(tick.frame.pose[SHOULDER].copy())
+    assert quaternion.angle_between(shown[70], quaternion.IDENTITY) < 0.01  # turned up from hanging
+    assert quaternion.angle_between(shown[-1], np.array(hanging)) < 0.01
+    steps = quaternion.angle_between(np.array(shown[61:]), np.array(shown[60:-1]))
+    assert steps.max() < 2 * 1.29 / 25  # 74 degrees, spread over half a second
 
 
 def test_a_late_tick_sends_the_last_pose_marked_late_and_the_phrase_waits(
@@ -157,7 +178,8 @@ def test_a_tick_makes_nothing_for_the_collector(stage: Callable[..., Tick]) -> N
 
 def test_section_times_add_up_to_the_cost(stage: Callable[..., Tick]) -> None:
     ticking = iter(np.arange(0.0, 100.0, 0.001).tolist())
-    tick = Tick(stage(hands=[]).cast, Iterations(3, 2, 10), 0.005, monotonic=lambda: next(ticking))
+    cast = stage(hands=[]).cast
+    tick = Tick(cast, worn(cast), Iterations(3, 2, 10), 0.005, monotonic=lambda: next(ticking))
     slot = Slot(0, 0.0, 0.0)
     tick.run(slot)
     cost_ms = tick.after(slot)

@@ -1,0 +1,395 @@
+"""Put on, switched on, stood still, danced; and what may happen to a sensor before the evening is over."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.pose import quaternion
+from appliance.sensor.link import SensorReading
+from appliance.sensor.memory import SensorMemory
+from appliance.sensor.neutral import NeutralPose
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.show import load_show
+from appliance.stage.cast import Cast, assemble
+from appliance.stage.wearing import Wearing
+from tests.stage.bundles import write_show
+
+SENSOR = "left-wrist"
+HANGING = (0.8, 0.0, 0.0, -0.6)
+HAND: dict[str, object] = {"sensor": SENSOR, "joint": "lShldr", "at_neutral": list(HANGING)}
+TICK_S = 0.02
+BOOT, NEXT_BOOT = 0xB007, 0xB008
+
+Orientation = tuple[float, float, float, float]
+Evening = Callable[..., "Stage"]
+
+
+def about_up(degrees: float) -> Orientation:
+    """A reading, sensor axes: z is up."""
+    return math.cos(math.radians(degrees) / 2), 0.0, 0.0, math.sin(math.radians(degrees) / 2)
+
+
+def about_front(degrees: float) -> Orientation:
+    return math.cos(math.radians(degrees) / 2), math.sin(math.radians(degrees) / 2), 0.0, 0.0
+
+
+def multiply(a: Orientation, b: Orientation) -> Orientation:
+    w, x, y, z = (float(part) for part in quaternion.multiply(np.array(a), np.array(b)))
+    return w, x, y, z
+
+
+class Stage:
+    """What Wearing joins, without ports: readings come from the test, at 50 Hz of its own time."""
+
+    def __init__(self, cast: Cast, memory: SensorMemory) -> None:
+        self.said: list[str] = []
+        self.cast = cast
+        self.memory = memory
+        self.wearing = Wearing(cast, memory, self.said.append)
+        self.now = 100.0
+        self.sequence = 0
+
+    def hear(
+        self,
+        orientation: Orientation,
+        sensor: str = SENSOR,
+        boot: int = BOOT,
+        taps: int = 0,
+        restarts: int = 0,
+    ) -> None:
+        """One tick with one reading."""
+        self.now += TICK_S
+        self.sequence += 1
+        reading = SensorReading(
+            *(sensor, orientation, self.sequence, 0, self.now, self.now, 90, 255),
+            *(boot, taps, restarts),
+        )
+        self.wearing.hear(reading)
+        self.cast.hear(reading)
+        self.cast.hands.pull(self.now)
+        self.wearing.look(self.now)
+
+    def stand(self, seconds: float, orientation: Orientation, **reading: int | str) -> None:
+        for _ in range(round(seconds / TICK_S)):
+            self.hear(orientation, **reading)  # type: ignore[arg-type]
+
+    def dance(self, seconds: float, boot: int = BOOT, **reading: int) -> None:
+        """Never still: 150 degrees a second."""
+        for step in range(round(seconds / TICK_S)):
+            self.hear(multiply(about_up(3.0 * step), about_front(2.0 * step)), boot=boot, **reading)
+
+    def silence(self, seconds: float) -> None:
+        for _ in range(round(seconds / TICK_S)):
+            self.now += TICK_S
+            self.cast.hands.pull(self.now)
+            self.wearing.look(self.now)
+
+    def target(self, joint: str = "lShldr") -> np.ndarray:
+        return self.cast.hands.targets[self.cast.puppet.joints.index(joint)].copy()
+
+    @property
+    def wants(self) -> bool:
+        return SENSOR in self.cast.link.wants_neutral
+
+    def taken(self, sensor: str = SENSOR) -> int:
+        return self.said.count(f"Sensor {sensor}: neutral pose taken. Dance.")
+
+
+def holds(target: np.ndarray, expected: Orientation) -> bool:
+    return bool(quaternion.angle_between(target, np.array(expected)) < 0.01)
+
+
+@pytest.fixture
+def memory() -> SensorMemory:
+    return SensorMemory(None, print)
+
+
+@pytest.fixture
+def evening(tmp_path: Path, memory: SensorMemory) -> Iterator[Evening]:
+    casts: list[Cast] = []
+
+    def begun(hands: list[dict[str, object]] | None = None) -> Stage:
+        """The box is switched on; what it remembers of before stays."""
+        show = load_show(write_show(tmp_path / f"show{len(casts)}", hands or [HAND]))
+        casts.append(
+            assemble(show, BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[])))
+        )
+        return Stage(casts[-1], memory)
+
+    yield begun
+    for cast in casts:
+        cast.close()
+
+
+def test_stood_still_for_a_breath_the_neutral_pose_is_taken_once(evening: Evening) -> None:
+    stage = evening()
+    assert not stage.wants  # nobody was heard yet
+    stage.dance(1.0)
+    assert stage.wants and stage.wearing.neutral_of(SENSOR) == "wanted"
+    standing = multiply(about_up(130.0), about_front(20.0))
+    stage.stand(1.4, standing)
+    assert stage.wants and stage.taken() == 0
+    stage.stand(0.7, standing)
+    assert not stage.wants and stage.taken() == 1
+    assert stage.wearing.neutral_of(SENSOR) == "taken"
+    assert holds(stage.target(), HANGING)
+    stage.dance(1.0)
+    stage.stand(5.0, about_up(10.0))
+    assert stage.taken() == 1 and len(stage.said) == 1
+
+
+def test_from_the_neutral_pose_on_the_joint_turns_as_the_dancer_does(evening: Evening) -> None:
+    stage = evening()
+    standing = about_up(130.0)  # the arrow to the front, and that is where the sensor's north lies
+    stage.stand(3.0, standing)
+    raised = multiply(about_front(90.0), about_up(0.0))  # to the left side, about the front axis
+    stage.stand(0.1, multiply(multiply(about_up(130.0), raised), about_up(0.0)))
+    about_stage_front = quaternion.from_axis_angle([0, 0, 1], math.pi / 2)
+    expected = quaternion.multiply(about_stage_front, np.array(HANGING))
+    assert holds(stage.target(), tuple(expected.tolist()))
+
+
+def test_the_pose_is_remembered_by_sensor_and_joint(evening: Evening, memory: SensorMemory) -> None:
+    stage = evening([HAND, {"sensor": SENSOR, "joint": "lForeArm", "facing": [0, 1, 0]}])
+    standing = about_up(40.0)
+    stage.stand(2.5, standing)
+    for joint in ("lShldr", "lForeArm"):
+        assert memory.neutral(SENSOR, joint) == NeutralPose(standing, 0.0, BOOT)
+    assert holds(stage.target("lShldr"), HANGING)
+    assert holds(stage.target("lForeArm"), (1.0, 0.0, 0.0, 0.0))
+
+
+def test_a_restart_of_the_box_keeps_the_pose_of_the_same_power_on(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    again = evening()
+    again.stand(0.1, about_up(40.0))
+    assert holds(again.target(), HANGING)
+    assert not again.wants and again.taken() == 0
+    assert again.said == [f"Sensor {SENSOR}: the neutral pose taken before is used on. Dance."]
+    assert again.wearing.neutral_of(SENSOR) == "taken"
+
+
+def test_another_night_begins_with_the_kept_pose_and_wants_a_new_one(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    tomorrow = evening()
+    assert tomorrow.wearing.neutral_of(SENSOR) == "kept"
+    tomorrow.stand(0.1, about_up(40.0), boot=NEXT_BOOT)
+    assert tomorrow.wants and holds(tomorrow.target(), HANGING)
+    tomorrow.stand(2.5, about_up(-20.0), boot=NEXT_BOOT)
+    assert tomorrow.taken() == 1 and holds(tomorrow.target(), HANGING)
+
+
+@pytest.mark.parametrize(("boot", "restarts"), [(NEXT_BOOT, 0), (BOOT, 1)])
+def test_a_heading_lost_in_mid_show_is_carried_over(evening: Evening, boot: int, restarts: int) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    stage.dance(2.0)
+    stage.stand(0.2, multiply(about_up(60.0), about_front(30.0)))
+    before = stage.target()
+    stage.silence(1.4)
+    north_moved = multiply(about_up(-100.0), multiply(about_up(60.0), about_front(30.0)))
+    shown = []
+    for _ in range(40):
+        stage.hear(north_moved, boot=boot, restarts=restarts)
+        shown.append(stage.target())
+    assert quaternion.angle_between(np.array(shown), before).max() < 0.01
+    assert not stage.wants and stage.taken() == 1
+    assert "its joint goes on where it was" in stage.said[-1]
+    assert ("IMU" in stage.said[-1]) == (boot == BOOT)
+    stage.stand(0.5, multiply(about_up(-100.0), about_up(40.0)), boot=boot, restarts=restarts)
+    assert holds(stage.target(), HANGING)
+
+
+def test_what_was_carried_over_survives_a_restart_of_the_box(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    stage.silence(2.0)
+    stage.stand(0.5, about_up(-60.0), boot=NEXT_BOOT)
+    again = evening()
+    again.stand(0.1, about_up(-60.0), boot=NEXT_BOOT)
+    assert not again.wants and holds(again.target(), HANGING)
+
+
+def test_after_more_than_a_minute_the_dancer_stands_still_again(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    stage.silence(61.0)
+    stage.stand(0.1, about_up(90.0), boot=NEXT_BOOT)
+    assert stage.wants
+    stage.stand(2.5, about_up(90.0), boot=NEXT_BOOT)
+    assert stage.taken() == 2 and holds(stage.target(), HANGING)
+
+
+def test_without_a_pose_nothing_is_carried_over(evening: Evening) -> None:
+    stage = evening()
+    stage.dance(1.0)
+    stage.silence(2.0)
+    stage.dance(1.0, boot=NEXT_BOOT)
+    assert stage.wants and stage.said == []
+    stage.stand(1.6, about_up(5.0), boot=NEXT_BOOT)
+    assert stage.taken() == 1
+
+
+def test_a_restart_of_the_imu_while_standing_still_begins_the_breath_anew(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(1.2, about_up(5.0))
+    stage.stand(1.2, about_up(6.0), restarts=1)
+    assert stage.taken() == 0
+    stage.stand(0.6, about_up(6.0), restarts=1)
+    assert stage.taken() == 1 and holds(stage.target(), HANGING) is False  # it is led over
+    stage.stand(0.6, about_up(6.0), restarts=1)
+    assert holds(stage.target(), HANGING)
+
+
+def test_a_double_tap_takes_the_pose_at_the_next_half_second_of_stillness(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    stage.dance(1.0, taps=0)
+    stage.dance(0.5, taps=1)
+    assert stage.wants
+    stage.stand(0.4, about_up(70.0), taps=1)
+    assert stage.taken() == 1
+    stage.stand(0.8, about_up(70.0), taps=1)
+    assert stage.taken() == 2 and not stage.wants
+    assert holds(stage.target(), HANGING)
+    stage.stand(3.0, about_up(20.0), taps=1)
+    assert stage.taken() == 2
+
+
+def test_stillness_before_the_tap_does_not_count(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(4.0, about_up(40.0))
+    stage.stand(0.4, about_up(40.0), taps=255)
+    assert stage.taken() == 1
+    stage.stand(0.2, about_up(40.0), taps=255)
+    assert stage.taken() == 2
+    stage.stand(0.6, about_up(40.0), taps=0)  # the counter wraps
+    assert stage.taken() == 3
+
+
+def test_who_taps_and_dances_on_keeps_the_pose_and_is_told(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    stage.dance(2.9, taps=1)
+    assert stage.wants and len(stage.said) == 1
+    stage.dance(0.2, taps=1)
+    assert not stage.wants and len(stage.said) == 2
+    assert "did not keep still within 3 s" in stage.said[1]
+    stage.stand(0.5, about_up(40.0), taps=1)
+    assert stage.taken() == 1 and holds(stage.target(), HANGING)
+
+
+def test_a_tap_before_the_first_pose_leaves_it_wanted(evening: Evening) -> None:
+    stage = evening()
+    stage.dance(0.2)
+    stage.dance(3.5, taps=1)
+    assert stage.wants and "did not keep still" in stage.said[-1]
+    stage.stand(1.6, about_up(40.0), taps=1)
+    assert stage.taken() == 1
+
+
+def test_a_sensor_that_falls_silent_while_asked_is_told_of_too(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    stage.stand(0.1, about_up(40.0), taps=1)
+    stage.silence(3.1)
+    assert not stage.wants and "did not keep still" in stage.said[-1]
+
+
+@pytest.mark.parametrize("asked", [SENSOR, None])
+def test_a_person_may_ask_for_the_pose(evening: Evening, asked: str | None) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    stage.dance(1.0)
+    stage.wearing.take_neutral(asked, stage.now)
+    stage.stand(1.2, about_up(80.0))
+    assert stage.taken() == 2 and holds(stage.target(), HANGING)
+
+
+def test_a_dancer_who_stands_still_already_need_not_wait(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    stage.dance(1.0)
+    stage.stand(1.0, about_up(80.0))
+    stage.wearing.take_neutral(SENSOR, stage.now)
+    stage.hear(about_up(80.0))
+    assert stage.taken() == 2
+
+
+@pytest.mark.parametrize("asked", [SENSOR, None])
+def test_the_heading_alone_is_reset(evening: Evening, memory: SensorMemory, asked: str | None) -> None:
+    stage = evening()
+    stage.stand(2.5, about_up(40.0))
+    drifted = multiply(about_up(25.0), about_up(40.0))
+    stage.stand(0.5, drifted)
+    assert not holds(stage.target(), HANGING)
+    stage.wearing.reset_heading(asked, stage.now)
+    stage.stand(0.6, drifted)
+    assert holds(stage.target(), HANGING)
+    assert stage.said[-1] == f"Sensor {SENSOR}: this is the front now. Dance."
+    kept = memory.neutral(SENSOR, "lShldr")
+    assert kept is not None and kept.heading == pytest.approx(math.radians(25.0))
+    assert stage.taken() == 1 and not stage.wants
+
+
+def test_a_heading_reset_before_any_pose_is_for_now_alone(evening: Evening, memory: SensorMemory) -> None:
+    stage = evening()
+    stage.dance(0.3)
+    stage.hear(about_up(90.0))
+    stage.wearing.reset_heading(SENSOR, stage.now)
+    stage.stand(0.6, about_up(90.0))
+    assert holds(stage.target(), HANGING)
+    assert memory.neutral(SENSOR, "lShldr") is None and stage.wants
+
+
+def test_upside_down_no_heading_is_reset(evening: Evening) -> None:
+    stage = evening()
+    stage.stand(2.0, about_up(0.0))
+    stage.stand(0.6, about_front(180.0))
+    before = stage.target()
+    stage.wearing.reset_heading(SENSOR, stage.now)
+    stage.stand(0.6, about_front(180.0))
+    assert "upside down" in stage.said[-1]
+    assert (stage.target() == before).all()
+
+
+def test_asking_for_a_stranger_or_a_silent_sensor_is_answered(evening: Evening) -> None:
+    stage = evening()
+    stage.wearing.take_neutral(None, stage.now)  # nobody is there: nothing to say
+    stage.wearing.take_neutral("left-wirst", stage.now)
+    stage.wearing.reset_heading(SENSOR, stage.now)
+    stage.wearing.look(stage.now)
+    assert len(stage.said) == 2
+    assert "'left-wirst'" in stage.said[0] and "Did you mean 'left-wrist'?" in stage.said[0]
+    assert "silent" in stage.said[1]
+    assert stage.wearing.neutral_of("left-wirst") == ""
+    assert stage.wearing.neutral_of(SENSOR) == "assumed"
+
+
+def test_an_arrow_that_points_down_is_complained_of_and_the_lid_tells_the_front(evening: Evening) -> None:
+    stage = evening()
+    arrow_down = multiply(about_up(70.0), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0))
+    stage.stand(2.5, arrow_down)
+    assert holds(stage.target(), HANGING)
+    assert len(stage.said) == 2
+    assert "stood upright" in stage.said[1] and "lid" in stage.said[1] and "lShldr" in stage.said[1]
+    stage.stand(0.1, multiply(about_up(30.0), arrow_down))  # turns to the left by 30 degrees
+    turned_left = quaternion.from_axis_angle([0, 1, 0], math.radians(30.0))
+    assert holds(stage.target(), tuple(quaternion.multiply(turned_left, np.array(HANGING)).tolist()))
+
+
+def test_sensors_do_not_mind_each_other(evening: Evening) -> None:
+    stage = evening([HAND, {"sensor": "right-wrist", "joint": "lForeArm"}])
+    for _ in range(100):
+        stage.hear(about_up(40.0))
+        stage.hear(multiply(about_up(stage.sequence * 2.0), about_front(9.0)), sensor="right-wrist")
+        stage.hear(about_up(0.0), sensor="stranger")
+    assert stage.taken() == 1 and stage.taken("right-wrist") == 0
+    assert stage.cast.link.wants_neutral == {"right-wrist"}
