@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import NamedTuple
 
 from appliance.sensor.plausibility import Orientation
@@ -32,7 +33,7 @@ class SensorState(NamedTuple):
     device_id: int
     state: str  # absent, greeted, linked, lost
     way: str  # "192.168.4.7:2390", "/dev/ttyACM0", or "" before the first reading
-    rate_hz: float  # believed to be its own: readings a second, last 2 s
+    rate_hz: float  # readings a second, last 2 s
     loss: float  # share of readings that never came, last 10 s
     round_trip_s: float | None
     age_s: float | None  # since the newest believed reading
@@ -43,3 +44,37 @@ class SensorState(NamedTuple):
     flags: int  # wire.HAS_PROFILE, wire.IS_NDOF
     boot_nonce: int
     complaint: str  # a sentence for people, or ""
+
+
+class Reception:
+    """How many readings a second come, and what share is lost on the way."""
+
+    LOSS_S = 10.0
+
+    def __init__(self) -> None:
+        self.received = 0
+        self.lost = 0
+        self._marks: deque[tuple[float, int, int]] = deque()  # a second apart: time, received, lost
+
+    def mark(self, now: float) -> None:
+        """Remember where things stand; to be called often, kept once a second."""
+        if self._marks and now - self._marks[-1][0] < 1.0:
+            return
+        self._marks.append((now, self.received, self.lost))
+        while now - self._marks[0][0] > self.LOSS_S:
+            self._marks.popleft()
+
+    def rate_hz(self, now: float) -> float:
+        """Readings a second since the mark before the newest: over the last one to two seconds."""
+        if not self._marks:
+            return 0.0
+        since, received, _ = self._marks[max(-2, -len(self._marks))]
+        return (self.received - received) / (now - since) if now > since else 0.0
+
+    def loss(self) -> float:
+        """The share that is missing of the last 10 s; 0 when there was nothing."""
+        if not self._marks:
+            return 0.0
+        _, received, lost = self._marks[0]
+        missing, came = self.lost - lost, self.received - received
+        return missing / (missing + came) if missing else 0.0

@@ -1,4 +1,4 @@
-"""Readings from the network: one UDP socket, drained without waiting, each datagram with its true arrival."""
+"""Sensors on the network: sockets drained without waiting, each datagram with its true arrival."""
 
 from __future__ import annotations
 
@@ -7,16 +7,21 @@ import struct
 import sys
 import time
 from collections import Counter
+from collections.abc import Collection, Iterator
 
 from appliance.sensor import wire
+from appliance.sensor.intake import Origin
 
 # Linux, include/uapi/asm-generic/socket.h: the kernel stamps each datagram as it comes in, on the wall clock.
 SO_TIMESTAMPNS = 35
 TIMESPEC = struct.Struct("@qq")
 OLDEST_S = 1.0
-# The kernel counts about 768 bytes for a datagram of ours and doubles what is asked for: room for some 250.
-# More would hold stale readings back in a flood, less would lose the burst after a stall of the network.
-RECEIVE_BUFFER_BYTES = 96 * 1024
+# The kernel counts about 768 bytes for a datagram of ours and doubles what is asked for.
+COMMON_BUFFER_BYTES = 192 * 1024  # room for some 500 of strangers: two ticks' worth of a heavy flood
+OWN_BUFFER_BYTES = 32 * 1024  # room for some 85 of one sensor: the burst after a stall of 1.7 s
+# A drain takes at most so many: in a flood 1.5 ms of a tick.
+COMMON_PER_DRAIN = 256
+OWN_PER_DRAIN = 32
 
 
 class PortError(OSError):
@@ -24,7 +29,11 @@ class PortError(OSError):
 
 
 class UdpIntake:
-    """Listens on `host`:`port` (0: any free port, see `address`). Raises PortError when it cannot."""
+    """Listens on `host`:`port` (0: any free port, see `address`). Raises PortError when it cannot.
+
+    Everybody is heard on the common socket. A linked sensor has one of its own, on the same port, connected
+    to its address: the kernel puts that sensor's datagrams there, and a flood fills the common one alone.
+    """
 
     def __init__(self, host: str, port: int) -> None:
         self.counts: Counter[str] = Counter()
@@ -38,45 +47,107 @@ class UdpIntake:
         except OSError as error:
             self._socket.close()
             raise PortError(_advice(host, port, error)) from error
-        self._socket.setblocking(False)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
-        if sys.platform == "linux":
-            self._socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
-        self.address: tuple[str, int] = self._socket.getsockname()[:2]
+        _prepare(self._socket, COMMON_BUFFER_BYTES)
+        if sys.platform == "linux":  # after bind: a second box must be refused, our own sockets must not
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        self._bound: Origin = self._socket.getsockname()
+        self.address: tuple[str, int] = (self._bound[0], self._bound[1])
+        self._own: dict[Origin, socket.socket] = {}
+        self._left: list[socket.socket] = []  # drained once more before they close
+        self._astray: set[Origin] = set()  # have a socket of their own, but were heard on the common one
         self._buffer = bytearray(2 * wire.LARGEST)  # longer datagrams are cut, and then have the wrong length
         self._view = memoryview(self._buffer)
         self._buffers = [self._buffer]
         self._ancillary_bytes = socket.CMSG_SPACE(TIMESPEC.size)
-        self._monotonic_minus_wall: float | None = None
+        self._monotonic_minus_wall = 0.0
 
-    def receive(self, now: float) -> tuple[wire.Buffer, float] | None:
-        """The next waiting datagram and its arrival (monotonic seconds, <= now); None when none waits.
+    def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
+        """Waiting datagrams, their arrivals (monotonic seconds, <= now) and senders; linked sensors' first.
 
-        The bytes are valid until the next call. Never waits, never raises: the network's errors are counted.
+        The bytes are valid until the next one. Never waits, never raises: the network's errors are counted.
         """
+        self._monotonic_minus_wall = (
+            time.monotonic() - time.time()
+        )  # anew each time: the wall clock may be set
+        for own in self._own.values():
+            yield from self._drain(own, OWN_PER_DRAIN, now)
+        while self._left:
+            own = self._left.pop()
+            yield from self._drain(own, OWN_PER_DRAIN, now)
+            own.close()
+        for received in self._drain(self._socket, COMMON_PER_DRAIN, now):
+            if received[2] in self._own:
+                self._astray.add(received[2])
+            yield received
+
+    def send(self, packet: bytes, origin: Origin) -> None:
+        """One datagram from the listening port. What cannot leave at once is dropped and counted."""
         try:
-            length, ancillary, _, _ = self._socket.recvmsg_into(self._buffers, self._ancillary_bytes)
-        except BlockingIOError:
-            self._monotonic_minus_wall = None
-            return None
+            self._socket.sendto(packet, origin)
         except OSError:
-            self.counts["socket_error"] += 1
-            return None
-        return self._view[:length], self._arrival(ancillary, now)
+            self.counts["send_error"] += 1
+
+    def attend(self, origins: Collection[Origin]) -> None:
+        """Give these senders, and nobody else, a socket of their own."""
+        if sys.platform != "linux":
+            return
+        for origin in [one for one in self._own if one not in origins or one in self._astray]:
+            self._left.append(self._own.pop(origin))
+        self._astray.clear()
+        for origin in origins:
+            if origin not in self._own:
+                try:
+                    self._own[origin] = self._connected(origin)
+                except OSError:
+                    self.counts["socket_error"] += 1
+
+    def describe(self, origin: Origin) -> str:
+        return f"{origin[0]}:{origin[1]}"
 
     def close(self) -> None:
-        self._view.release()
-        self._socket.close()
+        for one in (self._socket, *self._own.values(), *self._left):
+            one.close()
+
+    def _connected(self, origin: Origin) -> socket.socket:
+        own = socket.socket(self._socket.family, socket.SOCK_DGRAM)
+        try:
+            _prepare(own, OWN_BUFFER_BYTES)
+            own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+            own.bind(self._bound)
+            own.connect(origin)
+        except OSError:
+            own.close()
+            raise
+        return own
+
+    def _drain(
+        self, one: socket.socket, most: int, now: float
+    ) -> Iterator[tuple[wire.Buffer, float, Origin]]:
+        for _ in range(most):
+            try:
+                length, ancillary, _, origin = one.recvmsg_into(self._buffers, self._ancillary_bytes)
+            except BlockingIOError:
+                return
+            except OSError:
+                self.counts["socket_error"] += 1
+                return
+            yield self._view[:length], self._arrival(ancillary, now), origin
+        self.counts["drain_limit"] += 1
 
     def _arrival(self, ancillary: list[tuple[int, int, bytes]], now: float) -> float:
         """The kernel's stamp on the box's clock. A wall clock that was set meanwhile, or no stamp: `now`."""
         if not ancillary or len(ancillary[0][2]) != TIMESPEC.size:
             return now
-        if self._monotonic_minus_wall is None:  # compared anew in each drain: the wall clock may be set
-            self._monotonic_minus_wall = time.monotonic() - time.time()
         seconds, nanoseconds = TIMESPEC.unpack(ancillary[0][2])
         arrival: float = seconds + nanoseconds * 1e-9 + self._monotonic_minus_wall
         return arrival if now - OLDEST_S < arrival < now else now
+
+
+def _prepare(one: socket.socket, buffer_bytes: int) -> None:
+    one.setblocking(False)
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
+    if sys.platform == "linux":
+        one.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
 
 
 def _advice(host: str, port: int, error: Exception) -> str:

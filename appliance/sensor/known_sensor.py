@@ -1,0 +1,122 @@
+"""One sensor of the key file: its pairing, its clock, its last orientation, how it is."""
+
+from __future__ import annotations
+
+from math import inf
+
+from appliance.sensor import wire
+from appliance.sensor.device_clock import DeviceClock
+from appliance.sensor.intake import Way
+from appliance.sensor.keys import SensorKey
+from appliance.sensor.pairing import LOST_S, Pairing
+from appliance.sensor.plausibility import Orientation, PlausibilityGate
+from appliance.sensor.state import Reception, SensorReading, SensorState
+
+
+class KnownSensor:
+    """Turns authentic, new readings into believed ones."""
+
+    def __init__(self, key: SensorKey, pairing: Pairing) -> None:
+        self.key = key
+        self.pairing = pairing
+        self.reception = Reception()
+        self.believed_arrival: float | None = None
+        self.arrivals: list[float] = []  # of the believed readings of one drain
+        self.strobe_until = -inf
+        self._clock = DeviceClock()
+        self._gate = PlausibilityGate()
+        self._orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
+
+    def follow(self, packet: wire.Reading, way: Way, arrival: float, is_reboot: bool) -> int:
+        """Takes an authentic, new reading as the newest; gives how many before it were lost."""
+        if is_reboot:
+            self._clock.reset()
+            self._gate.reset()
+        lost = self.pairing.follow(packet, way, arrival)
+        self.reception.received += 1
+        self.reception.lost += lost
+        return lost
+
+    def believe(self, packet: wire.Reading, arrival: float) -> tuple[SensorReading | None, str]:
+        """The reading, if a hand could have made it, and what happened to it."""
+        sensor_time_us = self._clock.unwrap(packet.sensor_time_us, arrival)
+        measured_at = self._clock.observe(sensor_time_us, arrival)
+        unit, fate = self._gate.admit(packet.orientation, sensor_time_us, arrival)
+        if unit is None:
+            return None, fate
+        w, x, y, z = unit
+        a, b, c, d = self._orientation
+        if w * a + x * b + y * c + z * d < 0:
+            unit = (-w, -x, -y, -z)
+        self._orientation = unit
+        self.believed_arrival = arrival
+        self.arrivals.append(arrival)
+        return (
+            SensorReading(
+                self.key.name,
+                unit,
+                packet.sequence,
+                sensor_time_us,
+                measured_at,
+                arrival,
+                packet.battery,
+                packet.calibration,
+                packet.boot_nonce,
+                packet.taps,
+                packet.recoveries,
+                packet.flags,
+                _round_trip_s(packet),
+            ),
+            fate,
+        )
+
+    def state(self, now: float) -> SensorState:
+        """How it is, for people."""
+        pairing, session, hello = self.pairing, self.pairing.session, self.pairing.hello
+        newest = session.newest if session is not None else None
+        told = newest or hello
+        age_s = None if self.believed_arrival is None else max(0.0, now - self.believed_arrival)
+        return SensorState(
+            name=self.key.name,
+            device_id=self.key.device_id,
+            state=self._stage(now),
+            way="" if session is None else session.way[0].describe(session.way[1]),
+            rate_hz=self.reception.rate_hz(now),
+            loss=self.reception.loss(),
+            round_trip_s=None if newest is None else _round_trip_s(newest),
+            age_s=age_s,
+            battery=wire.BATTERY_UNKNOWN if told is None else told.battery,
+            calibration=0 if newest is None else newest.calibration,
+            firmware="" if hello is None else _firmware(hello),
+            imu_id="" if hello is None else hello.imu_id.hex(),
+            flags=0 if told is None else told.flags,
+            boot_nonce=0 if told is None else told.boot_nonce,
+            complaint="" if pairing.way(now) else self._complaint(),
+        )
+
+    def _stage(self, now: float) -> str:
+        pairing = self.pairing
+        if pairing.way(now) is not None:
+            return "linked"
+        if now - pairing.greeted_at < LOST_S:
+            return "greeted"
+        return "absent" if pairing.newest_hello is None else "lost"
+
+    def _complaint(self) -> str:
+        hello = self.pairing.newest_hello
+        if hello is None or hello.wire_hash == wire.WIRE_HASH:
+            return ""
+        return (
+            f"Sensor {self.key.name} speaks another wire (its firmware {_firmware(hello)}: "
+            f"{hello.wire_hash:08x}, this box: {wire.WIRE_HASH:08x}) and is not let in. "
+            "Its joint moves freely. "
+            "Flash it with the firmware/wearable of this version, or update the box."
+        )
+
+
+def _firmware(hello: wire.Hello) -> str:
+    return f"{hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}"
+
+
+def _round_trip_s(packet: wire.Reading) -> float | None:
+    return None if packet.round_trip == wire.ROUND_TRIP_UNKNOWN else packet.round_trip * 1e-4

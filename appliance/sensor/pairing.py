@@ -1,0 +1,192 @@
+"""One sensor's pairing: who is let in, from where it speaks, and what it is owed by the box.
+
+A sensor that was switched on says hello; the assignment that answers gives it a session; its first reading
+with that session puts the session in force. A session is a keyed hash of device, boot nonce and how many
+sessions came into force before: so it needs no memory, a boot that another one has followed can never come
+back, and whatever was recorded before a session began is worth nothing after it.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from hashlib import blake2s
+from math import inf
+
+from appliance.sensor import wire
+from appliance.sensor.intake import Way
+from appliance.sensor.keys import SensorKey
+from appliance.sensor.sequence import SequenceWindow
+
+RATE_HZ = 50
+HEARTBEAT_S = 1.0
+LOST_S = 3.0  # silent for longer: no more heartbeats; the sensor, which gets none, says hello
+SILENT_S = 0.5  # a linked sensor heard within this is there: nobody else with an old session is called
+ASSIGNMENT_INTERVAL_S = 0.1
+CALL_INTERVAL_S = 0.2
+RESTORES = 5
+REMEMBERED_BOOTS = 256
+NO_HAND = 255
+
+
+@dataclass(slots=True)
+class Session:
+    """What is in force: since when, with whom, from where."""
+
+    boot_nonce: int
+    number: int
+    way: Way
+    newest: wire.Reading  # the newest authentic reading
+    heard: float  # its arrival
+    readings: SequenceWindow
+    profile_sequence: int = -1
+    restores: int = 0
+
+
+class Pairing:
+    """State of one sensor. Time is an argument; packets come in authentic, and go out with `due`."""
+
+    def __init__(self, key: SensorKey, secret: bytes, phase_s: float, hand: int = NO_HAND) -> None:
+        self.tagger = wire.Tagger(key.key)
+        self.hand = hand
+        self.session: Session | None = None
+        self.greeted_at = -inf
+        self._device_id = key.device_id
+        self._secret = secret
+        self._phase_s = phase_s
+        self._sessions_before = 0
+        self._hellos: dict[int, wire.Hello] = {}  # boot nonce -> its newest; the newest boot is the last
+        self._unanswered: tuple[wire.Hello, Way] | None = None
+        self._uncalled: tuple[int, Way] | None = None
+        self._assigned_at = self._called_at = -inf
+        self._next_heartbeat = -inf
+        self._led: int | None = None
+        self._sent: dict[type[wire.Packet], int] = {}
+
+    # What is cheap to see, before anyone looks at the tag: why a packet is not new, or None when it may be.
+
+    def hello_staleness(self, boot_nonce: int, sequence: int) -> str | None:
+        before = self._hellos.get(boot_nonce)
+        return "old_hello" if before is not None and sequence <= before.sequence else None
+
+    def reading_staleness(self, boot_nonce: int, number: int, sequence: int) -> str | None:
+        session = self.session
+        if session is not None and boot_nonce == session.boot_nonce:
+            return session.readings.staleness(sequence) if number == session.number else "old_session"
+        return None if number == self._number_for(boot_nonce) else "old_session"
+
+    def profile_staleness(self, boot_nonce: int, number: int, sequence: int) -> str | None:
+        session = self.session
+        if session is None or (boot_nonce, number) != (session.boot_nonce, session.number):
+            return "old_session"
+        return "duplicate" if sequence <= session.profile_sequence else None
+
+    def is_to_be_called(self, now: float) -> bool:
+        """Whether an authentic reading of an unknown session would be answered: no one else is heard."""
+        if self.session is not None and now - self.session.heard < SILENT_S:
+            return False
+        return self._uncalled is None and now - self._called_at >= CALL_INTERVAL_S
+
+    # What is authentic and new.
+
+    def greet(self, hello: wire.Hello, way: Way, now: float) -> str:
+        """A hello, and what becomes of it: hello, or other_wire when it is answered by words alone.
+
+        It changes nothing in force: only a reading with the new session does.
+        """
+        self._hellos.pop(hello.boot_nonce, None)
+        self._hellos[hello.boot_nonce] = hello
+        if len(self._hellos) > REMEMBERED_BOOTS:
+            del self._hellos[next(iter(self._hellos))]
+        self.greeted_at = now
+        if hello.wire_hash != wire.WIRE_HASH:
+            return "other_wire"
+        self._unanswered = hello, way
+        return "hello"
+
+    def follow(self, reading: wire.Reading, way: Way, arrival: float) -> int:
+        """A reading: where it came from is where its sensor is. Gives how many before it never came."""
+        session = self.session
+        if session is None or reading.boot_nonce != session.boot_nonce:
+            session = self.session = Session(
+                reading.boot_nonce, reading.session, way, reading, arrival, SequenceWindow()
+            )
+            self._sessions_before += 1
+            self._next_heartbeat = -inf
+        was_lost = arrival - session.heard >= LOST_S
+        session.newest, session.heard, session.way = reading, arrival, way
+        missing = session.readings.advance(reading.sequence)
+        return 0 if was_lost else missing  # without a link a sensor streams to nobody
+
+    def keep(self, profile: wire.Profile) -> None:
+        """A calibration of the session in force."""
+        if self.session is not None:
+            self.session.profile_sequence = profile.sequence
+
+    def call(self, boot_nonce: int, way: Way) -> None:
+        """A reading of an unknown session: its sensor shall say hello."""
+        self._uncalled = boot_nonce, way
+
+    # What follows from it.
+
+    def due(self, now: float, led: int, profiles: Mapping[bytes, bytes]) -> Iterator[tuple[Way, wire.Packet]]:
+        """What is to be sent now, and where to: an assignment, a call, a heartbeat, a calibration at most."""
+        if self._unanswered is not None and now - self._assigned_at >= ASSIGNMENT_INTERVAL_S:
+            hello, way = self._unanswered
+            self._unanswered, self._assigned_at = None, now
+            yield (
+                way,
+                wire.Assignment(
+                    *self._head(wire.Assignment, hello.boot_nonce, self._number_for(hello.boot_nonce)),
+                    hello_sequence=hello.sequence,
+                    hand=self.hand,
+                    rate_hz=RATE_HZ,
+                    led=led,
+                ),
+            )
+        if self._uncalled is not None:
+            boot_nonce, way = self._uncalled
+            self._uncalled, self._called_at = None, now
+            yield way, wire.Call(*self._head(wire.Call, boot_nonce, 0))
+        session = self.session
+        if session is None or self.way(now) is None:
+            return
+        if now < self._next_heartbeat and led == self._led:
+            return
+        self._led = led
+        self._next_heartbeat = now + HEARTBEAT_S - (now - self._phase_s) % HEARTBEAT_S
+        held_us = max(0, round((now - session.heard) * 1e6))
+        head = self._head(wire.Heartbeat, session.boot_nonce, session.number)
+        yield session.way, wire.Heartbeat(*head, session.readings.newest, held_us, led)
+        imu_id = b"" if self.hello is None else self.hello.imu_id
+        has_profile = session.newest.flags & wire.HAS_PROFILE
+        if imu_id in profiles and not has_profile and session.restores < RESTORES:
+            session.restores += 1
+            head = self._head(wire.Restore, session.boot_nonce, session.number)
+            yield session.way, wire.Restore(*head, imu_id, profiles[imu_id])
+
+    def way(self, now: float) -> Way | None:
+        """Where the sensor is, while it is linked."""
+        session = self.session
+        return session.way if session is not None and now - session.heard < LOST_S else None
+
+    @property
+    def hello(self) -> wire.Hello | None:
+        """The newest hello of the boot in force; before any is, the newest at all."""
+        return self.newest_hello if self.session is None else self._hellos.get(self.session.boot_nonce)
+
+    @property
+    def newest_hello(self) -> wire.Hello | None:
+        return next(reversed(self._hellos.values()), None)
+
+    def _number_for(self, boot_nonce: int) -> int:
+        """The session that this boot has, or would get: 32 bits, never 0."""
+        if self.session is not None and boot_nonce == self.session.boot_nonce:
+            return self.session.number
+        drawn = struct.pack("<III", self._device_id, boot_nonce, self._sessions_before)
+        return int.from_bytes(blake2s(drawn, key=self._secret, digest_size=4).digest(), "little") or 1
+
+    def _head(self, kind: type[wire.Packet], boot_nonce: int, number: int) -> tuple[int, int, int, int]:
+        sequence = self._sent[kind] = self._sent.get(kind, 0) + 1
+        return self._device_id, boot_nonce, number, sequence
