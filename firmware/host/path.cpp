@@ -41,8 +41,9 @@ void Path::go_to(const Quaternion& orientation, uint64_t at_us) {
 }
 
 Quaternion Path::at(uint64_t at_us) const {
-  const auto right = std::upper_bound(waypoints_.begin(), waypoints_.end(), at_us,
-                                      [](uint64_t time, const Waypoint& point) { return time < point.at_us; });
+  const auto right =
+      std::upper_bound(waypoints_.begin(), waypoints_.end(), at_us,
+                       [](uint64_t time, const Waypoint& point) { return time < point.at_us; });
   if (right == waypoints_.begin()) return waypoints_.front().orientation;
   if (right == waypoints_.end()) return waypoints_.back().orientation;
   const auto left = right - 1;

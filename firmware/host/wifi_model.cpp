@@ -14,7 +14,10 @@ constexpr uint64_t kNever = std::numeric_limits<uint64_t>::max();
 }  // namespace
 
 bool WifiModel::is_up() {
-  if (is_joined_ && !is_carrying() && clock_.now_us() >= next_change(false, joined_at_us_) + stale_us_) leave();
+  if (is_joined_ && !is_carrying()) {
+    const uint64_t noticed_us = next_change(false, joined_at_us_) + stale_us_;
+    if (clock_.now_us() >= noticed_us) leave();
+  }
   return is_joined_;
 }
 

@@ -1,4 +1,4 @@
-// The models that stand in for the board: Wi-Fi that blocks and goes stale, flash, the cable, the watchdog, paths.
+// The models that stand in for the board: Wi-Fi that blocks and goes stale, flash, cable, watchdog, paths.
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -76,7 +76,7 @@ TEST_CASE("an access point that comes back while a join blocks is joined") {
   CHECK(air.clock.now_us() < 7 * kSecond);
 }
 
-TEST_CASE("the status is stale when the access point has gone, what is sent is lost, the socket closes at last") {
+TEST_CASE("when the access point has gone the status is stale, what is sent is lost, the socket closes") {
   Air air;
   air.wifi.conditions.stale_us[0] = air.wifi.conditions.stale_us[1] = 3'000'000;
   air.link_up();

@@ -1,0 +1,68 @@
+// The loop of the sketch, with everything around it that the sketch cannot see.
+#include "world.h"
+
+#include <algorithm>
+
+namespace bunraku {
+namespace {
+
+constexpr uint64_t kTurnUs[2] = {120, 280};  // one turn of loop() beside what the ports cost
+constexpr uint64_t kBootUs = 30'000;         // from power to begin(), by the boot loader
+
+uint64_t lot(uint64_t seed, uint64_t which) { return Random(seed * 8 + which).next(); }
+
+}  // namespace
+
+World::World(uint64_t seed, uint64_t start_us)
+    : clock(start_us), wifi(clock, lot(seed, 1)), board(clock, lot(seed, 2)), imu(clock, lot(seed, 3)),
+      loop_(lot(seed, 4)) {
+  imu.set_motion([this](uint64_t at_us) { return hand.at(at_us); });
+  imu.power_off();
+}
+
+void World::power(bool is_on) {
+  if (is_on == (wearable_ != nullptr)) return;
+  wearable_.reset();
+  wifi.leave();
+  led.set(false);
+  if (is_on) {
+    imu.power_on();
+    ++counts.power_ons;
+    boot();
+  } else {
+    imu.power_off();
+  }
+}
+
+void World::step_until(uint64_t us) {
+  if (!wearable_) clock.advance_to(us);
+  while (clock.now_us() < us) turn();
+}
+
+void World::turn() {
+  const uint64_t began_us = clock.now_us();
+  const bool was_linked = wearable_->status().state == State::kLinked;
+  wearable_->step();
+  if (was_linked && wearable_->status().state == State::kLinked) {
+    counts.longest_linked_step_us = std::max(counts.longest_linked_step_us, clock.now_us() - began_us);
+  }
+  board.notice();
+  if (board.has_bitten() || board.wants_restart()) {
+    ++(board.has_bitten() ? counts.watchdog_bites : counts.restarts);
+    wifi.leave();
+    led.set(false);
+    boot();
+  }
+  clock.advance(loop_.between(kTurnUs[0], kTurnUs[1]));
+}
+
+void World::boot() {
+  clock.advance(kBootUs);
+  booted_at_us_ = clock.now_us();
+  board_clock.power_on(first_micros);
+  board.power_on();
+  wearable_ = std::make_unique<Wearable>(Ports{board_clock, imu, wifi, serial, flash, led, board});
+  wearable_->begin();
+}
+
+}  // namespace bunraku

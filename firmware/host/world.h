@@ -1,0 +1,54 @@
+// One simulated wearable: the firmware on a model of its board, on a hand, near an access point.
+#pragma once
+
+#include <memory>
+
+#include "bno055_model.h"
+#include "board_model.h"
+#include "flash_model.h"
+#include "path.h"
+#include "serial_model.h"
+#include "virtual_clock.h"
+#include "wearable.h"
+#include "wifi_model.h"
+
+namespace bunraku {
+
+struct WorldCounts {
+  uint32_t power_ons = 0;
+  uint32_t restarts = 0;         // asked for by the firmware
+  uint32_t watchdog_bites = 0;   // restarts because it hung: never right
+  uint64_t longest_linked_step_us = 0;  // the longest turn of the loop that began and ended linked
+};
+
+class World {
+ public:
+  World(uint64_t seed, uint64_t start_us);
+
+  void power(bool is_on);        // the switch: the flash is kept, all else begins anew
+  void step_until(uint64_t us);  // runs on; a call that blocks may end later than asked for
+  const Wearable* wearable() const { return wearable_.get(); }  // null: switched off
+  uint64_t booted_at_us() const { return booted_at_us_; }       // when the board's clock showed first_micros
+
+  VirtualClock clock;
+  BoardClock board_clock{clock};
+  WifiModel wifi;
+  SerialModel serial;
+  FlashModel flash{clock};
+  LedTrace led{clock};
+  BoardModel board;
+  Bno055Model imu;
+  Path hand;  // orientation of the chip in a world with z up
+  uint64_t first_micros = 0;  // what the board's clock shows at each power-on
+  WorldCounts counts;
+
+ private:
+  void boot();
+  void turn();
+
+  Random loop_;
+  uint64_t booted_at_us_ = 0;
+  std::unique_ptr<Wearable> wearable_;
+};
+
+}  // namespace bunraku
