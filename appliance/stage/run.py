@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from appliance.sensor.link import SensorState
 from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
@@ -16,9 +17,10 @@ from appliance.stage.clock import Slot, TickClock
 from appliance.stage.control import Control
 from appliance.stage.health import Health
 from appliance.stage.journal import JUMPED, LATE, NOT_FINITE, Journal, JournalError
-from appliance.stage.obey import obey
+from appliance.stage.obey import SENSOR_COMMANDS, obey, obey_for_sensors
 from appliance.stage.phase_lock import PhaseLock
 from appliance.stage.realtime import enter_realtime, leave_realtime
+from appliance.stage.roster import Roster
 from appliance.stage.stage_error import StageError
 from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
@@ -41,7 +43,8 @@ class Stage:
             opened.callback(self.memory.close)
             self.cast: Cast = assemble(show, box, self.memory.profiles)
             opened.callback(self.cast.close)
-            self.control = _open_control(box)
+            self.roster = Roster(str(box.sensors.keys or ""))
+            self.control = _open_control(box, self.roster)
             if self.control is not None:
                 opened.callback(self.control.close)
             self.journal = self._open_journal(journal)
@@ -84,11 +87,12 @@ class Stage:
         shift_s = 0.0
         begun = clock.now()
         self.health.begin(begun)
+        self._look_at_sensors(begun)
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self.tick.run(slot)
             self._note(slot)
-            self._obey()
+            self._obey(slot.started)
             shift_s = self._follow_sensor(slot)
             if self.health.is_due(slot.started):
                 self._report(slot.started)
@@ -136,16 +140,27 @@ class Stage:
             self.lock.forget()
         return self.lock.shift_s(slot.deadline)
 
-    def _obey(self) -> None:
+    def _obey(self, now: float) -> None:
         if self.control is None:
             return
         for _ in range(_COMMANDS_A_TICK):
             order = self.control.take()
             if order is None:
                 return
-            complaint = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
-            if complaint:
-                self.say(complaint)
+            if order.name in SENSOR_COMMANDS:
+                done, words = obey_for_sensors(order, self.cast, self.wearing, now)
+                self._look_at_sensors(now)
+                self.control.answer(order, done, words)
+            else:
+                words = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
+            if words:
+                self.say(words)
+
+    def _look_at_sensors(self, now: float) -> list[SensorState]:
+        """How the sensors are, also for whoever asks over the control port."""
+        states = self.cast.link.states(now)
+        self.roster.refresh(states, self.wearing.neutral_of, now)
+        return states
 
     def _report(self, now: float) -> None:
         """Once a second, after the frame has left."""
@@ -155,7 +170,8 @@ class Stage:
         locked = self.lock is not None and self.lock.locked
         times = self.iterations
         self.say(self.health.line(now, times.coding, times.interaction, age_s, locked))
-        for sentence in self.watch.news(now):
+        sensors = self._look_at_sensors(now)
+        for sentence in self.watch.news(now, sensors):
             self.say(sentence)
         for imu_id, offsets in self.cast.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)
@@ -187,12 +203,12 @@ def stop_signals() -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
 
 
-def _open_control(box: BoxConfig) -> Control | None:
+def _open_control(box: BoxConfig, roster: Roster) -> Control | None:
     control = box.control
     if control is None:
         return None
     try:
-        return Control(control.host, control.port)
+        return Control(control.host, control.port, roster, box.sensors.keys)
     except OSError as error:
         raise StageError(
             f"UDP port {control.port} on {control.host} cannot be opened for commands ({error.strerror}). "

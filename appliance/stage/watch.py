@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from appliance.sensor import wire
+from appliance.sensor.link import SensorState
 from appliance.stage.cast import Cast
 
 SILENT_S = 0.5
+LOW_BATTERY, CHARGED = 15, 25  # percent: below the one it is said, above the other it may be said again
 
 
 class Watch:
@@ -16,13 +19,21 @@ class Watch:
         self._cast = cast
         self._silent: set[str] = set()
         self._heard: set[str] = set()
+        self._ways: dict[str, str] = {}
+        self._complaints: set[str] = set()
+        self._low: set[str] = set()
         self._gone: set[str] = set()
         self._dropped: dict[str, int] = {}
         self._network_failed = False
 
-    def news(self, now: float) -> Iterator[str]:
-        """Sentences about what changed since the last look; `now` in monotonic seconds."""
-        yield from self._sensors(now)
+    def news(self, now: float, sensors: Sequence[SensorState] = ()) -> Iterator[str]:
+        """Sentences about what changed since the last look; `now` in monotonic seconds.
+
+        `sensors`: how the link sees each of them at this moment.
+        """
+        for sensor in sensors:
+            yield from self._links(sensor)
+        yield from self._silences(now)
         yield from self._receivers()
         if self._cast.puppet.is_broken != self._network_failed:
             self._network_failed = self._cast.puppet.is_broken
@@ -33,7 +44,30 @@ class Watch:
                 else "The network gives poses again. The dancer moves."
             )
 
-    def _sensors(self, now: float) -> Iterator[str]:
+    def _links(self, sensor: SensorState) -> Iterator[str]:
+        """What a person should know of one sensor's link, battery and firmware."""
+        name, way_before = sensor.name, self._ways.get(sensor.name)
+        if sensor.state == "linked" and sensor.way and sensor.way != way_before:
+            self._ways[name] = sensor.way
+            yield (
+                f"Sensor {name} now speaks by {sensor.way}. The dance goes on."
+                if way_before
+                else f"Sensor {name} is linked by {sensor.way}, {self._holds(name)}."
+            )
+        if sensor.complaint and sensor.complaint not in self._complaints:
+            self._complaints.add(sensor.complaint)
+            yield sensor.complaint
+        if sensor.battery < LOW_BATTERY and name not in self._low:
+            self._low.add(name)
+            yield f"Sensor {name}: {sensor.battery} % of its battery left. The dance goes on. Charge it soon."
+        elif CHARGED <= sensor.battery != wire.BATTERY_UNKNOWN:
+            self._low.discard(name)
+
+    def _holds(self, name: str) -> str:
+        joints = [puppeteer.joint for puppeteer in self._cast.worn.get(name, ())]
+        return f"and holds {', '.join(joints)}" if joints else "and holds no joint of this show"
+
+    def _silences(self, now: float) -> Iterator[str]:
         for name, joints in self._cast.worn.items():
             silent_s = joints[0].silent_s(now)
             if silent_s <= SILENT_S:

@@ -111,14 +111,14 @@ class Wearing:
         if wearer.has_pose_of(reading.boot_nonce):
             self._news.append(f"Sensor {wearer.name}: the neutral pose taken before is used on. Dance.")
         else:
-            self._wait_for(wearer, STILL_S)
+            self._ask_for_stillness(wearer)
 
     def _meet_again(self, wearer: _Wearer, before: SensorReading, reading: SensorReading) -> None:
         """The sensor was switched on again, or its IMU restarted: its heading is another one."""
         wearer.stillness.restart()
         is_known = wearer.has_pose_of(before.boot_nonce)
         if not is_known or reading.arrival - before.arrival > CARRIED_WITHIN_S:
-            self._wait_for(wearer, STILL_S)
+            self._ask_for_stillness(wearer)
             return
         poses = (
             carried(hand.pose, before.orientation, reading.orientation, reading.boot_nonce)
@@ -130,6 +130,10 @@ class Wearing:
             f"Sensor {wearer.name}{what}: its joint goes on where it was. "
             "If it stands askew: a double tap on the sensor, then stand still."
         )
+
+    def _ask_for_stillness(self, wearer: _Wearer) -> None:
+        self._wait_for(wearer, STILL_S)
+        self._news.append(f"Sensor {wearer.name} is on. Its dancer stands still for a breath now.")
 
     def _take(self, wearer: _Wearer) -> None:
         reading = wearer.reading

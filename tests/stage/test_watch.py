@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.sensor.link import SensorReading
+from appliance.sensor.link import SensorReading, SensorState
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import Cast, assemble
@@ -47,6 +47,54 @@ def test_a_silent_sensor_and_its_return(cast: Cast) -> None:
     assert list(watch.news(12.5)) == []
     hear(cast, 13.0)
     assert list(watch.news(13.1)) == ["Sensor left-wrist is back. It takes its joint again."]
+
+
+def sensor(
+    name: str = "left-wrist",
+    state: str = "linked",
+    way: str = "10.0.0.7:2390",
+    battery: int = 90,
+    complaint: str = "",
+) -> SensorState:
+    return SensorState(
+        *(name, 1, state, way, 50.0, 0.0, 0.004, 0.01, battery, 255, "1.0.0", "", 0, 7, complaint)
+    )
+
+
+def test_a_sensor_that_is_linked_and_what_it_holds(cast: Cast) -> None:
+    watch = Watch(cast)
+    assert list(watch.news(1.0, [sensor(state="absent", way="")])) == []
+    assert list(watch.news(2.0, [sensor(state="greeted", way="")])) == []
+    assert list(watch.news(3.0, [sensor(), sensor(name="spare", way="10.0.0.8:2390")])) == [
+        "Sensor left-wrist is linked by 10.0.0.7:2390, and holds lShldr.",
+        "Sensor spare is linked by 10.0.0.8:2390, and holds no joint of this show.",
+    ]
+    assert list(watch.news(4.0, [sensor(), sensor(name="spare", way="10.0.0.8:2390")])) == []
+
+
+def test_a_sensor_that_moves_to_a_cable_and_back(cast: Cast) -> None:
+    watch = Watch(cast)
+    list(watch.news(1.0, [sensor()]))
+    assert list(watch.news(2.0, [sensor(way="/dev/ttyACM0")])) == [
+        "Sensor left-wrist now speaks by /dev/ttyACM0. The dance goes on."
+    ]
+    assert list(watch.news(3.0, [sensor(state="lost", way="")])) == []  # its silence is told of
+    assert list(watch.news(4.0, [sensor(way="/dev/ttyACM0")])) == []
+    assert len(list(watch.news(5.0, [sensor()]))) == 1
+
+
+def test_a_low_battery_is_told_of_once_until_it_was_charged(cast: Cast) -> None:
+    watch = Watch(cast)
+    told = [list(watch.news(1.0, [sensor(battery=level)])) for level in (16, 14, 15, 13, 255, 12, 80, 9)]
+    assert [len(words) for words in told] == [1, 1, 0, 0, 0, 0, 0, 1]  # the first one: linked
+    assert told[1] == ["Sensor left-wrist: 14 % of its battery left. The dance goes on. Charge it soon."]
+
+
+def test_a_complaint_of_the_link_is_passed_on_once(cast: Cast) -> None:
+    watch = Watch(cast)
+    stranger = sensor(state="greeted", way="", complaint="Sensor left-wrist speaks another wire.")
+    assert list(watch.news(1.0, [stranger])) == ["Sensor left-wrist speaks another wire."]
+    assert list(watch.news(2.0, [stranger])) == []
 
 
 def test_a_receiver_that_goes_and_comes_back(cast: Cast, receiver: OscReceiver) -> None:
