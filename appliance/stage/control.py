@@ -1,30 +1,48 @@
-"""Commands by OSC: a small thread listens, checks each message, and lays it down for the tick to pick up."""
+"""Commands by OSC: a small thread listens, checks each message, and lays it down for the tick to pick up.
+
+Who asks about sensors is answered, by the same thread: `/sensors/reply` once the tick has done it.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
+from pythonosc.osc_message_builder import OscMessageBuilder
 from pythonosc.osc_packet import OscPacket
+
+from appliance.sensor.keys import KeyFileError, SensorKey, load_keys
+from appliance.stage.roster import Message, Roster
 
 _LARGEST_DATAGRAM = 4096
 _PAUSE_S = 0.002  # after each datagram: a flood takes at most a few percent of the interpreter from the tick
 _WAITING = 64  # commands that may wait for a tick; then the oldest gives way
-_LISTEN_S = 0.1  # how soon the thread notices that the show is over
+_LISTEN_S = 0.1  # how soon the thread notices that the show is over, or that an answer waits
+_PAUSE_AFTER_RELOAD_S = 0.1  # reading the key file is some milliseconds of work
+
+Address = tuple[str, int]
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One checked command: `name` as in the table below, its numbers, and the joint that it is about."""
+    """One checked command: `name` as in the table below, its numbers, and what it is about.
+
+    `asker`: who waits for an answer; `keys`: what a reload has read.
+    """
 
     name: str
     values: tuple[float, ...] = ()
     joint: str | int = ""
+    sensor: str = ""  # empty: all of them
+    asker: Address | None = field(default=None, compare=False)
+    keys: Mapping[str, SensorKey] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +55,7 @@ class _Form:
     above: float = -1e6
     below: float = 1e6
     has_joint: bool = False
+    sensors: tuple[int, int] = (0, 0)  # how many sensors' names it takes, at least and at most
 
 
 FORMS = {
@@ -48,7 +67,13 @@ FORMS = {
     "/iterations": _Form("iterations", 2, 2, above=0.0, below=64.0),
     "/mocap/setjointrot": _Form("hold", 4, 4, has_joint=True),
     "/mocap/releasejoint": _Form("release", 0, 0, has_joint=True),
+    "/sensors/neutral": _Form("neutral", sensors=(0, 1)),
+    "/sensors/heading": _Form("heading", sensors=(0, 1)),
+    "/sensors/strobe": _Form("strobe", sensors=(1, 1)),
+    "/sensors/reload": _Form("reload"),
+    "/sensors/list": _Form("list"),
 }
+ANSWERED, REPLY = "/sensors/", "/sensors/reply"
 
 
 def command(address: str, arguments: Sequence[object]) -> Command:
@@ -61,6 +86,8 @@ def command(address: str, arguments: Sequence[object]) -> Command:
         if not arguments or not isinstance(arguments[0], str | int):
             raise ValueError(f"{address} begins with the joint: its name or its number.")
         joint, arguments = arguments[0], arguments[1:]
+    if form.sensors[1]:
+        return Command(form.name, sensor=_sensor(address, form, arguments))
     numbers = [float(value) for value in arguments if isinstance(value, int | float)]
     if len(numbers) != len(arguments) or not form.fewest <= len(numbers) <= form.most:
         count = f"{form.fewest}" if form.fewest == form.most else f"{form.fewest} to {form.most}"
@@ -70,13 +97,30 @@ def command(address: str, arguments: Sequence[object]) -> Command:
     return Command(form.name, tuple(numbers), joint)
 
 
+def _sensor(address: str, form: _Form, arguments: Sequence[object]) -> str:
+    fewest, most = form.sensors
+    if not fewest <= len(arguments) <= most or not all(isinstance(word, str) and word for word in arguments):
+        raise ValueError(f"{address} takes a sensor's name{'' if fewest else ', or nothing for all'}.")
+    return "".join(map(str, arguments))
+
+
+def datagram(message: Message) -> bytes:
+    """One OSC message: its address, then whole numbers, fractions and texts."""
+    builder = OscMessageBuilder(str(message[0]))
+    for argument in message[1:]:
+        builder.add_arg(argument)
+    return bytes(builder.build().dgram)
+
+
 class Control:
     """The control port: commands wait in a queue until a tick takes them.
 
+    `roster` is what `/sensors/list` tells, `key_file` what `/sensors/reload` reads, here and never in a tick.
     Raises OSError when the port is taken. What is no command is counted in `refused`, with the last `reason`.
     """
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(self, host: str, port: int, roster: Roster, key_file: Path | None = None) -> None:
+        self._roster, self._key_file = roster, key_file
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((host, port))
@@ -88,6 +132,7 @@ class Control:
         self.refused = 0
         self.reason = ""
         self._commands: deque[Command] = deque(maxlen=_WAITING)
+        self._answers: deque[tuple[Address, Message]] = deque(maxlen=_WAITING)
         self._closing = False
         self._thread = threading.Thread(target=self._listen, name="control", daemon=True)
         self._thread.start()
@@ -95,6 +140,11 @@ class Control:
     def take(self) -> Command | None:
         """The oldest command that waits, or None; never blocks."""
         return self._commands.popleft() if self._commands else None
+
+    def answer(self, order: Command, done: bool, words: str) -> None:
+        """Tell who asked what came of a command, if anyone waits for it; never blocks."""
+        if order.asker is not None:
+            self._answers.append((order.asker, (REPLY, f"{ANSWERED}{order.name}", int(done), words)))
 
     def close(self) -> None:
         """End the thread and free the port."""
@@ -105,16 +155,67 @@ class Control:
     def _listen(self) -> None:
         while not self._closing:
             try:
-                datagram = self._socket.recv(_LARGEST_DATAGRAM)
+                received, asker = self._socket.recvfrom(_LARGEST_DATAGRAM)
             except TimeoutError:
+                self._send_answers()
                 continue
-            self._read(datagram)
+            except OSError:  # an asker who is gone again, told by the kernel
+                received, asker = b"", ("", 0)
+            if received:
+                self._read(received, asker)
+            self._send_answers()
             time.sleep(_PAUSE_S)
 
-    def _read(self, datagram: bytes) -> None:
+    def _read(self, received: bytes, asker: Address) -> None:
         try:
-            for timed in OscPacket(datagram).messages:
-                self._commands.append(command(timed.message.address, timed.message.params))
+            messages = [timed.message for timed in OscPacket(received).messages]
         except Exception as error:  # python-osc raises many kinds; whatever came, the show goes on
-            self.refused += 1
-            self.reason = str(error)
+            self._refuse(str(error))
+            return
+        for one in messages:
+            is_answered = one.address.startswith(ANSWERED)
+            try:
+                order = command(one.address, one.params)
+                if is_answered:
+                    order = replace(order, asker=asker)
+                self._lay_down(order)
+            except ValueError as error:
+                self._refuse(str(error))
+                if is_answered:
+                    self._answers.append((asker, (REPLY, one.address, 0, str(error))))
+
+    def _lay_down(self, order: Command) -> None:
+        """Lists are told at once; a reload takes the keys along; the rest is the tick's."""
+        if order.name == "list" and order.asker is not None:
+            for message in self._roster.messages(time.monotonic()):
+                self._send(order.asker, message)
+            return
+        if order.name == "reload":
+            order = replace(order, keys=self._read_keys())
+            time.sleep(_PAUSE_AFTER_RELOAD_S)
+        self._commands.append(order)
+
+    def _read_keys(self) -> Mapping[str, SensorKey]:
+        if self._key_file is None:
+            raise ValueError("This box has no key file: name one under sensors.keys in its box file.")
+        try:
+            return load_keys(self._key_file)
+        except KeyFileError as error:
+            raise ValueError(f"{error}. The box goes on with the keys that it has.") from None
+        except OSError as error:
+            raise ValueError(
+                f"{self._key_file} cannot be read ({error.strerror}). "
+                "The box goes on with the keys that it has."
+            ) from None
+
+    def _refuse(self, reason: str) -> None:
+        self.refused += 1
+        self.reason = reason
+
+    def _send_answers(self) -> None:
+        while self._answers:
+            self._send(*self._answers.popleft())
+
+    def _send(self, asker: Address, message: Message) -> None:
+        with contextlib.suppress(OSError):  # who asked is gone
+            self._socket.sendto(datagram(message), asker)

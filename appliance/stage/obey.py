@@ -1,10 +1,16 @@
-"""Carries out commands between two ticks: playback, iterations, joints held by OSC."""
+"""Carries out commands between two ticks: playback, iterations, joints held by OSC, sensors."""
 
 from __future__ import annotations
 
 from appliance.dancer.puppeteers import Remote
+from appliance.sensor.link import SensorLink
+from appliance.show.config_error import did_you_mean
 from appliance.stage.cast import Cast, Iterations
 from appliance.stage.control import Command
+from appliance.stage.wearing import Wearing
+
+SENSOR_COMMANDS = frozenset(("neutral", "heading", "strobe", "reload"))
+STROBE_S = 10.0
 
 
 def obey(order: Command, cast: Cast, iterations: Iterations, usual_rate: float) -> str:
@@ -19,6 +25,53 @@ def obey(order: Command, cast: Cast, iterations: Iterations, usual_rate: float) 
     except ValueError as error:
         return str(error)
     return ""
+
+
+def obey_for_sensors(order: Command, cast: Cast, wearing: Wearing, now: float) -> tuple[bool, str]:
+    """Carry out one of SENSOR_COMMANDS: whether it was done, and a sentence for who asked."""
+    try:
+        if order.name == "reload":
+            return True, _admit(order, cast)
+        if order.name == "strobe":
+            _require_heard([order.sensor], cast.link, now)
+            cast.link.strobe(order.sensor, now, STROBE_S)
+            return True, f"{order.sensor} flashes for {STROBE_S:g} s."
+        _require_heard(_worn(order.sensor, list(cast.worn)), cast.link, now)
+    except ValueError as error:
+        return False, str(error)
+    if order.name == "neutral":
+        wearing.take_neutral(order.sensor or None, now)
+        return True, "The neutral pose is taken at the next stillness: stand still now."
+    wearing.reset_heading(order.sensor or None, now)
+    return True, "Where the dancer faces now is the front."
+
+
+def _admit(order: Command, cast: Cast) -> str:
+    cast.link.admit(order.keys)
+    known = f"The box knows {len(order.keys)} sensor{'' if len(order.keys) == 1 else 's'} now"
+    missing = [name for name in cast.worn if name not in order.keys]
+    if not missing:
+        return f"{known}."
+    return f"{known}, but not {', '.join(missing)} of this show: the dancer moves freely there."
+
+
+def _worn(name: str, worn: list[str]) -> list[str]:
+    """The sensors that are meant: one of the show's, or all of them."""
+    if not worn:
+        raise ValueError("No hand of this show is held by a sensor.")
+    if name and name not in worn:
+        raise ValueError(f"No hand of this show is held by a sensor '{name}'. {did_you_mean(name, worn)}")
+    return [name] if name else worn
+
+
+def _require_heard(names: list[str], link: SensorLink, now: float) -> None:
+    """At least one of them must be here to be asked."""
+    states = {state.name: state.state for state in link.states(now)}
+    for name in names:
+        if name not in states:
+            raise ValueError(f"The box knows no sensor '{name}'. {did_you_mean(name, list(states))}")
+    if not any(states[name] in ("linked", "greeted") for name in names):
+        raise ValueError(f"Sensor {', '.join(names)} is silent. Switch it on, and look at its battery.")
 
 
 def _play(order: Command, cast: Cast, usual_rate: float) -> None:
