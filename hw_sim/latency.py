@@ -22,6 +22,7 @@ class Reading(NamedTuple):
     sent_at: float
     sampled_at: float
     orientation: tuple[float, float, float, float]
+    power_on_at: float = 0.0  # of the sensor's boot that made it
 
 
 class Frame(NamedTuple):
@@ -32,6 +33,14 @@ class Frame(NamedTuple):
     sensor_sequence: int
     late: bool
     joint: Floats
+
+
+class Restart(NamedTuple):
+    """The box killed and started anew while a sensor runs on; monotonic seconds."""
+
+    killed_at: float
+    started_at: float
+    used_at: float  # the first frame of the new box that carries a reading
 
 
 class Transport(NamedTuple):
@@ -63,6 +72,27 @@ def transport(readings: Sequence[Reading], frames: Sequence[Frame]) -> Transport
     carried = {frame.sensor_sequence for frame in frames}
     overtaken = sum(number <= int(newest[-1]) and number not in carried for number in sent)
     return Transport(np.array(times), np.array(latencies), overtaken)
+
+
+def power_on_s(readings: Sequence[Reading], frames: Sequence[Frame]) -> Floats:
+    """From each power-on of the sensor to the first frame that carries a reading of that power-on, seconds.
+
+    A power-on of which no frame tells is left out: the run ended before.
+    """
+    in_order = sorted(frames, key=lambda frame: frame.arrived_at)
+    arrived_at = [frame.arrived_at for frame in in_order]
+    found = []
+    for power_on_at in sorted({reading.power_on_at for reading in readings}):
+        sent = {r.sequence: r.sent_at for r in readings if r.power_on_at == power_on_at}
+        first = int(np.searchsorted(arrived_at, min(sent.values())))
+        before = in_order[first - 1].sensor_sequence if first else -1
+        for frame in in_order[first:]:
+            # A frame shows the newest reading of the power-on before until there is a newer one.
+            if frame.sensor_sequence != before:
+                if sent.get(frame.sensor_sequence, np.inf) <= frame.arrived_at:
+                    found.append(frame.arrived_at - power_on_at)
+                break
+    return np.array(found)
 
 
 def missing_frames(frames: Sequence[Frame]) -> int:

@@ -1,4 +1,4 @@
-"""The picture of a measurement: how long readings were on their way, over time and against running free."""
+"""The picture of a measurement: how long readings were on their way, and how soon they were used."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hw_sim.figures import Evidence
 from hw_sim.latency import Transport
 from hw_sim.probe import Run
 
@@ -14,14 +15,14 @@ IVORY, VERMILION, SLATE, BACKDROP = "#efe6d8", "#f5452a", "#8f9bb3", "#14151b"
 LONGEST_SHOWN_MS = 45.0
 
 
-def draw_report(path: Path, locked: Run, ways: tuple[Transport, Transport]) -> Path:
-    """Write the PNG; `ways` are those of the phase-locked and of the free run. Needs matplotlib."""
+def draw_report(path: Path, evidence: Evidence) -> Path:
+    """Write the PNG. Needs matplotlib."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    way, free = ways
+    way, free = evidence.ways
     look: Any = {
         "figure.facecolor": BACKDROP,
         "axes.facecolor": BACKDROP,
@@ -33,10 +34,11 @@ def draw_report(path: Path, locked: Run, ways: tuple[Transport, Transport]) -> P
         "font.size": 10,
     }
     with matplotlib.rc_context(look):
-        figure, axes = pyplot.subplots(3, 1, figsize=(11, 11), layout="constrained")
+        figure, axes = pyplot.subplots(4, 1, figsize=(11, 14), layout="constrained")
         _histogram(axes[0], way, free)
         _timeline(axes[1], way)
-        _sections(axes[2], locked)
+        _sections(axes[2], evidence.locked)
+        _first_readings(axes[3], evidence)
         for one in axes:
             one.spines[["top", "right"]].set_visible(False)
         figure.savefig(path, dpi=110)
@@ -73,3 +75,19 @@ def _sections(axes: Any, locked: Run) -> None:
     axes.set_xticks(place, locked.sections)
     axes.set(title=f"A tick by section ({len(parts)} ticks)", ylabel="ms")
     axes.legend(frameon=False)
+
+
+def _first_readings(axes: Any, evidence: Evidence) -> None:
+    """Each power-on and each restart as a dot, their limits as lines."""
+    rows = (
+        ("sensor switched on", evidence.power_on_s, 1.0),
+        ("box started anew", evidence.restart_s, 1.5),
+        ("box killed", evidence.kill_s, 1.5),
+    )
+    for place, (_, seconds, limit) in enumerate(rows):
+        axes.plot(seconds, [place] * len(seconds), "o", color=VERMILION, alpha=0.6)
+        axes.plot([limit, limit], [place - 0.4, place + 0.4], color=SLATE)
+    axes.set_yticks(range(len(rows)), [words for words, *_ in rows])
+    axes.set(title="Until a frame carries a reading (line: the limit)", xlabel="s", ylim=(-0.6, 2.6))
+    axes.set_xlim(left=0.0)
+    axes.invert_yaxis()

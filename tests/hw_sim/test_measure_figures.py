@@ -7,8 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hw_sim.latency import Frame, Reading, missing_frames, percentiles, response_ms, steps, transport
-from hw_sim.measure import figures_of, table, verdict
+from hw_sim.figures import Evidence, figures_of, table, verdict
+from hw_sim.latency import (
+    Frame,
+    Reading,
+    Restart,
+    missing_frames,
+    percentiles,
+    power_on_s,
+    response_ms,
+    steps,
+    transport,
+)
 from hw_sim.motions import about
 from hw_sim.probe import Run
 
@@ -44,6 +54,38 @@ def run(sent: list[Reading], received: list[Frame]) -> Run:
     ticks = np.zeros(len(received), RECORD)
     ticks["sections_ms"] = (0.5, 1.0)
     return Run(received, sent, ticks, ("drain", "puppet"), 80.0, 0.9, 0.0)
+
+
+def power_ons(count: int, until_reading_s: float = 0.75) -> tuple[list[Reading], list[Frame]]:
+    """A sensor that is on for 1.5 s and off as long; each boot counts its readings from zero."""
+    sent, received = [], []
+    for boot in range(count):
+        power_on_at = 20.0 + 3.0 * boot
+        for n in range(35):
+            at = power_on_at + until_reading_s + 0.02 * n
+            sent.append(Reading(n, at, at, (1.0, 0.0, 0.0, 0.0), power_on_at))
+            received.append(Frame(at + 0.002, len(received), n, False, np.array([1.0, 0, 0, 0])))
+        gap = np.arange(sent[-1].sent_at + 0.022, power_on_at + 3.0 + until_reading_s, 0.02)
+        received += [Frame(at, len(received) + k, 34, False, np.zeros(4)) for k, at in enumerate(gap)]
+    return sent, received
+
+
+def evidence() -> Evidence:
+    sent = readings(400)
+    locked, free = run(sent, frames(sent)), run(sent, frames(sent, latency_s=0.012))
+    return Evidence(locked, free, run(*power_ons(5)), [Restart(10.0, 10.1, 11.0 + n / 10) for n in range(3)])
+
+
+def test_from_power_on_to_the_first_frame_that_carries_a_reading_of_it() -> None:
+    np.testing.assert_allclose(power_on_s(*power_ons(5)), 0.752, atol=1e-6)
+
+
+def test_a_power_on_of_which_no_frame_tells_is_left_out() -> None:
+    sent, received = power_ons(3)
+    ended = [frame for frame in received if frame.arrived_at < 26.5]
+    assert len(power_on_s(sent, ended)) == 2
+    assert len(power_on_s(sent, [])) == 0
+    assert len(power_on_s([], received)) == 0
 
 
 def test_transport_is_from_sending_to_the_first_frame_with_the_reading() -> None:
@@ -97,13 +139,15 @@ def test_a_joint_that_does_not_follow_has_no_response() -> None:
 
 
 def test_the_figures_have_exactly_the_documented_names() -> None:
-    sent = readings(400)
-    figures = figures_of(run(sent, frames(sent)), run(sent, frames(sent, latency_s=0.012)))
+    figures = figures_of(evidence())
     documented: dict[str, set[str]] = {
         "transport_ms": {"p50", "p99", "p999", "max"},
         "response_ms": {"p50"},
         "tick_ms": {"p50", "p99", "max"},
         "free_running_transport_ms": {"p50", "p99"},
+        "power_on_to_reading_s": {"p50", "max"},
+        "restart_to_reading_s": {"p50", "max"},
+        "kill_to_reading_s": {"p50", "max"},
     }
     for name, keys in documented.items():
         assert set(figures[name]) == keys
@@ -112,11 +156,14 @@ def test_the_figures_have_exactly_the_documented_names() -> None:
     assert figures["transport_ms"]["p50"] == pytest.approx(2.5)
     assert figures["free_running_transport_ms"]["p50"] == pytest.approx(12.0)
     assert figures["tick_ms"]["p50"] == pytest.approx(1.5)
+    assert figures["power_on_to_reading_s"]["p50"] == pytest.approx(0.752)
+    assert figures["restart_to_reading_s"] == {"p50": pytest.approx(1.0), "max": pytest.approx(1.1)}
+    assert figures["kill_to_reading_s"]["p50"] == pytest.approx(1.1)
+    assert (figures["power_ons"], figures["restarts"]) == (5, 3)
 
 
 def healthy() -> dict[str, Any]:
-    sent = readings(400)
-    return figures_of(run(sent, frames(sent)), run(sent, frames(sent, latency_s=0.012)))
+    return figures_of(evidence())
 
 
 def test_a_healthy_box_passes() -> None:
@@ -136,6 +183,10 @@ def test_a_healthy_box_passes() -> None:
         ({"missing_frames": 3}, "missing frames"),
         ({"rss_mb": 140.0}, "memory"),
         ({"start_to_first_frame_s": 2.0}, "start to first frame"),
+        ({"power_on_to_reading_s": {"p50": 1.1, "max": 1.1}}, "sensor's power-on"),
+        ({"power_on_to_reading_s": {"p50": None, "max": None}}, "sensor's power-on"),
+        ({"restart_to_reading_s": {"p50": 1.6, "max": 1.6}}, "box's restart"),
+        ({"kill_to_reading_s": {"p50": 1.6, "max": 1.6}}, "the same from its end"),
     ],
 )
 def test_each_limit_fails_by_itself(change: dict[str, Any], words: str) -> None:

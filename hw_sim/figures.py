@@ -1,0 +1,169 @@
+"""The figures of a measurement, their limits, and the table that a technician reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hw_sim.latency import (
+    Floats,
+    Restart,
+    Transport,
+    missing_frames,
+    percentiles,
+    power_on_s,
+    response_ms,
+    steps,
+    transport,
+)
+from hw_sim.probe import Run
+
+SETTLING_S = 3.0  # the first seconds do not count: the phase lock moves at most 10 ms in a second
+FREE_SETTLING_S = 1.0
+LATE = 1  # flag of the journal
+NAMED = {"p50": 50.0, "p99": 99.0, "p999": 99.9, "max": 100.0}
+FEW = {"p50": 50.0, "max": 100.0}
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Everything that was measured: in phase, running free, with a sensor that is switched off and on, and
+    with a box that is killed and started anew."""
+
+    locked: Run
+    free: Run
+    power_ons: Run
+    restarts: Sequence[Restart]
+
+    @property
+    def ways(self) -> tuple[Transport, Transport]:
+        """The transport of the phase-locked and of the free run."""
+        return _transport(self.locked, _settling_s(self.locked)), _transport(self.free, FREE_SETTLING_S)
+
+    @property
+    def power_on_s(self) -> Floats:
+        return power_on_s(self.power_ons.readings, self.power_ons.frames)
+
+    @property
+    def restart_s(self) -> Floats:
+        """From the start of the new box to its first frame with a reading."""
+        return np.array([one.used_at - one.started_at for one in self.restarts])
+
+    @property
+    def kill_s(self) -> Floats:
+        """The same from the end of the old box."""
+        return np.array([one.used_at - one.killed_at for one in self.restarts])
+
+
+class Limit(NamedTuple):
+    """One figure of the verdict."""
+
+    words: str
+    value: float | None
+    most: float
+    unit: str
+
+    @property
+    def holds(self) -> bool:
+        return self.value is not None and self.value <= self.most
+
+
+def figures_of(evidence: Evidence) -> dict[str, Any]:
+    """All figures; milliseconds, seconds and megabytes as their names say, None where nothing came."""
+    locked, (way, free_way) = evidence.locked, evidence.ways
+    standing = [moment for moment in steps(locked.readings) if moment >= locked.stood_from + 0.5]
+    response = response_ms(standing, locked.frames)
+    costs_ms: Floats = locked.ticks["sections_ms"].sum(axis=1).astype(np.float64)
+    return {
+        "transport_ms": percentiles(way.latency_ms, NAMED),
+        "free_running_transport_ms": percentiles(free_way.latency_ms, {"p50": 50.0, "p99": 99.0}),
+        "response_ms": percentiles(response, {"p50": 50.0}),
+        "ticks": len(locked.ticks),
+        "late_ticks": int(((locked.ticks["flags"] & LATE) > 0).sum()),
+        "missing_frames": missing_frames(locked.frames),
+        "tick_ms": percentiles(costs_ms, {"p50": 50.0, "p99": 99.0, "max": 100.0}),
+        "sections_ms": {
+            name: percentiles(locked.ticks["sections_ms"][:, place], {"p50": 50.0, "p99": 99.0})
+            for place, name in enumerate(locked.sections)
+        },
+        "rss_mb": round(locked.rss_mb, 1),
+        "start_to_first_frame_s": round(locked.start_to_first_frame_s, 3),
+        "power_on_to_reading_s": percentiles(evidence.power_on_s, FEW),
+        "restart_to_reading_s": percentiles(evidence.restart_s, FEW),
+        "kill_to_reading_s": percentiles(evidence.kill_s, FEW),
+        "power_ons": len(evidence.power_on_s),
+        "restarts": len(evidence.restarts),
+        "readings": len(way.latency_ms),
+        "overtaken_readings": way.overtaken,
+        "steps": len(response),
+    }
+
+
+def verdict(figures: dict[str, Any]) -> list[Limit]:
+    """The figures that have limits."""
+    free_p50 = figures["free_running_transport_ms"]["p50"]
+    power_on_s, restart_s, kill_s = (
+        figures[f"{name}_to_reading_s"]["p50"] for name in ("power_on", "restart", "kill")
+    )
+    late_share = 100.0 * figures["late_ticks"] / max(1, figures["ticks"])
+    return [
+        Limit("transport, median", figures["transport_ms"]["p50"], 3.0, "ms"),
+        Limit(
+            "transport, median, against free running / 4",
+            figures["transport_ms"]["p50"],
+            (free_p50 or 0.0) / 4,
+            "ms",
+        ),
+        Limit("tick, median", figures["tick_ms"]["p50"], 2.0, "ms"),
+        Limit("tick, p99", figures["tick_ms"]["p99"], 6.0, "ms"),
+        Limit("late ticks", late_share, 0.1, "%"),
+        Limit("missing frames", 100.0 * figures["missing_frames"] / max(1, figures["ticks"]), 0.1, "%"),
+        Limit("memory of the box", figures["rss_mb"], 120.0, "MB"),
+        Limit("start to first frame", figures["start_to_first_frame_s"], 1.5, "s"),
+        Limit("sensor's power-on to its reading in a frame, median", power_on_s, 1.0, "s"),
+        Limit("box's restart to a reading in a frame, median", restart_s, 1.5, "s"),
+        Limit("the same from its end, median", kill_s, 1.5, "s"),
+    ]
+
+
+def table(figures: dict[str, Any], limits: Sequence[Limit]) -> list[str]:
+    """What a technician reads."""
+    way, free, response = (
+        figures["transport_ms"],
+        figures["free_running_transport_ms"],
+        figures["response_ms"],
+    )
+    lines = [
+        "transport  " + "  ".join(f"{name} {_ms(value)}" for name, value in way.items()),
+        f"  ({figures['readings']} readings, {figures['overtaken_readings']} of them overtaken by newer)",
+        f"  running free  p50 {_ms(free['p50'])}  p99 {_ms(free['p99'])}",
+        f"response to a step, half of the way  p50 {_ms(response['p50'])}   ({figures['steps']} steps)",
+        f"{figures['power_ons']} power-ons of a sensor, {figures['restarts']} restarts of the box",
+        "tick by section, p50  "
+        + "  ".join(f"{name} {_ms(part['p50'])}" for name, part in figures["sections_ms"].items()),
+        "",
+    ]
+    for limit in limits:
+        value = "nothing came" if limit.value is None else f"{limit.value:.2f} {limit.unit}"
+        mark = "ok  " if limit.holds else "FAIL"
+        lines.append(f"{mark}  {limit.words}: {value} (at most {limit.most:.2f} {limit.unit})")
+    return lines
+
+
+def _ms(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f} ms"
+
+
+def _transport(one: Run, settling_s: float) -> Transport:
+    """The way of the readings that count: those sent after the first seconds."""
+    begin = min((reading.sent_at for reading in one.readings), default=0.0) + settling_s
+    return transport([reading for reading in one.readings if reading.sent_at >= begin], one.frames)
+
+
+def _settling_s(locked: Run) -> float:
+    """Three seconds, or half of a run that is shorter than six."""
+    times = [reading.sent_at for reading in locked.readings]
+    return min(SETTLING_S, (max(times) - min(times)) / 2.0) if times else SETTLING_S
