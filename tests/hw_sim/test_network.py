@@ -95,3 +95,14 @@ def test_a_stall_holds_up_all_sensors_at_once() -> None:
     stalled = np.array(delays) > 0.05
     assert stalled[0].sum() > 10
     assert (stalled[0] & stalled[1]).sum() > 0.9 * stalled[0].sum()
+
+
+def test_what_the_box_answers_suffers_the_same_and_changes_nothing_for_the_readings() -> None:
+    network = VenueNetwork(BAD, 3)
+    deliveries, answers = [], []
+    for n in range(1000):
+        deliveries += [(n, delivery) for delivery in network.carry(DATAGRAM, 100 + n * 0.02)]
+        answers += network.carry(DATAGRAM, 100 + n * 0.02, to_box=False)
+    assert deliveries == carried(BAD, 3, 20)
+    assert {delivery.note for delivery in answers} == {"", "lost", "reordered", "duplicated", "corrupted"}
+    assert [delivery.note for delivery in answers] != [delivery.note for _, delivery in deliveries]

@@ -134,6 +134,7 @@ class Pair:
         *,
         clock: FakeClock | None = None,
         network: VenueNetwork | None = None,
+        switched_on: bool = True,
     ) -> None:
         self.clock = clock or FakeClock()
         self.box = box or TinyBox()
@@ -151,7 +152,8 @@ class Pair:
             clock=self.clock,
             sleep=self.clock.sleep,
         )
-        self.emulator.start(self.clock.now)
+        if switched_on:
+            self.emulator.start(self.clock.now)
 
     def run(self, seconds: float) -> None:
         end = self.clock.now + seconds
