@@ -16,7 +16,9 @@ import typer
 from hw_sim import motions
 from hw_sim.casting import MOST_SENSORS, MotionKind, cast_sensors, choose_keys, name_and_motion, parse_axis
 from hw_sim.device import Way
+from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.emulator import Emulator, Sender
+from hw_sim.firmware import firmware_maker
 from hw_sim.measure import measure
 from hw_sim.network import PROFILES, VenueNetwork
 from hw_sim.senders import SendLog, SerialSender, UdpSender
@@ -89,6 +91,10 @@ def emulate(
     seconds: Annotated[
         float | None, typer.Option(min=0.0, help="End after so long; else Ctrl-C ends it.")
     ] = None,
+    firmware: Annotated[
+        bool,
+        typer.Option("--firmware", help="Each sensor runs the compiled firmware (first: make firmware)."),
+    ] = False,
     seed: Annotated[int, typer.Option(help="The same seed gives the same dance and the same network.")] = 1,
     log: Annotated[
         Path | None, typer.Option(help="Write a CSV line for each reading as it was sent.")
@@ -105,6 +111,8 @@ def emulate(
       bunraku emulate --sensor left-wrist=dance --sensor head=still --network bad
     A recorded arm, over a cable:
       bunraku emulate --motion trace --trace dance.bvh --joint lShldr --serial /dev/ttyUSB0
+    The wearables' own firmware, compiled for this computer:
+      bunraku emulate --firmware --motion dance
     """
 
     def motion_of(number: int, name: str) -> motions.Motion:
@@ -135,6 +143,7 @@ def emulate(
             stand_still_s=stand_still,
             drift_ppm=drift_ppm,
             reboot_every_s=reboot_every,
+            make=firmware_maker() if firmware else EmulatedSensor,
         )
         ways: list[dict[Way, Sender]] = [
             {Way.NETWORK: UdpSender(host, port)}

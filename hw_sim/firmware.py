@@ -24,7 +24,7 @@ LANES = {0: Way.NETWORK, 1: Way.CABLE}
 LIGHTS = ((0.15, "strobe"), (0.5, "fast"), (1.6, "slow"), (4.0, "on"))
 
 
-class ProvisioningError(RuntimeError):
+class ProvisioningError(ValueError):
     """The firmware's console refused what a box would tell it; the message has its answer."""
 
 
