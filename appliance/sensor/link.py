@@ -65,7 +65,6 @@ class SensorLink:
         self.light = True  # whether a linked sensor's light flashes now and then
         self.sent: Counter[str] = Counter()  # packets to sensors by kind
         self._hands = tuple(hands)
-        self._secret = secrets.token_bytes(16)
         self._profiles = dict(profiles)
         self._new_profiles: list[tuple[bytes, bytes]] = []
         self._by_device: dict[int, KnownSensor] = {}
@@ -119,7 +118,7 @@ class SensorLink:
             sensor = before.get(key.device_id)
             if sensor is None or sensor.key.key != key.key:
                 phase_s = place % HEARTBEATS_APART / HEARTBEATS_APART
-                sensor = KnownSensor(key, Pairing(key, self._secret, phase_s))
+                sensor = KnownSensor(key, Pairing(key, secrets.token_bytes(16), phase_s))
             sensor.key = key
             sensor.pairing.hand = self._hands.index(key.name) if key.name in self._hands else NO_HAND
             self._by_device[key.device_id] = self._by_name[key.name] = sensor
