@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import os
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorLink, SensorReading, open_link
-from appliance.sensor.serial import SerialIntake
 from appliance.sensor.udp import UdpIntake
-from tests.sensor.test_serial import Cable, await_that
+from tests.hw_sim.null_modem import NullModem
 
 pytestmark = pytest.mark.realtime
+
+PATIENCE_S = 30.0
 
 
 def emulate(*options: object, **process: object) -> subprocess.Popen[str]:
@@ -49,22 +48,30 @@ def port_of(link: SensorLink) -> int:
     return intake.address[1]
 
 
-def hear_until_it_ends(link: SensorLink, process: subprocess.Popen[str]) -> list[SensorReading]:
+def tick(link: SensorLink) -> list[SensorReading]:
+    """What a box does with its sensors, without its dance."""
+    readings = list(link.drain(time.monotonic()))
+    link.tend(time.monotonic())
+    time.sleep(0.004)
+    return readings
+
+
+def hear_until(link: SensorLink, is_enough: Callable[[list[SensorReading]], bool]) -> list[SensorReading]:
     readings: list[SensorReading] = []
-    while process.poll() is None:
-        readings += link.drain(time.monotonic())
-        time.sleep(0.004)
-    readings += link.drain(time.monotonic())
+    end = time.monotonic() + PATIENCE_S
+    while not is_enough(readings):
+        assert time.monotonic() < end, "the sensor was never heard"
+        readings += tick(link)
     return readings
 
 
 def test_the_box_hears_what_the_log_says_was_sent(link: SensorLink, keys_path: Path, tmp_path: Path) -> None:
     log = tmp_path / "sent.csv"
     process = emulate(
-        "--keys", keys_path, "--port", port_of(link), "--seconds", 1.5, "--log", log,
+        "--keys", keys_path, "--port", port_of(link), "--seconds", 2.2, "--log", log, "--stand-still", 0,
         "--sensor", "left-wrist=dance", "--sensor", "head=still",
     )  # fmt: skip
-    readings = hear_until_it_ends(link, process)
+    readings = hear_until(link, lambda _: process.poll() is not None) + tick(link)
     assert process.returncode == 0
     assert {reading.sensor for reading in readings} == {"left-wrist", "head"}
     with log.open() as file:
@@ -73,49 +80,50 @@ def test_the_box_hears_what_the_log_says_was_sent(link: SensorLink, keys_path: P
     for reading in readings:
         row = sent[reading.sensor, reading.sequence]
         assert reading.arrival >= float(row["sent_s"]) - 0.001
-        alike = sum(a * float(row[name]) for a, name in zip(reading.orientation, "wxyz", strict=True))
+        assert float(row["sampled_s"]) - float(row["power_on_s"]) >= 0.7
+        alike = sum(a * float(row[name]) for a, name in zip(reading.orientation, "wzxy", strict=True))
         assert abs(alike) > 0.9999
     counts = {reason: count for reason, count in link.counts.items() if count}
     assert counts.pop("accepted") == len(sent)
-    assert set(counts) <= {"lost"}
+    assert set(counts) <= {"lost", "hello"}
+
+
+def test_each_sensor_speaks_from_an_address_of_its_own(link: SensorLink, keys_path: Path) -> None:
+    process = emulate("--keys", keys_path, "--port", port_of(link))
+    hear_until(link, lambda readings: len({reading.sensor for reading in readings}) == 2)
+    ways = [state.way for state in link.states(time.monotonic())]
+    process.terminate()
+    assert process.wait(timeout=20) == 0
+    assert len(set(ways)) == 2
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_it_cleanly(link: SensorLink, keys_path: Path, number: signal.Signals) -> None:
     process = emulate("--keys", keys_path, "--port", port_of(link))
-    await_that(lambda: bool(link.drain(time.monotonic())))
+    hear_until(link, bool)
     process.send_signal(number)
     _, said = process.communicate(timeout=20)
     assert process.returncode == 0
-    assert "sent" in said
+    assert "readings sent" in said
     assert "Traceback" not in said
 
 
-def test_over_a_cable(keys_path: Path, tmp_path: Path) -> None:
-    cable = Cable(tmp_path / "sensor")
-    cable.plug_in()
-    # Two pseudo-terminals, joined by this test: the box and the emulator each have a device of their own.
-    intake = SerialIntake(str(cable.name))
-    link = SensorLink(load_keys(keys_path), [intake])
-    await_that(lambda: intake.trouble is None)
-    far_end, near_end = os.openpty()
-    process = emulate(
-        "--keys", keys_path, "--serial", os.ttyname(near_end), "--sensor", "head", "--network", "perfect"
-    )
-    os.set_blocking(far_end, False)
-
-    def passed_on() -> bool:
-        with contextlib.suppress(BlockingIOError):
-            cable.write(os.read(far_end, 4096))
-        return any(reading.sensor == "head" for reading in link.drain(time.monotonic()))
-
-    await_that(passed_on)
-    process.terminate()
-    assert process.wait(timeout=20) == 0
-    link.close()
-    cable.pull_out()
-    os.close(far_end)
-    os.close(near_end)
+def test_over_a_cable_that_is_pulled_out_and_plugged_in_again(keys_path: Path, tmp_path: Path) -> None:
+    with NullModem(tmp_path) as cable:
+        link = open_link(load_keys(keys_path), serial=[(str(cable.far), 115200)])
+        process = emulate(
+            "--keys", keys_path, "--serial", cable.near, "--sensor", "head", "--network", "perfect"
+        )
+        before = hear_until(link, bool)
+        cable.pull_out()
+        cable.plug_in()
+        after = hear_until(link, bool)
+        assert {reading.sensor for reading in before + after} == {"head"}
+        assert after[-1].sequence > before[-1].sequence
+        assert after[-1].boot_nonce == before[-1].boot_nonce
+        process.terminate()
+        assert process.wait(timeout=20) == 0
+        link.close()
 
 
 def test_the_first_run_writes_a_key_file_for_its_owner_alone(tmp_path: Path) -> None:
@@ -143,6 +151,7 @@ def test_the_first_run_writes_a_key_file_for_its_owner_alone(tmp_path: Path) -> 
         (["--axis", "0,0,0"], "length zero"),
         (["--seconds-per-turn", "0"], "stand still"),
         (["--host", "no.such.host.invalid"], "bunraku emulate: "),
+        (["--serial", "/dev/none"], "a cable carries one sensor, not 2"),
         (["--log", "/no/such/folder/log.csv"], "No such file or directory"),
     ],
 )
@@ -157,7 +166,9 @@ def test_a_wish_that_cannot_be_met_is_one_clear_line(
 
 
 def test_no_box_and_no_cable_are_no_reason_to_end(keys_path: Path, tmp_path: Path) -> None:
-    process = emulate("--keys", keys_path, "--serial", tmp_path / "absent", "--seconds", 0.3)
+    process = emulate(
+        "--keys", keys_path, "--serial", tmp_path / "absent", "--sensor", "head", "--seconds", 0.3
+    )
     _, said = process.communicate(timeout=30)
     assert process.returncode == 0
     assert "Nothing could be sent" in said
@@ -165,4 +176,6 @@ def test_no_box_and_no_cable_are_no_reason_to_end(keys_path: Path, tmp_path: Pat
         unused.bind(("127.0.0.1", 0))
         port = unused.getsockname()[1]
     process = emulate("--keys", keys_path, "--port", port, "--seconds", 0.3)
-    assert process.wait(timeout=30) == 0
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert "No box took these sensors" in said
