@@ -8,6 +8,8 @@ namespace bunraku {
 // What does not fit is cut off.
 class Answer {
  public:
+  static constexpr uint8_t kRoom = 240;  // its end, '\0', included
+
   void clear() { count_ = 0, text_[0] = '\0'; }
   Answer& add(const char* text);
   Answer& add_number(uint32_t value);
@@ -17,7 +19,7 @@ class Answer {
   uint8_t count() const { return count_; }
 
  private:
-  char text_[240] = "";
+  char text_[kRoom] = "";
   uint8_t count_ = 0;
 };
 

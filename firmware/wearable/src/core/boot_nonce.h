@@ -8,7 +8,7 @@
 
 namespace bunraku {
 
-// Keyed BLAKE2s of the count of power-ons and of noise: does not repeat even where one of them fails. Never 0.
+// Keyed BLAKE2s of the count of power-ons and noise: does not repeat even where one of them fails. Never 0.
 uint32_t draw_boot_nonce(const uint8_t (&key)[wire::kKeyBytes], FlashStore& flash, Board& board);
 
 }  // namespace bunraku

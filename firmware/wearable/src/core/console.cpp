@@ -29,10 +29,13 @@ const char* state_name(State state) {
   }
 }
 
-const char* lane_name(Lane lane) { return lane == Lane::kWifi ? "wifi" : lane == Lane::kCable ? "cable" : "none"; }
+const char* lane_name(Lane lane) {
+  return lane == Lane::kWifi ? "wifi" : lane == Lane::kCable ? "cable" : "none";
+}
 
 void identify(const Status& status, uint32_t board_number, Answer& answer) {
-  answer.add("ok bunraku-wearable ").add(kFirmwareVersion).add(" wire ").add_hex(wire::kWireHash).add(" imu ");
+  answer.add("ok bunraku-wearable ").add(kFirmwareVersion).add(" wire ").add_hex(wire::kWireHash);
+  answer.add(" imu ");
   if (status.has_imu_id)
     answer.add_hex(status.imu_id, sizeof status.imu_id);
   else
@@ -50,9 +53,10 @@ void tell(const Status& status, Answer& answer) {
   answer.add(" recoveries ").add_number(status.recoveries).add(" taps ").add_number(status.taps);
   answer.add(" rate ").add_number(status.rate_hz).add(" sent ").add_number(status.readings);
   answer.add(" skipped ").add_number(status.skipped).add(" unsent ").add_number(status.unsent);
-  answer.add(" joins ").add_number(status.joins).add(" malformed ").add_number(status.dropped.malformed);
-  answer.add(" foreign ").add_number(status.dropped.foreign).add(" forged ").add_number(status.dropped.forged);
-  answer.add(" replayed ").add_number(status.dropped.replayed).add(" damaged ").add_number(status.damaged_frames);
+  answer.add(" joins ").add_number(status.joins).add(" damaged ").add_number(status.damaged_frames);
+  const PairingCounts& dropped = status.dropped;
+  answer.add(" malformed ").add_number(dropped.malformed).add(" foreign ").add_number(dropped.foreign);
+  answer.add(" forged ").add_number(dropped.forged).add(" replayed ").add_number(dropped.replayed);
 }
 
 }  // namespace
@@ -89,7 +93,7 @@ Request Console::request(const char* line, Answer& answer) const {
   } kRequests[] = {{"save", "ok saved", Request::kSave},
                    {"forget", "ok forgotten", Request::kForget},
                    {"strobe", "ok", Request::kStrobe},
-                   {"calibration save", "ok saving; the lamp is on until it is done", Request::kSaveCalibration},
+                   {"calibration save", "ok saving; the lamp is on meanwhile", Request::kSaveCalibration},
                    {"restart", "ok restarting", Request::kRestart}};
   for (const auto& known : kRequests) {
     if (strcmp(line, known.line) != 0) continue;

@@ -59,8 +59,8 @@ uint8_t unframe(uint8_t* stuffed, uint8_t count) {
 
 CableInput::Found CableInput::feed(uint8_t byte, uint32_t now_us) {
   if (is_delivered_) count_ = 0, is_overlong_ = false, is_delivered_ = false;
-  if (is_packet_ && !patience_.is_running(now_us)) reset();
-  patience_.start(now_us, kPatienceUs);
+  if (is_packet_ && now_us - fed_us_ > kPatienceUs) reset();
+  fed_us_ = now_us;
   const Found found = is_packet_ ? feed_packet(byte) : feed_text(byte);
   is_delivered_ = found != Found::kNothing;
   return found;
@@ -115,7 +115,7 @@ bool CableOutput::put(const uint8_t* data, uint16_t count) {
     end_ = static_cast<uint16_t>(end_ - begin_);
     begin_ = 0;
   }
-  if (count > sizeof buffer_ - end_) return false;
+  if (!has_room(count)) return false;
   memcpy(buffer_ + end_, data, count);
   end_ = static_cast<uint16_t>(end_ + count);
   return true;
@@ -123,7 +123,8 @@ bool CableOutput::put(const uint8_t* data, uint16_t count) {
 
 void CableOutput::flush(SerialPort& serial) {
   if (begin_ == end_) return;
-  begin_ = static_cast<uint16_t>(begin_ + serial.write(buffer_ + begin_, static_cast<uint16_t>(end_ - begin_)));
+  const uint16_t waiting = static_cast<uint16_t>(end_ - begin_);
+  begin_ = static_cast<uint16_t>(begin_ + serial.write(buffer_ + begin_, waiting));
   if (begin_ == end_) begin_ = end_ = 0;
 }
 

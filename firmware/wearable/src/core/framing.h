@@ -5,7 +5,6 @@
 #include <stdint.h>
 
 #include "ports.h"
-#include "timer.h"
 #include "wire.h"
 
 namespace bunraku {
@@ -23,9 +22,8 @@ uint8_t frame(const uint8_t* packet, uint8_t count, uint8_t (&out)[kLongestFrame
 // Unstuffs in place and checks the CRC; the length of the packet, 0: damaged.
 uint8_t unframe(uint8_t* stuffed, uint8_t count);
 
-// Tells packets from text in what a host sends. A zero byte begins a packet and drops a line begun; the next one
-// ends it, and text is expected again. After silence of 0.25 s in a packet, text is expected too: whoever types
-// is heard.
+// Tells packets from text in what a host sends. A zero byte begins a packet and drops a line begun; the next
+// one ends it, and text is expected again; also after 0.25 s of silence in a packet: whoever types is heard.
 class CableInput {
  public:
   enum class Found : uint8_t { kNothing, kPacket, kLine, kOverlongLine };
@@ -48,7 +46,7 @@ class CableInput {
   bool is_packet_ = false;
   bool is_overlong_ = false;
   bool is_delivered_ = false;  // what the buffer holds was given out: the next byte starts anew
-  Timer patience_;
+  uint32_t fed_us_ = 0;
   uint32_t damaged_ = 0;
 };
 
@@ -56,11 +54,14 @@ class CableInput {
 class CableOutput {
  public:
   bool put(const uint8_t* data, uint16_t count);
+  bool has_room(uint16_t count) const { return count + end_ - begin_ <= kRoom; }
   void flush(SerialPort& serial);
   void reset() { begin_ = end_ = 0; }
 
  private:
-  uint8_t buffer_[320] = {};
+  static constexpr uint16_t kRoom = 320;
+
+  uint8_t buffer_[kRoom] = {};
   uint16_t begin_ = 0, end_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// Patterns that a dancer can tell apart at arm's length, and that nobody sees from the stalls while all is well.
+// Patterns that a dancer can tell apart at arm's length, and that the stalls do not see while all is well.
 #include "led_pattern.h"
 
 namespace bunraku {

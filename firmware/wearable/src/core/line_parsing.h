@@ -7,7 +7,7 @@
 
 namespace bunraku {
 
-// If `line` starts with `word` and then ends or goes on behind one space: what comes behind; otherwise nullptr.
+// If `line` starts with `word` and then ends or goes on behind a space: what comes behind; otherwise nullptr.
 const char* rest_after(const char* line, const char* word);
 
 bool is_word(const char* text, uint8_t longest);  // 1 to `longest` printable characters without spaces

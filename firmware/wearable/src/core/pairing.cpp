@@ -2,6 +2,7 @@
 #include "pairing.h"
 
 #include "blake2s.h"
+#include "saturating.h"
 #include "version.h"
 
 namespace bunraku {
@@ -17,9 +18,6 @@ constexpr Lane kGreetingOrder[] = {Lane::kCable, Lane::kWifi};
 constexpr uint32_t kOldHellos = 3;  // an assignment may answer the newest hello or one of these before it
 
 uint8_t index(Lane lane) { return static_cast<uint8_t>(lane); }
-void count(uint16_t& counter) {
-  if (counter < UINT16_MAX) ++counter;
-}
 bool is_newer(uint32_t sequence, uint32_t than) { return static_cast<int32_t>(sequence - than) > 0; }
 
 uint8_t size_from_box(uint8_t kind) {  // 0: not a packet that a box sends
@@ -97,7 +95,8 @@ Received Pairing::assigned(const uint8_t* data, const Way& from, uint32_t now_us
   const bool is_timely = is_newer(hello, answered_hello_) && hello_sequence_ - hello <= kOldHellos;
   if (assignment.session == 0 || !is_timely) return count(counts_.replayed), Received::kNothing;
   answered_hello_ = hello;
-  if (link_.lane == Lane::kCable && from.lane == Lane::kWifi) return Received::kNothing;  // the cable is better
+  const bool is_better_linked = link_.lane == Lane::kCable && from.lane == Lane::kWifi;
+  if (is_better_linked) return Received::kNothing;
   if (assignment.session != session_) heartbeat_sequence_ = restore_sequence_ = 0;
   if (!is_linked() || assignment.session != session_) restore_window_.start(now_us, kRestoreWithinUs);
   session_ = assignment.session;
@@ -150,11 +149,12 @@ Received Pairing::restored(const uint8_t* data, const Condition& condition, uint
 }
 
 bool Pairing::wants_hello(Lane lane) const {
-  if (!lane_is_up_[index(lane)]) return false;
+  if (!lane_is_up_[index(lane)] || device_id_ == 0) return false;
   return !is_linked() || (lane == Lane::kCable && link_.lane == Lane::kWifi);
 }
 
-uint8_t Pairing::next(const Condition& condition, uint32_t now_us, uint8_t (&packet)[wire::kLargest], Way& to) {
+uint8_t Pairing::next(const Condition& condition, uint32_t now_us, uint8_t (&packet)[wire::kLargest],
+                      Way& to) {
   call_pause_.is_running(now_us);
   restore_window_.is_running(now_us);
   if (is_linked() && !heard_.is_running(now_us)) leave();

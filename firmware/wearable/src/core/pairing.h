@@ -47,8 +47,8 @@ class Pairing {
   // A lane came up (greeted at once) or went down (a link on it is left at once). Call it as often as wished.
   void set_lane(Lane lane, bool is_up);
 
-  // One packet from anyone. kRestore: authentic, in time, for `condition.imu_id`, and wanted; the caller reads
-  // the wire::Restore in `data` and applies it.
+  // One packet from anyone. kRestore: authentic, in time, for `condition.imu_id`, and wanted; the caller
+  // reads the wire::Restore in `data` and applies it.
   Received receive(const uint8_t* data, uint16_t count_bytes, const Way& from, const Condition& condition,
                    uint32_t now_us);
 

@@ -33,7 +33,7 @@ struct Address {
 // Wi-Fi and one UDP socket. Calls marked with (blocks) stop everything: never made while linked.
 class DatagramLink {
  public:
-  virtual bool is_up() = 0;  // joined, by the driver's own word, which can be stale: the heartbeat is the truth
+  virtual bool is_up() = 0;  // joined, by the driver's own word, which can be stale: the heartbeat tells
   virtual bool join(const char* network, const char* password) = 0;  // (blocks, up to 10 s) true: joined
   virtual void leave() = 0;
   virtual bool open(uint16_t port) = 0;  // (blocks, up to 2 s) a disconnect has closed the socket

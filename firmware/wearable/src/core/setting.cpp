@@ -59,9 +59,7 @@ bool set_fusion(const char* value, Settings& settings) {
 bool set_axes(const char* value, Settings& settings) {
   uint8_t map, sign;
   if (!parse_hex(value, &map, 1, ' ') || !parse_hex(value + 3, &sign, 1)) return false;
-  const uint8_t x = map & 3, y = map >> 2 & 3, z = map >> 4 & 3;
-  const bool is_permutation = map < 64 && x + y + z == 3 && x != y && y != z && x != z;
-  if (!is_permutation || sign > 7) return false;
+  if (!is_axis_remap(map, sign)) return false;
   settings.imu.axis_map = map;
   settings.imu.axis_sign = sign;
   return true;
@@ -78,7 +76,7 @@ constexpr struct {
                  {"password", set_password, "a password has 8 to 63 bytes, or none for an open network"},
                  {"port", set_port, "a port is 1 to 65535"},
                  {"fusion", set_fusion, "fusion is imuplus or ndof"},
-                 {"axes", set_axes, "axes are the BNO055's remap registers 0x41 and 0x42, as in: set axes 24 00"}};
+                 {"axes", set_axes, "axes are a turn of the BNO055's axes as two registers, as in: 24 00"}};
 
 }  // namespace
 

@@ -6,7 +6,7 @@
 
 namespace bunraku {
 
-// `what` is the setting's name, a space, its value. What breaks a rule changes nothing and is answered with the rule.
+// `what`: the setting's name, a space, its value. What breaks a rule changes nothing; the rule is the answer.
 void change_setting(const char* what, Settings& settings, Answer& answer);
 
 const char* fusion_name(Fusion fusion);

@@ -20,7 +20,9 @@ class Taps {
   bool may_count_ = false;   // it began at the right moment for a tap
   bool has_spike_ = false;   // and was strong enough
   bool is_settled_ = false;  // it has been quiet for long enough
-  uint32_t burst_us_ = 0, quiet_us_ = 0, first_us_ = 0, fed_us_ = 0;  // when: burst, quiet, first tap, last sample
+  uint32_t burst_us_ = 0, quiet_us_ = 0;  // when they began
+  uint32_t first_us_ = 0;                 // when the first tap came
+  uint32_t fed_us_ = 0;
 };
 
 }  // namespace bunraku
