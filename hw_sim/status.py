@@ -54,12 +54,14 @@ class StatusLine:
         )
         if not emulator.counts["sent"]:
             self._console.print(
-                f"Nothing could be sent to {self._where}. Is it plugged in, and is the address right?"
+                f"Nothing could be sent to {self._where}. Is it plugged in, and is the address right?",
+                soft_wrap=True,
             )
         elif not emulator.counts["readings"]:
             self._console.print(
                 f"No box took these sensors at {self._where}. "
-                "Is it running, and does it read the same key file?"
+                "Is it running, and does it read the same key file?",
+                soft_wrap=True,
             )
 
 
