@@ -1,4 +1,4 @@
-"""The command `bunraku`: play, check, pack, filmstrip, version; simulation and studio plug theirs in."""
+"""The command `bunraku`: the box's own commands; simulation and studio plug theirs in."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from appliance.stage.realtime import prepare_environment
 prepare_environment()
 
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
+
+from appliance.stage import sensor_commands  # noqa: E402
 
 PLUG_INS = "bunraku.commands"
 REFUSED = 2
@@ -76,6 +78,10 @@ def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you cha
     pack_show(show)
 
 
+app.command()(sensor_commands.provision)
+app.add_typer(sensor_commands.sensors, name="sensors")
+
+
 @app.command()
 def filmstrip(
     recording: Annotated[Path, typer.Argument(help="A BVH recording, or the journal of a run.")],
@@ -120,9 +126,10 @@ def plug_in(onto: typer.Typer, found: Iterable[EntryPoint], say: Callable[[str],
 
 
 def _own_commands() -> set[str]:
-    return {
+    commands = {
         command.name or command.callback.__name__ for command in app.registered_commands if command.callback
     }
+    return commands | {str(group.name) for group in app.registered_groups if group.name}
 
 
 def _is_for_people(error: Exception) -> bool:

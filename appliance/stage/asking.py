@@ -1,0 +1,93 @@
+"""Asks the running box about its sensors over its control port, from another process."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pythonosc.osc_message import OscMessage, ParseError
+
+from appliance.show.box import BoxConfig
+from appliance.stage.control import REPLY, Address, datagram
+from appliance.stage.roster import END, SENSOR, Message, RosterLine
+
+PATIENCE_S = 2.0  # a tick takes the command, a thread answers: 0.2 s, and more while a box starts
+_LARGEST_DATAGRAM = 4096
+
+
+class NoBoxError(Exception):
+    """No box answers: a sentence for people."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the box replied: whether it was done, and a sentence."""
+
+    done: bool
+    words: str
+
+
+@dataclass(frozen=True)
+class Roll:
+    """All sensors of the running box, how old that is, and which key file it reads."""
+
+    lines: list[RosterLine]
+    age_s: float
+    key_file: Path | None
+
+
+class RunningBox:
+    """The box behind a control port; each question opens a socket of its own."""
+
+    def __init__(self, control: Address | None, patience_s: float = PATIENCE_S) -> None:
+        self._control = control
+        self._patience_s = patience_s
+
+    @classmethod
+    def of(cls, box: BoxConfig) -> RunningBox:
+        """The box that plays with this box file on this machine."""
+        control = box.control
+        if control is None or control.port == 0:
+            return cls(None)
+        return cls(("127.0.0.1" if control.host == "0.0.0.0" else control.host, control.port))
+
+    def ask(self, address: str, *arguments: str) -> Answer:
+        """Have one command carried out. Raises NoBoxError."""
+        for reply in self._replies((address, *arguments)):
+            if reply.address == REPLY and len(reply.params) == 3 and reply.params[0] == address:
+                return Answer(bool(reply.params[1]), str(reply.params[2]))
+        raise self._nobody()
+
+    def roll(self) -> Roll:
+        """How all its sensors are. Raises NoBoxError."""
+        lines = []
+        for reply in self._replies(("/sensors/list",)):
+            if reply.address == SENSOR and len(reply.params) == len(RosterLine._fields):
+                lines.append(RosterLine(*reply.params))
+            elif reply.address == END and len(reply.params) == 3 and reply.params[0] == len(lines):
+                _, age_s, key_file = reply.params
+                return Roll(lines, float(age_s), Path(key_file) if key_file else None)
+        raise self._nobody()
+
+    def _replies(self, message: Message) -> Iterator[OscMessage]:
+        """What the box sends back, until patience ends; nothing when no port is open there."""
+        if self._control is None:
+            return
+        until = time.monotonic() + self._patience_s
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asker, contextlib.suppress(OSError):
+            asker.connect(self._control)  # so that a port with nobody behind it is told at once
+            asker.send(datagram(message))
+            while (left_s := until - time.monotonic()) > 0:
+                asker.settimeout(left_s)
+                with contextlib.suppress(ParseError):
+                    yield OscMessage(asker.recv(_LARGEST_DATAGRAM))
+
+    def _nobody(self) -> NoBoxError:
+        if self._control is None:
+            return NoBoxError("The box file opens no control port that could be asked (`control`).")
+        host, port = self._control
+        return NoBoxError(f"No box answers on {host}:{port}.")

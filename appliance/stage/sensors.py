@@ -1,0 +1,212 @@
+"""`bunraku sensors`: what the running box knows of its sensors, and changes to who is let in."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.text import Text
+
+from appliance.sensor.key_editing import KeyEditing, editing
+from appliance.sensor.keys import KeyFileError, exposure, load_keys
+from appliance.show.box import BoxConfig, load_box
+from appliance.stage.asking import NoBoxError, Roll, RunningBox
+from appliance.stage.sensor_table import SensorTable, known_table, plain_values, unheard
+from appliance.stage.stage_error import StageError
+
+DEFAULT_KEYS = Path("sensors.keys")
+NOT_TAKEN = 1
+_OLD_ROLL_S = 3.0
+_PIPE_WIDTH = 160
+
+
+@dataclass(frozen=True)
+class Venue:
+    """Which box and which key file are meant."""
+
+    box_file: Path | None
+    box: BoxConfig
+    keys: Path
+
+    @property
+    def running(self) -> RunningBox:
+        return RunningBox.of(self.box)
+
+
+def venue(box_file: Path | None, keys: Path | None) -> Venue:
+    """By the box file, the key file alone, or what lies in this folder. Raises StageError, ConfigError."""
+    if box_file is not None and keys is not None:
+        raise StageError("Give --box or --keys, not both: a box file names its key file.")
+    box = load_box(box_file)
+    if box_file is not None and box.sensors.keys is None:
+        raise StageError(
+            f"{box_file} names no key file, so no sensor is let in. "
+            "Write `keys: sensors.keys` under sensors in it."
+        )
+    return Venue(box_file, box, box.sensors.keys or keys or DEFAULT_KEYS)
+
+
+def people_console() -> Console:
+    """Wide enough for the table where nobody looks, in a pipe."""
+    console = Console(highlight=False)
+    return console if console.is_terminal else Console(highlight=False, width=_PIPE_WIDTH)
+
+
+def list_sensors(place: Venue, watch: bool, as_json: bool) -> None:
+    """Print all sensors once, or again each second until Ctrl-C."""
+    if as_json:
+        print(json.dumps(_plain(place), indent=2))
+        return
+    console = people_console()
+    if not watch:
+        console.print(_picture(place))
+        return
+    try:
+        with Live(_picture(place), console=console, auto_refresh=False, screen=False) as live:
+            while True:
+                time.sleep(1.0)
+                live.update(_picture(place), refresh=True)
+    except KeyboardInterrupt:
+        return
+
+
+def tell(place: Venue, address: str, *arguments: str) -> None:
+    """Send one command to the running box and print its answer. Raises StageError when it is not done."""
+    try:
+        answer = place.running.ask(address, *arguments)
+    except NoBoxError as error:
+        raise StageError(f"{error} {_WHICH_BOX}") from None
+    if not answer.done:
+        raise StageError(answer.words)
+    print(answer.words)
+
+
+def replace_by_spare(place: Venue, broken: str, spare: str) -> int:
+    """A spare takes over a name, with no cable: the two change names. The exit status."""
+    return _edit(
+        place,
+        lambda change: change.swap(broken, spare),
+        f"{broken} is now the sensor that was {spare}; the other one is {spare} until it is mended.",
+    )
+
+
+def revoke(place: Venue, name: str) -> int:
+    """Let a sensor in no more. The exit status."""
+    return _edit(
+        place,
+        lambda change: change.remove(name),
+        f"{name} is revoked: whoever has that sensor moves nothing any more. "
+        "To use it again, provision it again.",
+    )
+
+
+def rename(place: Venue, name: str, new: str) -> int:
+    """Give a sensor another name. The exit status."""
+    return _edit(
+        place, lambda change: change.rename(name, new), f"{name} is now {new}. Shows name it by that."
+    )
+
+
+def reload(place: Venue) -> tuple[bool, str]:
+    """Have the running box read the key file again: whether it is as it should be, and a sentence."""
+    try:
+        roll = place.running.roll()
+        if roll.key_file is not None and roll.key_file.resolve() != place.keys.resolve():
+            return False, (
+                f"The running box reads another key file ({roll.key_file}) and knows nothing of this change. "
+                "Give the box file of that box with --box."
+            )
+        answer = place.running.ask("/sensors/reload")
+    except NoBoxError as error:
+        return True, f"{error} The change counts when it starts."
+    return answer.done, f"The running box {'took it' if answer.done else 'did not take it'}. {answer.words}"
+
+
+@contextmanager
+def clear_errors(path: Path) -> Iterator[None]:
+    """What goes wrong with a key file, as one clear line."""
+    try:
+        yield
+    except KeyFileError as error:
+        raise StageError(f"{error}.") from None
+    except FileNotFoundError:
+        missing = f"key file {path}" if path.parent.is_dir() else f"folder {path.parent} for the key file"
+        raise StageError(f"There is no {missing}. {_WHICH_KEYS}") from None
+    except OSError as error:
+        raise StageError(
+            f"{path}: {error.strerror}. Nothing was changed. May this user read and write there?"
+        ) from None
+
+
+_WHICH_BOX = "Is it running here? Its box file (--box) tells the control port, if it is not the usual one."
+_WHICH_KEYS = "Name it with --keys, or the box file with --box; the first bunraku provision makes one."
+
+
+def _edit(place: Venue, change_it: Callable[[KeyEditing], None], words: str) -> int:
+    with clear_errors(place.keys):
+        if not place.keys.exists():
+            raise FileNotFoundError
+        with editing(place.keys) as change:
+            change_it(change)
+            change.commit()
+    print(words)
+    is_well, words = reload(place)
+    print(words)
+    return 0 if is_well else NOT_TAKEN
+
+
+def _picture(place: Venue) -> Group:
+    """The table, and below it what should be looked at."""
+    try:
+        roll = place.running.roll()
+    except NoBoxError as error:
+        return _picture_of_file(place, str(error))
+    parts: list[object] = []
+    if roll.lines:
+        parts.append(SensorTable(roll.lines))
+    else:
+        parts.append(
+            Text("The running box knows no sensor. Provision one: bunraku provision --name left-wrist")
+        )
+    if roll.age_s > _OLD_ROLL_S:
+        parts.append(
+            Text(f"\nThis is {roll.age_s:.0f} s old: the box is starting, or it hangs.", style="red")
+        )
+    complaints = [f"{line.name}: {line.complaint}" for line in roll.lines if line.complaint]
+    parts += [Text(f"\n{words}", style="yellow") for words in complaints]
+    return Group(*parts)  # type: ignore[arg-type]
+
+
+def _picture_of_file(place: Venue, why: str) -> Group:
+    with clear_errors(place.keys):
+        try:
+            lines = unheard(load_keys(place.keys))
+        except FileNotFoundError:
+            raise StageError(f"{why} And there is no key file {place.keys}. {_WHICH_KEYS}") from None
+        warning = exposure(place.keys)
+    notes = [Text(f"{why} These sensors may come in ({place.keys}):\n", style="yellow")]
+    if not lines:
+        notes = [Text(f"{why} {place.keys} has no sensor yet.", style="yellow")]
+    return Group(*notes, known_table(lines) if lines else "", *([Text(f"\n{warning}")] if warning else []))
+
+
+def _plain(place: Venue) -> dict[str, object]:
+    try:
+        roll: Roll | None = place.running.roll()
+    except NoBoxError:
+        roll = None
+    if roll is not None:
+        return {
+            "box": True,
+            "age_s": round(roll.age_s, 3),
+            "sensors": [plain_values(one) for one in roll.lines],
+        }
+    with clear_errors(place.keys):
+        lines = unheard(load_keys(place.keys))
+    return {"box": False, "age_s": None, "sensors": [plain_values(line) for line in lines]}
