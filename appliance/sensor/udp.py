@@ -18,7 +18,7 @@ TIMESPEC = struct.Struct("@qq")
 OLDEST_S = 1.0
 # The kernel counts about 768 bytes for a datagram of ours and doubles what is asked for.
 COMMON_BUFFER_BYTES = 192 * 1024  # room for some 500 of strangers: two ticks' worth of a heavy flood
-OWN_BUFFER_BYTES = 32 * 1024  # room for some 85 of one sensor: the burst after a stall of 1.7 s
+OWN_BUFFER_BYTES = 96 * 1024  # room for some 250 of one sensor: the burst after a stall of 5 s
 # A drain takes at most so many: in a flood 1.5 ms of a tick.
 COMMON_PER_DRAIN = 256
 OWN_PER_DRAIN = 32

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from appliance.sensor import wire
@@ -341,6 +341,7 @@ def test_a_hundred_thousand_random_and_mutated_datagrams_none_accepted_and_the_s
     assert {"length", "magic", "version", "kind", "device", "tag", "old_session"} <= counts.keys()
 
 
+@settings(deadline=None)
 @given(st.lists(st.binary(max_size=120), max_size=30))
 def test_no_bytes_raise_move_or_are_answered(packets: list[bytes]) -> None:
     box, sensor = linked_box()
@@ -399,8 +400,10 @@ steps = st.one_of(
 )
 
 
-@settings(max_examples=300)
-@given(st.lists(steps, max_size=100))
+@settings(
+    max_examples=200, suppress_health_check=[HealthCheck.large_base_example, HealthCheck.data_too_large]
+)
+@given(st.lists(steps, min_size=40, max_size=100))
 def test_authentic_packets_in_any_order_never_raise_and_never_go_back(script: list[tuple[Any, ...]]) -> None:
     air = Air()
     for what, *arguments in script:

@@ -1,4 +1,4 @@
-"""Over a real socket: readings come with the kernel's time of arrival, nothing waits, nothing raises."""
+"""Over real sockets: true times of arrival, nothing waits or raises, no flood keeps a linked sensor out."""
 
 from __future__ import annotations
 
@@ -8,11 +8,56 @@ from collections.abc import Iterator
 
 import pytest
 
-from appliance.sensor import wire
+from appliance.sensor import udp, wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, open_link
 from appliance.sensor.udp import PortError, UdpIntake
-from tests.sensor.test_link import KEYS, datagram
+from tests.sensor.flood import flood
+from tests.sensor.peers import KEYS, Wearable
+
+PATIENCE_S = 20.0
+
+
+class Radio:
+    """A wearable at a socket."""
+
+    def __init__(self, address: tuple[str, int], key: SensorKey = KEYS["left-wrist"]) -> None:
+        self.wearable = Wearable(key)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.connect(address)
+        self.socket.setblocking(False)
+
+    def move(self) -> None:
+        """The same sensor at another address."""
+        box = self.socket.getpeername()
+        self.socket.close()
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.connect(box)
+        self.socket.setblocking(False)
+
+    def hear(self) -> list[wire.Packet]:
+        heard = []
+        while True:
+            try:
+                heard.append(self.wearable.hear(self.socket.recv(200)))
+            except BlockingIOError:
+                return heard
+
+    def pair(self, link: SensorLink) -> None:
+        """Hello, assignment, first reading; on loopback what was sent has come."""
+        self.socket.send(self.wearable.hello())
+        link.drain(time.monotonic())
+        link.tend(time.monotonic())
+        assert self.hear()
+        self.socket.send(self.wearable.reading())
+        assert [reading.sequence for reading in link.drain(time.monotonic())] == [self.wearable.sequence]
+        link.tend(time.monotonic())
+
+
+def intake_of(link: SensorLink) -> UdpIntake:
+    intake = link.intakes[0]
+    assert isinstance(intake, UdpIntake)
+    return intake
 
 
 @pytest.fixture
@@ -23,25 +68,26 @@ def link() -> Iterator[SensorLink]:
 
 
 @pytest.fixture
-def sensor(link: SensorLink) -> Iterator[socket.socket]:
-    intake = link.intakes[0]
-    assert isinstance(intake, UdpIntake)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sensor:
-        sensor.connect(intake.address)
-        yield sensor
+def radio(link: SensorLink) -> Iterator[Radio]:
+    radio = Radio(intake_of(link).address)
+    yield radio
+    radio.socket.close()
 
 
-def test_a_reading_over_the_network(link: SensorLink, sensor: socket.socket) -> None:
+def test_a_sensor_pairs_over_the_network(link: SensorLink, radio: Radio) -> None:
     assert link.drain(time.monotonic()) == ()
-    sensor.send(datagram(1))
-    (reading,) = link.drain(time.monotonic())
-    assert (reading.sensor, reading.sequence) == ("left-wrist", 1)
+    radio.pair(link)
+    (state, _) = link.states(time.monotonic())
+    assert state.state == "linked"
+    assert state.way == f"127.0.0.1:{radio.socket.getsockname()[1]}"
+    assert [type(packet) for packet in radio.hear()] == [wire.Heartbeat]
 
 
-def test_arrival_is_when_it_came_and_not_when_it_was_fetched(link: SensorLink, sensor: socket.socket) -> None:
-    for n in range(20):  # the kernel takes a moment to switch its stamps on after the socket opened
+def test_arrival_is_when_it_came_and_not_when_it_was_fetched(link: SensorLink, radio: Radio) -> None:
+    radio.pair(link)
+    for n in range(20):  # the kernel takes a moment to switch its stamps on after the first socket opened
         before = time.monotonic()
-        sensor.send(datagram(n, degrees=n))
+        radio.socket.send(radio.wearable.reading(degrees=n))
         after = time.monotonic()
         time.sleep(0.015)
         now = time.monotonic()
@@ -53,47 +99,98 @@ def test_arrival_is_when_it_came_and_not_when_it_was_fetched(link: SensorLink, s
         pytest.fail("no datagram was stamped at its arrival")
 
 
-def test_times_that_are_invented_are_kept(link: SensorLink, sensor: socket.socket) -> None:
-    for n, now in enumerate((5.0, 1e9)):
-        sensor.send(datagram(n))
+def test_times_that_are_invented_are_kept(link: SensorLink, radio: Radio) -> None:
+    radio.pair(link)
+    for now in (5.0, 1e9):
+        radio.socket.send(radio.wearable.reading())
         (reading,) = link.drain(now)
         assert reading.arrival == now
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00", b"BK", bytes(42), bytes(65_000)], ids=len)
-def test_odd_sizes(link: SensorLink, sensor: socket.socket, data: bytes) -> None:
-    sensor.send(data)
-    sensor.send(datagram(1))
-    assert [reading.sequence for reading in link.drain(time.monotonic())] == [1]
-    assert sum(link.counts.values()) == 2
+def test_odd_sizes(link: SensorLink, radio: Radio, data: bytes) -> None:
+    radio.pair(link)
+    for _ in range(2):  # on the sensor's own socket
+        radio.socket.send(data)
+        radio.socket.send(radio.wearable.reading())
+        assert [one.sequence for one in link.drain(time.monotonic())] == [radio.wearable.sequence]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:  # and on the common one
+        stranger.sendto(data, intake_of(link).address)
+        assert link.drain(time.monotonic()) == ()
+    assert link.counts["length"] + link.counts["magic"] == 3
 
 
-def test_a_longer_datagram_that_begins_like_a_reading_is_no_reading(
-    link: SensorLink, sensor: socket.socket
-) -> None:
-    sensor.send(datagram(1) + b"\x00")
+def test_a_longer_datagram_that_begins_like_a_reading_is_no_reading(link: SensorLink, radio: Radio) -> None:
+    radio.pair(link)
+    radio.socket.send(radio.wearable.reading() + b"\x00")
     assert link.drain(time.monotonic()) == ()
     assert link.counts["length"] == 1
 
 
-def test_a_flood_keeps_the_newest_reading_at_most_a_few_drains_away(
-    link: SensorLink, sensor: socket.socket
-) -> None:
-    for _ in range(3000):
-        sensor.send(bytes(wire.READING.size))
-    drains = 0
-    while link.drain(time.monotonic()) or link.counts["drain_limit"] > drains:
-        drains += 1
-    assert drains < 5
-    sensor.send(datagram(1))
-    assert [reading.sequence for reading in link.drain(time.monotonic())] == [1]
+def test_a_sensor_that_changes_its_address_dances_on(link: SensorLink, radio: Radio) -> None:
+    radio.pair(link)
+    for n in range(30):
+        if n % 10 == 5:
+            radio.move()
+        radio.socket.send(radio.wearable.reading())
+        assert [one.sequence for one in link.drain(time.monotonic())] == [radio.wearable.sequence]
+        link.tend(time.monotonic())
+    assert list(intake_of(link)._own) == [radio.socket.getsockname()]
+    assert link.counts["accepted"] == 31
 
 
-def test_a_taken_port_says_what_to_do(link: SensorLink) -> None:
-    intake = link.intakes[0]
-    assert isinstance(intake, UdpIntake)
-    with pytest.raises(PortError, match="Is a second bunraku running"):
-        UdpIntake(*intake.address)
+def test_readings_that_wait_while_sockets_change_are_not_lost(link: SensorLink, radio: Radio) -> None:
+    """On the common socket when the own one opens, and on the own one when it is left."""
+    intake = intake_of(link)
+    radio.pair(link)
+    origin = radio.socket.getsockname()
+    for attended in ((), (origin,), (), (origin,)):
+        radio.socket.send(radio.wearable.reading())
+        intake.attend(attended)
+        radio.socket.send(radio.wearable.reading())
+        assert [one.sequence for one in link.drain(time.monotonic())] == [radio.wearable.sequence]
+    assert link.counts["accepted"] == 7
+    assert link.counts["reordered"] == 2  # from the common socket, after a newer one from the own
+    assert not intake._left
+
+
+def test_a_socket_that_its_sensor_does_not_reach_any_more_is_made_anew() -> None:
+    """As when the box has got another address: what is sent there comes to the common socket."""
+    intake = UdpIntake("0.0.0.0", 0)
+    port = intake.address[1]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sensor:
+        sensor.bind(("127.0.0.1", 0))
+        origin = sensor.getsockname()
+        intake.attend([origin])
+        own = intake._own[origin]
+        sensor.sendto(b"to the address of before", ("127.0.0.1", port))
+        sensor.sendto(b"to another one", ("127.0.0.2", port))
+        assert [bytes(data) for data, *_ in intake.receive(0.0)] == [
+            b"to the address of before",
+            b"to another one",
+        ]
+        intake.attend([origin])
+        assert intake._own[origin] is not own
+    intake.close()
+
+
+def test_answers_leave_from_the_listening_port(link: SensorLink, radio: Radio) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sensor:
+        sensor.settimeout(PATIENCE_S)
+        sensor.sendto(radio.wearable.hello(), intake_of(link).address)
+        link.drain(time.monotonic())
+        link.tend(time.monotonic())
+        _, whence = sensor.recvfrom(200)
+    assert whence == intake_of(link).address
+
+
+def test_a_taken_port_says_what_to_do_also_while_sensors_are_linked(link: SensorLink, radio: Radio) -> None:
+    host, port = intake_of(link).address
+    for _ in range(2):
+        for taken in (host, "0.0.0.0"):
+            with pytest.raises(PortError, match="Is a second bunraku running"):
+                UdpIntake(taken, port)
+        radio.pair(link)
 
 
 @pytest.mark.parametrize(("host", "port"), [("no.such.host.invalid", 9750), ("203.0.113.1", 9750)])
@@ -102,23 +199,87 @@ def test_an_impossible_address_says_what_to_do(host: str, port: int) -> None:
         UdpIntake(host, port)
 
 
-def test_a_closed_socket_never_raises_into_the_tick(link: SensorLink) -> None:
-    intake = link.intakes[0]
-    assert isinstance(intake, UdpIntake)
-    intake._socket.close()
+def test_closed_sockets_never_raise_into_the_tick(link: SensorLink, radio: Radio) -> None:
+    radio.pair(link)
+    intake = intake_of(link)
+    for one in (intake._socket, *intake._own.values()):
+        one.close()
     assert link.drain(time.monotonic()) == ()
-    assert link.counts["socket_error"] == 1
+    link.strobe("left-wrist", time.monotonic())
+    link.tend(time.monotonic())
+    assert link.counts["socket_error"] == 2
+    assert link.counts["send_error"] == 1
+
+
+def test_an_answer_that_cannot_leave_is_counted() -> None:
+    intake = UdpIntake("127.0.0.1", 0)
+    intake.send(b"x", ("203.0.113.1", 9))  # from loopback there is no way there
+    intake.attend([("203.0.113.1", 9)])
+    assert intake.counts["send_error"] == 1
+    assert intake.counts["socket_error"] == 1
+    intake.close()
 
 
 def test_no_sensors_no_port_no_trouble() -> None:
     link = open_link({}, udp=None)
     assert link.drain(0.0) == ()
+    link.tend(0.0)
     link.close()
 
 
-def test_an_unknown_key_is_not_heard(link: SensorLink, sensor: socket.socket) -> None:
-    stranger = SensorKey("stranger", 0x33, bytes(16))
-    reading = wire.Reading(stranger.device_id, 1, 0, 1, 0, (1.0, 0.0, 0.0, 0.0), 0, 0, 0, 0, 0, 0)
-    sensor.send(wire.pack(reading, wire.Tagger(stranger.key)))
+def test_an_unknown_key_is_not_heard(link: SensorLink, radio: Radio) -> None:
+    stranger = Wearable(SensorKey("stranger", 0x33, bytes(16)))
+    radio.socket.send(stranger.hello())
     assert link.drain(time.monotonic()) == ()
+    link.tend(time.monotonic())
     assert link.counts["device"] == 1
+    assert radio.hear() == []
+
+
+def test_a_flood_takes_a_bounded_share_of_a_drain_and_passes(link: SensorLink, radio: Radio) -> None:
+    radio.pair(link)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        for _ in range(3000):
+            stranger.sendto(bytes(wire.READING.size), intake_of(link).address)
+    radio.socket.send(radio.wearable.reading())
+    before = link.counts["magic"]
+    assert len(link.drain(time.monotonic())) == 1  # not behind the flood
+    assert link.counts["magic"] - before == udp.COMMON_PER_DRAIN
+    assert link.counts["drain_limit"] == 1
+    drains = 0
+    while (before := link.counts["magic"]) >= 0:
+        link.drain(time.monotonic())
+        drains += 1
+        if link.counts["magic"] == before:
+            break
+    assert drains <= 4
+
+
+@pytest.mark.realtime
+def test_a_stranger_floods_while_a_sensor_dances_and_another_one_is_switched_on(
+    link: SensorLink, radio: Radio
+) -> None:
+    """10,000 datagrams a second: noise, copies of what is on the air, forged hellos of known sensors."""
+    radio.pair(link)
+    late = Radio(intake_of(link).address, KEYS["head"])
+    stranger = flood(intake_of(link).address, [Wearable(KEYS["left-wrist"]), Wearable(KEYS["head"], 9)], 2.0)
+    sequences: list[int] = []
+    hellos = 0
+    tick = time.monotonic()
+    while stranger.poll() is None:
+        radio.socket.send(radio.wearable.reading())
+        if late.wearable.session:
+            late.socket.send(late.wearable.reading())
+        elif len(sequences) % 25 == 24:
+            late.socket.send(late.wearable.hello())
+            hellos += 1
+        newest = {reading.sensor: reading.sequence for reading in link.drain(time.monotonic())}
+        link.tend(time.monotonic())
+        late.hear()
+        sequences.append(newest["left-wrist"])
+        tick += 0.02
+        time.sleep(max(0.0, tick - time.monotonic()))
+    assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))  # every one, in its tick
+    assert late.wearable.session, f"none of {hellos} hellos came through"
+    assert link.states(time.monotonic())[0].way.endswith(str(radio.socket.getsockname()[1]))
+    late.socket.close()
