@@ -116,5 +116,6 @@ class SerialIntake:
         """One frame between two zero bytes: the first ends whatever was written before."""
         try:
             port.write(END + frame(packet))
-        except serial.SerialTimeoutException:  # nobody reads at the other end
-            self.counts["send_error"] += 1
+        except serial.SerialTimeoutException:  # nobody reads at the other end: what waits is stale
+            self.counts["send_error"] += 1 + len(self._unsent)
+            self._unsent.clear()

@@ -64,10 +64,9 @@ class Wearable:
         return wire.pack(wire.Profile(*head, imu_id, offsets), self.tagger)
 
     def hear(self, data: bytes) -> wire.Packet:
-        """Believes what is authentic and for this power-on; an assignment gives it its session."""
+        """Believes what is authentic; an assignment for this power-on gives it its session."""
         packet = wire.unpack(data, lambda device: self.tagger if device == self.key.device_id else None)
-        assert packet.boot_nonce == self.boot
-        if isinstance(packet, wire.Assignment):
+        if isinstance(packet, wire.Assignment) and packet.boot_nonce == self.boot:
             assert packet.hello_sequence == self.hellos
             self.session = packet.session
         self.heard.append(packet)
