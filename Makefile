@@ -7,14 +7,22 @@ PICTURE := out/dance.png
 ARGS ?= --seconds 30
 TEST_ARGS ?=
 
-# What the tests need from the system, as package:command.
-DEBIAN_FOR_TESTS := liblo-tools:oscdump iproute2:ip
+# What is needed from the system, as package:command or package:file (where the package brings no command).
+DEBIAN_FOR_FIRMWARE := cmake:cmake g++:g++ make:make
+DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) liblo-tools:oscdump iproute2:ip \
+    doctest-dev:/usr/include/doctest/doctest.h cppcheck:cppcheck clang-14:clang++-14 \
+    libclang-rt-14-dev:/usr/lib/llvm-14/lib/clang/*/lib/linux/libclang_rt.fuzzer-* \
+    gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \
+    qemu-system-arm:qemu-system-arm
+
+FUZZ_SECONDS ?= 30
 
 .DEFAULT_GOAL := help
-.PHONY: help run studio test lint bench lock clean debian-for-tests
+.PHONY: help run studio firmware test firmware-test fuzz-corpus lint bench lock clean \
+    debian-for-firmware debian-for-tests
 
 help: ## show this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 	@echo "  make run ARGS='--seconds 10' passes options on; make run ARGS= dances until Ctrl-C"
 
 run: $(VENV)/.ready-to-run ## dance with an emulated sensor and draw a picture of it
@@ -23,8 +31,36 @@ run: $(VENV)/.ready-to-run ## dance with an emulated sensor and draw a picture o
 
 studio: $(VENV)/.ready-to-test ## add what training needs (PyTorch) to the environment
 
-test: $(VENV)/.ready-to-test debian-for-tests lint ## style, types, import contracts and all tests
+firmware: debian-for-firmware ## build the wearable's firmware for this machine: emulate --firmware runs it
+	@$(call build,firmware,wearable)
+
+test: $(VENV)/.ready-to-test debian-for-tests lint firmware firmware-test ## style, types, contracts, all tests
 	@$(BIN)/pytest $(TEST_ARGS)
+
+firmware-test: debian-for-tests ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
+	@echo "Wearable: host tests with sanitizers"
+	@$(call build,firmware,core_tests)
+	@build/firmware/core_tests --no-version --minimal
+	@echo "Wearable: static analysis"
+	@cppcheck --std=c++17 --language=c++ --enable=warning,performance,portability --inline-suppr --quiet \
+	    --error-exitcode=1 -I firmware/stubs firmware/wearable/src firmware/host firmware/qemu firmware/fuzz
+	@echo "Wearable: for its processor; the sketch against the stubs"
+	@$(call build,firmware-m0,all,-DCMAKE_TOOLCHAIN_FILE=cmake/cortex-m0plus.cmake)
+	@echo "Wearable: on an emulated Cortex-M0"
+	@$(call build,firmware-m0,dance)
+	@echo "Wearable: fuzzing for $(FUZZ_SECONDS) s"
+	@$(call build,firmware-fuzz,all,-DBUNRAKU_FUZZ=ON -DCMAKE_CXX_COMPILER=clang++-14)
+	@firmware/fuzz/run.sh build/firmware-fuzz $(FUZZ_SECONDS)
+
+fuzz-corpus: debian-for-tests ## fuzz the wearable (FUZZ_SECONDS) and keep the inputs that reach new code
+	@$(call build,firmware-fuzz,all,-DBUNRAKU_FUZZ=ON -DCMAKE_CXX_COMPILER=clang++-14)
+	@firmware/fuzz/run.sh build/firmware-fuzz $(FUZZ_SECONDS) keep
+
+# $(1) the folder under build/, $(2) the target, $(3) how it is configured.
+define build
+mkdir -p build && cmake -S firmware -B build/$(1) $(3) >build/$(1).log 2>&1 || { cat build/$(1).log; exit 1; }; \
+cmake --build build/$(1) --target $(2) --parallel 2 -- --silent --no-print-directory
+endef
 
 lint: $(VENV)/.ready-to-test ## style, types and import contracts alone
 	@$(BIN)/ruff check .
@@ -59,13 +95,21 @@ $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-
 endef
 
 debian-for-tests:
-	@missing=; for pair in $(DEBIAN_FOR_TESTS); do \
-	    command -v $${pair#*:} >/dev/null || missing="$$missing $${pair%%:*}"; done; \
-	if [ -n "$$missing" ]; then \
-	    echo "Missing Debian packages:$$missing. Install them with: sudo apt-get install -y$$missing"; \
-	    [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && apt-get update -qq && \
-	    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $$missing >/dev/null; \
-	fi
+	@$(call debian,$(DEBIAN_FOR_TESTS))
+
+debian-for-firmware:
+	@$(call debian,$(DEBIAN_FOR_FIRMWARE))
+
+define debian
+missing=; for pair in $(1); do probe=$${pair#*:}; \
+    case $$probe in /*) compgen -G "$$probe" >/dev/null;; *) command -v $$probe >/dev/null;; esac || \
+    missing="$$missing $${pair%%:*}"; done; \
+if [ -n "$$missing" ]; then \
+    echo "Missing Debian packages:$$missing. Install them with: sudo apt-get install -y$$missing"; \
+    [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && apt-get update -qq && \
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null; \
+fi
+endef
 
 lock: | $(VENV)/bin/python ## choose the newest versions that pyproject.toml allows and pin them
 	@rm -rf build && $(BIN)/python -m venv build/lock

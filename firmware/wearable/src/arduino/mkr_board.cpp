@@ -59,6 +59,16 @@ void MkrBoard::feed_watchdog() {
 
 void MkrBoard::restart() { NVIC_SystemReset(); }
 
+// SAM D21 data sheet, "Serial Number": 128 bits in four words, folded into one.
+uint32_t MkrBoard::serial_number() {
+  uint32_t folded = 0;
+  constexpr uintptr_t kWords[] = {0x0080A00C, 0x0080A040, 0x0080A044, 0x0080A048};
+  for (const uintptr_t address : kWords) {
+    folded ^= *reinterpret_cast<const volatile uint32_t*>(address);
+  }
+  return folded;
+}
+
 // 16 s, longer than the longest call that may block (joining Wi-Fi, 10 s): 16384 ticks of 1024 Hz, which are the
 // 32 kHz oscillator divided by 2^(4+1).
 void MkrBoard::start_watchdog() {

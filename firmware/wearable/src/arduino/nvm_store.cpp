@@ -1,5 +1,5 @@
-// The flash store in the SAM D21's own flash. A row bears 25,000 erasures: the boot counter, one page a power-on
-// over four rows, wears out after 400,000.
+// The flash store in the SAM D21's own flash. A row bears 25,000 erasures; each of the two records that take turns
+// in counting power-ons wanders a page at a time over four rows, so it wears out after 400,000 saves.
 #include "nvm_store.h"
 
 #include <Arduino.h>
@@ -8,6 +8,7 @@ namespace bunraku {
 namespace {
 
 constexpr uint8_t kSlots = 4, kRowsPerSlot = 4;
+constexpr uint8_t kFirstCounter = 2;  // slots before it hold settings and calibration: old ones must go
 
 // Part of the image, so that the linker keeps everything else out of it.
 __attribute__((used)) alignas(kRowBytes) const uint8_t rows[kSlots * kRowsPerSlot * kRowBytes] = {};
@@ -24,13 +25,16 @@ void command(uint32_t command, const volatile void* address) {
 }  // namespace
 
 bool NvmStore::load(uint8_t slot, uint8_t* data, uint16_t count) {
-  if (slot >= kSlots) return false;
-  return PageLog(*this, static_cast<uint8_t>(slot * kRowsPerSlot), kRowsPerSlot).load(data, count);
+  return slot < kSlots && log_of(slot).load(data, count);
 }
 
 bool NvmStore::save(uint8_t slot, const uint8_t* data, uint16_t count) {
-  if (slot >= kSlots) return false;
-  return PageLog(*this, static_cast<uint8_t>(slot * kRowsPerSlot), kRowsPerSlot).save(data, count);
+  return slot < kSlots && log_of(slot).save(data, count);
+}
+
+PageLog NvmStore::log_of(uint8_t slot) {
+  const Old old = slot < kFirstCounter ? Old::kErased : Old::kKept;
+  return PageLog(*this, static_cast<uint8_t>(slot * kRowsPerSlot), kRowsPerSlot, old);
 }
 
 const uint8_t* NvmStore::row(uint8_t row) const {

@@ -12,6 +12,7 @@ class NvmStore final : public FlashStore, private FlashRows {
   bool save(uint8_t slot, const uint8_t* data, uint16_t count) override;
 
  private:
+  PageLog log_of(uint8_t slot);
   const uint8_t* row(uint8_t row) const override;
   void erase(uint8_t row) override;
   void program(uint8_t row, uint8_t page, const uint8_t (&data)[kPageBytes]) override;

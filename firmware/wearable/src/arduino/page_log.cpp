@@ -33,35 +33,42 @@ bool PageLog::load(uint8_t* data, uint16_t count) const {
 
 bool PageLog::save(const uint8_t* data, uint16_t count) {
   if (count == 0 || kHeadBytes + count > kRowBytes) return false;
-  Place place;
-  Head head = {1, count, 0};
-  uint8_t row = first_row_, page = 0;
-  const uint8_t pages = pages_for(count);
-  if (newest(place)) {
-    head.sequence = place.head.sequence + 1;
-    row = place.row;
-    page = static_cast<uint8_t>(place.page + pages_for(place.head.count));
-    if (page + pages > kPagesPerRow || !is_blank(row, page, pages)) {
-      row = static_cast<uint8_t>(first_row_ + (row - first_row_ + 1) % rows_);
-      page = 0;
+  Place next = {first_row_, 0, {1, count, 0}};
+  Place before;
+  const bool has_before = newest(before);
+  if (has_before) {
+    next.head.sequence = before.head.sequence + 1;
+    next.row = before.row;
+    next.page = static_cast<uint8_t>(before.page + pages_for(before.head.count));
+    const bool fits = next.page + pages_for(count) <= kPagesPerRow;
+    if (old_ == Old::kErased || !fits || !is_blank(next.row, next.page, pages_for(count))) {
+      next.row = static_cast<uint8_t>(first_row_ + (before.row - first_row_ + 1) % rows_);
+      next.page = 0;
     }
   }
-  if (page == 0) flash_.erase(row);
-  head.crc = sum_of(head.sequence, data, count);
+  next.head.crc = sum_of(next.head.sequence, data, count);
+  if (next.page == 0) flash_.erase(next.row);
+  write(next, data);
+  Head written;
+  const bool is_saved = is_whole(next.row, next.page, written) && written.sequence == next.head.sequence;
+  if (is_saved && has_before && old_ == Old::kErased) flash_.erase(before.row);
+  return is_saved;
+}
+
+void PageLog::write(const Place& place, const uint8_t* data) {
   uint16_t done = 0;
-  for (uint8_t i = 0; i < pages; ++i) {
+  for (uint8_t i = 0; i < pages_for(place.head.count); ++i) {
     uint8_t bytes[kPageBytes];
     memset(bytes, 0xFF, sizeof bytes);
     const uint16_t from = i == 0 ? kHeadBytes : 0;
+    const uint16_t left = static_cast<uint16_t>(place.head.count - done);
     const uint16_t room = static_cast<uint16_t>(kPageBytes - from);
-    const uint16_t piece = count - done < room ? static_cast<uint16_t>(count - done) : room;
-    if (i == 0) memcpy(bytes, &head, kHeadBytes);
+    const uint16_t piece = left < room ? left : room;
+    if (i == 0) memcpy(bytes, &place.head, kHeadBytes);
     memcpy(bytes + from, data + done, piece);
-    flash_.program(row, static_cast<uint8_t>(page + i), bytes);
+    flash_.program(place.row, static_cast<uint8_t>(place.page + i), bytes);
     done = static_cast<uint16_t>(done + piece);
   }
-  Head written;
-  return is_whole(row, page, written) && written.sequence == head.sequence;
 }
 
 bool PageLog::newest(Place& place) const {

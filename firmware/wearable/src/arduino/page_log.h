@@ -19,10 +19,13 @@ class FlashRows {
   ~FlashRows() = default;
 };
 
+// What a save leaves of the record before it. Kept ones cost no wear; erased ones tell nobody a key or a password.
+enum class Old : uint8_t { kKept, kErased };
+
 class PageLog {
  public:
-  PageLog(FlashRows& flash, uint8_t first_row, uint8_t rows)
-      : flash_(flash), first_row_(first_row), rows_(rows) {}  // at least two rows
+  PageLog(FlashRows& flash, uint8_t first_row, uint8_t rows, Old old)
+      : flash_(flash), first_row_(first_row), rows_(rows), old_(old) {}  // at least two rows
 
   bool load(uint8_t* data, uint16_t count) const;  // false: never written, or in another size
   bool save(const uint8_t* data, uint16_t count);  // up to 248 bytes; false: the flash did not take it
@@ -40,12 +43,14 @@ class PageLog {
   };
 
   bool newest(Place& place) const;
+  void write(const Place& place, const uint8_t* data);
   bool is_whole(uint8_t row, uint8_t page, Head& head) const;
   bool is_blank(uint8_t row, uint8_t page, uint8_t pages) const;
   const uint8_t* at(uint8_t row, uint8_t page) const { return flash_.row(row) + page * kPageBytes; }
 
   FlashRows& flash_;
   const uint8_t first_row_, rows_;
+  const Old old_;
 };
 
 }  // namespace bunraku

@@ -1,0 +1,8 @@
+// What the budget counts: one wearable that runs, with its ports outside.
+#include "wearable.h"
+
+extern "C" void run_wearable(const bunraku::Ports& ports) {
+  static bunraku::Wearable wearable(ports);
+  wearable.begin();
+  for (;;) wearable.step();
+}

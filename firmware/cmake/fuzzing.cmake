@@ -1,0 +1,13 @@
+# One libFuzzer target for each source in fuzz/; needs clang.
+file(GLOB TARGETS CONFIGURE_DEPENDS fuzz/*.cpp)
+set(SANITIZERS -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all)
+add_compile_options(-O1 -g ${SANITIZERS})
+add_link_options(${SANITIZERS})
+
+add_library(fuzzed_core OBJECT ${CORE})
+target_include_directories(fuzzed_core PUBLIC ${CORE_FOLDER})
+foreach(SOURCE ${TARGETS})
+  get_filename_component(NAME ${SOURCE} NAME_WE)
+  add_executable(${NAME} ${SOURCE})
+  target_link_libraries(${NAME} PRIVATE fuzzed_core)
+endforeach()
