@@ -16,7 +16,7 @@ constexpr double kStandardGravity = 9.81;
 constexpr double kTapUs = 20'000;  // the chip's low-pass at 62.5 Hz makes a knock that long
 constexpr int kNoise = 2;          // 1/100 m/s^2: 1 mg of noise in 62.5 Hz
 constexpr uint8_t kNdof = 0x0C, kImuPlus = 0x08;
-constexpr double kAccelerometerTurn = kPi / 2, kMagnetometerTurn = 2 * kPi / 3;  // radians a calibration level
+constexpr double kAccelerometerTurn = kPi / 2, kMagnetometerTurn = 2 * kPi / 3;  // for a calibration level
 
 Quaternion product(const Quaternion& a, const Quaternion& b) {
   return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],

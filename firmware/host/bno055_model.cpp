@@ -18,6 +18,7 @@ constexpr uint32_t kStuckUs = 1000;         // what the board's driver waits on 
 constexpr uint32_t kRecoverUs = 100;
 constexpr uint8_t kErrorSystem = 3;         // SYS_ERR: system initialisation
 constexpr uint8_t kLastOffset = kOffsets + kOffsetBytes - 1;
+constexpr uint8_t kTemperatureSource = 0x40;
 constexpr uint8_t kLastGyroscopeOffset = 0x66;
 
 bool covers_data(uint8_t reg, uint8_t count) { return reg <= kQuaternion && reg + count > kQuaternion + 7; }
@@ -27,7 +28,7 @@ bool is_fusion_mode(uint8_t mode) { return mode == 0x08 || mode == 0x0B || mode 
 
 Bno055Model::Bno055Model(VirtualClock& clock, uint64_t seed, uint8_t address)
     : clock_(clock), random_(seed), address_(address) {
-  std::generate(unique_id_.begin(), unique_id_.end(), [this] { return static_cast<uint8_t>(random_.next()); });
+  for (uint8_t& byte : unique_id_) byte = static_cast<uint8_t>(random_.next());
   set_orientation({1, 0, 0, 0});
   power_on();
 }
@@ -176,7 +177,8 @@ bool Bno055Model::write_byte(uint8_t reg, uint8_t value) {
   if (mode_ != kConfigMode) return false;
   if (reg == kTrigger) return write_trigger(value);
   const bool is_offset = reg >= kOffsets && reg <= kLastOffset;
-  const bool is_setting = reg == kUnits || reg == kPower || reg == 0x40 || reg == kAxisMap || reg == kAxisSign;
+  const bool is_axes = reg == kAxisMap || reg == kAxisSign;
+  const bool is_setting = is_axes || reg == kUnits || reg == kPower || reg == kTemperatureSource;
   if (!is_offset && !is_setting) return false;
   if (reg == kAxisMap) {
     const uint8_t axes[3] = {static_cast<uint8_t>(value & 3), static_cast<uint8_t>(value >> 2 & 3),
@@ -224,7 +226,8 @@ void Bno055Model::settle() {
 
 bool Bno055Model::is_fusing() {
   settle();
-  return is_powered_ && clock_.now_us() >= answers_us_ && is_fusion_mode(mode_) && registers_[kSystemError] == 0;
+  const bool is_up = is_powered_ && clock_.now_us() >= answers_us_;
+  return is_up && is_fusion_mode(mode_) && registers_[kSystemError] == 0;
 }
 
 uint8_t Bno055Model::peek(uint8_t reg) {

@@ -1,4 +1,4 @@
-// The BNO055 as its host sees it: registers, pages, modes, waits, fusion at 100 Hz, and what goes wrong with it.
+// The BNO055 as its host sees it: registers, pages, modes, waits, fusion at 100 Hz, and what goes wrong.
 #pragma once
 
 #include <stddef.h>
@@ -30,7 +30,7 @@ constexpr size_t kImuFaults = 9;
 
 struct ImuModelCounts {
   uint32_t transactions = 0;
-  uint32_t illegal_writes = 0;     // read-only or reserved registers, settings outside CONFIG mode, wrong values
+  uint32_t illegal_writes = 0;     // to read-only registers, settings outside CONFIG mode, wrong values
   uint32_t illegal_reads = 0;      // offsets outside CONFIG mode
   uint32_t early_accesses = 0;     // during a mode switch, or during a reset that the host commanded
   uint32_t start_up_accesses = 0;  // in the 400 ms after power came
@@ -61,7 +61,7 @@ class Bno055Model final : public I2cBus {
 
   void power_on();  // also after power was there: a power cycle
   void power_off() { is_powered_ = false; }
-  void inject(ImuFault fault, uint32_t times = 1);  // into the next transactions that it can strike; states: now
+  void inject(ImuFault fault, uint32_t times = 1);  // the next transactions that it can strike; states: now
   void set_probability(ImuFault fault, double per_transaction);
 
   double drift_degrees_minute = 0;           // IMUPLUS: its heading creeps

@@ -14,8 +14,7 @@ constexpr uint32_t kNothing = kUnit / 4;              // half the length
 constexpr uint32_t kShortest = kUnit / 10000 * 9801;  // 0.99 of the length; Q14 rounding gives 6e-5
 constexpr uint32_t kLongest = kUnit / 10000 * 10201;  // 1.01 of the length
 constexpr int32_t kLargestPart = 16548;               // 1.01: no sum of four squares overflows
-constexpr int32_t kFlip = 32768;                      // what turning the top bit adds or takes
-constexpr int32_t kSuspect = 31130;                   // 1.9: a part that changed by so much may be flipped
+constexpr int16_t kOne = 16384;
 constexpr uint32_t kSlackMillidegrees = 3000;         // rounding, and a fusion that corrects itself
 constexpr uint32_t kHalfTurnUs = 88500;               // 2000 degrees/s reach every orientation by then
 constexpr uint32_t kLongestStepUs = 60000;            // while refusing, no more way than for this is allowed
@@ -49,16 +48,11 @@ uint32_t reach(uint32_t elapsed_us) {
 }
 
 // A part near 1 with its top bit flipped reads near -1: unit norm still, and up to 20 degrees off, too small
-// a step for the rate. Undoing the flip tells it from a turn: that leads back to where the sensor was.
-bool has_flipped_bit(const Orientation& believed, const Orientation& raw) {
+// a step for the rate. It is known by its size: 2 minus what it was, so never below 1. An orientation whose
+// sign changed as a whole has such a part only within 1 degree of an axis; refusing it there costs 0.1 s.
+bool has_flipped_bit(const Orientation& before, const Orientation& raw) {
   for (uint8_t i = 0; i < 4; ++i) {
-    const int32_t step = raw[i] - believed[i];
-    if (step < kSuspect && step > -kSuspect) continue;
-    Orientation mended;
-    memcpy(mended, raw, sizeof mended);
-    mended[i] = static_cast<int16_t>(raw[i] + (raw[i] < 0 ? kFlip : -kFlip));
-    const uint32_t turn = separation(believed, raw);
-    return turn > reach(0) && separation(believed, mended) < turn / 9;
+    if ((raw[i] >= kOne && before[i] < 0) || (raw[i] <= -kOne && before[i] > 0)) return true;
   }
   return false;
 }

@@ -1,0 +1,123 @@
+// A driver on a simulated BNO055 in virtual time, called as the wearable calls it; its readings are judged.
+#pragma once
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "bno055.h"
+#include "bno055_model.h"
+#include "schedule.h"
+
+namespace bunraku {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+inline Quaternion turned(double degrees, double x, double y, double z) {
+  const double length = std::sqrt(x * x + y * y + z * z), half = degrees * kDegree / 2;
+  return {std::cos(half), std::sin(half) * x / length, std::sin(half) * y / length,
+          std::sin(half) * z / length};
+}
+
+inline double degrees_between(const Quaternion& a, const Quaternion& b) {
+  double dot = 0, norms = 0;
+  for (size_t i = 0; i < 4; ++i) dot += a[i] * b[i];
+  for (const Quaternion& q : {a, b}) norms += std::log(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  return 2 * std::acos(std::min(1.0, std::abs(dot) / std::exp(norms / 2))) / kDegree;
+}
+
+inline Quaternion quaternion(const int16_t (&q)[4]) {
+  return {q[0] / 16384.0, q[1] / 16384.0, q[2] / 16384.0, q[3] / 16384.0};
+}
+
+// An arm that dances: up to about 500 degrees/s about changing axes.
+inline Quaternion dance(uint64_t at_us) {
+  const double t = static_cast<double>(at_us) * 1e-6;
+  return turned(120 * std::sin(4.1 * t) + 20 * std::sin(1.3 * t), std::cos(0.7 * t), std::sin(0.9 * t), 0.6);
+}
+
+struct ImuRig {
+  static constexpr ImuSettings kPlain{Fusion::kImuPlus, 0x24, 0x00};
+  static constexpr double kSlackDegrees = 1.9;  // what a torn byte weighs
+
+  explicit ImuRig(uint64_t seed = 1, uint64_t start_us = 1000000) : clock(start_us), model(clock, seed) {}
+
+  void power_on(const ImuSettings& settings = kPlain) {
+    imu.start(settings, clock.micros());
+    schedule.start(clock.micros(), 20000);
+  }
+
+  void run(double seconds, uint32_t loop_us = 700) {
+    const uint64_t end_us = clock.now_us() + static_cast<uint64_t>(seconds * 1e6);
+    while (clock.now_us() < end_us) turn(loop_us);
+  }
+
+  // Until it runs and a reading was believed; the virtual seconds that it took, or the limit.
+  double run_until_reading(double limit_s = 10) {
+    const uint64_t begun_us = clock.now_us();
+    const uint32_t before = readings;
+    while (readings == before && clock.now_us() < begun_us + static_cast<uint64_t>(limit_s * 1e6)) turn(700);
+    return static_cast<double>(clock.now_us() - begun_us) * 1e-6;
+  }
+
+  void turn(uint32_t loop_us) {
+    const uint32_t before = model.counts().transactions + model.counts().recovers;
+    const uint64_t stepped_us = clock.now_us();
+    imu.step(clock.micros());
+    const uint32_t transactions = model.counts().transactions + model.counts().recovers - before;
+    most_transactions = std::max(most_transactions, transactions);
+    longest_step_us = std::max(longest_step_us, clock.now_us() - stepped_us);
+    if (schedule.is_due(clock.micros())) judge();
+    int16_t linear[3];
+    if (imu.acceleration(linear)) {
+      ++accelerations;
+      for (const int16_t part : linear) hardest = std::max<int>(hardest, std::abs(int{part}));
+    }
+    clock.advance(loop_us);
+  }
+
+  // A believed reading must be what fusion said, and a fusion started anew must show in `recoveries`.
+  void judge() {
+    const Quaternion newest = model.newest(), previous = model.previous();
+    const uint64_t begun_us = clock.now_us();
+    if (!imu.sample(clock.micros(), sample)) return;
+    ++readings;
+    longest_gap_us = std::max(longest_gap_us, begun_us - read_us);
+    read_us = begun_us;
+    const bool has_previous = previous != Quaternion{0, 0, 0, 0};
+    const double slack = kSlackDegrees + (has_previous ? degrees_between(newest, previous) : 0);
+    worst_degrees = std::max(worst_degrees, degrees_between(newest, quaternion(sample.orientation)) - slack);
+    if (starts != 0 && starts != model.counts().fusion_starts) CHECK(imu.recoveries() != recoveries);
+    if (starts == model.counts().fusion_starts) CHECK(imu.recoveries() == recoveries);
+    starts = model.counts().fusion_starts;
+    recoveries = imu.recoveries();
+  }
+
+  void check_manners() const {  // what must hold whatever the faults
+    CHECK(most_transactions <= 1);
+    CHECK(longest_step_us < 6000);
+    CHECK(worst_degrees <= 0);
+    CHECK(model.counts().early_accesses == 0);
+    CHECK(model.counts().illegal_writes == 0);
+    CHECK(model.counts().illegal_reads == 0);
+  }
+
+  VirtualClock clock;
+  Bno055Model model;
+  Bno055 imu{model};
+  Schedule schedule;
+  Sample sample = {};
+  uint32_t readings = 0;
+  uint32_t accelerations = 0;
+  int hardest = 0;
+  uint32_t most_transactions = 0;
+  uint32_t starts = 0;
+  uint8_t recoveries = 0;
+  uint64_t longest_step_us = 0;
+  uint64_t read_us = clock.now_us();
+  uint64_t longest_gap_us = 0;
+  double worst_degrees = -1;
+};
+
+}  // namespace bunraku
