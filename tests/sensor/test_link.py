@@ -113,10 +113,10 @@ def test_device_time_wraps_under_way() -> None:
 
 def test_a_new_power_on_starts_clock_and_gate_anew() -> None:
     box = Box()
-    box.hear(box.pair(boot=1).numbered(5000))
-    (reading,) = box.hear(box.pair(boot=2).numbered(1, degrees=170))
-    assert (reading.sequence, reading.sensor_time_us, reading.boot_nonce) == (1, 20_000, 2)
-    assert box.counted() == {"hello": 2, "accepted": 2, "reboot": 1}
+    for boot, time_us in ((1, 30_000), (2, 50_000), (3, 20_000)):
+        (reading,) = box.hear(box.pair(boot=boot).numbered(7, degrees=170 * (boot % 2), time_us=time_us))
+        assert (reading.sequence, reading.sensor_time_us, reading.boot_nonce) == (7, time_us, boot)
+    assert box.counted() == {"hello": 3, "accepted": 3, "reboot": 2}
 
 
 def test_what_is_sent_to_nobody_is_not_lost() -> None:

@@ -207,6 +207,31 @@ def test_a_night_replayed_while_a_sensor_dances_changes_nothing_for_it() -> None
     assert way(box) == "192.168.4.7:2390"
 
 
+def test_readings_of_the_session_before_the_box_was_started_anew() -> None:
+    """The same power-on of the sensor, but another session: silent or not, they count no more."""
+    sensor = Box().pair()
+    held_back = [sensor.numbered(n) for n in range(1000, 1050)]
+    box = Box()
+    box.greet(sensor)
+    for silence_s in (0.0, 0.6):
+        assert len(box.hear(sensor.reading())) == 1
+        box.now += silence_s
+        assert box.hear(*held_back, origin=STRANGER) == ()
+        assert way(box) == "192.168.4.7:2390"
+    assert box.counted()["old_session"] == 100
+
+
+def test_an_old_session_is_not_answered_while_its_sensor_is_heard() -> None:
+    recorded = [data for data in Night().recorded if data[3] == wire.READING.kind]
+    box, sensor = linked_box()
+    for _ in range(50):
+        box.now += 0.02
+        box.hear(*recorded, origin=STRANGER)
+        assert all(to == A for _, to in box.answers())
+        box.hear(sensor.reading())
+    assert box.link.sent["call"] == 0
+
+
 def test_an_earlier_power_on_of_the_same_night_never_comes_back() -> None:
     """Not even with readings that the box never got: its session ended when the next one's began."""
     box = Box()
@@ -243,6 +268,7 @@ def test_replayed_hellos_neither_move_nor_unseat_a_linked_sensor_nor_its_light()
     for _ in range(100):
         box.now += 0.02
         box.hear(own, *hellos, origin=STRANGER)
+        assert way(box) == "192.168.4.7:2390"
         assert len(box.hear(sensor.reading())) == 1
         assert all(
             to == A or data[3] == 2 for data, to in box.answers()
