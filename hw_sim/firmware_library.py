@@ -117,7 +117,6 @@ class CompiledWearable:
         self._library.wearable_set_clock(self._world, drift_ppm, first_us)
         self._library.wearable_set_access_point(self._world, False, start_us)
         self._buffer = (c_uint8 * SERIAL_ROOM)()
-        self._status = Status()
 
     def close(self) -> None:
         if self._world:
@@ -135,9 +134,10 @@ class CompiledWearable:
 
     @property
     def status(self) -> Status:
-        """Valid until it is asked for again."""
-        self._library.wearable_read_status(self._world, byref(self._status))
-        return self._status
+        """As it is now."""
+        status = Status()
+        self._library.wearable_read_status(self._world, byref(status))
+        return status
 
     def set_network(self, name: str, password: str) -> None:
         self._library.wearable_set_network(self._world, name.encode(), password.encode())

@@ -49,6 +49,12 @@ class LedTrace : public Led {
     changes_.push_back({clock_.now_us(), is_on});
   }
   bool is_on() const { return is_on_; }
+  void forget_after(uint64_t at_us) {
+    while (!changes_.empty() && changes_.back().at_us > at_us) {
+      is_on_ = !changes_.back().is_on;
+      changes_.pop_back();
+    }
+  }
   bool take(Change& change) {  // the oldest change that was not taken yet
     if (changes_.empty()) return false;
     change = changes_.front();

@@ -29,6 +29,7 @@ void tell_firmware(const bunraku::Status& from, wearable_status& to) {
   to.battery_millivolts = from.battery_millivolts;
   to.state = static_cast<uint8_t>(from.state);
   to.lane = static_cast<uint8_t>(from.lane);
+  to.is_light_on = from.is_light_on;
   to.has_imu = from.has_imu;
   to.has_profile = from.has_profile;
   to.calibration = from.calibration;
@@ -78,10 +79,9 @@ void wearable_read_status(const wearable_world* world, wearable_status* status) 
   status->power_ons = world->counts.power_ons;
   status->restarts = world->counts.restarts;
   status->watchdog_bites = world->counts.watchdog_bites;
-  status->is_on = world->wearable() != nullptr;
-  status->is_light_on = world->led.is_on();
+  status->is_on = world->is_on();
   status->is_joined = world->wifi.is_carrying();
-  if (world->wearable() != nullptr) tell_firmware(world->wearable()->status(), *status);
+  if (world->is_on()) tell_firmware(world->status(), *status);
 }
 
 void wearable_set_network(wearable_world* world, const char* name, const char* password) {

@@ -38,6 +38,7 @@ void wearable_power(wearable_world* world, int is_on);
 void wearable_set_clock(wearable_world* world, double drift_ppm, uint64_t first_us);
 /* Runs until then and gives the time reached, which is later when a call of the firmware blocked. */
 uint64_t wearable_step_until(wearable_world* world, uint64_t us);
+/* As at the time that was asked for, also when a call blocks beyond it. */
 void wearable_read_status(const wearable_world* world, wearable_status* status);
 
 /* Wi-Fi. A change of the access point may be told before it comes; times never go back. */

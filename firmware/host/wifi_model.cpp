@@ -30,11 +30,13 @@ bool WifiModel::join(const char* network, const char* password) {
   const bool is_known = network_ == network && password_ == password;
   if (!is_known || heard_us >= deadline_us || heard_us + took_us > deadline_us ||
       next_change(false, heard_us) <= heard_us + took_us || random_.happens(conditions.join_failures)) {
-    clock_.advance(deadline_us - start_us);
+    join_us_[0] = start_us, join_us_[1] = deadline_us;
+    clock_.advance_to(deadline_us);
     ++counts.failed_joins;
     return false;
   }
-  clock_.advance(heard_us + took_us - start_us);
+  join_us_[0] = start_us, join_us_[1] = heard_us + took_us;
+  clock_.advance_to(heard_us + took_us);
   is_joined_ = true;
   joined_at_us_ = clock_.now_us();
   stale_us_ = chosen(conditions.stale_us);
@@ -102,6 +104,11 @@ bool WifiModel::take(Datagram& datagram) {
   datagram = leaving_.front();
   leaving_.pop_front();
   return true;
+}
+
+void WifiModel::forget_after(uint64_t at_us) {
+  while (!leaving_.empty() && leaving_.back().at_us > at_us) leaving_.pop_back();
+  join_us_[1] = std::min(join_us_[1], at_us);
 }
 
 bool WifiModel::is_carrying() const {

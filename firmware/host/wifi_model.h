@@ -61,7 +61,9 @@ class WifiModel : public DatagramLink {
   void power_off() { leave(); }
   bool deliver(const Datagram& datagram);  // false: nobody there hears it
   bool take(Datagram& datagram);           // the oldest that was sent and not lost
+  void forget_after(uint64_t at_us);       // what was sent later
   bool is_carrying() const;                // whether what is sent now gets through
+  bool is_joining(uint64_t at_us) const { return join_us_[0] <= at_us && at_us < join_us_[1]; }
   uint64_t joined_at_us() const { return joined_at_us_; }
   uint16_t port() const { return port_; }
 
@@ -84,6 +86,7 @@ class WifiModel : public DatagramLink {
   std::vector<Change> access_point_{{0, true}};
   bool is_joined_ = false;  // by the driver's own word
   uint64_t joined_at_us_ = 0;
+  uint64_t join_us_[2] = {0, 0};  // when the last join began and ended
   uint64_t stale_us_ = 0;   // drawn at each join
   uint16_t port_ = 0;       // 0: no socket
   std::deque<Datagram> arriving_, leaving_;

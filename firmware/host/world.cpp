@@ -15,13 +15,14 @@ uint64_t lot(uint64_t seed, uint64_t which) { return Random(seed * 8 + which).ne
 
 World::World(uint64_t seed, uint64_t start_us)
     : clock(start_us), wifi(clock, lot(seed, 1)), board(clock, lot(seed, 2)), imu(clock, lot(seed, 3)),
-      loop_(lot(seed, 4)) {
+      loop_(lot(seed, 4)), until_us_(start_us) {
   imu.set_motion([this](uint64_t at_us) { return hand.at(at_us); });
   imu.power_off();
 }
 
 void World::power(bool is_on) {
-  if (is_on == (wearable_ != nullptr)) return;
+  if (is_on == this->is_on()) return;
+  forget_what_was_ahead();
   wearable_.reset();
   wifi.leave();
   led.set(false);
@@ -35,15 +36,25 @@ void World::power(bool is_on) {
 }
 
 void World::step_until(uint64_t us) {
+  until_us_ = std::max(until_us_, us);
   if (!wearable_) clock.advance_to(us);
   while (clock.now_us() < us) turn();
 }
 
+Status World::status() const {
+  Status then = clock.now_us() > until_us_ ? before_ : wearable_->status();
+  if (wifi.is_joining(until_us_)) {
+    then.state = State::kJoining;
+    then.lane = Lane::kNone;
+  }
+  return then;
+}
+
 void World::turn() {
   const uint64_t began_us = clock.now_us();
-  const bool was_linked = wearable_->status().state == State::kLinked;
+  before_ = wearable_->status();
   wearable_->step();
-  if (was_linked && wearable_->status().state == State::kLinked) {
+  if (before_.state == State::kLinked && wearable_->status().state == State::kLinked) {
     counts.longest_linked_step_us = std::max(counts.longest_linked_step_us, clock.now_us() - began_us);
   }
   board.notice();
@@ -56,6 +67,14 @@ void World::turn() {
   clock.advance(loop_.between(kTurnUs[0], kTurnUs[1]));
 }
 
+// The power was cut while a call blocked: what came after that moment never happened.
+void World::forget_what_was_ahead() {
+  if (clock.now_us() <= until_us_) return;
+  clock = VirtualClock(until_us_);
+  wifi.forget_after(until_us_);
+  led.forget_after(until_us_);
+}
+
 void World::boot() {
   clock.advance(kBootUs);
   booted_at_us_ = clock.now_us();
@@ -63,6 +82,7 @@ void World::boot() {
   board.power_on();
   wearable_ = std::make_unique<Wearable>(Ports{board_clock, imu, wifi, serial, flash, led, board});
   wearable_->begin();
+  before_ = wearable_->status();
 }
 
 }  // namespace bunraku

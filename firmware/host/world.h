@@ -27,7 +27,8 @@ class World {
 
   void power(bool is_on);        // the switch: the flash is kept, all else begins anew
   void step_until(uint64_t us);  // runs on; a call that blocks may end later than asked for
-  const Wearable* wearable() const { return wearable_.get(); }  // null: switched off
+  bool is_on() const { return wearable_ != nullptr; }
+  Status status() const;  // at the time that was asked for, also when a call blocks beyond it; while on
   uint64_t booted_at_us() const { return booted_at_us_; }       // when the board's clock showed first_micros
 
   VirtualClock clock;
@@ -44,9 +45,12 @@ class World {
 
  private:
   void boot();
+  void forget_what_was_ahead();
   void turn();
 
   Random loop_;
+  uint64_t until_us_;
+  Status before_;  // the turn that is over, or that blocks
   uint64_t booted_at_us_ = 0;
   std::unique_ptr<Wearable> wearable_;
 };
