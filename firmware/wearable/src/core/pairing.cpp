@@ -196,6 +196,12 @@ uint8_t Pairing::reading(const Sample& sample, const Condition& condition, uint3
   return sign(reading, packet);
 }
 
+void Pairing::introduce() {
+  if (!is_linked()) return;
+  answer_to_ = link_;
+  is_called_ = true;
+}
+
 void Pairing::announce_profile(const uint8_t* offsets22) {
   memcpy(offsets_, offsets22, sizeof offsets_);
   profiles_left_ = kProfilesToSay;

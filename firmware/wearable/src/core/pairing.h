@@ -60,6 +60,9 @@ class Pairing {
   uint8_t reading(const Sample& sample, const Condition& condition, uint32_t now_us,
                   uint8_t (&packet)[wire::kLargest], Way& to);
 
+  // What a hello tells has changed: says it anew where the link is.
+  void introduce();
+
   // A calibration was saved: tells the box three times, a second apart, as soon as linked.
   void announce_profile(const uint8_t* offsets22);
 
@@ -94,8 +97,8 @@ class Pairing {
   bool lane_is_up_[kLanes] = {};
   Timer hello_pause_[kLanes];
   Way link_;
-  Way answer_to_;           // where a call came from
-  bool is_called_ = false;  // and a hello there is due
+  Way answer_to_;           // who called, or is to know more
+  bool is_called_ = false;  // a hello there is due
   Timer call_pause_;
   Timer heard_;             // runs while the box was heard in the last 3 s
   Timer restore_window_;    // runs for 10 s after an assignment

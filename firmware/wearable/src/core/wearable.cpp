@@ -11,6 +11,8 @@ namespace bunraku {
 namespace {
 
 constexpr uint32_t kSecondUs = 1'000'000;
+constexpr uint32_t kImuStartsUs = 10'000;  // its wait for the chip begins, and passes during the first join
+constexpr uint32_t kImuFirstMs = 2'000;
 constexpr uint32_t kUnlinkedForSavingUs = 30'000'000;  // then nobody dances: the heading may be lost
 
 }  // namespace
@@ -21,6 +23,7 @@ void Wearable::begin() {
   status_.boot_nonce = draw_boot_nonce(settings_.key, ports_.flash, ports_.board);
   imu_.start(settings_.imu, now_us);
   start_pairing();
+  join_pause_.start(now_us, kImuStartsUs);
   schedule_.start(now_us, kSecondUs / pairing_.rate_hz());
   measure_battery(now_us);
   refresh_status();
@@ -65,6 +68,7 @@ void Wearable::keep_calibration(uint32_t now_us) {
   uint8_t offsets[kProfileBytes];
   if (!has_looked_for_profile_ && imu_.has_id()) {
     has_looked_for_profile_ = true;
+    pairing_.introduce();
     if (load_profile(ports_.flash, imu_.unique_id(), offsets)) {
       imu_.use_profile(offsets, now_us);
       pairing_.announce_profile(offsets);
@@ -134,6 +138,12 @@ void Wearable::light(uint32_t now_us) {
 void Wearable::set_lamp(bool is_on) {
   if (is_on != status_.is_light_on) ports_.led.set(is_on);
   status_.is_light_on = is_on;
+}
+
+// A hello tells whose calibration the box may know: the IMU gets a moment to say who it is.
+bool Wearable::may_greet() {
+  may_greet_ = may_greet_ || imu_.has_id() || imu_.has_failed() || uptime_ms_ > kImuFirstMs;
+  return may_greet_;
 }
 
 State Wearable::state() const {

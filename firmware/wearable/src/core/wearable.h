@@ -56,6 +56,7 @@ class Wearable {
   void light(uint32_t now_us);
   void set_lamp(bool is_on);
   void refresh_status();
+  bool may_greet();
   State state() const;
   Condition condition() const;
 
@@ -88,6 +89,7 @@ class Wearable {
   Timer network_trial_;         // how long a network without a box is kept
   uint32_t trial_us_ = 0;
 
+  bool may_greet_ = false;
   bool has_looked_for_profile_ = false;
   bool has_saved_profile_ = false;  // by itself, in this power-on
   Timer linked_lately_;

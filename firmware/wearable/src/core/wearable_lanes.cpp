@@ -35,7 +35,7 @@ void Wearable::serve_cable(uint32_t now_us) {
   }
   // Hellos would disturb whoever types; a link on the cable goes on.
   const bool is_quiet = conversation_.is_running(now_us) && pairing_.link().lane != Lane::kCable;
-  pairing_.set_lane(Lane::kCable, is_connected && !is_quiet);
+  pairing_.set_lane(Lane::kCable, is_connected && !is_quiet && may_greet());
   uint8_t byte;
   for (uint8_t i = 0; i < kBytesATurn && cable_output_.has_room(kLongestAnswer); ++i) {
     if (ports_.serial.read(&byte, 1) == 0) break;
@@ -132,7 +132,7 @@ void Wearable::start_pairing() {
 
 void Wearable::serve_wifi(uint32_t now_us) {
   if (is_socket_open_ && !ports_.wifi.is_up()) is_socket_open_ = false;  // a disconnect has closed it
-  pairing_.set_lane(Lane::kWifi, is_socket_open_);
+  pairing_.set_lane(Lane::kWifi, is_socket_open_ && may_greet());
   uint8_t data[wire::kLargest];
   Way from;
   from.lane = Lane::kWifi;

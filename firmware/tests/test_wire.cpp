@@ -1,0 +1,162 @@
+// The firmware's packets against the golden vectors: each decoded to its fields, each made from them bit by bit.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "blake2s.h"
+#include "golden.h"
+#include "wire.h"
+
+using namespace bunraku;
+
+namespace {
+
+// Every field of every packet by its name; `visit` checks or fills it.
+template <typename Packet, typename Visit>
+void head(Packet& packet, Visit& visit) {
+  visit("device_id", packet.device_id);
+  visit("boot_nonce", packet.boot_nonce);
+  visit("session", packet.session);
+  visit("sequence", packet.sequence);
+}
+template <typename Visit>
+void fields(wire::Hello& packet, Visit& visit) {
+  head(packet, visit);
+  visit("wire_hash", packet.wire_hash);
+  visit("firmware_major", packet.firmware_major);
+  visit("firmware_minor", packet.firmware_minor);
+  visit("firmware_patch", packet.firmware_patch);
+  visit("battery", packet.battery);
+  visit("flags", packet.flags);
+  visit("imu_id", packet.imu_id);
+}
+template <typename Visit>
+void fields(wire::Assignment& packet, Visit& visit) {
+  head(packet, visit);
+  visit("hello_sequence", packet.hello_sequence);
+  visit("hand", packet.hand);
+  visit("rate_hz", packet.rate_hz);
+  visit("led", packet.led);
+}
+template <typename Visit>
+void fields(wire::Reading& packet, Visit& visit) {
+  head(packet, visit);
+  visit("sensor_time_us", packet.sensor_time_us);
+  visit("orientation", packet.orientation);
+  visit("calibration", packet.calibration);
+  visit("battery", packet.battery);
+  visit("round_trip", packet.round_trip);
+  visit("taps", packet.taps);
+  visit("recoveries", packet.recoveries);
+  visit("flags", packet.flags);
+}
+template <typename Visit>
+void fields(wire::Heartbeat& packet, Visit& visit) {
+  head(packet, visit);
+  visit("echo_sequence", packet.echo_sequence);
+  visit("echo_held_us", packet.echo_held_us);
+  visit("led", packet.led);
+}
+template <typename Visit>
+void fields(wire::Call& packet, Visit& visit) {
+  head(packet, visit);
+}
+template <typename Visit>
+void fields(wire::Profile& packet, Visit& visit) {
+  head(packet, visit);
+  visit("imu_id", packet.imu_id);
+  visit("offsets", packet.offsets);
+}
+template <typename Visit>
+void fields(wire::Restore& packet, Visit& visit) {
+  head(packet, visit);
+  visit("imu_id", packet.imu_id);
+  visit("offsets", packet.offsets);
+}
+
+int16_t q14(double value) { return static_cast<int16_t>(std::lround(value * 16384)); }
+
+struct Check {
+  const golden::Value& values;
+  size_t visited = 0;
+
+  template <typename Number>
+  void operator()(const char* name, Number& field) {
+    CHECK_MESSAGE(field == static_cast<Number>(values[name].number), name);
+    ++visited;
+  }
+  void operator()(const char* name, int16_t (&field)[4]) {
+    for (size_t i = 0; i < 4; ++i) CHECK_MESSAGE(field[i] == q14(values[name].items.at(i).number), name);
+    ++visited;
+  }
+  template <size_t count>
+  void operator()(const char* name, uint8_t (&field)[count]) {
+    CHECK_MESSAGE(std::vector<uint8_t>(field, field + count) == values[name].bytes(), name);
+    ++visited;
+  }
+};
+
+struct Fill {
+  const golden::Value& values;
+
+  template <typename Number>
+  void operator()(const char* name, Number& field) {
+    field = static_cast<Number>(values[name].number);
+  }
+  void operator()(const char* name, int16_t (&field)[4]) {
+    for (size_t i = 0; i < 4; ++i) field[i] = q14(values[name].items.at(i).number);
+  }
+  template <size_t count>
+  void operator()(const char* name, uint8_t (&field)[count]) {
+    const auto bytes = values[name].bytes();
+    REQUIRE(bytes.size() == count);
+    std::copy(bytes.begin(), bytes.end(), field);
+  }
+};
+
+template <typename Packet>
+void compare(const golden::Value& vector, const std::vector<uint8_t>& key) {
+  const auto datagram = vector["datagram"].bytes();
+  REQUIRE(datagram.size() == Packet::kSize);
+  CHECK(datagram[3] == Packet::kKind);
+  CHECK(Packet::kSignedBytes + wire::kTagBytes == Packet::kSize);
+
+  Packet decoded;
+  decoded.read(datagram.data());
+  Check check = {vector["fields"]};
+  fields(decoded, check);
+  CHECK(check.visited == vector["fields"].members.size());
+
+  Packet filled;
+  Fill fill = {vector["fields"]};
+  fields(filled, fill);
+  std::vector<uint8_t> made(Packet::kSize);
+  filled.write(made.data());
+  blake2s({key.data(), static_cast<uint8_t>(key.size()), made.data(), Packet::kSignedBytes},
+          made.data() + Packet::kSignedBytes, wire::kTagBytes);
+  CHECK(made == datagram);
+}
+
+}  // namespace
+
+TEST_CASE("every golden packet is decoded and made, bit for bit") {
+  const golden::Value wire_json = golden::load("wire.json");
+  CHECK(static_cast<uint32_t>(wire_json["wire_hash"].number) == wire::kWireHash);
+  const auto key = wire_json["key"].bytes();
+  std::map<std::string, int> seen;
+  for (const golden::Value& vector : wire_json["packets"].items) {
+    const std::string& packet = vector["packet"].text;
+    CAPTURE(packet);
+    ++seen[packet];
+    if (packet == "Hello") compare<wire::Hello>(vector, key);
+    if (packet == "Assignment") compare<wire::Assignment>(vector, key);
+    if (packet == "Reading") compare<wire::Reading>(vector, key);
+    if (packet == "Heartbeat") compare<wire::Heartbeat>(vector, key);
+    if (packet == "Call") compare<wire::Call>(vector, key);
+    if (packet == "Profile") compare<wire::Profile>(vector, key);
+    if (packet == "Restore") compare<wire::Restore>(vector, key);
+  }
+  CHECK(seen.size() == 7);
+}
