@@ -9,10 +9,10 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import yaml
 
@@ -32,8 +32,14 @@ class Box:
     receiver: OscReceiver
     sensors: int
     control: int
-    key: SensorKey
+    keys: dict[str, SensorKey]
     words_file: Path
+    command: list[str]
+
+    @property
+    def key(self) -> SensorKey:
+        """Of the only or first sensor."""
+        return next(iter(self.keys.values()))
 
     @property
     def words(self) -> str:
@@ -49,6 +55,29 @@ class Box:
             found += [arguments for _, address, arguments in self.receiver.poll(0.05) if "frame" in address]
         return found
 
+    def frame_that(self, is_wanted: Callable[[list[Any]], bool]) -> list[Any]:
+        """The next frame message that is as wanted."""
+        until = time.monotonic() + PATIENCE_S
+        while True:
+            for frame in self.frames(1):
+                if is_wanted(frame):
+                    return frame
+            assert time.monotonic() < until, self.words
+
+    def await_words(self, words: str, count: int = 1) -> None:
+        """Until it has said this so often."""
+        until = time.monotonic() + PATIENCE_S
+        while self.words.count(words) < count:
+            assert time.monotonic() < until and self.process.poll() is None, self.words
+            self.receiver.poll(0.05)
+
+    def kill_and_restart(self) -> None:
+        """As systemd does it: gone in the middle of a tick, and the same command again."""
+        self.end(signal.SIGKILL)
+        self.receiver.poll()
+        with self.words_file.open("ab") as words:
+            self.process = _start(self.command, words)
+
     def end(self, number: int = signal.SIGTERM) -> int:
         """Send a signal and give the exit status."""
         self.process.send_signal(number)
@@ -63,31 +92,39 @@ def playing(
     settings: dict[str, Any] | None = None,
     more_receivers: Sequence[dict[str, Any]] = (),
     command: Sequence[str] = PLAY,
+    names: Sequence[str] = ("left-wrist",),
 ) -> Iterator[Box]:
-    """A box that dances this show, with the sensor left-wrist in its key file."""
-    key = create_keys(folder / "sensors.keys", ["left-wrist"])["left-wrist"]
+    """A box that dances this show, with these sensors in its key file; `settings` go over its own."""
+    keys = create_keys(folder / "sensors.keys", names)
     sensors, control = free_ports(2)
     with OscReceiver(HOST) as receiver, (folder / "words.txt").open("wb") as words:
         frames = {"host": HOST, "port": receiver.port, "frame_message": True}
-        box = {
+        box: dict[str, Any] = {
             "sensors": {"udp": {"host": HOST, "port": sensors}, "keys": "sensors.keys"},
             "outputs": {"osc": [*more_receivers, frames]},
             "control": {"host": HOST, "port": control},
-            **(settings or {}),
         }
+        for section, values in (settings or {}).items():
+            box[section] = {**box.get(section, {}), **values} if section == "sensors" else values
         (folder / "box.yaml").write_text(yaml.safe_dump(box))
-        process = subprocess.Popen(
-            [*command, "--show", str(show), "--box", str(folder / "box.yaml"), *arguments],
-            stdin=subprocess.DEVNULL,
-            stdout=words,
-            stderr=subprocess.STDOUT,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )
+        full = [*command, "--show", str(show), "--box", str(folder / "box.yaml"), *arguments]
+        process = _start(full, words)
+        running = Box(process, receiver, sensors, control, keys, folder / "words.txt", full)
         try:
-            yield Box(process, receiver, sensors, control, key, folder / "words.txt")
+            yield running
         finally:
-            process.kill()
-            process.wait()
+            running.process.kill()
+            running.process.wait()
+
+
+def _start(command: Sequence[str], words: IO[bytes]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=words,
+        stderr=subprocess.STDOUT,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
 
 
 def free_ports(count: int) -> list[int]:

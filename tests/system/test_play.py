@@ -8,7 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +15,9 @@ import pytest
 from pythonosc.udp_client import SimpleUDPClient
 
 from appliance.stage.journal import LATE, NOT_FINITE, read_journal
-from hw_sim.emulated_sensor import EmulatedSensor
-from hw_sim.emulator import Emulator
-from hw_sim.motions import dance
-from hw_sim.network import VENUE, VenueNetwork
-from hw_sim.senders import UdpSender
 from tests.stage.bundles import write_show
-from tests.system.box import HOST, PATIENCE_S, PLAY, Box, free_ports, is_free, playing
+from tests.system.box import HOST, PATIENCE_S, PLAY, free_ports, is_free, playing
+from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
 
@@ -52,21 +47,12 @@ def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_show(tmp_path_factory.mktemp("bundle") / "show")
 
 
-def send_readings(box: Box, seconds: float) -> Emulator:
-    """A dancer on a venue's network, in a thread; returns at once."""
-    sender = UdpSender(HOST, box.sensors)
-    sensor = EmulatedSensor(box.key, dance(1))
-    emulator = Emulator([sensor], sender.send, network=VenueNetwork(VENUE, 1))
-    threading.Thread(target=emulator.run, args=(seconds,), daemon=True).start()
-    return emulator
-
-
 def test_frames_leave_on_a_grid_of_20_ms_and_carry_the_readings(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path, settings=JOURNAL) as box:
         box.frames(1)
-        send_readings(box, 30.0)
-        frames = box.frames(150)
-        assert box.end() == 0
+        with Wearables([box.key], box.sensors):
+            frames = box.frames(150)
+            assert box.end() == 0
     numbers = [frame[0] for frame in frames]
     assert numbers == sorted(set(numbers))
     ticks = read_journal(tmp_path / "run.journal").ticks
@@ -149,14 +135,14 @@ def test_a_flood_of_bad_datagrams_moves_nothing(show: Path, tmp_path: Path) -> N
     bad = [noise.randbytes(noise.choice(lengths)) for _ in range(1000)]
     with playing(show, tmp_path, settings=JOURNAL) as box:
         box.frames(1)
-        send_readings(box, 60.0)
-        box.frames(50)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as flood:
-            for number in range(100_000):
-                flood.sendto(bad[number % len(bad)], (HOST, box.sensors))
-        before = box.frames(1)[0][2]
-        after = box.frames(100)[-1][2]
-        assert box.end() == 0
+        with Wearables([box.key], box.sensors):
+            box.frame_that(lambda frame: frame[2] > 20)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as flood:
+                for number in range(100_000):
+                    flood.sendto(bad[number % len(bad)], (HOST, box.sensors))
+            before = box.frames(1)[0][2]
+            after = box.frames(100)[-1][2]
+            assert box.end() == 0
     assert after > before  # readings come through again
     assert "Traceback" not in box.words
     ticks = read_journal(tmp_path / "run.journal").ticks
@@ -203,7 +189,7 @@ def test_a_killed_box_leaves_a_journal_that_can_be_read(show: Path, tmp_path: Pa
 
 def test_emulated_sensors_come_and_go_with_the_run(show: Path, tmp_path: Path) -> None:
     picture = tmp_path / "dance.png"
-    arguments = ("--emulate", "--seconds", "3", "--filmstrip", str(picture))
+    arguments = ("--emulate", "--seconds", "5", "--filmstrip", str(picture))
     with playing(show, tmp_path, *arguments) as box:
         frames = box.frames(100)
         assert box.process.wait(PATIENCE_S) == 0

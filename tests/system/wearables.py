@@ -1,0 +1,84 @@
+"""Emulated wearables for the real box, in a thread: to be switched off, carried out of reach, plugged in."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
+from types import TracebackType
+
+from appliance.sensor.keys import SensorKey
+from hw_sim.device import Way
+from hw_sim.emulated_sensor import EmulatedSensor
+from hw_sim.emulator import Emulator, Sender, Sent
+from hw_sim.motions import Motion, dance
+from hw_sim.network import VENUE, VenueNetwork
+from hw_sim.senders import SerialSender, UdpSender
+from hw_sim.wearer import Wearer
+
+HOST = "127.0.0.1"
+STAND_STILL_S = 2.0
+
+
+class Radio(UdpSender):
+    """A way by the network that can be lost, both directions at once, without the sensor being told."""
+
+    in_reach = True
+
+    def send(self, data: bytes) -> bool:
+        return super().send(data) if self.in_reach else True
+
+    def receive(self) -> bytes | None:
+        while (data := super().receive()) is not None and not self.in_reach:
+            pass
+        return data
+
+
+class Wearables:
+    """A context: the sensors run from its beginning to its end, on a venue's network."""
+
+    def __init__(
+        self,
+        keys: Sequence[SensorKey],
+        port: int,
+        *,
+        cable: Path | None = None,
+        motion: Callable[[int], Motion] = dance,
+        on_sent: Callable[[Sent], None] | None = None,
+    ) -> None:
+        self.sensors = [
+            EmulatedSensor(key, Wearer(motion(number), STAND_STILL_S)) for number, key in enumerate(keys)
+        ]
+        self.radios = [Radio(HOST, port) for _ in keys]
+        ways: list[dict[Way, Sender]] = [{Way.NETWORK: radio} for radio in self.radios]
+        if cable is not None:
+            ways[0][Way.CABLE] = SerialSender(str(cable))
+        self.emulator = Emulator(self.sensors, ways, network=VenueNetwork(VENUE, 1), on_sent=on_sent)
+        self._wishes: queue.SimpleQueue[Callable[[float], None]] = queue.SimpleQueue()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> Wearables:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def do(self, wish: Callable[[float], None]) -> None:
+        """In the sensors' own thread, with the time of the moment."""
+        self._wishes.put(wish)
+
+    def _run(self) -> None:
+        with closing(self.emulator):
+            self.emulator.run(None, self._ended.is_set, self._fulfil)
+
+    def _fulfil(self) -> None:
+        while not self._wishes.empty():
+            self._wishes.get()(time.monotonic())
