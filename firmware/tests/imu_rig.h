@@ -68,7 +68,11 @@ struct ImuRig {
     const uint32_t transactions = model.counts().transactions + model.counts().recovers - before;
     most_transactions = std::max(most_transactions, transactions);
     longest_step_us = std::max(longest_step_us, clock.now_us() - stepped_us);
-    if (schedule.is_due(clock.micros())) judge();
+    const uint32_t slot_us = schedule.next_us();
+    if (schedule.is_due(clock.micros())) {
+      latest_us = std::max(latest_us, clock.micros() - slot_us);
+      judge();
+    }
     int16_t linear[3];
     if (imu.acceleration(linear)) {
       ++accelerations;
@@ -117,6 +121,7 @@ struct ImuRig {
   uint64_t longest_step_us = 0;
   uint64_t read_us = clock.now_us();
   uint64_t longest_gap_us = 0;
+  uint32_t latest_us = 0;  // a sample behind its slot
   double worst_degrees = -1;
 };
 

@@ -48,12 +48,13 @@ TEST_CASE("50 readings and 100 accelerations a second, calibration at its pace")
   rig.power_on();
   rig.run_until_reading();
   const uint32_t readings = rig.readings, accelerations = rig.accelerations;
-  rig.longest_gap_us = 0;
+  rig.longest_gap_us = rig.latest_us = 0;
   rig.run(20);
   CHECK(rig.readings - readings >= 999);
   CHECK(rig.accelerations - accelerations >= 1900);
   CHECK(rig.schedule.skipped() == 0);
-  CHECK(rig.longest_gap_us < 25000);
+  CHECK(rig.longest_gap_us < 21000);
+  CHECK(rig.latest_us < 1000);
   CHECK(rig.imu.is_calibrated());
   CHECK(rig.sample.calibration == 0x3C);
   CHECK(rig.imu.counts().bus_errors <= 2);
@@ -68,9 +69,12 @@ TEST_CASE("other rates keep their places too: 25 Hz, 100 Hz") {
     rig.power_on();
     rig.run_until_reading();
     rig.schedule.start(rig.clock.micros(), period_us);
+    rig.run(0.1);
+    rig.latest_us = 0;
     const uint32_t readings = rig.readings, accelerations = rig.accelerations;
     rig.run(10);
     CHECK(rig.readings - readings >= 10000000 / period_us - 1);
+    CHECK(rig.latest_us < 1000);  // looks after the chip and for taps do not delay a sample
     CHECK(rig.accelerations - accelerations >= 750);
     CHECK(rig.imu.is_calibrated());
     rig.check_manners();
@@ -268,6 +272,55 @@ TEST_CASE("a chip that lost fusion is brought back, and the lost heading is said
   }
 }
 
+TEST_CASE("after a lost heading the first readings are believed, however far they are from the last") {
+  ImuRig rig;
+  rig.model.set_motion([](uint64_t at_us) { return turned(static_cast<double>(at_us) * 40e-6, 0, 0, 1); });
+  rig.power_on();
+  rig.run(4);
+  rig.model.inject(ImuFault::kSilentConfig);
+  rig.run(1);
+  CHECK(rig.imu.recoveries() == 1);
+  CHECK(rig.imu.counts().rate == 0);
+  CHECK(rig.imu.counts().relocated == 0);
+}
+
+TEST_CASE("wrong answers to a look at the chip's health do not cost the heading") {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    ImuRig rig(seed);
+    rig.model.set_motion(dance);
+    rig.power_on();
+    rig.run(2);
+    rig.model.set_probability(ImuFault::kZeroRead, 0.05);
+    rig.run(30);
+    CHECK(rig.imu.recoveries() == 0);
+    CHECK(rig.imu.counts().zero > 10);
+    rig.check_manners();
+  }
+}
+
+TEST_CASE("the unique id and a saved profile are right even where every fifth answer is wrong") {
+  for (uint64_t seed = 1; seed <= 40; ++seed) {
+    CAPTURE(seed);
+    uint8_t clean[22], saved[22];
+    bool is_saved[2];
+    for (const bool is_disturbed : {false, true}) {
+      ImuRig rig(seed);
+      rig.model.set_motion(dance);
+      const double share = is_disturbed ? 0.1 : 0;
+      rig.model.set_probability(ImuFault::kFlippedBit, share);
+      rig.model.set_probability(ImuFault::kZeroRead, share);
+      rig.power_on();
+      rig.run(8);
+      if (rig.imu.has_id()) CHECK(memcmp(rig.imu.unique_id(), rig.model.unique_id().data(), 16) == 0);
+      rig.imu.save_profile(rig.clock.micros());
+      rig.run(1);
+      is_saved[is_disturbed] = rig.imu.profile_ready(is_disturbed ? saved : clean);
+    }
+    CHECK(is_saved[0]);
+    if (is_saved[1]) CHECK(memcmp(saved, clean, 22) == 0);
+  }
+}
+
 TEST_CASE("a wearable lying still for minutes is not taken for a frozen one") {
   ImuRig rig;
   rig.power_on();
@@ -417,11 +470,16 @@ TEST_CASE("a profile is not saved from a chip that fails meanwhile") {
 TEST_CASE("a loop that stalls, or a bus that stretches much more, breaks no wait") {
   for (const uint32_t loop_us : {50u, 5000u, 60000u}) {
     ImuRig rig;
-    rig.model.stretch_us_byte = 180;
     rig.model.set_motion(dance);
     rig.power_on();
     rig.run(5, loop_us);
+    const Offsets profile;
+    rig.imu.use_profile(profile.bytes, rig.clock.micros());
+    rig.run(2, loop_us);
+    rig.imu.save_profile(rig.clock.micros());
+    rig.run(2, loop_us);
     CHECK(rig.imu.is_running());
+    CHECK(rig.imu.recoveries() == 2);
     rig.check_manners();
   }
   ImuRig rig;

@@ -1,4 +1,4 @@
-// The simulated BNO055 against the datasheet: a model that forgave what the chip does not would prove nothing.
+// The simulated BNO055 against the datasheet: a model that forgives more would prove nothing.
 #include <doctest/doctest.h>
 
 #include <cmath>
