@@ -8,7 +8,7 @@ namespace bunraku {
 // What does not fit is cut off.
 class Answer {
  public:
-  static constexpr uint8_t kRoom = 240;  // its end, '\0', included
+  static constexpr uint8_t kRoom = 253;  // its end, '\0', included
 
   void clear() { count_ = 0, text_[0] = '\0'; }
   Answer& add(const char* text);

@@ -51,7 +51,7 @@ void tell(const Status& status, Answer& answer) {
     answer.add(" ").add_number(status.calibration >> shift & 3u);
   answer.add(" profile ").add(set_or_none(status.has_profile));
   answer.add(" recoveries ").add_number(status.recoveries).add(" taps ").add_number(status.taps);
-  answer.add(" rate ").add_number(status.rate_hz).add(" sent ").add_number(status.readings);
+  answer.add(" sent ").add_number(status.readings);
   answer.add(" skipped ").add_number(status.skipped).add(" unsent ").add_number(status.unsent);
   answer.add(" joins ").add_number(status.joins).add(" damaged ").add_number(status.damaged_frames);
   const PairingCounts& dropped = status.dropped;
