@@ -79,7 +79,7 @@ class KnownSensor:
         return SensorState(
             name=self.key.name,
             device_id=self.key.device_id,
-            state=self._stage(now),
+            state=self._word(now),
             way="" if session is None else session.way[0].describe(session.way[1]),
             rate_hz=self.reception.rate_hz(now),
             loss=self.reception.loss(),
@@ -94,7 +94,7 @@ class KnownSensor:
             complaint="" if pairing.way(now) else self._complaint(),
         )
 
-    def _stage(self, now: float) -> str:
+    def _word(self, now: float) -> str:
         pairing = self.pairing
         if pairing.way(now) is not None:
             return "linked"

@@ -128,6 +128,8 @@ class UdpIntake:
                 length, ancillary, _, origin = one.recvmsg_into(self._buffers, self._ancillary_bytes)
             except BlockingIOError:
                 return
+            except ConnectionRefusedError:
+                continue  # an answer of ours came back: the sensor was switched off; forged, it costs nothing
             except OSError:
                 self.counts["socket_error"] += 1
                 return

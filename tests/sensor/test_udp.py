@@ -211,6 +211,20 @@ def test_closed_sockets_never_raise_into_the_tick(link: SensorLink, radio: Radio
     assert link.counts["send_error"] == 1
 
 
+def test_an_answer_that_comes_back_keeps_no_reading_out(link: SensorLink, radio: Radio) -> None:
+    """The sensor was switched off; the kernel tells so on its own socket, before what waits there."""
+    radio.pair(link)
+    port = radio.socket.getsockname()[1]
+    radio.socket.close()
+    link.strobe("left-wrist", time.monotonic())
+    link.tend(time.monotonic())
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
+        again.bind(("127.0.0.1", port))
+        again.sendto(radio.wearable.reading(), intake_of(link).address)
+        assert [one.sequence for one in link.drain(time.monotonic())] == [2]
+    assert "socket_error" not in link.counts
+
+
 def test_an_answer_that_cannot_leave_is_counted() -> None:
     intake = UdpIntake("127.0.0.1", 0)
     intake.send(b"x", ("203.0.113.1", 9))  # from loopback there is no way there
