@@ -92,9 +92,9 @@ void Bno055Model::tap(uint64_t at_us, double peak_m_s2) {
 
 double Bno055Model::linear_z(uint64_t at_us) const {
   double sum = 0;
-  for (const Tap& tap : taps_) {
-    const double since_us = static_cast<double>(at_us) - static_cast<double>(tap.at_us);
-    if (since_us >= 0 && since_us < kTapUs) sum += tap.peak_m_s2 * std::sin(kPi * since_us / kTapUs);
+  for (const Tap& knock : taps_) {
+    const double since_us = static_cast<double>(at_us) - static_cast<double>(knock.at_us);
+    if (since_us >= 0 && since_us < kTapUs) sum += knock.peak_m_s2 * std::sin(kPi * since_us / kTapUs);
   }
   return sum;
 }

@@ -104,14 +104,15 @@ TEST_CASE("the board restarts, the chip does not: it goes on, heading kept, what
     Bno055 anew(rig.model);
     const Offsets profile;
     anew.start(ImuRig::kPlain, rig.clock.micros());
-    anew.use_profile(profile.bytes, rig.clock.micros());
     const uint64_t begun_us = rig.clock.now_us();
     while (!anew.is_running() && rig.clock.now_us() < begun_us + 1000000) {
       anew.step(rig.clock.micros());
+      if (anew.has_id()) anew.use_profile(profile.bytes, rig.clock.micros());  // it is kept by this id
       rig.clock.advance(700);
     }
     CHECK(anew.is_running());
     CHECK(rig.clock.now_us() - begun_us < 60000);
+    for (int i = 0; i < 100; ++i) anew.step(rig.clock.micros());
     CHECK(anew.has_id());
     CHECK(anew.has_profile());
     CHECK(anew.recoveries() == 0);
@@ -354,6 +355,50 @@ TEST_CASE("a chip that never gets well is reset, later and later, and taken when
   rig.model.set_probability(ImuFault::kFusionError, 0);
   CHECK(rig.run_until_reading() < 6);
   CHECK_FALSE(rig.imu.has_failed());
+}
+
+TEST_CASE("trouble long ago does not slow the next repair down") {
+  ImuRig rig;
+  rig.model.set_motion(dance);
+  rig.power_on();
+  rig.run(12);
+  for (uint8_t times = 1; times <= 6; ++times) {
+    rig.model.inject(ImuFault::kFusionError);
+    rig.run(2.2);
+    CHECK(rig.imu.is_running());
+    CHECK(rig.imu.recoveries() == times);
+    rig.run(12);
+  }
+  CHECK(rig.model.counts().resets == 6);
+  rig.check_manners();
+}
+
+TEST_CASE("a chip that says all is well and gives zeros is started anew") {
+  ImuRig rig;
+  rig.model.set_motion(dance);
+  rig.power_on();
+  rig.run(2);
+  rig.model.inject(ImuFault::kZeroRead, 40);
+  rig.run(3);
+  CHECK(rig.imu.counts().frozen == 1);
+  CHECK(rig.imu.recoveries() == 1);
+  CHECK(rig.imu.is_running());
+  rig.check_manners();
+}
+
+TEST_CASE("a profile that fusion refuses is dropped: rather without than not at all") {
+  ImuRig rig;
+  const Offsets profile;
+  rig.power_on();
+  rig.imu.use_profile(profile.bytes, rig.clock.micros());
+  rig.run(2);
+  CHECK(rig.imu.has_profile());
+  rig.model.poke(bno055::kSystemError, bno055::kErrorConfiguration);
+  rig.run(4);
+  CHECK(rig.imu.is_running());
+  CHECK_FALSE(rig.imu.has_profile());
+  CHECK(rig.imu.counts().refused_profiles == 1);
+  CHECK(rig.model.counts().resets == 1);
 }
 
 TEST_CASE("profiles: restored at once before start, through CONFIG mode later, and after a brown-out") {

@@ -94,10 +94,7 @@ void Bno055::inspect() {
   const uint8_t status = bytes[0], error = bytes[kSystemError - kSystemStatus];
   const uint8_t* units = bytes + (kUnits - kSystemStatus);
   is_fusion_kept_ = status == kStatusFusion && is_as_told(units, static_cast<uint8_t>(settings_.fusion));
-  if (is_fusion_kept_) {
-    if (!has_run_ && wants_restore_) has_profile_ = true, wants_restore_ = false;  // from before the restart
-    return go(has_id_ ? State::kAwaitData : State::kSelectIdPage);
-  }
+  if (is_fusion_kept_) return go(has_id_ ? State::kAwaitData : State::kSelectIdPage);
   if (++looks_ < kMostDoubts) return;
   if (status == kStatusError) return repair_fusion(error);
   if (is_fusion_expected_) {
@@ -230,6 +227,9 @@ void Bno055::begin_running(uint32_t now_us) {
     gate_.reset();
     calibration_ = calibrated_looks_ = 0;
     if (has_run_) ++recoveries_;
+  } else if (!has_run_ && wants_restore_) {  // the board was restarted: the chip has its profile from before
+    has_profile_ = true;
+    wants_restore_ = false;
   }
   has_run_ = is_fusion_expected_ = is_suspicious_ = true;  // the first look at its health is due at once
   has_failed_ = is_cold_ = false;
