@@ -135,36 +135,21 @@ class Pairing:
         if self._unanswered is not None and now - self._assigned_at >= ASSIGNMENT_INTERVAL_S:
             hello, way = self._unanswered
             self._unanswered, self._assigned_at = None, now
-            yield (
-                way,
-                wire.Assignment(
-                    *self._head(wire.Assignment, hello.boot_nonce, self._number_for(hello.boot_nonce)),
-                    hello_sequence=hello.sequence,
-                    hand=self.hand,
-                    rate_hz=RATE_HZ,
-                    led=led,
-                ),
-            )
+            head = self._head(wire.Assignment, hello.boot_nonce, self._number_for(hello.boot_nonce))
+            yield way, wire.Assignment(*head, hello.sequence, self.hand, RATE_HZ, led)
         if self._uncalled is not None:
             boot_nonce, way = self._uncalled
             self._uncalled, self._called_at = None, now
             yield way, wire.Call(*self._head(wire.Call, boot_nonce, 0))
         session = self.session
-        if session is None or self.way(now) is None:
-            return
-        if now < self._next_heartbeat and led == self._led:
-            return
-        self._led = led
-        self._next_heartbeat = now + HEARTBEAT_S - (now - self._phase_s) % HEARTBEAT_S
-        held_us = max(0, round((now - session.heard) * 1e6))
-        head = self._head(wire.Heartbeat, session.boot_nonce, session.number)
-        yield session.way, wire.Heartbeat(*head, session.readings.newest, held_us, led)
-        imu_id = b"" if self.hello is None else self.hello.imu_id
-        has_profile = session.newest.flags & wire.HAS_PROFILE
-        if imu_id in profiles and not has_profile and session.restores < RESTORES:
-            session.restores += 1
-            head = self._head(wire.Restore, session.boot_nonce, session.number)
-            yield session.way, wire.Restore(*head, imu_id, profiles[imu_id])
+        is_due = now >= self._next_heartbeat or led != self._led
+        if session is not None and self.way(now) is not None and is_due:
+            self._led = led
+            self._next_heartbeat = now + HEARTBEAT_S - (now - self._phase_s) % HEARTBEAT_S
+            yield session.way, self._heartbeat(session, now, led)
+            restore = self._restore(session, profiles)
+            if restore is not None:
+                yield session.way, restore
 
     def way(self, now: float) -> Way | None:
         """Where the sensor is, while it is linked."""
@@ -186,6 +171,21 @@ class Pairing:
             return self.session.number
         drawn = struct.pack("<III", self._device_id, boot_nonce, self._sessions_before)
         return int.from_bytes(blake2s(drawn, key=self._secret, digest_size=4).digest(), "little") or 1
+
+    def _heartbeat(self, session: Session, now: float, led: int) -> wire.Heartbeat:
+        head = self._head(wire.Heartbeat, session.boot_nonce, session.number)
+        held_us = max(0, round((now - session.heard) * 1e6))
+        return wire.Heartbeat(*head, session.readings.newest, held_us, led)
+
+    def _restore(self, session: Session, profiles: Mapping[bytes, bytes]) -> wire.Restore | None:
+        """The calibration that this sensor's IMU should have and has not."""
+        offsets = profiles.get(self.hello.imu_id) if self.hello is not None else None
+        has_profile = session.newest.flags & wire.HAS_PROFILE
+        if self.hello is None or offsets is None or has_profile or session.restores >= RESTORES:
+            return None
+        session.restores += 1
+        head = self._head(wire.Restore, session.boot_nonce, session.number)
+        return wire.Restore(*head, self.hello.imu_id, offsets)
 
     def _head(self, kind: type[wire.Packet], boot_nonce: int, number: int) -> tuple[int, int, int, int]:
         sequence = self._sent[kind] = self._sent.get(kind, 0) + 1
