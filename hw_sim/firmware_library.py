@@ -227,7 +227,7 @@ def load_library(path: Path = LIBRARY) -> ctypes.CDLL:
     if not path.exists():
         raise FirmwareMissingError(
             f"the firmware was not compiled: there is no {path}. Build it with 'make firmware'; "
-            "it needs two Debian packages: sudo apt-get install -y cmake g++"
+            "it needs these Debian packages: sudo apt-get install -y cmake g++ make"
         )
     library = ctypes.CDLL(str(path))
     world, data = c_void_p, c_char_p
