@@ -37,8 +37,18 @@ inline Quaternion dance(uint64_t at_us) {
   return turned(120 * std::sin(4.1 * t) + 20 * std::sin(1.3 * t), std::cos(0.7 * t), std::sin(0.9 * t), 0.6);
 }
 
+// A sound calibration profile: registers 0x55 to 0x6A.
+struct Offsets {
+  uint8_t bytes[22] = {7, 0, 0xF3, 0xFF, 0xF2, 0xFF, 9, 0, 4, 0, 200, 0, 3, 0, 2, 0, 1, 0, 0xE8, 3, 0xF4, 1};
+  void set(size_t at, int value) {
+    bytes[at] = static_cast<uint8_t>(value);
+    bytes[at + 1] = static_cast<uint8_t>(value >> 8);
+  }
+};
+
 struct ImuRig {
   static constexpr ImuSettings kPlain{Fusion::kImuPlus, 0x24, 0x00};
+  static constexpr ImuSettings kNdof{Fusion::kNdof, 0x24, 0x00};
   static constexpr double kSlackDegrees = 1.9;  // what a torn byte weighs
 
   explicit ImuRig(uint64_t seed = 1, uint64_t start_us = 1000000) : clock(start_us), model(clock, seed) {}

@@ -62,12 +62,12 @@ class Bno055 {
   bool acceleration(int16_t (&linear)[3]);
 
   bool is_running() const { return state_ == State::kRunning; }  // fusion runs and gives data
-  bool has_failed() const { return has_failed_; }                // no chip after several tries; goes on trying
+  bool has_failed() const { return has_failed_; }  // no chip, or none that gets well; goes on trying
   bool has_id() const { return has_id_; }
   const uint8_t* unique_id() const { return unique_id_; }  // 16 bytes, page 1 register 0x50
 
-  // 22 bytes, registers 0x55 to 0x6A, through CONFIG mode: the heading is lost. Nonsense is refused (counted);
-  // a magnetometer radius outside 144..1280 is left out.
+  // 22 bytes, registers 0x55 to 0x6A, through CONFIG mode: the heading is lost. The same again changes nothing.
+  // Nonsense is refused and counted; a magnetometer radius outside 144..1280 is left out.
   void use_profile(const uint8_t* offsets22, uint32_t now_us);
 
   // Reads the offsets through CONFIG mode: the heading is lost. Given up if the chip fails meanwhile.
@@ -111,7 +111,7 @@ class Bno055 {
   void weigh(ImuGate::Verdict verdict);
   void look_for_frozen(const uint8_t* bytes);
 
-  // bno055_start_up.cpp: everything else.
+  // bno055_start_up.cpp: from power-on to fusion, and back there.
   void advance(uint32_t now_us);
   void search(uint32_t now_us);
   void select_page(uint32_t now_us);
@@ -135,7 +135,7 @@ class Bno055 {
   void repair_fusion(uint8_t error);
   void keep_looking(uint32_t now_us);
 
-  // The bus: false is counted and answered with patience, nine clocks, and a new search.
+  // bno055_bus.cpp: an error is counted and answered with patience, nine clocks, and a new search.
   bool write(uint8_t reg, const uint8_t* data, uint8_t count);
   bool write(uint8_t reg, uint8_t value) { return write(reg, &value, 1); }
   bool read(uint8_t reg, uint8_t* data, uint8_t count);
