@@ -66,7 +66,7 @@ class Bno055 {
   bool has_id() const { return has_id_; }
   const uint8_t* unique_id() const { return unique_id_; }  // 16 bytes, page 1 register 0x50
 
-  // 22 bytes, registers 0x55 to 0x6A, through CONFIG mode: the heading is lost. The same again changes nothing.
+  // 22 bytes, registers 0x55 to 0x6A, through CONFIG mode: the heading is lost. The same again: nothing.
   // Nonsense is refused and counted; a magnetometer radius outside 144..1280 is left out.
   void use_profile(const uint8_t* offsets22, uint32_t now_us);
 
