@@ -24,6 +24,8 @@ from hw_sim.probe import Run
 SETTLING_S = 3.0  # the first seconds do not count: the phase lock moves at most 10 ms in a second
 FREE_SETTLING_S = 1.0
 LATE = 1  # flag of the journal
+POWER_ON_S, POWER_ON_AND_JOIN_S = 1.0, 5.0  # until a reading is used: network up; Wi-Fi joined first
+RESTART_S = 1.5
 NAMED = {"p50": 50.0, "p99": 99.0, "p999": 99.9, "max": 100.0}
 FEW = {"p50": 50.0, "max": 100.0}
 
@@ -37,6 +39,7 @@ class Evidence:
     free: Run
     power_ons: Run
     restarts: Sequence[Restart]
+    firmware: bool = False  # the compiled firmware was the sensor, and joined a simulated Wi-Fi each time
 
     @property
     def ways(self) -> tuple[Transport, Transport]:
@@ -94,6 +97,7 @@ def figures_of(evidence: Evidence) -> dict[str, Any]:
         "power_on_to_reading_s": percentiles(evidence.power_on_s, FEW),
         "restart_to_reading_s": percentiles(evidence.restart_s, FEW),
         "kill_to_reading_s": percentiles(evidence.kill_s, FEW),
+        "firmware": evidence.firmware,
         "power_ons": len(evidence.power_on_s),
         "restarts": len(evidence.restarts),
         "readings": len(way.latency_ms),
@@ -108,6 +112,7 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
     power_on_s, restart_s, kill_s = (
         figures[f"{name}_to_reading_s"]["p50"] for name in ("power_on", "restart", "kill")
     )
+    power_on_limit_s = POWER_ON_AND_JOIN_S if figures["firmware"] else POWER_ON_S
     late_share = 100.0 * figures["late_ticks"] / max(1, figures["ticks"])
     return [
         Limit("transport, median", figures["transport_ms"]["p50"], 3.0, "ms"),
@@ -123,9 +128,9 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
         Limit("missing frames", 100.0 * figures["missing_frames"] / max(1, figures["ticks"]), 0.1, "%"),
         Limit("memory of the box", figures["rss_mb"], 120.0, "MB"),
         Limit("start to first frame", figures["start_to_first_frame_s"], 1.5, "s"),
-        Limit("sensor's power-on to its reading in a frame, median", power_on_s, 1.0, "s"),
-        Limit("box's restart to a reading in a frame, median", restart_s, 1.5, "s"),
-        Limit("the same from its end, median", kill_s, 1.5, "s"),
+        Limit("sensor's power-on to its reading in a frame, median", power_on_s, power_on_limit_s, "s"),
+        Limit("box's restart to a reading in a frame, median", restart_s, RESTART_S, "s"),
+        Limit("the same from its end, median", kill_s, RESTART_S, "s"),
     ]
 
 

@@ -13,6 +13,7 @@ import typer
 import yaml
 
 from appliance.sensor.keys import create_keys
+from hw_sim.emulated_sensor import REBOOT_S
 from hw_sim.figures import FREE_SETTLING_S, Evidence, figures_of, table, verdict
 from hw_sim.peers import ProbeError, Setting
 from hw_sim.probe import Course, run, run_restarts
@@ -20,7 +21,8 @@ from hw_sim.probe import Course, run, run_restarts
 REFUSED, FAILED = 2, 1
 BEAT_S = 0.02
 LOCKED_DRIFT_PPM = 60.0  # what a wearable's crystal may be off by; the lock has to follow it
-POWERED_S = 1.5  # how long a sensor is on until it is switched off again, and then as long off
+POWERED_S = 1.5  # how long a sensor is on until it is switched off again
+POWERED_FIRMWARE_S = 5.0  # the firmware joins a simulated Wi-Fi first, which takes seconds
 MOST_POWER_ONS, MOST_RESTARTS = 9, 5
 
 
@@ -57,12 +59,12 @@ def measure(
             free_s = max(6.0, seconds / 3.0)
             print(f"Measuring {free_s:g} s running free ...", flush=True)
             free = run(setting, free_course(free_s))
-            course = power_on_course(seconds)
+            course = power_on_course(seconds, POWERED_FIRMWARE_S if firmware else POWERED_S)
             print(f"Switching the sensor on and off for {course.seconds:g} s ...", flush=True)
             power_ons = run(setting, course)
             times = min(max(2, round(seconds / 6)), MOST_RESTARTS)
             print(f"Killing and starting the box {times} times ...", flush=True)
-            evidence = Evidence(locked, free, power_ons, run_restarts(setting, times))
+            evidence = Evidence(locked, free, power_ons, run_restarts(setting, times), firmware)
     except (ProbeError, OSError, ValueError) as error:
         print(f"bunraku measure: {error}", file=sys.stderr)
         raise typer.Exit(REFUSED) from None
@@ -93,10 +95,10 @@ def free_course(seconds: float) -> Course:
     return Course("free", seconds, phase_lock=False, drift_ppm=drift_ppm, seed=2)
 
 
-def power_on_course(seconds: float) -> Course:
-    """The sensor is switched off and on again and again; in each third of the given seconds once."""
+def power_on_course(seconds: float, powered_s: float) -> Course:
+    """The sensor is switched off and on again and again; once in each third second of the given ones."""
     power_ons = min(max(2, round(seconds / 3)), MOST_POWER_ONS)
-    return Course("power-ons", 2 * POWERED_S * power_ons, seed=3, reboot_every_s=POWERED_S)
+    return Course("power-ons", (powered_s + REBOOT_S) * power_ons, seed=3, reboot_every_s=powered_s)
 
 
 def _setting(show: Path | None, box: Path | None, scratch: Path, firmware: bool) -> Setting:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hw_sim.figures import Evidence
+from hw_sim.figures import POWER_ON_AND_JOIN_S, POWER_ON_S, RESTART_S, Evidence
 from hw_sim.latency import Transport
 from hw_sim.probe import Run
 
@@ -80,9 +80,13 @@ def _sections(axes: Any, locked: Run) -> None:
 def _first_readings(axes: Any, evidence: Evidence) -> None:
     """Each power-on and each restart as a dot, their limits as lines."""
     rows = (
-        ("sensor switched on", evidence.power_on_s, 1.0),
-        ("box started anew", evidence.restart_s, 1.5),
-        ("box killed", evidence.kill_s, 1.5),
+        (
+            "sensor switched on",
+            evidence.power_on_s,
+            POWER_ON_AND_JOIN_S if evidence.firmware else POWER_ON_S,
+        ),
+        ("box started anew", evidence.restart_s, RESTART_S),
+        ("box killed", evidence.kill_s, RESTART_S),
     )
     for place, (_, seconds, limit) in enumerate(rows):
         axes.plot(seconds, [place] * len(seconds), "o", color=VERMILION, alpha=0.6)
