@@ -96,18 +96,13 @@ def _within_reach(a: Orientation, b: Orientation, elapsed_s: float) -> bool:
 def _has_flipped_bit(believed: Orientation, raw: Orientation, unit: Orientation) -> bool:
     """A component near 1 with its top bit flipped reads near -1: unit norm still, and up to 20 degrees off.
 
-    Too small a step for the rate gate. It is told from a turn by undoing the flip: if that leads back to
-    where the sensor was, and the reading itself does not, the bit was flipped.
+    Too small a step for the rate gate. It is known by its size: 2 minus what it was, so never below 1. A sign
+    that changed as a whole is no step at all.
     """
-    for i in range(4):
-        if abs(raw[i] - believed[i]) > 1.9:
-            mended = list(raw)
-            mended[i] += 2.0 if raw[i] < 0 else -2.0
-            norm = sqrt(sum(part * part for part in mended))
-            w, x, y, z = (part / norm for part in mended)
-            turn = _degrees(believed, unit)
-            return turn > SLACK_DEGREES and _degrees(believed, (w, x, y, z)) < turn / 3
-    return False
+    return (
+        any(abs(now) >= 1.0 and now * before < 0.0 for now, before in zip(raw, believed, strict=True))
+        and _degrees(believed, unit) > SLACK_DEGREES
+    )
 
 
 def _alignment(a: Orientation, b: Orientation) -> float:

@@ -61,7 +61,7 @@ def test_what_is_no_orientation(orientation: Orientation, fate: str) -> None:
 def test_the_opposite_sign_is_the_same_orientation() -> None:
     feed = Feed()
     for step in range(50):
-        w, x, y, z = about_x(20.0 * step)
+        w, x, y, z = about_x(20.0 * step + 5.0)
         assert feed((w, x, y, z) if step % 2 else (-w, -x, -y, -z)) == "accepted"
 
 
@@ -121,6 +121,16 @@ def test_a_flipped_top_bit_with_unit_norm_is_refused(component: int, degrees_off
     feed(tuple(still))  # type: ignore[arg-type]
     assert feed(tuple(flipped)) == "torn"  # type: ignore[arg-type]
     assert feed(tuple(still)) == "accepted"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("speed", [-600.0, -300.0, 300.0, 600.0])
+def test_a_flipped_top_bit_is_refused_while_the_arm_moves_too(speed: float) -> None:
+    feed = Feed()
+    for step in range(-10, 0):
+        assert feed(about_x(speed * 0.02 * step)) == "accepted"
+    half = radians(2.0 if speed > 0 else -2.0)
+    assert feed((cos(half) - 2.0, sin(half), 0.0, 0.0)) == "torn"
+    assert feed(about_x(speed * 0.02)) == "accepted"
 
 
 def test_plus_one_read_as_minus_one_is_the_same_orientation_and_moves_nothing() -> None:
