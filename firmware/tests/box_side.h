@@ -16,7 +16,8 @@ template <typename Packet>
 std::vector<uint8_t> signed_packet(const Packet& packet, const uint8_t (&key)[wire::kKeyBytes] = kKey) {
   std::vector<uint8_t> data(Packet::kSize);
   packet.write(data.data());
-  blake2s({key, sizeof key, data.data(), Packet::kSignedBytes}, data.data() + Packet::kSignedBytes, wire::kTagBytes);
+  blake2s({key, sizeof key, data.data(), Packet::kSignedBytes}, data.data() + Packet::kSignedBytes,
+          wire::kTagBytes);
   return data;
 }
 
@@ -51,7 +52,8 @@ struct BoxSide {
     packet.led = wire::kLedOn;
     return packet;
   }
-  wire::Heartbeat heartbeat(uint32_t echo_sequence = 0, uint32_t echo_held_us = 0, uint8_t led = wire::kLedOn) {
+  wire::Heartbeat heartbeat(uint32_t echo_sequence = 0, uint32_t echo_held_us = 0,
+                            uint8_t led = wire::kLedOn) {
     auto packet = head<wire::Heartbeat>();
     packet.echo_sequence = echo_sequence;
     packet.echo_held_us = echo_held_us;

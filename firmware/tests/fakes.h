@@ -23,14 +23,15 @@ class FakeClock : public Clock {
   uint32_t now_us = 0;
 };
 
-// A BNO055 that is always ready: registers, two pages, a status that follows the mode, a reading that trembles.
+// A BNO055 that is always ready: registers on two pages, a status that follows the mode, trembling readings.
 class FakeImu : public I2cBus {
  public:
   FakeImu() {
     page(0)[0x00] = 0xA0;
     for (uint8_t i = 0; i < 16; ++i) page(1)[0x50 + i] = static_cast<uint8_t>(0x50 + i);
     set(0x20, 16384);
-    for (uint8_t at = 0x55; at <= 0x5F; at = static_cast<uint8_t>(at + 2)) set(at, static_cast<int16_t>(at - 0x50));
+    for (uint8_t at = 0x55; at <= 0x5F; at = static_cast<uint8_t>(at + 2))
+      set(at, static_cast<int16_t>(at - 0x50));
     set(0x67, 1000);
     set(0x69, 480);
   }

@@ -27,8 +27,9 @@ struct Session {
     return answer.text();
   }
   void provision() {
-    for (const char* line : {"set name left-wrist", "set device 1a2b3c4d", "set network Stage Left", "set port 9751",
-                             "set password break a leg", "set fusion ndof", "set axes 21 04"})
+    for (const char* line :
+         {"set name left-wrist", "set device 1a2b3c4d", "set network Stage Left", "set port 9751",
+          "set password break a leg", "set fusion ndof", "set axes 21 04"})
       CHECK(ask(line) == "ok");
     CHECK(ask(std::string("set key ") + kKeyAsHex) == "ok");
   }
@@ -57,7 +58,8 @@ TEST_CASE("what was set is shown and kept in the draft; secrets only as set") {
   Session session;
   session.provision();
   CHECK(session.ask("show") ==
-        "ok name left-wrist device 1a2b3c4d key set password set port 9751 fusion ndof axes 21 04 network Stage Left");
+        "ok name left-wrist device 1a2b3c4d key set password set port 9751 fusion ndof axes 21 04 "
+        "network Stage Left");
   const Settings& draft = session.console.draft();
   CHECK(draft.device_id == 0x1A2B3C4D);
   CHECK(draft.key[15] == 15);
@@ -83,14 +85,16 @@ TEST_CASE("names of networks may have letters beyond ASCII and spaces at their e
 
 TEST_CASE("what breaks a rule changes nothing") {
   for (const char* line :
-       {"set device 1a2b3c4", "set device 1a2b3c4dd", "set device 1a2b3c4g", "set device 00000000", "set device",
-        "set device -1a2b3c4", "set key 00", "set key 000102030405060708090a0b0c0d0e0", "set key",
+       {"set device 1a2b3c4", "set device 1a2b3c4dd", "set device 1a2b3c4g", "set device 00000000",
+        "set device", "set device -1a2b3c4", "set key 00", "set key 000102030405060708090a0b0c0d0e0", "set key",
         "set key 000102030405060708090a0b0c0d0e0f00", "set key 0001020304050607 8090a0b0c0d0e0f", "set name",
         "set name two words", "set name a-name-of-25-characters!!", "set name B\xC3\xBChne", "set port 0",
-        "set port 65536", "set port 4294977046", "set port 9750x", "set port -1", "set port", "set password short",
+        "set port 65536", "set port 4294977046", "set port 9750x", "set port -1", "set port",
+        "set password short",
         "set password 1234567890123456789012345678901234567890123456789012345678901234",
         "set network 123456789012345678901234567890123", "set fusion amg", "set fusion", "set axes 24",
-        "set axes 24 08", "set axes 64 00", "set axes 25 00", "set axes 24 01", "set axes 2400", "set axes 24 00 "}) {
+        "set axes 24 08", "set axes 64 00", "set axes 25 00", "set axes 24 01", "set axes 2400",
+        "set axes 24 00 "}) {
     CAPTURE(line);
     Session session;
     const std::string before = session.ask("show");
@@ -127,11 +131,12 @@ TEST_CASE("prove: keyed BLAKE2s over the word and the nonce") {
 
 TEST_CASE("what the wearable has to do is asked of it") {
   Session session;
-  const std::vector<std::pair<const char*, Request>> requests = {{"save", Request::kSave},
-                                                                 {"forget", Request::kForget},
-                                                                 {"strobe", Request::kStrobe},
-                                                                 {"calibration save", Request::kSaveCalibration},
-                                                                 {"restart", Request::kRestart}};
+  const std::vector<std::pair<const char*, Request>> requests = {
+      {"save", Request::kSave},
+      {"forget", Request::kForget},
+      {"strobe", Request::kStrobe},
+      {"calibration save", Request::kSaveCalibration},
+      {"restart", Request::kRestart}};
   for (const auto& known : requests) {
     CHECK(session.ask(known.first).substr(0, 2) == "ok");
     CHECK(session.request == known.second);
@@ -170,8 +175,9 @@ TEST_CASE("each state has its word") {
 TEST_CASE("help names every command") {
   Session session;
   const std::string help = session.ask("help");
-  for (const char* command : {"id", "show", "status", "device", "key", "name", "network", "password", "port", "fusion",
-                              "axes", "save", "forget", "prove", "strobe", "calibration save", "restart"})
+  for (const char* command :
+       {"id", "show", "status", "device", "key", "name", "network", "password", "port", "fusion", "axes", "save",
+        "forget", "prove", "strobe", "calibration save", "restart"})
     CHECK(help.find(command) != std::string::npos);
   CHECK(help.substr(help.size() - 7) == "restart");
 }
@@ -202,10 +208,11 @@ TEST_CASE("no answer holds the key or the password, whatever is asked") {
   Session session;
   session.provision();
   const char* lines[] = {"id", "show", "status", "help", "save", "forget", "strobe", "restart", "set key",
-                         "set password", "set password short", "prove 0000000000000000", "set key zz", "get key",
-                         "show key", "show password", "calibration", "set name break a leg",
+                         "set password", "set password short", "prove 0000000000000000", "set key zz",
+                         "get key", "show key", "show password", "calibration", "set name break a leg",
                          "set network break a leg and more than fits into a name",
-                         "set device 000102030405060708090a0b0c0d0e0f", "key 000102030405060708090a0b0c0d0e0f"};
+                         "set device 000102030405060708090a0b0c0d0e0f",
+                         "key 000102030405060708090a0b0c0d0e0f"};
   for (const char* line : lines) {
     CAPTURE(line);
     const std::string answer = session.ask(line);

@@ -89,7 +89,8 @@ TEST_CASE("text and packets take turns") {
   line.feed(framed({8}));
   line.feed(framed({9}));
   line.feed(text("show\r"));
-  CHECK(line.found == Findings{"line:id", "packet:\x07", "line:status", "packet:\x08", "packet:\x09", "line:show"});
+  CHECK(line.found == Findings{"line:id", "packet:\x07", "line:status", "packet:\x08", "packet:\x09",
+                               "line:show"});
   CHECK(line.input.damaged() == 0);
 }
 

@@ -1,4 +1,4 @@
-// The firmware's packets against the golden vectors: each decoded to its fields, each made from them bit by bit.
+// The firmware's packets against the golden vectors: each decoded to its fields, each made from them.
 #include <doctest/doctest.h>
 
 #include <cmath>
