@@ -75,7 +75,7 @@ def provision(
         known = _known_as(shown, change)
         _require_free_name(settings.name, known, shown, change, takes_over)
         replaced = settings.name in change.keys
-        sensor = _new_key(settings.name, known, change)
+        sensor = _new_key(settings.name, change, takes_over)
         change.put(sensor)
         _draft(console, sensor, settings)
         say("settings", f"sent and proved: fresh key, device 0x{sensor.device_id:08x}, {_way(settings)}")
@@ -120,22 +120,23 @@ def _known_as(shown: str, change: KeyEditing) -> str:
 
 
 def _require_free_name(name: str, known: str, shown: str, change: KeyEditing, takes_over: bool) -> None:
-    """Two wearables must not change places by mistake: one with another name does not take this one's."""
-    own = known or _word_after("name", shown)
-    if takes_over or name not in change.keys or own in (name, "", "none"):
+    """Two wearables must not change places by mistake; one that remembers nothing may be any of them."""
+    if takes_over or name not in change.keys or known == name or _word_after("device", shown) == "none":
         return
+    own = known or _word_after("name", shown)
+    whose = f"is '{own}' already" if known else f"was provisioned elsewhere (as '{own}')"
     raise ProvisioningError(
-        f"This wearable is '{own}', and '{name}' is another one. Nothing was changed. To put this one in the "
-        f"place of a broken {name}: bunraku sensors replace {name} --port DEVICE"
-        + (f", or without a cable: bunraku sensors replace {name} {own}" if known else "")
-        + "."
+        f"This wearable {whose}, and '{name}' is another one. Nothing was changed. To put this one in the "
+        f"place of a broken {name}: bunraku sensors replace {name} "
+        + (f"{own} (no cable needed)." if known else "--port, with the other options as now.")
     )
 
 
-def _new_key(name: str, known: str, change: KeyEditing) -> SensorKey:
-    """A fresh key; a wearable that has this name already keeps its device id."""
+def _new_key(name: str, change: KeyEditing, takes_over: bool) -> SensorKey:
+    """A fresh key. The same wearable keeps its device id, by which it is known if this breaks off."""
     new = fresh_key(name, change.keys.values())
-    return SensorKey(name, change.keys[name].device_id, new.key) if known == name else new
+    has_place = name in change.keys and not takes_over
+    return SensorKey(name, change.keys[name].device_id if has_place else new.device_id, new.key)
 
 
 def _draft(console: WearableConsole, sensor: SensorKey, settings: Settings) -> None:

@@ -9,13 +9,14 @@ import errno
 import re
 import secrets
 import time
+from collections import deque
 from dataclasses import dataclass
 from hashlib import blake2s
 from hmac import compare_digest
 
 import serial
-from serial.tools import list_ports
 
+from appliance.sensor.serial_ports import found_ports, ports_sentence
 from appliance.sensor.wire import TAG_BYTES
 
 BAUD = 115200  # USB: any speed is the same, but 1200 would start the bootloader
@@ -25,14 +26,11 @@ LONGEST_LINE = 128
 _TO_TEXT = b"\x00\x00\x01\x00\n"
 _ASK_AGAIN_S = 3.0
 _QUIET_S = 0.15
-_NOISE = 4096
+_LONGEST_ANSWER = 256
 _IDENTITY = re.compile(
     r"ok bunraku-wearable (?P<firmware>\S+) wire (?P<wire>[0-9a-f]{8}) "
     r"imu (?P<imu>none|[0-9a-f]{32}) board (?P<board>\S+)"
 )
-# USB vendor and product of the MKR1000 (boards.txt of the Arduino SAMD core): running, and in its bootloader.
-_VENDOR = 0x2341
-_RUNNING, _BOOTLOADER = {0x804E, 0x824E}, {0x004E, 0x024E}
 
 
 class ConsoleError(Exception):
@@ -63,7 +61,8 @@ class WearableConsole:
     def __init__(self, device: str, patience_s: float = PATIENCE_S) -> None:
         self.device = device
         self._patience_s = patience_s
-        self._received = b""
+        self._text = TextOnCable()
+        self._lines: deque[str] = deque()
         try:
             self._port = serial.Serial(device, BAUD, timeout=0.05, write_timeout=patience_s, exclusive=True)
         except (OSError, ValueError) as error:  # pyserial's SerialException is an OSError
@@ -122,22 +121,17 @@ class WearableConsole:
         return compare_digest(answer, blake2s(b"prove" + nonce, key=key, digest_size=TAG_BYTES).hexdigest())
 
     def _line(self, until: float) -> str | None:
-        """The next line of text; None when none came in time. Packets and noise are passed over."""
-        while True:
-            line, end, rest = self._received.partition(b"\n")
-            if end:
-                self._received = rest
-                text = line.rpartition(b"\x00")[2].rstrip(b"\r")
-                if text and min(text) >= 32:
-                    return text.decode("utf-8", "replace")
-                continue
+        """The next line of text; None when none came in time."""
+        while not self._lines:
             if time.monotonic() >= until:
                 return None
-            self._received = self._received[-_NOISE:] + self._read()
+            self._lines += self._text.feed(self._read())
+        return self._lines.popleft()
 
     def _settle(self) -> None:
         """Pass over answers to a question that was asked more than once."""
-        while self._line(time.monotonic() + _QUIET_S) is not None:
+        until = time.monotonic() + self._patience_s
+        while time.monotonic() < until and self._line(time.monotonic() + _QUIET_S) is not None:
             pass
 
     def _read(self) -> bytes:
@@ -157,55 +151,33 @@ class WearableConsole:
             ) from None
 
 
-@dataclass(frozen=True)
-class FoundPort:
-    """A serial port of this machine, and whether a wearable's board is on it."""
+class TextOnCable:
+    """Finds the console's lines among packets, in a stream that begins anywhere.
 
-    device: str
-    description: str
-    is_wearable: bool
-    is_bootloader: bool = False
+    A packet stands between zero bytes. What stands there and begins like an answer is text: a packet begins
+    with the distance to its first zero, which is less than any letter's code.
+    """
 
-    def __str__(self) -> str:
-        hint = "a wearable's board" if self.is_wearable else self.description
-        if self.is_bootloader:
-            hint = "a wearable's board that waits for firmware: press its reset button once"
-        return f"{self.device} ({hint})" if hint else self.device
+    def __init__(self) -> None:
+        self._rest = b""
+        self._is_text: bool | None = True  # the stream may begin in the middle of a line
 
-
-def found_ports() -> list[FoundPort]:
-    """The serial ports of this machine."""
-    return [
-        FoundPort(
-            port.device,
-            "" if port.description in ("n/a", None) else port.description,
-            port.vid == _VENDOR and port.pid in _RUNNING,
-            port.vid == _VENDOR and port.pid in _BOOTLOADER,
-        )
-        for port in sorted(list_ports.comports(), key=lambda port: port.device)
-    ]
-
-
-def only_wearable(ports: list[FoundPort]) -> str:
-    """The device of the one wearable that is plugged in. Raises ConsoleError that lists what there is."""
-    wearables = [port for port in ports if port.is_wearable]
-    if len(wearables) == 1:
-        return wearables[0].device
-    if wearables:
-        raise ConsoleError(
-            f"{len(wearables)} wearables are plugged in: {', '.join(port.device for port in wearables)}. "
-            "Leave one, or say which with --port."
-        )
-    raise ConsoleError(f"No wearable is plugged in. {_ports_sentence(ports)}")
-
-
-def _ports_sentence(ports: list[FoundPort]) -> str:
-    if not ports:
-        return (
-            "This machine has no serial port at all. Plug the wearable in with a USB cable that carries data "
-            "(many carry power alone) and switch it on."
-        )
-    return f"Serial ports here: {', '.join(map(str, ports))}. Say which one with --port."
+    def feed(self, received: bytes) -> list[str]:
+        """The lines completed by `received`."""
+        lines: list[bytes] = []
+        for number, part in enumerate(received.split(b"\x00")):
+            if number:
+                self._rest, self._is_text = b"", None
+            self._rest += part
+            begin = self._rest.lstrip(b"\r\n")[:2]
+            if self._is_text is None and len(begin) == 2:
+                self._is_text = begin in (b"ok", b"er")
+            if self._is_text:
+                *complete, self._rest = self._rest.split(b"\n")
+                lines += complete
+            self._rest = self._rest[-_LONGEST_ANSWER:]
+        texts = (line.strip(b"\r").decode("utf-8", "replace") for line in lines)
+        return [text for text in texts if text and min(text) >= " "]
 
 
 def _cannot_open(device: str, error: Exception) -> str:
@@ -221,5 +193,5 @@ def _cannot_open(device: str, error: Exception) -> str:
             "and try again."
         )
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return f"There is no serial port {device}. {_ports_sentence(found_ports())}"
-    return f"{device} cannot be opened as a serial port. {_ports_sentence(found_ports())}"
+        return f"There is no serial port {device}. {ports_sentence(found_ports())}"
+    return f"{device} cannot be opened as a serial port. {ports_sentence(found_ports())}"

@@ -15,7 +15,7 @@ from appliance.stage.run import Stage, stop_signals
 from appliance.stage.speaker import Speaker
 
 _PICTURED_S = 10.0
-_NO_REFUSAL = ("accepted", "relocated", "lost", "reboot", "drain_limit")
+_NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
 
 
 def play_show(

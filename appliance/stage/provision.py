@@ -16,7 +16,8 @@ from appliance.sensor.provisioning import (
     Settings,
     provision,
 )
-from appliance.sensor.wearable_console import ConsoleError, WearableConsole, found_ports, only_wearable
+from appliance.sensor.serial_ports import NoWearableError, found_ports, only_wearable
+from appliance.sensor.wearable_console import ConsoleError, WearableConsole
 from appliance.stage.sensors import NOT_TAKEN, Venue, clear_errors, people_console, reload
 from appliance.stage.stage_error import StageError
 
@@ -50,7 +51,7 @@ def provision_sensor(
             done = provision(
                 cable, place.keys, settings, lambda what, words: _step(console, what, words), takes_over
             )
-    except (ConsoleError, ProvisioningError) as error:
+    except (ConsoleError, NoWearableError, ProvisioningError) as error:
         raise StageError(str(error)) from None
     except KeyboardInterrupt:
         raise StageError(

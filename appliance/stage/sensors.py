@@ -92,7 +92,8 @@ def replace_by_spare(place: Venue, broken: str, spare: str) -> int:
     return _edit(
         place,
         lambda change: change.swap(broken, spare),
-        f"{broken} is now the sensor that was {spare}; the other one is {spare} until it is mended.",
+        f"{broken} is now the sensor that was {spare}; the broken one is called {spare} from now on. "
+        "Put it on, switch it on, stand still for a breath.",
     )
 
 

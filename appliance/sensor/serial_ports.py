@@ -1,0 +1,67 @@
+"""The serial ports of this machine, and on which of them a wearable's board is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from serial.tools import list_ports
+
+# USB vendor and product of the MKR1000 (boards.txt of the Arduino SAMD core): running, and in its bootloader.
+_VENDOR = 0x2341
+_RUNNING, _BOOTLOADER = {0x804E, 0x824E}, {0x004E, 0x024E}
+
+
+class NoWearableError(Exception):
+    """No wearable was found, or several: which ports there are and what to do."""
+
+
+@dataclass(frozen=True)
+class FoundPort:
+    """A serial port of this machine, and whether a wearable's board is on it."""
+
+    device: str
+    description: str
+    is_wearable: bool
+    is_bootloader: bool = False
+
+    def __str__(self) -> str:
+        hint = "a wearable's board" if self.is_wearable else self.description
+        if self.is_bootloader:
+            hint = "a wearable's board that waits for firmware: press its reset button once"
+        return f"{self.device} ({hint})" if hint else self.device
+
+
+def found_ports() -> list[FoundPort]:
+    """The serial ports of this machine."""
+    return [
+        FoundPort(
+            port.device,
+            "" if port.description in ("n/a", None) else port.description,
+            port.vid == _VENDOR and port.pid in _RUNNING,
+            port.vid == _VENDOR and port.pid in _BOOTLOADER,
+        )
+        for port in sorted(list_ports.comports(), key=lambda port: port.device)
+    ]
+
+
+def only_wearable(ports: list[FoundPort]) -> str:
+    """The device of the one wearable that is plugged in. Raises NoWearableError that lists what there is."""
+    wearables = [port for port in ports if port.is_wearable]
+    if len(wearables) == 1:
+        return wearables[0].device
+    if wearables:
+        raise NoWearableError(
+            f"{len(wearables)} wearables are plugged in: {', '.join(port.device for port in wearables)}. "
+            "Leave one, or say which with --port."
+        )
+    raise NoWearableError(f"No wearable is plugged in. {ports_sentence(ports)}")
+
+
+def ports_sentence(ports: list[FoundPort]) -> str:
+    """What to tell a person who named no port, or a wrong one."""
+    if not ports:
+        return (
+            "This machine has no serial port at all. Plug the wearable in with a USB cable that carries data "
+            "(many carry power alone) and switch it on."
+        )
+    return f"Serial ports here: {', '.join(map(str, ports))}. Say which one with --port."
