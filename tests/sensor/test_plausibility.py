@@ -127,10 +127,10 @@ def test_a_flipped_top_bit_with_unit_norm_is_refused(component: int, degrees_off
 def test_a_flipped_top_bit_is_refused_while_the_arm_moves_too(speed: float) -> None:
     feed = Feed()
     for step in range(-10, 0):
-        assert feed(about_x(speed * 0.02 * step)) == "accepted"
-    half = radians(2.0 if speed > 0 else -2.0)
+        assert feed(about_x(8.0 + speed * 0.02 * step)) == "accepted"
+    half = radians(8.0) / 2
     assert feed((cos(half) - 2.0, sin(half), 0.0, 0.0)) == "torn"
-    assert feed(about_x(speed * 0.02)) == "accepted"
+    assert feed(about_x(8.0 + speed * 0.02)) == "accepted"
 
 
 def test_plus_one_read_as_minus_one_is_the_same_orientation_and_moves_nothing() -> None:
