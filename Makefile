@@ -40,12 +40,12 @@ test: $(VENV)/.ready-to-test debian-for-tests lint firmware firmware-test ## sty
 firmware-test: debian-for-tests ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
 	@echo "Wearable: host tests with sanitizers"
 	@$(call build,firmware,core_tests)
-	@build/firmware/core_tests --no-version --minimal
+	@build/firmware/core_tests --no-version
 	@echo "Wearable: static analysis"
 	@cppcheck --std=c++17 --language=c++ --enable=warning,performance,portability --inline-suppr --quiet \
 	    --error-exitcode=1 -I firmware/stubs firmware/wearable/src firmware/host firmware/qemu firmware/fuzz
 	@echo "Wearable: for its processor; the sketch against the stubs"
-	@$(call build,firmware-m0,all,-DCMAKE_TOOLCHAIN_FILE=cmake/cortex-m0plus.cmake)
+	@$(call build,firmware-m0,sketch budget,-DCMAKE_TOOLCHAIN_FILE=cmake/cortex-m0plus.cmake)
 	@echo "Wearable: on an emulated Cortex-M0"
 	@$(call build,firmware-m0,dance)
 	@echo "Wearable: fuzzing for $(FUZZ_SECONDS) s"

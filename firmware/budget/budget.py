@@ -28,7 +28,7 @@ EDGE = re.compile(r'^edge: \{ sourcename: "(?P<source>[^"]+)" targetname: "(?P<t
 FRAME = re.compile(r"(?P<bytes>\d+) bytes \((?P<kind>[a-z, ]+)\)")
 
 
-class Unbounded(Exception):
+class UnboundedStackError(Exception):
     """The stack has no bound that can be told from the call graph."""
 
 
@@ -48,7 +48,7 @@ class CallGraph:
                 continue  # declared here, defined elsewhere
             title = node["title"]
             if frame["kind"].startswith("dynamic") and "bounded" not in frame["kind"]:
-                raise Unbounded(f"{readable(node['label'])} has a frame of unknown size")
+                raise UnboundedStackError(f"{readable(node['label'])} has a frame of unknown size")
             self.frames[title] = int(frame["bytes"])
             self.names[title] = readable(node["label"])
         for edge in EDGE.finditer(text):
@@ -70,7 +70,7 @@ class CallGraph:
             if function in known:
                 return known[function]
             if function in open_calls:
-                raise Unbounded(f"{self.names[function]} calls itself")
+                raise UnboundedStackError(f"{self.names[function]} calls itself")
             open_calls.append(function)
             below: list[tuple[str, int]] = []
             for callee in sorted(self.calls.get(function, ())):
@@ -84,10 +84,10 @@ class CallGraph:
         return walk(entry)
 
 
-def readable(label: str) -> str:
-    """The function's name without its return type's and parameters' types."""
-    signature = label.split("\\n")[0]
-    return re.sub(r"\(.*\)( const)?$", "", signature).split(" ")[-1]
+def readable(signature: str) -> str:
+    """A function's name without types and without what all have in common."""
+    name = re.sub(r"bunraku::|\{anonymous\}::|\(anonymous namespace\)::", "", signature.split("\\n")[0])
+    return re.sub(r"\(.*\)( const)?$", "", name).split(" ")[-1]
 
 
 def depth(path: list[tuple[str, int]]) -> int:
@@ -110,7 +110,7 @@ def symbols(elf: Path, *options: str) -> list[tuple[str, int]]:
         text=True,
         check=True,
     ).stdout
-    found = re.findall(r"^\w+ (\w+) [tTwW] (.+?)(?:\(.*)?$", listing, re.MULTILINE)
+    found = re.findall(r"^\w+ (\w+) [tTwW] (.+)$", listing, re.MULTILINE)
     return [(name, int(size, 16)) for size, name in found]
 
 
@@ -121,7 +121,7 @@ def main(elf: Path, folder: Path) -> int:
         for file in sorted(folder.rglob("*.ci")):
             graph.read(file.read_text())
         path = graph.deepest(ENTRY, {name for name, _ in symbols(elf)})
-    except Unbounded as reason:
+    except UnboundedStackError as reason:
         print(f"The wearable's core: the stack cannot be bounded: {reason}.")
         return 1
     rows = [
@@ -131,12 +131,15 @@ def main(elf: Path, folder: Path) -> int:
     ]
     print("The wearable's core    bytes   budget")
     for name, used, budget in rows:
-        print(f"  {name:<18} {used:>7,} {budget:>8,}  {used / budget:4.0%}{'  EXCEEDED' if used > budget else ''}")
-    print("  largest functions: " + ", ".join(f"{name} {size}" for name, size in symbols(elf, "-C")[:4]))
+        verdict = "  EXCEEDED" if used > budget else ""
+        print(f"  {name:<18} {used:>7,} {budget:>8,}  {used / budget:4.0%}{verdict}")
+    largest = dict.fromkeys(f"{readable(name)} {size}" for name, size in symbols(elf, "-C"))
+    print("  largest functions: " + ", ".join(list(largest)[:5]))
     print("  deepest calls: " + " > ".join(f"{name} {frame}" for name, frame in path))
     exceeded = [name for name, used, budget in rows if used > budget]
     if exceeded:
-        print(f"The core needs more {' and '.join(exceeded)} than its budget. Make it smaller or argue for more.")
+        needs = " and ".join(exceeded)
+        print(f"The core needs more {needs} than its budget. Make it smaller, or argue for more.")
     return 1 if exceeded else 0
 
 

@@ -7,10 +7,10 @@ add_executable(core ${CORE} budget/core.cpp)
 target_include_directories(core PRIVATE ${CORE_FOLDER})
 target_compile_options(core PRIVATE -fstack-usage -fcallgraph-info=su)
 target_link_options(core PRIVATE --specs=nano.specs -nostartfiles -Wl,--gc-sections,--entry=run_wearable)
-add_custom_command(TARGET core POST_BUILD
+add_custom_target(budget
   COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/budget/budget.py $<TARGET_FILE:core>
           ${CMAKE_BINARY_DIR}/CMakeFiles/core.dir
-  VERBATIM)
+  DEPENDS core VERBATIM)
 
 # The sketch's own code against the stubs: nothing is linked.
 file(GLOB GLUE CONFIGURE_DEPENDS wearable/src/arduino/*.cpp)

@@ -40,7 +40,12 @@ def packet_scripts() -> list[bytes]:
     hello_sequence = (1).to_bytes(4, "little")
     assignment = bytes([SIGNED, 1]) + bytes([7, 0, 0, 0, 1, 0, 0, 0]) + hello_sequence + bytes([0, 50, 1])
     evening = up + assignment + bytes([READING, WAIT, 1]) + b"".join(signed.values()) + bytes([PROFILE, SEND])
-    return [*raw, *(up + script for script in signed.values()), evening, evening + bytes([LANE, 0, WAIT, 200, SEND])]
+    return [
+        *raw,
+        *(up + script for script in signed.values()),
+        evening,
+        evening + bytes([LANE, 0, WAIT, 200, SEND]),
+    ]
 
 
 def cable_inputs() -> list[bytes]:
