@@ -86,7 +86,8 @@ TEST_CASE("names of networks may have letters beyond ASCII and spaces at their e
 TEST_CASE("what breaks a rule changes nothing") {
   for (const char* line :
        {"set device 1a2b3c4", "set device 1a2b3c4dd", "set device 1a2b3c4g", "set device 00000000",
-        "set device", "set device -1a2b3c4", "set key 00", "set key 000102030405060708090a0b0c0d0e0", "set key",
+        "set device", "set device -1a2b3c4", "set key 00", "set key 000102030405060708090a0b0c0d0e0",
+        "set key",
         "set key 000102030405060708090a0b0c0d0e0f00", "set key 0001020304050607 8090a0b0c0d0e0f", "set name",
         "set name two words", "set name a-name-of-25-characters!!", "set name B\xC3\xBChne", "set port 0",
         "set port 65536", "set port 4294977046", "set port 9750x", "set port -1", "set port",
@@ -176,8 +177,8 @@ TEST_CASE("help names every command") {
   Session session;
   const std::string help = session.ask("help");
   for (const char* command :
-       {"id", "show", "status", "device", "key", "name", "network", "password", "port", "fusion", "axes", "save",
-        "forget", "prove", "strobe", "calibration save", "restart"})
+       {"id", "show", "status", "device", "key", "name", "network", "password", "port", "fusion", "axes",
+        "save", "forget", "prove", "strobe", "calibration save", "restart"})
     CHECK(help.find(command) != std::string::npos);
   CHECK(help.substr(help.size() - 7) == "restart");
 }
