@@ -10,9 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-from matplotlib.patches import FancyBboxPatch
-
 from hw_sim.lamp_traces import SHOWN_S, Trace, traces
 
 PICTURE = Path("docs/pictures/lamp.png")
@@ -80,7 +77,9 @@ def main() -> None:
 
 
 def draw_lamp(path: Path, shown: dict[str, Trace]) -> Path:
-    """All rows; `shown`: by name, when the lamp went on and off, seconds in 0..SHOWN_S."""
+    """All rows; `shown`: by name, when the lamp went on and off, seconds in 0..SHOWN_S. Needs matplotlib."""
+    from matplotlib.figure import Figure
+
     height = TOP + sum(HEADING + ROW * len(rows) for _, rows in GROUPS) + 24
     figure = Figure(figsize=(WIDTH / 100, height / 100), dpi=100, facecolor=BACKDROP)
     axes = figure.add_axes((0, 0, 1, 1))
@@ -113,6 +112,8 @@ def _draw_row(axes: Any, row: Row, trace: Trace, y: float) -> None:
 
 
 def _bar(begun: float, ended: float, y: float, thickness: float, colour: str, alpha: float) -> Any:
+    from matplotlib.patches import FancyBboxPatch
+
     left, right = (STRIP_X + STRIP * t / SHOWN_S for t in (begun, ended))
     wider = (thickness - 15.0) / 4 if colour == LIT else 0.0
     round_by = f"round,pad=0,rounding_size={min(thickness / 2, (right - left) / 2 + wider):.2f}"

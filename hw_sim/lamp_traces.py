@@ -12,6 +12,7 @@ from hw_sim.firmware_library import CompiledWearable, State
 
 SHOWN_S = 8.0
 SETTLE_S = 8.0  # joined, greeted, linked, and any blocking call is over
+JUST_BEGUN_S = 0.02  # what lights up only at the very end is left out
 TURN_US = 2_000
 HEARTBEAT_EVERY_US = 1_000_000
 SESSION = 0xB0B0B0
@@ -119,5 +120,5 @@ def _from_a_lit_moment(changes: list[tuple[int, bool]]) -> Trace:
     return [
         (begun - start, min(ended - start, SHOWN_S))
         for begun, ended in settled
-        if 0 <= begun - start < SHOWN_S
+        if 0 <= begun - start < SHOWN_S - JUST_BEGUN_S
     ]

@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon
 
 from appliance.pose import quaternion
 from appliance.pose.body import Body
@@ -37,6 +35,9 @@ def main() -> None:
 
 def draw_wearing(path: Path) -> Path:
     """The dancer in the neutral pose, and the sensor on the left wrist from near."""
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Circle
+
     dancer = _Dancer(read_bvh(SKELETON).skeleton)
     figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, facecolor=BACKDROP)
     axes = figure.add_axes((0, 0, 1, 1))
@@ -120,6 +121,8 @@ class _Dancer:
 
     def draw_case(self, axes: Any, view: _View, clip: Any) -> None:
         """The strap and the three sides of the case that are seen."""
+        from matplotlib.patches import Polygon
+
         zorder = 6 if clip else 3
         ring = np.linspace(0, np.pi, 40)[:, None]
         around = self.wrist + 0.0255 * (np.sin(ring) * self._towards_viewer() + np.cos(ring) * self._across())
@@ -147,6 +150,8 @@ class _Dancer:
 
     def draw_arrow(self, axes: Any, view: _View) -> None:
         """The arrow on the lid, and the way to the front that it shows."""
+        from matplotlib.patches import Polygon
+
         lid = self.case + HALF_CASE_M[0] * self.out
         shape = np.array(
             [[-0.72, 0.1], [0.1, 0.1], [0.1, 0.34], [0.78, 0], [0.1, -0.34], [0.1, -0.1], [-0.72, -0.1]]
@@ -168,6 +173,8 @@ def _unit(v: Array) -> Array:
 
 def _point_out(axes: Any, small: Array, near: _View) -> None:
     """Two lines from the small sensor to the circle."""
+    from matplotlib.patches import Circle
+
     axes.add_patch(Circle(tuple(small), 22, fill=False, edgecolor=FAINT, linewidth=1.2, zorder=3))
     for way in (-1.0, 1.0):
         x, y = [small[0] + 4, near.at[0] - 40], [small[1] + 21.6 * way, near.at[1] + 246.8 * way]
