@@ -183,6 +183,8 @@ def test_who_carries_packets_to_and_fro_does_not_get_the_stream(
     relay_evening: tuple[LockstepSensor, _Relay, int],
 ) -> None:
     """The box's own assignment, from another address, takes no link away that is alive."""
-    sensor, _, believed = relay_evening
+    sensor, relay, believed = relay_evening
+    assert relay.carried["Hello"] > 10
+    assert relay.carried["Assignment"] > 10
     assert len(sensor.sent_to) == 1
     assert believed >= 0.97 * 500
