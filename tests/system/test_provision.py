@@ -1,0 +1,278 @@
+"""`bunraku provision` and `bunraku sensors` as processes: all sides agree, and no secret leaks."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import subprocess
+import sys
+import termios
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from appliance.sensor.keys import SensorKey, load_keys
+from appliance.sensor.wearable_console import WearableConsole
+from hw_sim.firmware_library import State
+from tests.stage.bundles import write_show
+from tests.system.bench import NETWORK, PASSWORD, Bench
+from tests.system.box import PATIENCE_S, Box, playing
+
+pytestmark = pytest.mark.realtime
+
+BUNRAKU = (sys.executable, "-m", "appliance.cli")
+ON_A_TERMINAL = (
+    sys.executable,
+    "-c",
+    "import fcntl, os, sys, termios\n"
+    "os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0)\n"
+    "os.execv(sys.argv[1], sys.argv[1:])",
+)
+
+
+@pytest.fixture(scope="module")
+def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_show(tmp_path_factory.mktemp("bundle") / "show")
+
+
+def bunraku(*words: str, stdin: str = "", status: int = 0) -> str:
+    done = subprocess.run(
+        [*BUNRAKU, *words], input=stdin, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == status, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stdout + done.stderr
+
+
+def provision(bench: Bench, *words: str, status: int = 0, password: str = PASSWORD + "\n") -> str:
+    network = ("--network", NETWORK) if password else ()
+    return bunraku("provision", "--port", bench.device, *network, *words, stdin=password, status=status)
+
+
+def listed(box: Box) -> dict[str, dict[str, Any]]:
+    """What `bunraku sensors --json` tells, by name."""
+    told = json.loads(bunraku("sensors", "--json", "--box", box_file(box)))
+    assert told["box"]
+    return {sensor["name"]: sensor for sensor in told["sensors"]}
+
+
+def box_file(box: Box) -> str:
+    return str(box.words_file.with_name("box.yaml"))
+
+
+def await_state(box: Box, name: str, state: str) -> dict[str, Any]:
+    until = time.monotonic() + PATIENCE_S
+    while (sensor := listed(box).get(name, {})).get("state") != state:
+        assert time.monotonic() < until, (sensor, box.words)
+    return sensor
+
+
+def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path) as box, Bench(box.sensors) as bench:
+        box.frames(1)
+        said = provision(bench, "--name", "left-wrist", "--box", box_file(box))
+        assert "The running box took it. The box knows 1 sensor now." in said
+        assert f"looks for its box on '{NETWORK}'" in said
+        assert "listens to this machine alone" in said
+        bench.pull_out()
+        box.frame_that(lambda frame: frame[2] > 0)
+        sensor = await_state(box, "left-wrist", "linked")
+        assert sensor["firmware"] == "1.0.0"
+        assert sensor["way"].startswith("127.0.0.1:")
+        assert sensor["imu"]
+        assert "flashes for 10 s" in bunraku("sensors", "strobe", "left-wrist", "--box", box_file(box))
+        assert "stand still now" in bunraku("sensors", "neutral", "--box", box_file(box))
+        table = bunraku("sensors", "--box", box_file(box))
+        assert "gyro" in table
+        assert "linked" in table
+
+        with Bench(box.sensors) as spare:
+            bench.plug_in()
+            words = bunraku(
+                *("sensors", "replace", "left-wrist", "--port", spare.device, "--network", NETWORK),
+                *("--box", box_file(box)),
+                stdin=PASSWORD + "\n",
+            )
+            assert "left-wrist has its new key" in words
+            spare.pull_out()
+            await_state(box, "left-wrist", "linked")
+            assert spare.state == State.LINKED
+            assert f"{listed(box)['left-wrist']['id']}" != sensor["id"]
+            assert "left-wrist is revoked" in bunraku(
+                "sensors", "revoke", "left-wrist", "--box", box_file(box)
+            )
+            assert listed(box) == {}
+            assert "but not left-wrist of this show: the dancer moves freely there" in box.words
+            until = time.monotonic() + PATIENCE_S
+            while spare.state == State.LINKED:
+                assert time.monotonic() < until
+                time.sleep(0.05)
+        assert box.end() == 0
+
+
+def test_a_spare_takes_over_the_name_while_the_box_plays(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, names=["left-wrist", "spare-1"]) as box, Bench(box.sensors) as spare:
+        box.frames(1)
+        before = load_keys(tmp_path / "sensors.keys")
+        provision(spare, "--name", "spare-1", "--box", box_file(box))
+        spare.pull_out()
+        await_state(box, "spare-1", "linked")
+        words = bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", box_file(box))
+        assert "left-wrist is now the sensor that was spare-1" in words
+        assert "took it" in words
+        box.frame_that(lambda frame: frame[2] > 0)
+        assert listed(box)["left-wrist"]["state"] == "linked"
+        assert listed(box)["spare-1"]["id"] == f"{before['left-wrist'].device_id:08x}"
+        assert box.end() == 0
+
+
+def test_a_cable_pulled_at_the_save_is_mended_by_another_run(tmp_path: Path) -> None:
+    keys = tmp_path / "sensors.keys"
+    with Bench() as bench:
+        provision(bench, "--name", "left-wrist", "--keys", str(keys), password="")
+        first = load_keys(keys)
+        bench.pulls_at = b"save\n"
+        words = provision(bench, "--name", "left-wrist", "--keys", str(keys), password="", status=2)
+        assert "may or may not have its new key" in words
+        assert load_keys(keys) == first
+        bench.plug_in()
+        provision(bench, "--name", "left-wrist", "--keys", str(keys), password="")
+        second = load_keys(keys)["left-wrist"]
+        assert (second.device_id, second.key != first["left-wrist"].key) == (
+            first["left-wrist"].device_id,
+            True,
+        )
+        with WearableConsole(bench.device) as console:
+            console.identify()
+            assert console.proves(second.key)
+            assert not console.proves(first["left-wrist"].key)
+
+
+def test_a_box_that_holds_the_cable_is_named(show: Path, tmp_path: Path) -> None:
+    with Bench() as bench:
+        settings = {"sensors": {"serial": [{"device": bench.device}]}}
+        with playing(show, tmp_path, settings=settings) as box:
+            box.frames(10)
+            words = provision(bench, "--name", "left-wrist", "--box", box_file(box), password="", status=2)
+            assert "in use by another program. Stop the running bunraku" in words
+            assert box.end() == 0
+
+
+def test_the_password_is_asked_for_on_the_terminal_and_not_shown(tmp_path: Path) -> None:
+    keys = tmp_path / "sensors.keys"
+    command = [
+        *BUNRAKU,
+        "provision",
+        "--port",
+        "",
+        "--name",
+        "head",
+        "--keys",
+        str(keys),
+        "--network",
+        NETWORK,
+    ]
+    with Bench() as bench:
+        command[command.index("--port") + 1] = bench.device
+        master, slave = pty.openpty()
+        process = subprocess.Popen([*ON_A_TERMINAL, *command], stdin=slave, stdout=slave, stderr=slave)
+        os.close(slave)
+        shown = read_until(master, b"open network): ")
+        assert not termios.tcgetattr(master)[3] & termios.ECHO
+        os.write(master, PASSWORD.encode() + b"\n")
+        shown += read_until(master, b"head is ready")
+        assert process.wait(PATIENCE_S) == 0
+        os.close(master)
+        assert PASSWORD.encode() in bench.flash()
+    assert PASSWORD.encode() not in shown
+    assert load_keys(keys)["head"].key.hex().encode() not in shown
+
+
+def read_until(master: int, words: bytes) -> bytes:
+    shown, until = b"", time.monotonic() + PATIENCE_S
+    while words not in shown:
+        assert select.select([master], [], [], until - time.monotonic())[0], shown
+        shown += os.read(master, 4096)
+    return shown
+
+
+class Snoop:
+    """Another user of this machine: looks at all command lines, environments and files, again and again."""
+
+    def __init__(self, folder: Path) -> None:
+        self.seen: set[bytes] = set()
+        self.readable: set[tuple[str, int]] = set()
+        self._folder = folder
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._look, daemon=True)
+
+    def _look(self) -> None:
+        while not self._is_over.wait(0.002):
+            for process in Path("/proc").glob("[0-9]*"):
+                for name in ("cmdline", "environ"):
+                    try:
+                        self.seen.add((process / name).read_bytes())
+                    except OSError:
+                        continue
+            for path in self._folder.rglob("*"):
+                try:
+                    self.readable.add((path.name, path.stat().st_mode & 0o777))
+                except OSError:
+                    continue
+
+    @contextmanager
+    def looking(self) -> Iterator[None]:
+        self._thread.start()
+        yield
+        self._is_over.set()
+        self._thread.join()
+
+
+def test_no_secret_is_anywhere_that_others_can_see(show: Path, tmp_path: Path) -> None:
+    password_file = tmp_path / "password"
+    password_file.write_text(PASSWORD + "\n")
+    password_file.chmod(0o600)
+    journal = {"journal": {"file": "run.journal", "minutes": 1}}
+    snoop, before, said = Snoop(tmp_path), os.umask(0), ""
+    try:
+        with playing(show, tmp_path, settings=journal) as box, Bench(box.sensors) as bench, snoop.looking():
+            box.frames(1)
+            secrets = secrets_of(box.key)
+            for name in ("left-wrist", "spare-1"):
+                said += provision(
+                    bench, "--name", name, "--password-file", str(password_file), "--box", box_file(box)
+                )
+                secrets += secrets_of(load_keys(tmp_path / "sensors.keys")[name])
+            said += provision(bench, "--name", "x y", "--box", box_file(box), status=2)
+            bench.pull_out()
+            await_state(box, "spare-1", "linked")
+            said += bunraku("sensors", "--box", box_file(box))
+            said += bunraku("sensors", "--json", "--box", box_file(box))
+            said += bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", box_file(box))
+            box.frame_that(lambda frame: frame[2] > 0)
+            assert box.end() == 0
+            said += box.words
+    finally:
+        os.umask(before)
+    seen = b"".join(snoop.seen)
+    assert NETWORK.encode() in seen  # it does look
+    for secret in secrets:
+        assert secret not in seen
+        assert secret not in said.encode()
+        for path in filter(Path.is_file, tmp_path.rglob("*")):
+            assert secret not in path.read_bytes() or path.stat().st_mode & 0o077 == 0, path
+        assert secret not in (tmp_path / "run.journal").read_bytes()
+    keys = [(name, mode) for name, mode in snoop.readable if "keys" in name]
+    assert keys
+    assert all(mode == 0o600 for _, mode in keys), keys
+
+
+def secrets_of(sensor: SensorKey) -> list[bytes]:
+    return [sensor.key, sensor.key.hex().encode(), sensor.key.hex().upper().encode(), PASSWORD.encode()]
