@@ -99,6 +99,18 @@ TEST_CASE("a chip that lost fusion is brought back, and the lost heading is said
   }
 }
 
+TEST_CASE("fusion that stopped with an error gives at most 100 ms of readings that stand still") {
+  ImuRig rig(3);
+  rig.model.set_motion(dance);
+  rig.power_on();
+  rig.run(3.2);
+  rig.model.inject(ImuFault::kFusionError);
+  const uint32_t before = rig.readings;
+  rig.run(0.5);
+  CHECK(rig.readings - before <= 5);
+  CHECK(rig.imu.counts().fusion_errors == 1);
+}
+
 TEST_CASE("after a lost heading the first readings are believed, however far they are from the last") {
   ImuRig rig;
   rig.model.set_motion([](uint64_t at_us) { return turned(static_cast<double>(at_us) * 40e-6, 0, 0, 1); });

@@ -20,7 +20,8 @@ constexpr uint32_t kBusKeptFreeUs = 3700;       // before a sample: the longest 
 constexpr uint32_t kSampleLateUs = 5000;        // and so much after its time
 constexpr uint8_t kMostMisses = 8;              // bus errors in a row, then the chip is searched for
 constexpr uint8_t kMostUnusable = 25;           // readings in a row without an orientation: 0.5 s
-constexpr uint16_t kMostUnchanged = 500;        // its noise alone changes a reading much sooner
+constexpr uint16_t kDoubtUnchanged = 3;         // its noise alone usually changes a reading sooner: a look
+constexpr uint16_t kMostUnchanged = 500;        // and always much sooner
 constexpr int16_t kLargestAcceleration = 6000;  // 1/100 m/s^2: at 4 g nothing larger is measured
 constexpr uint8_t kReadingBytes = 14;           // quaternion and linear acceleration
 
@@ -178,6 +179,7 @@ void Bno055::look_for_frozen(const uint8_t* bytes) {
   const bool is_unchanged = memcmp(bytes, seen_, kReadingBytes) == 0;
   unchanged_ = is_unchanged ? static_cast<uint16_t>(unchanged_ + 1) : 0;
   memcpy(seen_, bytes, kReadingBytes);
+  if (unchanged_ == kDoubtUnchanged) is_suspicious_ = true;
   if (unchanged_ >= kMostUnchanged) repair(counts_.frozen);
 }
 
