@@ -35,24 +35,27 @@ def unheard(keys: Mapping[str, SensorKey]) -> list[RosterLine]:
 
 
 class SensorTable:
-    """A row for each sensor, coloured where a technician should look; two tables where one is too wide."""
+    """A row for each sensor, coloured where one should look; several tables where one is too wide."""
 
     def __init__(self, lines: Sequence[RosterLine]) -> None:
         self._lines = lines
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        whole = self._table(_NAME, *_LINK, *_SENSOR)
-        if console.measure(whole, options=options.update_width(_ANY_WIDTH)).maximum <= options.max_width:
-            yield whole
-            return
-        yield self._table(_NAME, *_LINK)
-        yield ""
-        yield self._table(_NAME, *_SENSOR)
+        unbounded = options.update_width(_ANY_WIDTH)
+        columns = [_NAME]
+        for column in _COLUMNS:
+            wider = self._table([*columns, column])
+            if console.measure(wider, options=unbounded).maximum > options.max_width and len(columns) > 1:
+                yield self._table(columns)
+                yield ""
+                columns = [_NAME]
+            columns.append(column)
+        yield self._table(columns)
 
-    def _table(self, *columns: _Column) -> Table:
+    def _table(self, columns: Sequence[_Column]) -> Table:
         table = _bare_table()
         for column in columns:
-            table.add_column(column.heading, justify=column.justify, no_wrap=column.heading != "way")
+            table.add_column(column.heading, justify=column.justify, no_wrap=True)
         for line in self._lines:
             table.add_row(*(column.cell(line) for column in columns))
         return table
@@ -160,15 +163,13 @@ class _Column(NamedTuple):
 
 
 _NAME = _Column("name", lambda line: Text(line.name, style="bold"))
-_LINK = (
+_COLUMNS = (
     _Column("state", lambda line: Text(line.state, style=_COLOURS.get(line.state, ""))),
     _Column("rate", _rate, "right"),
     _Column("loss", _loss, "right"),
     _Column("round trip", _round_trip, "right"),
     _Column("age", _age, "right"),
     _Column("battery", _battery, "right"),
-)
-_SENSOR = (
     _Column("calibration", _calibration),
     _Column("neutral", lambda line: Text(line.neutral, style=_NEUTRAL_COLOURS.get(line.neutral, ""))),
     _Column("firmware", lambda line: Text(line.firmware) if line.firmware else _NONE),

@@ -1,19 +1,23 @@
-"""Commands change the dance between two ticks, within what fits the budget."""
+"""Commands change the dance between two ticks, within what fits the budget; and who may take part."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from appliance.pose import quaternion
+from appliance.sensor.keys import SensorKey
+from appliance.sensor.link import SensorLink, SensorState
+from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import Cast, Iterations, assemble
 from appliance.stage.control import Command
-from appliance.stage.obey import obey
+from appliance.stage.obey import obey, obey_for_sensors
+from appliance.stage.wearing import Wearing
 from tests.stage.bundles import write_show
 
 
@@ -73,3 +77,80 @@ def test_a_joint_that_no_hand_holds_by_osc_is_refused_in_words(cast: Cast) -> No
     )
     assert "no joint 99" in obey(Command("release", (), 99), cast, iterations, 1.0)
     assert "no rotation" in obey(Command("hold", (0.0, 0.0, 0.0, 1.0), "lShldr"), cast, iterations, 1.0)
+
+
+class HeardLink(SensorLink):
+    """A link on which some sensors are heard; what it is asked for is noted."""
+
+    def __init__(self, heard: Mapping[str, str]) -> None:
+        super().__init__({}, [])
+        self.heard = heard
+        self.strobed: list[str] = []
+        self.admitted: Mapping[str, SensorKey] = {}
+
+    def states(self, now: float) -> list[SensorState]:
+        return [
+            SensorState(name, 1, state, "", 0.0, 0.0, None, None, 255, 0, "", "", 0, 0, "")
+            for name, state in self.heard.items()
+        ]
+
+    def strobe(self, sensor: str, now: float, seconds: float = 10.0) -> None:
+        self.strobed.append(sensor)
+
+    def admit(self, keys: Mapping[str, SensorKey]) -> None:
+        self.admitted = keys
+
+
+@pytest.fixture
+def worn(tmp_path: Path) -> Iterator[Cast]:
+    """left-wrist is worn and heard, head is worn and lost, spare-1 is heard."""
+    hands: list[dict[str, object]] = [
+        {"sensor": "left-wrist", "joint": "lShldr"},
+        {"sensor": "head", "joint": "Chest"},
+    ]
+    show = load_show(write_show(tmp_path / "worn", hands))
+    cast = assemble(show, BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[])))
+    cast.link.close()
+    cast.link = HeardLink({"left-wrist": "linked", "head": "lost", "spare-1": "greeted"})
+    yield cast
+    cast.close()
+
+
+@pytest.mark.parametrize(
+    ("order", "done", "words"),
+    [
+        (Command("strobe", sensor="left-wrist"), True, "left-wrist flashes for 10 s"),
+        (Command("strobe", sensor="spare-1"), True, "spare-1 flashes"),
+        (Command("strobe", sensor="head"), False, "Sensor head is silent"),
+        (Command("strobe", sensor="left-wirst"), False, "Did you mean 'left-wrist'?"),
+        (Command("neutral"), True, "stand still now"),
+        (Command("neutral", sensor="left-wrist"), True, "stand still now"),
+        (Command("neutral", sensor="head"), False, "Sensor head is silent"),
+        (Command("neutral", sensor="spare-1"), False, "No hand of this show is held by a sensor 'spare-1'"),
+        (Command("heading"), True, "is the front"),
+        (Command("heading", sensor="nobody"), False, "No hand of this show"),
+        (
+            Command("reload", keys={"left-wrist": SensorKey("left-wrist", 1, bytes(16))}),
+            True,
+            "The box knows 1 sensor now, but not head of this show",
+        ),
+    ],
+)
+def test_commands_about_sensors_are_done_or_refused_in_words(
+    worn: Cast, order: Command, done: bool, words: str
+) -> None:
+    assert isinstance(worn.link, HeardLink)
+    wearing = Wearing(worn, SensorMemory(None, print), print)
+    outcome = obey_for_sensors(order, worn, wearing, 100.0)
+    assert outcome[0] == done
+    assert words in outcome[1]
+    assert worn.link.strobed == ([order.sensor] if order.name == "strobe" and done else [])
+    assert worn.link.admitted == order.keys
+
+
+def test_a_show_without_sensors_has_no_neutral_pose(cast: Cast) -> None:
+    wearing = Wearing(cast, SensorMemory(None, print), print)
+    assert obey_for_sensors(Command("neutral"), cast, wearing, 100.0) == (
+        False,
+        "No hand of this show is held by a sensor.",
+    )

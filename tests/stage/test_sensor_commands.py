@@ -1,0 +1,317 @@
+"""`bunraku sensors` against a control port: tables, values, changes of the key file, clear refusals."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import yaml
+from rich.console import Console
+
+from appliance.cli import main
+from appliance.sensor.keys import create_keys, load_keys
+from appliance.sensor.link import SensorState
+from appliance.sensor.wire import HAS_PROFILE, IS_NDOF
+from appliance.stage.control import Command, Control
+from appliance.stage.roster import Roster, RosterLine
+from appliance.stage.sensor_table import SensorTable
+
+LEFT = SensorState(
+    *("left-wrist", 0x1A2B3C4D, "linked", "192.168.4.7:2390", 49.96, 0.0123, 0.0042, 0.013),
+    *(12, 0b00111011, "1.0.0", "00112233445566778899aabbccddeeff", HAS_PROFILE, 77, ""),
+)
+LOST = LEFT._replace(name="head", state="lost", rate_hz=0.0, round_trip_s=None, age_s=192.0, battery=255)
+SPARE = SensorState(
+    *("spare-1", 5, "absent", "", 0.0, 0.0, None, None, 255, 0, "", "", 0, 0, "Its firmware is older."),
+)
+
+
+class RunningBox:
+    """A control port that answers as a stage would, without anyone dancing."""
+
+    def __init__(self, folder: Path, key_file: Path | None = None) -> None:
+        self.obeyed: list[Command] = []
+        self.done = True
+        self.roster = Roster(str(key_file or folder / "sensors.keys"))
+        self.control = Control("127.0.0.1", 0, self.roster, folder / "sensors.keys")
+        self.box_file = folder / "box.yaml"
+        settings = {
+            "sensors": {"keys": "sensors.keys"},
+            "control": {"host": "0.0.0.0", "port": self.control.port},
+        }
+        self.box_file.write_text(yaml.safe_dump(settings))
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._obey)
+        self._thread.start()
+
+    def _obey(self) -> None:
+        while not self._is_over.wait(0.005):
+            order = self.control.take()
+            if order is not None:
+                self.obeyed.append(order)
+                self.control.answer(order, self.done, f"{order.name} it is.")
+
+    def close(self) -> None:
+        self._is_over.set()
+        self._thread.join()
+        self.control.close()
+
+
+@pytest.fixture
+def box(tmp_path: Path) -> Iterator[RunningBox]:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist", "head", "spare-1"])
+    box = RunningBox(tmp_path)
+    box.roster.refresh(
+        [LEFT, LOST, SPARE],
+        lambda name: {"left-wrist": "wanted", "head": "kept"}.get(name, ""),
+        time.monotonic(),
+    )
+    yield box
+    box.close()
+
+
+@contextmanager
+def ends(capsys: pytest.CaptureFixture[str], status: int, *words: str) -> Iterator[list[str]]:
+    said: list[str] = []
+    with pytest.raises(SystemExit) as ended:
+        main(["sensors", *words])
+    captured = capsys.readouterr()
+    assert (ended.value.code or 0) == status, captured
+    said += [captured.out, captured.err]
+    yield said
+
+
+def test_the_table_has_everything_that_the_box_knows(
+    box: RunningBox, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        heading, left, head, spare, *rest = out.splitlines()
+    assert re.split(r"  +", heading.strip()) == [
+        *("name", "state", "rate", "loss", "round trip", "age", "battery"),
+        *("calibration", "neutral", "firmware", "id", "way"),
+    ]
+    assert re.split(r"  +", left.strip()) == [
+        *("left-wrist", "linked", "50 Hz", "1.2 %", "4.2 ms", "13 ms", "12 %"),
+        *("gyro 3 accel 2", "wanted", "1.0.0", "1a2b3c4d", "192.168.4.7:2390"),
+    ]
+    assert re.split(r"  +", head.strip())[:7] == ["head", "lost", "-", "-", "-", "3 min", "-"]
+    assert "absent" in spare
+    assert "spare-1: Its firmware is older." in rest
+
+
+def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
+    line = RosterLine(
+        *("a-name-of-24-letters-abc", "1a2b3c4d", "linked", "192.168.100.107:23900", 50.0, 0.5, 0.2, 0.7),
+        *(87, 0b11010110, IS_NDOF, "1.0.0", "00", "taken", ""),
+    )
+    console = Console(width=80, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
+    console.print(SensorTable([line]))
+    shown = console.export_text()
+    assert all(len(row) <= 80 for row in shown.splitlines())
+    assert "…" not in shown
+    words = "a-name-of-24-letters-abc linked 50.0 200.0 700 87 gyro accel mag taken 1.0.0 1a2b3c4d"
+    assert all(word in shown for word in words.split())
+
+
+def test_programs_get_values_and_nulls(box: RunningBox, capsys: pytest.CaptureFixture[str]) -> None:
+    with ends(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
+        told = json.loads(out)
+    assert told["box"] is True
+    left, head, spare = told["sensors"]
+    assert left == {
+        "name": "left-wrist",
+        "id": "1a2b3c4d",
+        "state": "linked",
+        "way": "192.168.4.7:2390",
+        "rate_hz": 49.96,
+        "loss": 0.0123,
+        "round_trip_s": 0.0042,
+        "age_s": 0.013,
+        "battery_percent": 12,
+        "calibration": {"system": 0, "gyro": 3, "accel": 2, "mag": 3},
+        "has_profile": True,
+        "fusion": "imuplus",
+        "firmware": "1.0.0",
+        "imu": "00112233445566778899aabbccddeeff",
+        "neutral": "wanted",
+        "complaint": None,
+    }
+    assert (head["round_trip_s"], head["age_s"], head["battery_percent"]) == (None, 192.0, None)
+    assert (spare["calibration"], spare["neutral"]) == (None, None)
+
+
+def test_without_a_box_it_lists_the_key_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist", "head"])
+    box_file = tmp_path / "box.yaml"
+    box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
+    with ends(capsys, 0, "--box", str(box_file)) as (out, _):
+        assert "opens no control port" in out
+        assert re.search(r"^left-wrist  [0-9a-f]{8}", out, re.MULTILINE)
+        assert load_keys(tmp_path / "sensors.keys")["head"].key.hex() not in out
+    (tmp_path / "sensors.keys").chmod(0o644)
+    with ends(capsys, 0, "--box", str(box_file)) as (out, _):
+        assert "chmod 600" in out
+    with ends(capsys, 0, "--json", "--box", str(box_file)) as (out, _):
+        told = json.loads(out)
+    assert (told["box"], [sensor["state"] for sensor in told["sensors"]]) == (False, [None, None])
+
+
+@pytest.mark.parametrize(
+    ("words", "name", "sensor"),
+    [
+        (["strobe", "left-wrist"], "strobe", "left-wrist"),
+        (["neutral"], "neutral", ""),
+        (["neutral", "head"], "neutral", "head"),
+        (["heading", "head"], "heading", "head"),
+    ],
+)
+def test_commands_reach_the_box_and_its_answer_is_printed(
+    box: RunningBox, capsys: pytest.CaptureFixture[str], words: list[str], name: str, sensor: str
+) -> None:
+    with ends(capsys, 0, *words, "--box", str(box.box_file)) as (out, _):
+        assert out == f"{name} it is.\n"
+    assert box.obeyed == [Command(name, sensor=sensor)]
+    box.done = False
+    with ends(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
+        assert err == f"bunraku: {name} it is.\n"
+
+
+def test_changes_of_the_key_file_reach_the_box(
+    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = load_keys(tmp_path / "sensors.keys")
+    with ends(capsys, 0, "replace", "left-wrist", "spare-1", "--box", str(box.box_file)) as (out, _):
+        assert "left-wrist is now the sensor that was spare-1" in out
+        assert "The running box took it." in out
+    with ends(capsys, 0, "rename", "spare-1", "spare-2", "--box", str(box.box_file)) as (out, _):
+        assert "spare-1 is now spare-2" in out
+    with ends(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert "head is revoked" in out
+    after = load_keys(tmp_path / "sensors.keys")
+    assert {name: key.key for name, key in after.items()} == {
+        "left-wrist": before["spare-1"].key,
+        "spare-2": before["left-wrist"].key,
+    }
+    assert [order.name for order in box.obeyed] == ["reload"] * 3
+    assert box.obeyed[-1].keys == after
+
+
+def test_a_box_that_does_not_take_it_costs_the_exit_status(
+    box: RunningBox, capsys: pytest.CaptureFixture[str]
+) -> None:
+    box.done = False
+    with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert "head is revoked" in out
+        assert "did not take it. reload it is." in out
+
+
+def test_a_box_with_another_key_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    create_keys(tmp_path / "sensors.keys", ["head"])
+    box = RunningBox(tmp_path, key_file=tmp_path / "others.keys")
+    with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert f"reads another key file ({tmp_path / 'others.keys'})" in out
+    assert box.obeyed == []
+    box.close()
+
+
+def test_without_a_box_a_change_counts_later(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    create_keys(tmp_path / "sensors.keys", ["head"])
+    box_file = tmp_path / "box.yaml"
+    box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
+    with ends(capsys, 0, "revoke", "head", "--box", str(box_file)) as (out, _):
+        assert "The change counts when it starts." in out
+    assert load_keys(tmp_path / "sensors.keys") == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["revoke", "haed"], "Did you mean 'head'?"),
+        (["rename", "head", "left-wrist"], "already"),
+        (["rename", "head", "two words"], "without spaces"),
+        (["replace", "head", "spare-9"], "no sensor 'spare-9'"),
+        (["replace", "head"], "Name a spare"),
+        (["replace", "head", "spare-1", "--port", "/dev/ttyACM0"], "Name a spare"),
+        (["revoke", "head", "--keys", "other.keys"], "not both"),
+    ],
+)
+def test_what_cannot_be_done_is_one_clear_line(
+    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], complaint: str
+) -> None:
+    before = (tmp_path / "sensors.keys").read_bytes()
+    with ends(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
+        assert complaint in err
+        assert len(err.splitlines()) == 1
+    assert (tmp_path / "sensors.keys").read_bytes() == before
+    assert box.obeyed == []
+
+
+def test_a_missing_key_file_or_box_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    box_file = tmp_path / "box.yaml"
+    box_file.write_text("control: {port: 1}\n")
+    with ends(capsys, 2, "--box", str(box_file)) as (_, err):
+        assert "names no key file" in err
+    with ends(capsys, 2, "revoke", "head", "--keys", "sensors.keys") as (_, err):
+        assert "There is no key file sensors.keys" in err
+    box_file.write_text("sensors: {keys: nowhere/sensors.keys}\ncontrol: {port: 1}\n")
+    with ends(capsys, 2, "revoke", "head", "--box", str(box_file)) as (_, err):
+        assert "There is no folder" in err
+    with ends(capsys, 2, "strobe", "head", "--box", str(box_file)) as (_, err):
+        assert "No box answers on 127.0.0.1:1." in err
+    with ends(capsys, 2, "--watch", "strobe", "head") as (_, err):
+        assert "behind 'strobe'" in err
+
+
+def test_watching_goes_on_until_it_is_ended(box: RunningBox) -> None:
+    command = [sys.executable, "-m", "appliance.cli", "sensors", "--watch", "--box", str(box.box_file)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    seen = 0
+    until = time.monotonic() + 60.0
+    lists = box.control._lay_down
+
+    def counted(order: Command) -> None:
+        nonlocal seen
+        seen += order.name == "list"
+        lists(order)
+
+    box.control._lay_down = counted  # type: ignore[method-assign]
+    while seen < 3:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert "left-wrist" in out
+
+
+def test_provision_says_what_is_wrong_before_it_opens_a_port(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.stdin", open("/dev/null"))  # noqa: SIM115, PTH123
+    for words, complaint in (
+        (["--name", "two words"], "without spaces"),
+        (["--name", "head", "--axes", "24"], "two hexadecimal numbers"),
+        (["--name", "head", "--axes", "20,00"], "no axes"),
+        (["--name", "head", "--password-file", "p"], "needs a network"),
+        (["--name", "head", "--network", "n", "--password-file", "p"], "p: the password cannot be read"),
+        (["--name", "head", "--network", "n"], "No password came"),
+        (["--name", "head"], "There is no serial port /dev/nowhere"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(["provision", "--port", "/dev/nowhere", *words])
+        assert ended.value.code == 2
+        assert complaint in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
