@@ -40,6 +40,14 @@ class Script {
   size_t left_;
 };
 
+bool is_signed(const uint8_t* packet, uint8_t count) {
+  if (count <= wire::kTagBytes) return false;
+  const uint8_t signed_bytes = static_cast<uint8_t>(count - wire::kTagBytes);
+  uint8_t tag[wire::kTagBytes];
+  blake2s({kKey, sizeof kKey, packet, signed_bytes}, tag, sizeof tag);
+  return memcmp(tag, packet + signed_bytes, sizeof tag) == 0;
+}
+
 void receive_raw(Pairing& pairing, Script& script, const Way& from, uint32_t now_us) {
   uint8_t packet[128];
   const uint8_t count = static_cast<uint8_t>(script.byte() % sizeof packet);
@@ -47,7 +55,8 @@ void receive_raw(Pairing& pairing, Script& script, const Way& from, uint32_t now
   const bool was_linked = pairing.is_linked();
   const uint32_t session = pairing.session();
   const Received received = pairing.receive(packet, count, from, kCondition, now_us);
-  if (received != Received::kNothing) return;  // a golden packet, tag and all
+  if (is_signed(packet, count)) return;
+  require(received == Received::kNothing);
   require(pairing.is_linked() == was_linked && pairing.session() == session);
 }
 
