@@ -33,6 +33,7 @@ studio: $(VENV)/.ready-to-test ## add what training needs (PyTorch) to the envir
 
 firmware: debian-for-firmware ## build the wearable's firmware for this machine: emulate --firmware runs it
 	@$(call build,firmware,wearable)
+	@echo "Built build/firmware/libwearable.so"
 
 test: $(VENV)/.ready-to-test debian-for-tests lint firmware firmware-test ## style, types, contracts, all tests
 	@$(BIN)/pytest $(TEST_ARGS)
@@ -40,7 +41,7 @@ test: $(VENV)/.ready-to-test debian-for-tests lint firmware firmware-test ## sty
 firmware-test: debian-for-tests ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
 	@echo "Wearable: host tests with sanitizers"
 	@$(call build,firmware,core_tests)
-	@build/firmware/core_tests --no-version
+	@build/firmware/core_tests --no-intro
 	@echo "Wearable: static analysis"
 	@cppcheck --std=c++17 --language=c++ --enable=warning,performance,portability --inline-suppr --quiet \
 	    --error-exitcode=1 -I firmware/stubs firmware/wearable/src firmware/host firmware/qemu firmware/fuzz

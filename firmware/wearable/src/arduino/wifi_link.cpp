@@ -15,8 +15,8 @@ bool WifiLink::is_up() { return is_started_ && WiFi.status() == WL_CONNECTED; }
 
 bool WifiLink::join(const char* network, const char* password) {
   board_.feed_watchdog();
-  is_started_ = true;
-  if (WiFi.status() == WL_NO_SHIELD) return false;
+  is_started_ = WiFi.status() != WL_NO_SHIELD;
+  if (!is_started_) return false;
   WiFi.setTimeout(kJoinMs);
   board_.feed_watchdog();
   const bool is_open = password[0] == '\0';
@@ -25,6 +25,7 @@ bool WifiLink::join(const char* network, const char* password) {
   if (status != WL_CONNECTED) {
     if (++failed_joins_ >= kJoinsBeforeRestart) {
       failed_joins_ = 0;
+      is_started_ = false;
       WiFi.end();
     }
     return false;

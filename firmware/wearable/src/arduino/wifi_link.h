@@ -22,7 +22,7 @@ class WifiLink final : public DatagramLink {
  private:
   Board& board_;
   WiFiUDP udp_;
-  bool is_started_ = false;  // the module was spoken to: starting it blocks for about a second
+  bool is_started_ = false;  // else even status() starts the module, which blocks for about a second
   uint8_t failed_joins_ = 0;
 };
 
