@@ -25,6 +25,8 @@ LONGEST_LINE = 128
 # Brings the wearable's reader from any state to text: ends a frame that was begun, then sends a void one.
 _TO_TEXT = b"\x00\x00\x01\x00\n"
 _ASK_AGAIN_S = 3.0
+_IMU_STARTS_S = 2.0  # the BNO055 takes 0.65 s after power-on, and some tries
+_ASK_FOR_IMU_S = 0.2
 _QUIET_S = 0.15
 _LONGEST_ANSWER = 256
 _IDENTITY = re.compile(
@@ -75,22 +77,20 @@ class WearableConsole:
         self._port.close()
 
     def identify(self) -> Identity:
-        """Find the wearable on this port and ask who it is."""
+        """Find the wearable on this port and ask who it is; an IMU that is just starting is waited for."""
         until = time.monotonic() + self._patience_s
-        while time.monotonic() < until:
-            self._write(_TO_TEXT + b"id\n")
-            ask_again_at = min(time.monotonic() + _ASK_AGAIN_S, until)
-            while (line := self._line(ask_again_at)) is not None:
-                found = _IDENTITY.fullmatch(line)
-                if found:
-                    self._settle()
-                    imu_id = "" if found["imu"] == "none" else found["imu"]
-                    return Identity(found["firmware"], int(found["wire"], 16), imu_id, found["board"])
-        raise ConsoleError(
-            f"Nothing on {self.device} answers as a bunraku wearable. Nothing was changed. Is it the right "
-            "port, and is the firmware on the board (docs/firmware.md)? "
-            "Press its reset button once and try again."
-        )
+        while (identity := self._identity(until)) is None:
+            if time.monotonic() >= until:
+                raise ConsoleError(
+                    f"Nothing on {self.device} answers as a bunraku wearable. Nothing was changed. "
+                    "Is it the right port, and is the firmware on the board (docs/firmware.md)? "
+                    "Press its reset button once and try again."
+                )
+        until = time.monotonic() + _IMU_STARTS_S
+        while not identity.imu_id and time.monotonic() < until:
+            time.sleep(_ASK_FOR_IMU_S)
+            identity = self._identity(until) or identity
+        return identity
 
     def ask(self, command: str, secret: str = "") -> str:
         """What comes behind `ok` in the answer. Raises RefusedError, UnpluggedError.
@@ -127,6 +127,18 @@ class WearableConsole:
                 return None
             self._lines += self._text.feed(self._read())
         return self._lines.popleft()
+
+    def _identity(self, until: float) -> Identity | None:
+        """What it says of itself; None when no answer comes soon."""
+        self._write(_TO_TEXT + b"id\n")
+        until = min(time.monotonic() + _ASK_AGAIN_S, until)
+        while (line := self._line(until)) is not None:
+            found = _IDENTITY.fullmatch(line)
+            if found:
+                self._settle()
+                imu_id = "" if found["imu"] == "none" else found["imu"]
+                return Identity(found["firmware"], int(found["wire"], 16), imu_id, found["board"])
+        return None
 
     def _settle(self) -> None:
         """Pass over answers to a question that was asked more than once."""

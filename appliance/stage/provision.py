@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import getpass
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -36,21 +37,21 @@ def provision_sensor(
 ) -> int:
     """Provision the wearable on a serial port; the exit status. Raises StageError, and then it is not."""
     console = people_console()
+
+    def say(what: str, words: str) -> None:
+        _step(console, what, words)
+
     try:
+        settings = Settings(name, network or "", "", _udp_port(place), fusion, _axes(axes))
+        is_asked = network is not None and password_file is None and sys.stdin.isatty()
+        if not is_asked:
+            settings = replace(settings, password=_read_password(network, password_file))
         device = port or only_wearable(found_ports())
-        # What can be wrong is told before a password is asked for.
-        Settings(name, network or "", port=_udp_port(place), fusion=fusion, axes=_axes(axes))
-        settings = Settings(
-            name, network or "", _password(network, password_file), _udp_port(place), fusion, _axes(axes)
-        )
-        with (
-            clear_errors(place.keys),
-            console.status(f"Asking {escape(device)}"),
-            WearableConsole(device) as cable,
-        ):
-            done = provision(
-                cable, place.keys, settings, lambda what, words: _step(console, what, words), takes_over
-            )
+        with clear_errors(place.keys), WearableConsole(device) as cable:
+            if is_asked:  # last of all: nobody likes to type it in vain
+                settings = replace(settings, password=_ask_password(settings.network))
+            with console.status(f"Asking {escape(device)}"):
+                done = provision(cable, place.keys, settings, say, takes_over)
     except (ConsoleError, NoWearableError, ProvisioningError) as error:
         raise StageError(str(error)) from None
     except KeyboardInterrupt:
@@ -70,26 +71,31 @@ def _step(console: Console, what: str, words: str, is_well: bool = True) -> None
     console.print(f"{marks[not is_well]} [bold]{escape(what):<14}[/] {escape(words)}", soft_wrap=True)
 
 
-def _password(network: str | None, file: Path | None) -> str:
-    """Asked for hidden, or from a file's first line or standard input; never from the command line."""
+def _ask_password(network: str) -> str:
+    """Hidden, on the terminal."""
+    try:
+        return getpass.getpass(f"Password of '{network}' (nothing for an open network): ")
+    except (EOFError, KeyboardInterrupt):
+        raise StageError("No password was given. Nothing was changed.") from None
+
+
+def _read_password(network: str | None, file: Path | None) -> str:
+    """The first line of a file or of standard input; never from the command line."""
     if network is None:
         if file is not None:
             raise StageError("A password needs a network: give --network with its name. Nothing was changed.")
         return ""
-    if file is None and sys.stdin.isatty():
-        try:
-            return getpass.getpass(f"Password of '{network}' (nothing for an open network): ")
-        except (EOFError, KeyboardInterrupt):
-            raise StageError("No password was given. Nothing was changed.") from None
-    if file is None or file == STDIN:
-        line = sys.stdin.readline()
-    else:
-        try:
+    try:
+        if file is None or file == STDIN:
+            line = sys.stdin.readline()
+        else:
             with file.open(encoding="utf-8") as text:
                 line = text.readline()
-        except (OSError, UnicodeDecodeError) as error:
-            why = error.strerror if isinstance(error, OSError) else "it is no text"
-            raise StageError(f"{file}: the password cannot be read ({why}). Nothing was changed.") from None
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise StageError(
+            f"{file or STDIN}: the password cannot be read ({why}). Nothing was changed."
+        ) from None
     if not line:
         raise StageError(
             "No password came. Nothing was changed. Run this on a terminal, or give --password-file; "

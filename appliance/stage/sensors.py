@@ -179,7 +179,7 @@ def _picture(place: Venue) -> Group:
         parts.append(
             Text(f"\nThis is {roll.age_s:.0f} s old: the box is starting, or it hangs.", style="red")
         )
-    complaints = [f"{line.name}: {line.complaint}" for line in roll.lines if line.complaint]
+    complaints = [line.complaint for line in roll.lines if line.complaint]
     parts += [Text(f"\n{words}", style="yellow") for words in complaints]
     return Group(*parts)  # type: ignore[arg-type]
 

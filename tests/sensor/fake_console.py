@@ -17,7 +17,8 @@ from appliance.sensor import wire
 from appliance.sensor.framing import frame
 
 HELLO_S = 0.05
-ID = "ok bunraku-wearable 1.0.0 wire {wire:08x} imu 00112233445566778899aabbccddeeff board deadbeef"
+ID = "ok bunraku-wearable 1.0.0 wire {wire:08x} imu {imu} board deadbeef"
+IMU = "00112233445566778899aabbccddeeff"
 
 
 @dataclass
@@ -40,7 +41,8 @@ class FakeWearable:
 
     Faults: `pulls_at`: the cable comes loose when this command comes; `pulls_after`: when it was carried out,
     before the answer; `refuses`: command -> words; `mute`: nothing is answered; `forgets`: save keeps a wrong
-    key; `chatter`: hellos of its own between the lines.
+    key; `chatter`: hellos of its own between the lines; `ids_before_imu`: how often it is asked before it has
+    found its IMU.
     """
 
     saved: Memory = field(default_factory=Memory)
@@ -51,6 +53,7 @@ class FakeWearable:
     mute: bool = False
     forgets: bool = False
     chatter: bool = True
+    ids_before_imu: int = 0
     heard: list[str] = field(default_factory=list)
 
     def __enter__(self) -> FakeWearable:
@@ -124,7 +127,8 @@ class FakeWearable:
             return "error: a line has 128 bytes at most, nothing was done; type help"
         word, _, rest = line.partition(" ")
         if word == "id":
-            return ID.format(wire=self.wire_hash)
+            self.ids_before_imu -= 1
+            return ID.format(wire=self.wire_hash, imu="none" if self.ids_before_imu >= 0 else IMU)
         if word == "show":
             one = self.draft
             return (

@@ -202,6 +202,13 @@ def test_a_port_where_nothing_answers_is_told_apart(path: Path) -> None:
         console.identify()
 
 
+def test_an_imu_that_is_just_starting_is_waited_for_and_one_that_is_missing_is_told() -> None:
+    with FakeWearable(ids_before_imu=2) as fake, WearableConsole(fake.port) as console:
+        assert console.identify().imu_id
+    with FakeWearable(ids_before_imu=1000) as fake, WearableConsole(fake.port) as console:
+        assert not console.identify().imu_id
+
+
 def test_a_wearable_that_repeats_a_secret_does_not_get_it_printed(path: Path) -> None:
     with FakeWearable(refuses={"set password": "error: what is curtain up 9"}) as fake:
         assert "repeated what is secret" in refused(fake, path)

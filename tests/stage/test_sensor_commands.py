@@ -105,7 +105,7 @@ def test_the_table_has_everything_that_the_box_knows(
     ]
     assert re.split(r"  +", head.strip())[:7] == ["head", "lost", "-", "-", "-", "3 min", "-"]
     assert "absent" in spare
-    assert "spare-1: Its firmware is older." in rest
+    assert "Its firmware is older." in rest
 
 
 def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
