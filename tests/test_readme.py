@@ -113,7 +113,9 @@ def test_the_readme_names_every_command_and_no_other() -> None:
     assert sorted(table) == sorted(offered)
 
 
-@pytest.mark.parametrize("page", [*PAGES, "docs/osc.md", "docs/wire.md", "docs/configuration.md"])
+@pytest.mark.parametrize(
+    "page", sorted({*PAGES, *(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))})
+)
 def test_links_lead_somewhere(page: str) -> None:
     source = ROOT / page
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", source.read_text()):

@@ -30,10 +30,11 @@ void Wearable::begin() {
 }
 
 void Wearable::step() {
-  const uint32_t now_us = ports_.clock.micros();
+  const uint32_t begun_us = ports_.clock.micros();
   ports_.board.feed_watchdog();
-  stream(now_us);
-  watch_imu(now_us);
+  stream(begun_us);
+  watch_imu(begun_us);
+  const uint32_t now_us = ports_.clock.micros();  // the bus took milliseconds; round trips count from here
   serve_cable(now_us);
   serve_wifi(now_us);
   greet(now_us);
