@@ -33,7 +33,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Roll:
-    """All sensors of the running box, how old that is, and which key file it reads."""
+    """All sensors of the running box, how old that is (negative: it starts), and which key file it reads."""
 
     lines: list[RosterLine]
     age_s: float

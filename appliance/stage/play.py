@@ -70,7 +70,7 @@ def _introduction(stage: Stage) -> list[str]:
     if stage.cast.worn and box.sensors.keys is None:
         lines.append(
             "No key file: no sensor is let in, and the dancer moves freely. "
-            "Set sensors.keys in the box file, or try it with --emulate."
+            "Set sensors.keys in the box file (bunraku provision makes it), or try it with --emulate."
         )
     return lines
 

@@ -9,7 +9,7 @@ from appliance.sensor.link import SensorState
 
 Message = tuple[str | int | float, ...]  # an OSC address and its arguments
 SENSOR, END = "/sensors/sensor", "/sensors/end"
-UNKNOWN_S = -1.0  # a round trip or an age that there is none of
+UNKNOWN_S = -1.0  # a round trip or an age that there is none of; the look of a box that is still starting
 
 
 class RosterLine(NamedTuple):
@@ -37,7 +37,7 @@ class Roster:
 
     def __init__(self, key_file: str = "") -> None:
         self._key_file = key_file
-        self._looked_at = 0.0
+        self._looked_at: float | None = None
         self._lines: tuple[RosterLine, ...] = ()
 
     def refresh(self, states: Sequence[SensorState], neutral_of: Callable[[str], str], now: float) -> None:
@@ -50,7 +50,8 @@ class Roster:
         lines = self._lines
         for line in lines:
             yield SENSOR, *line
-        yield END, len(lines), now - self._looked_at, self._key_file
+        age_s = UNKNOWN_S if self._looked_at is None else now - self._looked_at
+        yield END, len(lines), age_s, self._key_file
 
 
 def _line(state: SensorState, neutral: str) -> RosterLine:

@@ -169,16 +169,16 @@ def _picture(place: Venue) -> Group:
     except NoBoxError as error:
         return _picture_of_file(place, str(error))
     parts: list[object] = []
-    if roll.lines:
+    if roll.age_s < 0:
+        parts.append(Text("The box is still starting. Ask again in a moment.", style="yellow"))
+    elif roll.lines:
         parts.append(SensorTable(roll.lines))
     else:
         parts.append(
             Text("The running box knows no sensor. Provision one: bunraku provision --name left-wrist")
         )
     if roll.age_s > _OLD_ROLL_S:
-        parts.append(
-            Text(f"\nThis is {roll.age_s:.0f} s old: the box is starting, or it hangs.", style="red")
-        )
+        parts.append(Text(f"\nThis is {roll.age_s:.0f} s old: the box hangs, or is very busy.", style="red"))
     complaints = [line.complaint for line in roll.lines if line.complaint]
     parts += [Text(f"\n{words}", style="yellow") for words in complaints]
     return Group(*parts)  # type: ignore[arg-type]
@@ -205,7 +205,7 @@ def _plain(place: Venue) -> dict[str, object]:
     if roll is not None:
         return {
             "box": True,
-            "age_s": round(roll.age_s, 3),
+            "age_s": round(roll.age_s, 3) if roll.age_s >= 0 else None,
             "sensors": [plain_values(one) for one in roll.lines],
         }
     with clear_errors(place.keys):

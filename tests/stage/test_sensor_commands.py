@@ -149,6 +149,21 @@ def test_programs_get_values_and_nulls(box: RunningBox, capsys: pytest.CaptureFi
     assert (spare["calibration"], spare["neutral"]) == (None, None)
 
 
+def test_a_box_that_is_still_starting_or_hangs_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist"])
+    box = RunningBox(tmp_path)
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "still starting" in out
+    with ends(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
+        assert json.loads(out) == {"box": True, "age_s": None, "sensors": []}
+    box.roster.refresh([LEFT], lambda name: "", time.monotonic() - 60.0)
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "This is 60 s old: the box hangs" in out
+    box.close()
+
+
 def test_without_a_box_it_lists_the_key_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist", "head"])
     box_file = tmp_path / "box.yaml"
