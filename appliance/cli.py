@@ -15,7 +15,7 @@ prepare_environment()
 
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
 
-from appliance.stage import sensor_commands  # noqa: E402
+from appliance.commands import sensor_commands  # noqa: E402
 
 PLUG_INS = "bunraku.commands"
 REFUSED = 2
@@ -52,7 +52,7 @@ def play(
     ] = None,
 ) -> None:
     """Dance: sensors in, joints out, 50 times a second, until Ctrl-C."""
-    from appliance.stage.play import play_show
+    from appliance.commands.play import play_show
 
     raise typer.Exit(play_show(show, box, seconds, emulate, journal, filmstrip))
 
@@ -65,7 +65,7 @@ def check(
     box: BoxFile = None,
 ) -> None:
     """Verify a show bundle and a box file, and measure whether the iterations fit this machine."""
-    from appliance.stage.check import check_show
+    from appliance.commands.check import check_show
 
     check_show(show, box)
 
@@ -73,7 +73,7 @@ def check(
 @app.command()
 def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you changed.")]) -> None:
     """Verify a changed show bundle and vouch for its files with new checksums."""
-    from appliance.stage.check import pack_show
+    from appliance.commands.check import pack_show
 
     pack_show(show)
 
@@ -91,7 +91,7 @@ def filmstrip(
     metres_per_unit: Annotated[float, typer.Option(min=1e-6, help="Unit of a BVH file, in metres.")] = 0.01,
 ) -> None:
     """Draw a recording or a journal as a row of poses; held joints are highlighted."""
-    from appliance.stage.pictures import picture_of_file
+    from appliance.commands.pictures import picture_of_file
 
     typer.echo(picture_of_file(recording, out, start, seconds, metres_per_unit))
 

@@ -6,11 +6,11 @@ from math import inf
 
 from appliance.sensor import wire
 from appliance.sensor.device_clock import DeviceClock
-from appliance.sensor.intake import Way
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.pairing import LOST_S, Pairing
 from appliance.sensor.plausibility import Orientation, PlausibilityGate
 from appliance.sensor.state import Reception, SensorReading, SensorState
+from appliance.sensor.ways.intake import Way
 
 
 class KnownSensor:

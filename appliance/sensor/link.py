@@ -10,14 +10,14 @@ from types import MappingProxyType
 from typing import cast
 
 from appliance.sensor import wire
-from appliance.sensor.intake import Intake, Way
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.known_sensor import KnownSensor
 from appliance.sensor.pairing import NO_HAND, Pairing
-from appliance.sensor.serial import SerialIntake
 from appliance.sensor.state import SensorReading as SensorReading
 from appliance.sensor.state import SensorState as SensorState
-from appliance.sensor.udp import UdpIntake
+from appliance.sensor.ways.intake import Intake, Way
+from appliance.sensor.ways.serial import SerialIntake
+from appliance.sensor.ways.udp import UdpIntake
 
 ATTEND_S = 1.0
 HEARTBEATS_APART = 8  # sensors in the key file's order get theirs at different eighths of a second

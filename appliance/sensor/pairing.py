@@ -15,9 +15,9 @@ from hashlib import blake2s
 from math import inf
 
 from appliance.sensor import wire
-from appliance.sensor.intake import Way
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.sequence import SequenceWindow
+from appliance.sensor.ways.intake import Way
 
 RATE_HZ = 50
 HEARTBEAT_S = 1.0

@@ -29,7 +29,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.sensor.keys import KeyFileError, SensorKey, load_keys, unknown_sensor
 from appliance.sensor.link import SensorLink, SensorReading, open_link
 from appliance.sensor.neutral import Mounting, joint_from_reading
-from appliance.sensor.udp import PortError
+from appliance.sensor.ways.udp import PortError
 from appliance.show.box import BoxConfig
 from appliance.show.show import HandConfig, Show
 from appliance.stage.budget import Admission, admit

@@ -11,7 +11,7 @@ import pytest
 
 from appliance.sensor.keys import SensorKey, create_keys
 from appliance.sensor.memory import SensorMemory
-from appliance.sensor.udp import UdpIntake
+from appliance.sensor.ways.udp import UdpIntake
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig, UdpConfig
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show

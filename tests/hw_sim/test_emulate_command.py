@@ -15,7 +15,7 @@ import pytest
 
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorLink, SensorReading, open_link
-from appliance.sensor.udp import UdpIntake
+from appliance.sensor.ways.udp import UdpIntake
 from tests.hw_sim.null_modem import NullModem
 
 pytestmark = pytest.mark.realtime

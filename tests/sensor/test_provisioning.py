@@ -8,12 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from appliance.sensor import serial_ports, wearable_console
 from appliance.sensor.framing import frame
 from appliance.sensor.keys import KeyFileError, SensorKey, create_keys, load_keys
-from appliance.sensor.provisioning import Provisioned, ProvisioningError, Settings, provision
-from appliance.sensor.serial_ports import FoundPort, NoWearableError, only_wearable
-from appliance.sensor.wearable_console import ConsoleError, RefusedError, TextOnCable, WearableConsole
+from appliance.sensor.provisioning import serial_ports, wearable_console
+from appliance.sensor.provisioning.provisioning import Provisioned, ProvisioningError, Settings, provision
+from appliance.sensor.provisioning.serial_ports import FoundPort, NoWearableError, only_wearable
+from appliance.sensor.provisioning.wearable_console import (
+    ConsoleError,
+    RefusedError,
+    TextOnCable,
+    WearableConsole,
+)
 from tests.sensor.fake_console import FakeWearable, Memory
 
 SETTINGS = Settings("left-wrist", "stage net", "curtain up 9", 9751, "ndof", (0x21, 0x02))

@@ -17,8 +17,8 @@ import pytest
 from appliance.sensor import wire
 from appliance.sensor.framing import Deframer, frame
 from appliance.sensor.link import SensorLink, SensorReading, open_link
-from appliance.sensor.serial import UNSENT_PACKETS, SerialIntake
-from appliance.sensor.udp import UdpIntake
+from appliance.sensor.ways.serial import UNSENT_PACKETS, SerialIntake
+from appliance.sensor.ways.udp import UdpIntake
 from tests.sensor.peers import KEYS, Wearable
 
 PATIENCE_S = 20.0

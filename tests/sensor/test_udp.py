@@ -8,10 +8,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from appliance.sensor import udp, wire
+from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, open_link
-from appliance.sensor.udp import PortError, UdpIntake
+from appliance.sensor.ways import udp
+from appliance.sensor.ways.udp import PortError, UdpIntake
 from tests.sensor.flood import flood
 from tests.sensor.peers import KEYS, Wearable
 

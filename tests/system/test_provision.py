@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from appliance.sensor.keys import SensorKey, load_keys
-from appliance.sensor.wearable_console import WearableConsole
+from appliance.sensor.provisioning.wearable_console import WearableConsole
 from hw_sim.firmware_library import State
 from tests.stage.bundles import write_show
 from tests.system.bench import NETWORK, PASSWORD, Bench

@@ -13,11 +13,11 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
+from appliance.commands.asking import NoBoxError, Roll, RunningBox
+from appliance.commands.sensor_table import SensorTable, known_table, plain_values, unheard
 from appliance.sensor.key_editing import KeyEditing, editing
 from appliance.sensor.keys import KeyFileError, exposure, load_keys
 from appliance.show.box import BoxConfig, load_box
-from appliance.stage.asking import NoBoxError, Roll, RunningBox
-from appliance.stage.sensor_table import SensorTable, known_table, plain_values, unheard
 from appliance.stage.stage_error import StageError
 
 DEFAULT_KEYS = Path("sensors.keys")

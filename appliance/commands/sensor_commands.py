@@ -60,8 +60,8 @@ def provision(
     axes: Axes = None,
 ) -> None:
     """Give a wearable its name, its network and a fresh key, once, by cable."""
-    from appliance.stage.provision import provision_sensor
-    from appliance.stage.sensors import venue
+    from appliance.commands.provision import provision_sensor
+    from appliance.commands.sensors import venue
 
     place = venue(box, keys)
     raise typer.Exit(provision_sensor(place, name, port, network, password_file, fusion, axes))
@@ -80,7 +80,7 @@ def list_them(
         if (box, keys, watch, as_json) != (None, None, False, False):
             raise typer.BadParameter(f"write options behind '{context.invoked_subcommand}'")
         return
-    from appliance.stage.sensors import list_sensors, venue
+    from appliance.commands.sensors import list_sensors, venue
 
     list_sensors(venue(box, keys), watch, as_json)
 
@@ -88,7 +88,7 @@ def list_them(
 @sensors.command()
 def strobe(name: Name, box: BoxFile = None, keys: KeyFile = None) -> None:
     """Let a sensor's light flash for 10 s, to find it in a drawer."""
-    from appliance.stage.sensors import tell, venue
+    from appliance.commands.sensors import tell, venue
 
     tell(venue(box, keys), "/sensors/strobe", name)
 
@@ -100,7 +100,7 @@ def neutral(
     keys: KeyFile = None,
 ) -> None:
     """Take the neutral pose anew: how the sensor sits on the dancer, who stands still now."""
-    from appliance.stage.sensors import tell, venue
+    from appliance.commands.sensors import tell, venue
 
     tell(venue(box, keys), "/sensors/neutral", *([name] if name else []))
 
@@ -112,7 +112,7 @@ def heading(
     keys: KeyFile = None,
 ) -> None:
     """Reset the heading alone: the dancer faces the front now."""
-    from appliance.stage.sensors import tell, venue
+    from appliance.commands.sensors import tell, venue
 
     tell(venue(box, keys), "/sensors/heading", *([name] if name else []))
 
@@ -134,8 +134,8 @@ def replace(
     keys: KeyFile = None,
 ) -> None:
     """Put a spare, or a new wearable on a cable, in the place of a broken one."""
-    from appliance.stage.provision import provision_sensor
-    from appliance.stage.sensors import replace_by_spare, venue
+    from appliance.commands.provision import provision_sensor
+    from appliance.commands.sensors import replace_by_spare, venue
     from appliance.stage.stage_error import StageError
 
     place = venue(box, keys)
@@ -153,7 +153,7 @@ def replace(
 @sensors.command()
 def revoke(name: Name, box: BoxFile = None, keys: KeyFile = None) -> None:
     """Let a stolen or lost sensor in no more: its key is removed."""
-    from appliance.stage.sensors import revoke, venue
+    from appliance.commands.sensors import revoke, venue
 
     raise typer.Exit(revoke(venue(box, keys), name))
 
@@ -166,6 +166,6 @@ def rename(
     keys: KeyFile = None,
 ) -> None:
     """Give a sensor another name."""
-    from appliance.stage.sensors import rename, venue
+    from appliance.commands.sensors import rename, venue
 
     raise typer.Exit(rename(venue(box, keys), name, new))

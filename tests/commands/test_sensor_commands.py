@@ -18,12 +18,12 @@ import yaml
 from rich.console import Console
 
 from appliance.cli import main
+from appliance.commands.sensor_table import SensorTable
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorState
 from appliance.sensor.wire import HAS_PROFILE, IS_NDOF
 from appliance.stage.control import Command, Control
 from appliance.stage.roster import Roster, RosterLine
-from appliance.stage.sensor_table import SensorTable
 
 LEFT = SensorState(
     *("left-wrist", 0x1A2B3C4D, "linked", "192.168.4.7:2390", 49.96, 0.0123, 0.0042, 0.013),

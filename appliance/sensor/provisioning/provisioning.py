@@ -13,7 +13,12 @@ from pathlib import Path
 from appliance.sensor import wire
 from appliance.sensor.key_editing import KeyEditing, editing
 from appliance.sensor.keys import SensorKey, fresh_key, name_fault
-from appliance.sensor.wearable_console import ConsoleError, Identity, UnpluggedError, WearableConsole
+from appliance.sensor.provisioning.wearable_console import (
+    ConsoleError,
+    Identity,
+    UnpluggedError,
+    WearableConsole,
+)
 
 LONGEST_NETWORK = 32  # bytes, IEEE 802.11
 SHORTEST_PASSWORD, LONGEST_PASSWORD = 8, 63  # WPA2

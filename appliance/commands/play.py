@@ -7,10 +7,10 @@ import tempfile
 from contextlib import ExitStack
 from pathlib import Path
 
+from appliance.commands.emulation import Emulation
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
-from appliance.stage.emulation import Emulation
 from appliance.stage.run import Stage, stop_signals
 from appliance.stage.speaker import Speaker
 
@@ -51,7 +51,7 @@ def play_show(
         for line in _conclusion(stage):
             speaker.say(line)
         if filmstrip is not None and journal is not None:
-            from appliance.stage.pictures import picture_of_journal
+            from appliance.commands.pictures import picture_of_journal
 
             picture = picture_of_journal(journal, filmstrip, -_PICTURED_S, _PICTURED_S)
             speaker.say(f"What was just danced, held joints highlighted: {picture}")

@@ -10,16 +10,16 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from appliance.sensor.provisioning import (
+from appliance.commands.sensors import NOT_TAKEN, Venue, clear_errors, people_console, reload
+from appliance.sensor.provisioning.provisioning import (
     DEFAULT_PORT,
     Provisioned,
     ProvisioningError,
     Settings,
     provision,
 )
-from appliance.sensor.serial_ports import NoWearableError, found_ports, only_wearable
-from appliance.sensor.wearable_console import ConsoleError, WearableConsole
-from appliance.stage.sensors import NOT_TAKEN, Venue, clear_errors, people_console, reload
+from appliance.sensor.provisioning.serial_ports import NoWearableError, found_ports, only_wearable
+from appliance.sensor.provisioning.wearable_console import ConsoleError, WearableConsole
 from appliance.stage.stage_error import StageError
 
 STDIN = Path("-")

@@ -16,7 +16,7 @@ from hmac import compare_digest
 
 import serial
 
-from appliance.sensor.serial_ports import found_ports, ports_sentence
+from appliance.sensor.provisioning.serial_ports import found_ports, ports_sentence
 from appliance.sensor.wire import TAG_BYTES
 
 BAUD = 115200  # USB: any speed is the same, but 1200 would start the bootloader

@@ -14,7 +14,7 @@ import serial
 
 from appliance.sensor import wire
 from appliance.sensor.framing import END, Deframer, frame
-from appliance.sensor.intake import Origin
+from appliance.sensor.ways.intake import Origin
 
 FIRST_RETRY_S = 0.1
 LONGEST_RETRY_S = 2.0

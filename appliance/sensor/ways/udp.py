@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 
 from appliance.sensor import wire
-from appliance.sensor.intake import Origin
+from appliance.sensor.ways.intake import Origin
 
 # Linux, include/uapi/asm-generic/socket.h: the kernel stamps each datagram as it comes in, on the wall clock.
 SO_TIMESTAMPNS = 35

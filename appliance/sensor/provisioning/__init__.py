@@ -1,0 +1,1 @@
+"""Once, by cable: a wearable gets its name, its network and its key."""

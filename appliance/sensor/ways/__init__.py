@@ -1,0 +1,1 @@
+"""The ways by which packets come and go: the network, a cable."""
