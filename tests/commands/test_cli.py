@@ -149,7 +149,7 @@ def test_a_broken_plug_in_costs_only_its_own_commands() -> None:
 
 def test_a_plug_in_adds_its_commands_beside_the_others() -> None:
     app = typer.Typer()
-    plug_in(app, [EntryPoint("mine", "tests.stage.test_cli:plugged", "bunraku.commands")], print)
+    plug_in(app, [EntryPoint("mine", "tests.commands.test_cli:plugged", "bunraku.commands")], print)
     command = typer.main.get_command(app)
     assert "emote" in command.commands
 
