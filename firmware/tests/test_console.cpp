@@ -1,12 +1,14 @@
 // The console: every command, every refusal, and no secret in any answer.
 #include <doctest/doctest.h>
 
+#include <cstdio>
 #include <cstring>
 #include <string>
 #include <vector>
 
 #include "blake2s.h"
 #include "console.h"
+#include "version.h"
 #include "wire.h"
 
 using namespace bunraku;
@@ -41,11 +43,13 @@ bool is_error(const std::string& answer) { return answer.substr(0, 7) == "error:
 
 TEST_CASE("id") {
   Session session;
-  CHECK(session.ask("id") == "ok bunraku-wearable 1.0.0 wire 2d20a5df imu none board b0a2d001");
+  char wire_hash[9];
+  snprintf(wire_hash, sizeof wire_hash, "%08x", wire::kWireHash);
+  const std::string who = std::string("ok bunraku-wearable ") + kFirmwareVersion + " wire " + wire_hash;
+  CHECK(session.ask("id") == who + " imu none board b0a2d001");
   session.status.has_imu_id = true;
   for (uint8_t i = 0; i < 16; ++i) session.status.imu_id[i] = static_cast<uint8_t>(0x50 + i);
-  CHECK(session.ask("id") ==
-        "ok bunraku-wearable 1.0.0 wire 2d20a5df imu 505152535455565758595a5b5c5d5e5f board b0a2d001");
+  CHECK(session.ask("id") == who + " imu 505152535455565758595a5b5c5d5e5f board b0a2d001");
 }
 
 TEST_CASE("a fresh board shows that it knows nothing") {

@@ -30,6 +30,7 @@ void Wearable::serve_cable(uint32_t now_us) {
     is_cable_connected_ = is_connected;
     cable_input_.reset();
     cable_output_.reset();
+    console_.begin(settings_);  // what was set and not saved is forgotten with the cable
     conversation_.stop();
     cable_first_.start(now_us, kCableFirstUs);
   }
