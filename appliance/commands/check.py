@@ -21,6 +21,8 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
     cast = assemble(show, _without_ports(box))
     verdict = admission(cast, show, box)
     cast.close()
+    if box.sensors.keys is not None and cast.complaints:
+        raise StageError("\n".join(cast.complaints))
     if not verdict.fits:
         raise StageError(verdict.sentence())
     print(f"{show.config.name}: the bundle is whole.")

@@ -59,7 +59,7 @@ def play_show(
 
 
 def _introduction(stage: Stage) -> list[str]:
-    show, box = stage.show, stage.box
+    show = stage.show
     hands = ", ".join(f"{hand.sensor or hand.kind} holds {hand.joint}" for hand in show.config.hands)
     receivers = ", ".join(receiver.name for receiver in stage.cast.outputs.receivers) or "nobody"
     lines = [
@@ -67,11 +67,7 @@ def _introduction(stage: Stage) -> list[str]:
         f"The dance goes to {receivers}.",
         stage.admission.sentence(),
     ]
-    if stage.cast.worn and box.sensors.keys is None:
-        lines.append(
-            "No key file: no sensor is let in, and the dancer moves freely. "
-            "Set sensors.keys in the box file (bunraku provision makes it), or try it with --emulate."
-        )
+    lines += stage.cast.complaints
     return lines
 
 

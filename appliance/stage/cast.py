@@ -36,6 +36,8 @@ from appliance.stage.budget import Admission, admit
 from appliance.stage.realtime import borrowed_priority
 from appliance.stage.stage_error import StageError
 
+_CURE = "Check sensors.keys in the box file, or run: bunraku provision."
+
 
 @dataclass(slots=True)
 class Iterations:
@@ -51,7 +53,7 @@ class Cast:
     """Everything that dances, hears and speaks.
 
     `hand_places`: where the hands' joints stand among the moving ones; `worn`: which joints a sensor holds;
-    `mountings`: how it is worn for each of these joints.
+    `mountings`: how it is worn for each of these joints; `complaints`: why sensors are not let in.
     """
 
     skeleton: Skeleton
@@ -66,6 +68,7 @@ class Cast:
     primary: str | None
     link: SensorLink
     outputs: OscOutputs
+    complaints: tuple[str, ...] = ()
     newest_primary: SensorReading | None = field(default=None)
 
     def hear(self, reading: SensorReading) -> None:
@@ -84,7 +87,8 @@ class Cast:
 def assemble(show: Show, box: BoxConfig, profiles: Mapping[bytes, bytes] = MappingProxyType({})) -> Cast:
     """Open every port and file of a show; `profiles`: the sensors' calibrations that the box has kept.
 
-    Raises StageError or ConfigError before anything dances.
+    Raises StageError or ConfigError before anything dances. Keys that are missing are no reason not to dance:
+    see `complaints`.
     """
     try:
         puppet = Puppet(show.network, show.skeleton)
@@ -101,6 +105,7 @@ def assemble(show: Show, box: BoxConfig, profiles: Mapping[bytes, bytes] = Mappi
         if hand.sensor is not None and isinstance(puppeteer, WornSensor):
             worn.setdefault(hand.sensor, []).append(puppeteer)
             mountings[hand.joint] = _mounting(hand)
+    keys, complaints = _keys(box.sensors.keys, list(worn))
     return Cast(
         skeleton=show.skeleton,
         puppet=puppet,
@@ -112,8 +117,9 @@ def assemble(show: Show, box: BoxConfig, profiles: Mapping[bytes, bytes] = Mappi
         worn=worn,
         mountings=mountings,
         primary=show.config.primary_sensor,
-        link=_link(box, list(worn), profiles),
+        link=_link(box, keys, list(worn), profiles),
         outputs=OscOutputs(box.outputs.osc, show.skeleton),
+        complaints=complaints,
     )
 
 
@@ -171,8 +177,9 @@ def _playback(show: Show, phrase: Recording, window: int, lifts: NDArray[np.floa
     )
 
 
-def _link(box: BoxConfig, sensors: Sequence[str], profiles: Mapping[bytes, bytes]) -> SensorLink:
-    keys = _keys(box.sensors.keys, sensors)
+def _link(
+    box: BoxConfig, keys: Mapping[str, SensorKey], sensors: Sequence[str], profiles: Mapping[bytes, bytes]
+) -> SensorLink:
     udp = box.sensors.udp
     try:
         link = open_link(
@@ -188,20 +195,23 @@ def _link(box: BoxConfig, sensors: Sequence[str], profiles: Mapping[bytes, bytes
     return link
 
 
-def _keys(path: Path | None, sensors: Sequence[str]) -> dict[str, SensorKey]:
-    """Keys of the box's sensors; none without a key file: then no sensor is let in."""
+def _keys(path: Path | None, sensors: Sequence[str]) -> tuple[dict[str, SensorKey], tuple[str, ...]]:
+    """Keys of the box's sensors, and why those of the show that have none are not let in."""
+    if not sensors:
+        return {}, ()
     if path is None:
-        return {}
+        return {}, (
+            "No key file: no sensor is let in, and the dancer moves freely. "
+            "Set sensors.keys in the box file (bunraku provision makes it), or try it with --emulate.",
+        )
     try:
         keys = load_keys(path)
-    except KeyFileError as error:
-        raise StageError(str(error)) from error
-    except OSError as error:
-        raise StageError(
-            f"{path}: the sensors' key file cannot be read ({error.strerror}). No sensor could be heard. "
-            "Check sensors.keys in the box file."
-        ) from error
-    for name in sensors:
-        if name not in keys:
-            raise StageError(f"{path}: {unknown_sensor(name, keys)}")
-    return keys
+    except (KeyFileError, OSError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        place = f"{path}: the sensors' key file cannot be read" if isinstance(error, OSError) else "Key file"
+        return {}, (f"{place} ({reason}). No sensor is let in, and the dancer moves freely. {_CURE}",)
+    return keys, tuple(
+        f"{path}: {unknown_sensor(name, keys)}. It is not let in, and the dancer moves freely there. {_CURE}"
+        for name in sensors
+        if name not in keys
+    )

@@ -114,6 +114,34 @@ def test_check_refuses_iterations_that_the_budget_cannot_hold(
     assert "3 coding iterations do not fit" in refused(capsys, "check", str(show), "--box", str(box))
 
 
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        (
+            "head: {device: 7, key: 000102030405060708090a0b0c0d0e0f}\n",
+            "no sensor 'left-wrist' in the key file",
+        ),
+        ("left-wrist: {device: 7}\n", "sensors.keys:1: sensor 'left-wrist' has no key"),
+        (None, "cannot be read (No such file or directory)"),
+    ],
+    ids=["revoked", "damaged", "absent"],
+)
+def test_without_a_sensors_key_check_refuses_and_play_dances(
+    keys: str | None, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    show = write_show(tmp_path / "show")
+    write_checksums(show)
+    box = tmp_path / "box.yaml"
+    box.write_text("sensors: {udp: {port: 0}, keys: sensors.keys}\ncontrol: null\noutputs: {osc: []}\n")
+    if keys is not None:
+        (tmp_path / "sensors.keys").write_text(keys)
+    assert said in refused(capfd, "check", str(show), "--box", str(box))
+    words = succeeded(capfd, "play", "--show", str(show), "--box", str(box), "--seconds", "0.2")
+    assert said in words
+    assert "the dancer moves freely" in words
+    assert re.search(r"Danced [1-9]\d* ticks", words)
+
+
 def test_a_filmstrip_of_a_recording_and_of_a_journal(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
