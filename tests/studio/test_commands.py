@@ -32,6 +32,10 @@ def test_training_ends_with_a_show_that_the_box_accepts(trained: Trained) -> Non
     assert verify_bundle(show) == []
     config = load_show(show).config
     assert config.name == "evening" and config.hands[0].joint == "lShldr"
+    skeleton = load_show(show).skeleton
+    arm = skeleton.offsets[skeleton.index("lForeArm")]
+    w, _, _, z = config.hands[0].at_neutral
+    assert arm[0] > 0 and w == pytest.approx(0.766, abs=0.001) and z == pytest.approx(-0.643, abs=0.02)
 
 
 def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:

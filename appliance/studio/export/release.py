@@ -14,6 +14,7 @@ import numpy as np
 
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import Catalogue, Dataset, Take, find_catalogue, load_take
 from appliance.studio.evaluation.coders import OnnxCoder, Poses, TorchCoder, load_checkpoint
 from appliance.studio.evaluation.evaluation import evaluate, fitting_hop
@@ -28,6 +29,7 @@ from appliance.studio.studio_error import StudioError
 EQUALITY = 1e-4  # in any component of any quaternion after 10 iterations
 EQUALITY_WINDOWS = 16
 PHRASE_S = 60.0
+HANGING_DEGREES = 80.0  # below the level: a hanging arm does not touch the hip
 FIRST_HANDS = (
     "lshldr",
     "leftshoulder",
@@ -98,7 +100,10 @@ def _write_texts(
     phrase = _phrase(request, dataset, catalogue, say)
     if phrase is not None:
         packing.write_phrase(request.out, phrase)
-    hand = {"sensor": "left-wrist", "joint": first_hand(coder.joints)}
+    hand: dict[str, Any] = {"sensor": "left-wrist", "joint": first_hand(coder.joints)}
+    hanging = hanging_orientation(dataset.skeleton, hand["joint"])
+    if hanging is not None:
+        hand["at_neutral"] = hanging
     packing.write_show_yaml(request.out, request.name, [hand], catalogue.acknowledgement)
     (request.out / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
@@ -107,6 +112,23 @@ def first_hand(joints: tuple[str, ...]) -> str:
     """The joint that a new show gives to its sensor: the left upper arm where it is named so."""
     folded = {name.casefold().replace("_", ""): name for name in joints}
     return next((folded[name] for name in FIRST_HANDS if name in folded), joints[-1])
+
+
+def hanging_orientation(skeleton: Skeleton, joint: str) -> list[float] | None:
+    """Local orientation (w, x, y, z) of an arm that hangs while the dancer stands still.
+
+    None for a joint whose bone does not lie level in the rest pose: only arms of a T-pose are lowered.
+    """
+    place = skeleton.index(joint)
+    bones = [
+        offset for offset, parent in zip(skeleton.offsets, skeleton.parents, strict=True) if parent == place
+    ]
+    bone = max(bones, key=lambda offset: float(np.linalg.norm(offset)), default=np.zeros(3))
+    level = np.array([bone[0], 0.0, bone[2]])
+    if np.linalg.norm(level) <= abs(bone[1]):
+        return None
+    down = quaternion.from_axis_angle(np.cross(level, [0.0, -1.0, 0.0]), np.radians(HANGING_DEGREES))
+    return [round(float(part), 3) for part in down]
 
 
 def _export_both(coder: TorchCoder, state: dict[str, Any], folder: Path) -> dict[str, Path]:
