@@ -83,7 +83,7 @@ def test_the_sign_is_continuous_whatever_the_sensor_sends() -> None:
     before = (1.0, 0.0, 0.0, 0.0)
     for n in range(40):
         box.now += 0.02
-        (reading,) = box.hear(sensor.numbered(n, degrees=20 * n + 360 * (n % 2)))
+        (reading,) = box.hear(sensor.numbered(n, degrees=20 * n + 5 + 360 * (n % 2)))
         assert sum(a * b for a, b in zip(before, reading.orientation, strict=True)) > 0.9
         before = reading.orientation
 
