@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 from appliance.sensor.keys import SensorKey, load_keys
+from appliance.sensor.link import open_link
 from appliance.sensor.provisioning.wearable_console import WearableConsole
 from hw_sim.firmware_library import State
 from tests.stage.bundles import write_show
@@ -65,6 +66,13 @@ def listed(box: Box) -> dict[str, dict[str, Any]]:
 
 def box_file(box: Box) -> str:
     return str(box.words_file.with_name("box.yaml"))
+
+
+def resting_box(folder: Path) -> str:
+    """The box file of a box that is not running; whichever else runs on this machine is not asked."""
+    path = folder / "resting.yaml"
+    path.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
+    return str(path)
 
 
 def await_state(box: Box, name: str, state: str) -> dict[str, Any]:
@@ -133,17 +141,47 @@ def test_a_spare_takes_over_the_name_while_the_box_plays(show: Path, tmp_path: P
         assert box.end() == 0
 
 
+def test_a_new_board_s_readings_are_believed_by_cable(tmp_path: Path) -> None:
+    with Bench() as bench:
+        provision(bench, "--name", "left-wrist", "--box", resting_box(tmp_path))
+        keys = load_keys(tmp_path / "sensors.keys")
+        believed, link = 0, open_link(keys, serial=[(bench.device, 115200)])
+        until = time.monotonic() + PATIENCE_S
+        while believed < 50:
+            assert time.monotonic() < until
+            believed += len(link.drain(time.monotonic()))
+            link.tend(time.monotonic())
+            time.sleep(0.004)
+        (state,) = link.states(time.monotonic())
+        link.close()
+    assert (state.state, state.way, state.firmware) == ("linked", bench.device, "1.0.0")
+
+
+def test_provisioned_anew_the_old_key_is_nowhere_in_the_flash(tmp_path: Path) -> None:
+    keys = []
+    with Bench() as bench:
+        for _ in range(2):
+            provision(bench, "--name", "left-wrist", "--box", resting_box(tmp_path))
+            keys.append(load_keys(tmp_path / "sensors.keys")["left-wrist"].key)
+        old, new = keys
+        assert new != old
+        assert new in bench.flash()
+        assert old not in bench.flash()
+
+
 def test_a_cable_pulled_at_the_save_is_mended_by_another_run(tmp_path: Path) -> None:
     keys = tmp_path / "sensors.keys"
     with Bench() as bench:
-        provision(bench, "--name", "left-wrist", "--keys", str(keys), password="")
+        provision(bench, "--name", "left-wrist", "--box", resting_box(tmp_path), password="")
         first = load_keys(keys)
         bench.pulls_at = b"save\n"
-        words = provision(bench, "--name", "left-wrist", "--keys", str(keys), password="", status=2)
+        words = provision(
+            bench, "--name", "left-wrist", "--box", resting_box(tmp_path), password="", status=2
+        )
         assert "may or may not have its new key" in words
         assert load_keys(keys) == first
         bench.plug_in()
-        provision(bench, "--name", "left-wrist", "--keys", str(keys), password="")
+        provision(bench, "--name", "left-wrist", "--box", resting_box(tmp_path), password="")
         second = load_keys(keys)["left-wrist"]
         assert (second.device_id, second.key != first["left-wrist"].key) == (
             first["left-wrist"].device_id,
@@ -174,8 +212,8 @@ def test_the_password_is_asked_for_on_the_terminal_and_not_shown(tmp_path: Path)
         "",
         "--name",
         "head",
-        "--keys",
-        str(keys),
+        "--box",
+        resting_box(tmp_path),
         "--network",
         NETWORK,
     ]
