@@ -183,7 +183,11 @@ class SensorLink:
         else:
             stale = pairing.profile_staleness(boot_nonce, session, sequence)
         if stale is not None:
-            is_of_use = stale == "old_session" and layout is wire.READING and pairing.is_to_be_called(arrival)
+            is_of_use = (
+                stale == "old_session"
+                and layout is wire.READING
+                and pairing.is_to_be_called(boot_nonce, arrival)
+            )
             if is_of_use and pairing.tagger.is_authentic(data):
                 pairing.call(boot_nonce, way)
             return stale

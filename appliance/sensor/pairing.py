@@ -15,6 +15,7 @@ from hashlib import blake2s
 from math import inf
 
 from appliance.sensor import wire
+from appliance.sensor.answering import Answering
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.sequence import SequenceWindow
 from appliance.sensor.ways.intake import Way
@@ -57,9 +58,8 @@ class Pairing:
         self._phase_s = phase_s
         self._sessions_before = 0
         self._hellos: dict[int, wire.Hello] = {}  # boot nonce -> its newest; the newest boot is the last
-        self._unanswered: tuple[wire.Hello, Way] | None = None
-        self._uncalled: tuple[int, Way] | None = None
-        self._assigned_at = self._called_at = -inf
+        self._unanswered: Answering[tuple[wire.Hello, Way]] = Answering(ASSIGNMENT_INTERVAL_S)
+        self._uncalled: Answering[Way] = Answering(CALL_INTERVAL_S)
         self._next_heartbeat = -inf
         self._led: int | None = None
         self._sent: dict[type[wire.Packet], int] = {}
@@ -82,11 +82,11 @@ class Pairing:
             return "old_session"
         return "duplicate" if sequence <= session.profile_sequence else None
 
-    def is_to_be_called(self, now: float) -> bool:
+    def is_to_be_called(self, boot_nonce: int, now: float) -> bool:
         """Whether an authentic reading of an unknown session would be answered: no one else is heard."""
         if self.session is not None and now - self.session.heard < SILENT_S:
             return False
-        return self._uncalled is None and now - self._called_at >= CALL_INTERVAL_S
+        return self._uncalled.may_ask(boot_nonce, now)
 
     # What is authentic and new.
 
@@ -98,11 +98,12 @@ class Pairing:
         self._hellos.pop(hello.boot_nonce, None)
         self._hellos[hello.boot_nonce] = hello
         if len(self._hellos) > REMEMBERED_BOOTS:
-            del self._hellos[next(iter(self._hellos))]
+            in_force = None if self.session is None else self.session.boot_nonce
+            del self._hellos[next(boot_nonce for boot_nonce in self._hellos if boot_nonce != in_force)]
         self.greeted_at = now
         if hello.wire_hash != wire.WIRE_HASH:
             return "other_wire"
-        self._unanswered = hello, way
+        self._unanswered.ask(hello.boot_nonce, (hello, way))
         return "hello"
 
     def follow(self, reading: wire.Reading, way: Way, arrival: float) -> int:
@@ -126,20 +127,16 @@ class Pairing:
 
     def call(self, boot_nonce: int, way: Way) -> None:
         """A reading of an unknown session: its sensor shall say hello."""
-        self._uncalled = boot_nonce, way
+        self._uncalled.ask(boot_nonce, way)
 
     # What follows from it.
 
     def due(self, now: float, led: int, profiles: Mapping[bytes, bytes]) -> Iterator[tuple[Way, wire.Packet]]:
-        """What is to be sent now, and where to: an assignment, a call, a heartbeat, a calibration at most."""
-        if self._unanswered is not None and now - self._assigned_at >= ASSIGNMENT_INTERVAL_S:
-            hello, way = self._unanswered
-            self._unanswered, self._assigned_at = None, now
-            head = self._head(wire.Assignment, hello.boot_nonce, self._number_for(hello.boot_nonce))
+        """What is to be sent now, and where to: assignments, calls, a heartbeat, a calibration."""
+        for boot_nonce, (hello, way) in self._unanswered.due(now):
+            head = self._head(wire.Assignment, boot_nonce, self._number_for(boot_nonce))
             yield way, wire.Assignment(*head, hello.sequence, self.hand, RATE_HZ, led)
-        if self._uncalled is not None:
-            boot_nonce, way = self._uncalled
-            self._uncalled, self._called_at = None, now
+        for boot_nonce, way in self._uncalled.due(now):
             yield way, wire.Call(*self._head(wire.Call, boot_nonce, 0))
         session = self.session
         is_due = now >= self._next_heartbeat or led != self._led

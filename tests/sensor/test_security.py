@@ -295,6 +295,61 @@ def test_replayed_hellos_do_not_keep_a_sensor_from_being_let_in() -> None:
     assert len(box.hear(sensor.reading())) == 1
 
 
+def test_an_hour_of_recorded_hellos_does_not_keep_a_sensor_from_being_let_in() -> None:
+    """They were never heard by this box, so each of them is new once; the next one comes with each tick."""
+    box = Box()
+    before = Wearable(KEYS["left-wrist"], boot=8)
+    sensor = Wearable(KEYS["left-wrist"], boot=9)
+    for hello in [before.hello() for _ in range(200)]:
+        box.now += 0.02
+        if sensor.hellos == 0:
+            box.hear(sensor.hello())
+        box.hear(hello, origin=STRANGER)
+        for data, to in box.answers():
+            if to == A:
+                sensor.hear(data)
+    assert len(box.hear(sensor.reading())) == 1
+
+
+def test_hellos_of_hundreds_of_power_ons_over_and_over_do_not_either() -> None:
+    """More power-ons than the box remembers: each of their hellos is new again and again."""
+    recorded = [Wearable(KEYS["left-wrist"], boot).hello() for boot in range(1000, 1300)]
+    box = Box()
+    sensor = Wearable(KEYS["left-wrist"], boot=9)
+    for n in range(100):
+        box.now += 0.02
+        if n == 50:
+            box.hear(sensor.hello())
+        for at in range(4):
+            box.hear(recorded[(4 * n + at) % len(recorded)], origin=STRANGER)
+        for data, to in box.answers():
+            if to == A:
+                sensor.hear(data)
+    assert len(box.hear(sensor.reading())) == 1
+
+
+def test_what_a_linked_sensor_said_of_itself_outlives_hundreds_of_replayed_hellos() -> None:
+    box, sensor = linked_box()
+    for boot in range(1000, 1600):
+        box.hear(Wearable(KEYS["left-wrist"], boot).hello(), origin=STRANGER)
+    assert box.link.states(box.now)[0].firmware == "1.2.3"
+    assert len(box.hear(sensor.reading())) == 1
+
+
+def test_a_replayed_reading_does_not_take_the_call_of_a_sensor_whose_box_was_started_anew() -> None:
+    replayed = Box().pair(boot=5).reading()
+    sensor = Box().pair(boot=6)
+    box = Box(now=200.0)
+    called_at = []
+    for _ in range(50):
+        box.now += 0.02
+        box.hear(replayed, sensor.reading(), replayed, origin=STRANGER)
+        called_at += [box.now for data, _ in box.answers() if data[8:12] == (6).to_bytes(4, "little")]
+    assert called_at[0] - 200.0 < 0.03
+    assert len(called_at) <= 5
+    assert box.link.sent["call"] <= 10
+
+
 def bytes_in_and_out(box: Box, packets: list[bytes], seconds: float) -> tuple[int, int]:
     came = left = 0
     for _ in range(round(seconds / 0.02)):
