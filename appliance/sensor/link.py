@@ -12,6 +12,7 @@ from typing import cast
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.known_sensor import KnownSensor
+from appliance.sensor.memory import with_profile
 from appliance.sensor.pairing import NO_HAND, Pairing
 from appliance.sensor.state import SensorReading as SensorReading
 from appliance.sensor.state import SensorState as SensorState
@@ -66,7 +67,7 @@ class SensorLink:
         self.sent: Counter[str] = Counter()  # packets to sensors by kind
         self._hands = tuple(hands)
         self._profiles = dict(profiles)
-        self._new_profiles: list[tuple[bytes, bytes]] = []
+        self._new_profiles: dict[bytes, bytes] = {}
         self._by_device: dict[int, KnownSensor] = {}
         self._by_name: dict[str, KnownSensor] = {}
         self._counts = dict.fromkeys(REASONS, 0)
@@ -125,8 +126,8 @@ class SensorLink:
 
     def take_profiles(self) -> list[tuple[bytes, bytes]]:
         """Calibrations that sensors have sent since the last call: (the IMU's unique id, offsets)."""
-        taken, self._new_profiles = self._new_profiles, []
-        return taken
+        taken, self._new_profiles = self._new_profiles, {}
+        return list(taken.items())
 
     @property
     def counts(self) -> dict[str, int]:
@@ -217,6 +218,6 @@ class SensorLink:
         """An authentic, new calibration."""
         sensor.pairing.keep(profile)
         if self._profiles.get(profile.imu_id) != profile.offsets:
-            self._profiles[profile.imu_id] = profile.offsets
-            self._new_profiles.append((profile.imu_id, profile.offsets))
+            self._profiles = with_profile(self._profiles, profile.imu_id, profile.offsets)
+            self._new_profiles = with_profile(self._new_profiles, profile.imu_id, profile.offsets)
         return "profile"

@@ -19,8 +19,18 @@ HEADER = "# What this box remembers of its sensors: neutral poses, and calibrati
 IMU_ID_BYTES = 16
 OFFSETS_BYTES = 22
 LARGEST_FILE = 256 * 1024
+MOST_PROFILES = 64  # so many IMUs no house has: more would only fill the file
 
 Place = tuple[str, str]  # sensor, joint
+
+
+def with_profile(profiles: Mapping[bytes, bytes], imu_id: bytes, offsets: bytes) -> dict[bytes, bytes]:
+    """These calibrations and a new one; of too many the oldest give way."""
+    kept = {other: those for other, those in profiles.items() if other != imu_id}
+    kept[imu_id] = offsets
+    for oldest in list(kept)[:-MOST_PROFILES]:
+        del kept[oldest]
+    return kept
 
 
 class SensorMemory:
@@ -63,7 +73,7 @@ class SensorMemory:
     def keep_profile(self, imu_id: bytes, offsets: bytes) -> None:
         """Remember the calibration of an IMU."""
         if self._profiles.get(imu_id) != offsets:
-            self._profiles = {**self._profiles, imu_id: offsets}
+            self._profiles = with_profile(self._profiles, imu_id, offsets)
             self._changed.set()
 
     def close(self) -> None:
@@ -106,7 +116,9 @@ class SensorMemory:
         try:
             if path.stat().st_size > LARGEST_FILE:
                 raise ValueError("it is too large")
-            self._neutral, self._profiles = _remembered(yaml.safe_load(path.read_text(encoding="utf-8")))
+            self._neutral, self._profiles = _remembered(
+                yaml.load(path.read_text(encoding="utf-8"), _PlainLoader)
+            )
         except (FileNotFoundError, NotADirectoryError):
             return
         except OSError as error:
@@ -114,7 +126,15 @@ class SensorMemory:
                 f"{path}: what was remembered of the sensors cannot be read ({error.strerror}). "
                 "Sensors need a moment of stillness tonight. Check who may read this file."
             )
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError, yaml.YAMLError):
+        except (
+            ValueError,
+            TypeError,
+            KeyError,
+            AttributeError,
+            OverflowError,
+            RecursionError,
+            yaml.YAMLError,
+        ):
             self._set_aside(path)
 
     def _set_aside(self, path: Path) -> None:
@@ -145,6 +165,15 @@ def _text(neutral: Mapping[Place, NeutralPose], profiles: Mapping[bytes, bytes])
     lines.append("profiles:\n" if profiles else "profiles: {}\n")
     lines += [f'  "{imu_id.hex()}": "{offsets.hex()}"\n' for imu_id, offsets in profiles.items()]
     return "".join(lines)
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Without aliases: the box writes none, and a few of them can stand for more than any memory holds."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.YAMLError("an alias")
+        return super().compose_node(parent, index)
 
 
 def _remembered(values: Any) -> tuple[dict[Place, NeutralPose], dict[bytes, bytes]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.sensor.memory import FILE_NAME, SensorMemory
+from appliance.sensor.memory import FILE_NAME, IMU_ID_BYTES, LARGEST_FILE, MOST_PROFILES, SensorMemory
 from appliance.sensor.neutral import NeutralPose
 
 POSE = NeutralPose((0.5, -0.5, 0.5, 0.5), 0.25, 0xFFFFFFFF)
@@ -46,6 +46,21 @@ def test_the_file_is_its_owners_alone_and_nothing_stays_beside_it(tmp_path: Path
     assert path.stat().st_mode & 0o777 == 0o600
 
 
+def test_more_calibrations_than_a_house_has_imus_do_not_fill_the_file(tmp_path: Path) -> None:
+    memory = SensorMemory(tmp_path, silent)
+    memory.keep_neutral("left-wrist", "lShldr", POSE)
+    for number in range(20_000):
+        memory.keep_profile(number.to_bytes(IMU_ID_BYTES, "big"), OFFSETS)
+    memory.close()
+    assert (tmp_path / FILE_NAME).stat().st_size < LARGEST_FILE / 10
+    again = SensorMemory(tmp_path, silent)
+    assert again.neutral("left-wrist", "lShldr") == POSE
+    assert list(again.profiles) == [
+        number.to_bytes(IMU_ID_BYTES, "big") for number in range(20_000 - MOST_PROFILES, 20_000)
+    ]
+    again.close()
+
+
 def test_nothing_new_writes_nothing(tmp_path: Path) -> None:
     SensorMemory(tmp_path, silent).close()
     assert not (tmp_path / FILE_NAME).exists()
@@ -74,6 +89,12 @@ def test_without_a_folder_it_remembers_for_the_run(tmp_path: Path) -> None:
         'neutral: {}\nprofiles: {"00": "11"}\n',
         "neutral: {}\nprofiles: {12: 13}\n",
         "[" * 5000,
+        "neutral: {a: {b: {orientation: [1, 0, 0, 0], heading: 0, boot_nonce: .inf}}}\nprofiles: {}\n",
+        f"neutral: {{a: {{b: {{orientation: [1, 0, 0, 0], heading: 1{'0' * 400}, boot_nonce: 1}}}}}}\n"
+        "profiles: {}\n",
+        "neutral: &none {}\nprofiles: *none\n",
+        "a0: &a0 {b: 1}\n"
+        + "".join(f"a{n}: &a{n} {{<<: [{', '.join([f'*a{n - 1}'] * 10)}]}}\n" for n in range(1, 20)),
     ],
 )
 def test_a_damaged_file_is_set_aside_and_said_once(tmp_path: Path, text: str) -> None:

@@ -9,6 +9,7 @@ import pytest
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorState
+from appliance.sensor.memory import MOST_PROFILES
 from tests.sensor.peers import IMU_ID, KEYS, A, B, Box, Wearable
 
 EIGHT = {f"hand-{n}": SensorKey(f"hand-{n}", 0x100 + n, bytes([n]) * 16) for n in range(8)}
@@ -277,6 +278,19 @@ def test_a_saved_calibration_is_kept_once_and_goes_to_the_next_power_on() -> Non
     assert box.counted() == {"hello": 1, "old_session": 1, "accepted": 1, "profile": 3, "duplicate": 3}
     dance(box, box.pair(boot=2), 0.02)
     assert box.link.sent["restore"] == 1
+
+
+def test_a_sensor_that_sends_calibrations_without_end_fills_nothing() -> None:
+    box = Box()
+    sensor = box.pair()
+    box.hear(sensor.reading())
+    for number in range(1000):
+        assert box.hear(sensor.profile(imu_id=number.to_bytes(16, "big"))) == ()
+    taken = box.link.take_profiles()
+    assert [imu_id[-2:] for imu_id, _ in taken] == [
+        number.to_bytes(2, "big") for number in range(1000 - MOST_PROFILES, 1000)
+    ]
+    assert box.link.take_profiles() == []
 
 
 def test_a_key_file_read_anew_keeps_who_dances_and_sends_away_who_is_gone() -> None:
