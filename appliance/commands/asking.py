@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, get_type_hints
 
-from pythonosc.osc_message import OscMessage, ParseError
+from pythonosc.osc_message import OscMessage
 
 from appliance.show.box import BoxConfig
-from appliance.stage.control import REPLY, Address, datagram
+from appliance.stage.control import REPLY, Address, datagram, readable
 from appliance.stage.roster import END, SENSOR, Message, RosterLine
 
 PATIENCE_S = 2.0  # a tick takes the command, a thread answers: 0.2 s, and more while a box starts
 _LARGEST_DATAGRAM = 4096
+_LINE = tuple(get_type_hints(RosterLine).values())
+_ENDING = (int, float, str)
 
 
 class NoBoxError(Exception):
@@ -59,18 +63,20 @@ class RunningBox:
         """Have one command carried out. Raises NoBoxError."""
         for reply in self._replies((address, *arguments)):
             if reply.address == REPLY and len(reply.params) == 3 and reply.params[0] == address:
-                return Answer(bool(reply.params[1]), str(reply.params[2]))
+                return Answer(bool(reply.params[1]), readable(str(reply.params[2])))
         raise self._nobody()
 
     def roll(self) -> Roll:
         """How all its sensors are. Raises NoBoxError."""
-        lines = []
+        lines: list[RosterLine] = []
         for reply in self._replies(("/sensors/list",)):
-            if reply.address == SENSOR and len(reply.params) == len(RosterLine._fields):
-                lines.append(RosterLine(*reply.params))
-            elif reply.address == END and len(reply.params) == 3 and reply.params[0] == len(lines):
+            if reply.address == SENSOR and _is_made_of(_LINE, reply.params):
+                lines.append(RosterLine(*(_shown(value) for value in reply.params)))
+            elif (
+                reply.address == END and _is_made_of(_ENDING, reply.params) and reply.params[0] == len(lines)
+            ):
                 _, age_s, key_file = reply.params
-                return Roll(lines, float(age_s), Path(key_file) if key_file else None)
+                return Roll(lines, float(age_s), Path(_shown(key_file)) if key_file else None)
         raise self._nobody()
 
     def _replies(self, message: Message) -> Iterator[OscMessage]:
@@ -83,11 +89,27 @@ class RunningBox:
             asker.send(datagram(message))
             while (left_s := until - time.monotonic()) > 0:
                 asker.settimeout(left_s)
-                with contextlib.suppress(ParseError):
-                    yield OscMessage(asker.recv(_LARGEST_DATAGRAM))
+                received = asker.recv(_LARGEST_DATAGRAM)
+                try:
+                    reply = OscMessage(received)
+                except Exception:  # python-osc raises many kinds; who listens there may be no box
+                    continue
+                yield reply
 
     def _nobody(self) -> NoBoxError:
         if self._control is None:
             return NoBoxError("The box file opens no control port that could be asked (`control`).")
         host, port = self._control
         return NoBoxError(f"No box answers on {host}:{port}.")
+
+
+def _is_made_of(kinds: Sequence[type], values: Sequence[object]) -> bool:
+    """Whether these are finite numbers and texts as a box sends them: on its port, anyone may listen."""
+    return len(values) == len(kinds) and all(
+        isinstance(value, int | float) and math.isfinite(value) if kind is float else isinstance(value, kind)
+        for value, kind in zip(values, kinds, strict=True)
+    )
+
+
+def _shown(value: Any) -> Any:
+    return readable(value) if isinstance(value, str) else value

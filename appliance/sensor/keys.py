@@ -149,6 +149,10 @@ def _sensor(path: Path, name_node: yaml.Node, entry_node: yaml.Node) -> SensorKe
         raise KeyFileError(
             path, _line(name_node), f"a sensor's name has at most {LONGEST_NAME} letters; {ENTRY}"
         )
+    if not name.isprintable():
+        raise KeyFileError(
+            path, _line(name_node), "a sensor's name has no control characters: choose one that can be read"
+        )
     if not isinstance(entry_node, yaml.MappingNode):
         raise KeyFileError(path, _line(entry_node), f"sensor {name!r} needs a device id and a key; {ENTRY}")
     values: dict[str, tuple[int, str]] = {}

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pythonosc.osc_message_builder import OscMessageBuilder
+from pythonosc.osc_message_builder import BuildError, OscMessageBuilder
 from pythonosc.osc_packet import OscPacket
 
 from appliance.sensor.keys import KeyFileError, SensorKey, load_keys
@@ -23,9 +23,10 @@ from appliance.stage.roster import Message, Roster
 
 _LARGEST_DATAGRAM = 4096
 _PAUSE_S = 0.002  # after each datagram: a flood takes at most a few percent of the interpreter from the tick
+_A_PAUSE = 8  # messages of a bundle for which one pause is enough
 _WAITING = 64  # commands that may wait for a tick; then the oldest gives way
 _LISTEN_S = 0.1  # how soon the thread notices that the show is over, or that an answer waits
-_PAUSE_AFTER_RELOAD_S = 0.1  # reading the key file is some milliseconds of work
+_PAUSE_AFTER_RELOAD_S = 0.1  # reading a changed key file is some milliseconds of work
 
 Address = tuple[str, int]
 
@@ -74,10 +75,13 @@ FORMS = {
     "/sensors/list": _Form("list"),
 }
 ANSWERED, REPLY = "/sensors/", "/sensors/reply"
+_ONCE_A_BUNDLE = ("/sensors/list", "/sensors/reload")  # much work, and the same each time
 
 
 def command(address: str, arguments: Sequence[object]) -> Command:
     """The command in one message. Raises ValueError with one clear sentence."""
+    if not all(text.isprintable() for text in (address, *arguments) if isinstance(text, str)):
+        raise ValueError("A command has no control characters in it.")
     form = FORMS.get(address)
     if form is None:
         raise ValueError(f"{address} is no command of this box. It knows {', '.join(FORMS)}.")
@@ -102,6 +106,11 @@ def _sensor(address: str, form: _Form, arguments: Sequence[object]) -> str:
     if not fewest <= len(arguments) <= most or not all(isinstance(word, str) and word for word in arguments):
         raise ValueError(f"{address} takes a sensor's name{'' if fewest else ', or nothing for all'}.")
     return "".join(map(str, arguments))
+
+
+def readable(text: str) -> str:
+    """What may be shown on a terminal, whoever sent it: no control characters."""
+    return "".join(sign if sign.isprintable() else "?" for sign in text)
 
 
 def datagram(message: Message) -> bytes:
@@ -133,6 +142,7 @@ class Control:
         self.reason = ""
         self._commands: deque[Command] = deque(maxlen=_WAITING)
         self._answers: deque[tuple[Address, Message]] = deque(maxlen=_WAITING)
+        self._read_keys: tuple[object, Mapping[str, SensorKey] | str] | None = None
         self._closing = False
         self._thread = threading.Thread(target=self._listen, name="control", daemon=True)
         self._thread.start()
@@ -161,18 +171,24 @@ class Control:
                 continue
             except OSError:  # an asker who is gone again, told by the kernel
                 received, asker = b"", ("", 0)
-            if received:
-                self._read(received, asker)
+            count = self._read(received, asker) if received else 0
             self._send_answers()
-            time.sleep(_PAUSE_S)
+            time.sleep(_PAUSE_S * max(1.0, count / _A_PAUSE))
 
-    def _read(self, received: bytes, asker: Address) -> None:
+    def _read(self, received: bytes, asker: Address) -> int:
+        """Take one datagram's messages; gives how many there were."""
         try:
             messages = [timed.message for timed in OscPacket(received).messages]
         except Exception as error:  # python-osc raises many kinds; whatever came, the show goes on
             self._refuse(str(error))
-            return
+            return 1
+        once: set[str] = set()
         for one in messages:
+            if one.address in once:
+                self._refuse(f"{one.address} came twice in a bundle: once is enough.")
+                continue
+            if one.address in _ONCE_A_BUNDLE:
+                once.add(one.address)
             is_answered = one.address.startswith(ANSWERED)
             try:
                 order = command(one.address, one.params)
@@ -183,19 +199,42 @@ class Control:
                 self._refuse(str(error))
                 if is_answered:
                     self._answers.append((asker, (REPLY, one.address, 0, str(error))))
+        return len(messages)
 
     def _lay_down(self, order: Command) -> None:
         """Lists are told at once; a reload takes the keys along; the rest is the tick's."""
         if order.name == "list" and order.asker is not None:
             for message in self._roster.messages(time.monotonic()):
                 self._send(order.asker, message)
+                time.sleep(_PAUSE_S)
             return
         if order.name == "reload":
-            order = replace(order, keys=self._read_keys())
-            time.sleep(_PAUSE_AFTER_RELOAD_S)
+            order = replace(order, keys=self._keys())
         self._commands.append(order)
 
-    def _read_keys(self) -> Mapping[str, SensorKey]:
+    def _keys(self) -> Mapping[str, SensorKey]:
+        """What the key file holds; read only when it has changed, however often someone asks."""
+        stamp = self._stamp()
+        if self._read_keys is None or self._read_keys[0] != stamp:
+            try:
+                self._read_keys = stamp, self._load_keys()
+            except ValueError as error:
+                self._read_keys = stamp, str(error)
+            time.sleep(_PAUSE_AFTER_RELOAD_S)
+        read = self._read_keys[1]
+        if isinstance(read, str):
+            raise ValueError(read)
+        return read
+
+    def _stamp(self) -> object:
+        """What changes with the key file; None when nothing is there."""
+        try:
+            status = self._key_file.stat() if self._key_file is not None else None
+        except OSError:
+            return None
+        return status and (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+
+    def _load_keys(self) -> Mapping[str, SensorKey]:
         if self._key_file is None:
             raise ValueError("This box has no key file: name one under sensors.keys in its box file.")
         try:
@@ -210,12 +249,12 @@ class Control:
 
     def _refuse(self, reason: str) -> None:
         self.refused += 1
-        self.reason = reason
+        self.reason = readable(reason)
 
     def _send_answers(self) -> None:
         while self._answers:
             self._send(*self._answers.popleft())
 
     def _send(self, asker: Address, message: Message) -> None:
-        with contextlib.suppress(OSError):  # who asked is gone
+        with contextlib.suppress(OSError, BuildError):  # who asked is gone; no OSC text
             self._socket.sendto(datagram(message), asker)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -18,12 +19,13 @@ import yaml
 from rich.console import Console
 
 from appliance.cli import main
+from appliance.commands.asking import RunningBox as AskedBox
 from appliance.commands.sensor_table import SensorTable
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorState
 from appliance.sensor.wire import HAS_PROFILE, IS_NDOF
-from appliance.stage.control import Command, Control
-from appliance.stage.roster import Roster, RosterLine
+from appliance.stage.control import Command, Control, datagram
+from appliance.stage.roster import Message, Roster, RosterLine
 
 LEFT = SensorState(
     *("left-wrist", 0x1A2B3C4D, "linked", "192.168.4.7:2390", 49.96, 0.0123, 0.0042, 0.013),
@@ -330,3 +332,63 @@ def test_provision_says_what_is_wrong_before_it_opens_a_port(
         assert ended.value.code == 2
         assert complaint in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+class Impostor:
+    """Somebody else on the control port while no box runs; replies with whatever he likes."""
+
+    def __init__(self, folder: Path, replies: list[Message]) -> None:
+        self._replies = replies
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", 0))
+        self.box_file = folder / "box.yaml"
+        control = {"host": "127.0.0.1", "port": self._socket.getsockname()[1]}
+        self.box_file.write_text(yaml.safe_dump({"sensors": {"keys": "sensors.keys"}, "control": control}))
+        threading.Thread(target=self._answer, daemon=True).start()
+
+    def _answer(self) -> None:
+        _, asker = self._socket.recvfrom(4096)
+        for reply in self._replies:
+            self._socket.sendto(datagram(reply), asker)
+
+
+OBEYED = "\x1b]0;mine\x07\x1b[2J\x9b31m"
+
+
+def test_what_an_impostor_replies_commands_no_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist"])
+    line = ("name", "1", *(OBEYED,) * 2, 50.0, 0.0, 0.0, 0.0, 9, 0, 0, *(OBEYED,) * 4)
+    listed: list[Message] = [("/sensors/sensor", *line), ("/sensors/end", 1, 0.1, OBEYED)]
+    with ends(capsys, 0, "--box", str(Impostor(tmp_path, listed).box_file)) as (out, _):
+        assert "mine" in out
+    told: list[Message] = [("/sensors/reply", "/sensors/strobe", 1, OBEYED)]
+    with ends(capsys, 0, "strobe", "head", "--box", str(Impostor(tmp_path, told).box_file)) as (words, _):
+        assert "mine" in words
+    assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", out + words)
+
+
+@pytest.mark.parametrize(
+    "replies",
+    [
+        [("/sensors/end", 0, "x", 7)],
+        [("/sensors/end", "0", 0.1, "")],
+        [("/sensors/sensor", *range(15)), ("/sensors/end", 1, 0.1, "")],
+        [("/sensors/sensor", *"abcdefghijklmno"), ("/sensors/end", 1, 0.1, "")],
+        [
+            ("/sensors/sensor", *"abcd", float("nan"), float("inf"), 0.0, 0.0, 1, 1, 1, *"lmno"),
+            ("/sensors/end", 1, 0.1, ""),
+        ],
+    ],
+)
+def test_nonsense_from_an_impostor_is_no_box(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    replies: list[Message],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(AskedBox.__init__, "__defaults__", (0.2,))
+    create_keys(tmp_path / "sensors.keys", ["left-wrist"])
+    with ends(capsys, 0, "--box", str(Impostor(tmp_path, replies).box_file)) as (out, _):
+        assert "No box answers" in out

@@ -296,6 +296,12 @@ def test_lines_are_found_among_packets_wherever_the_stream_begins() -> None:
     assert TextOnCable().feed(b"nk saved\r\nok\r\n") == ["nk saved", "ok"]
 
 
+@pytest.mark.parametrize("sign", ["\x1b[2J", "\x7f", "\x9b31m", "\x90"])
+def test_a_line_that_a_terminal_would_obey_is_dropped(sign: str) -> None:
+    received = f"ok name {sign}\r\nok caf\u00e9\r\n".encode()
+    assert TextOnCable().feed(received) == ["ok caf\u00e9"]
+
+
 def test_from_the_middle_of_a_packet_it_still_finds_the_wearable() -> None:
     with FakeWearable() as fake:
         interrupted = os.open(fake.port, os.O_RDWR | os.O_NOCTTY)

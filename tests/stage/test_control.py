@@ -10,10 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message import OscMessage
+from pythonosc.osc_message_builder import OscMessageBuilder
 from pythonosc.udp_client import SimpleUDPClient
 
-from appliance.sensor.keys import create_keys, load_keys
+from appliance.sensor.keys import SensorKey, create_keys, load_keys
 from appliance.sensor.link import SensorState
 from appliance.stage.control import Command, Control, command, datagram
 from appliance.stage.roster import Roster
@@ -88,6 +90,9 @@ def test_commands_arrive_in_order(control: Control) -> None:
         ("/sensors/neutral", [1], "or nothing for all"),
         ("/sensors/heading", [""], "or nothing for all"),
         ("/sensors/reload", ["now"], "takes 0 numbers"),
+        ("/sensors/strobe", ["\x1b[2J"], "no control characters"),
+        ("/mocap/releasejoint", ["\x9b31m"], "no control characters"),
+        ("/player/\x1b[2J", [], "no control characters"),
     ],
 )
 def test_what_is_no_command_is_refused_in_words(
@@ -107,6 +112,57 @@ def test_nonsense_is_counted_and_the_port_goes_on_listening(control: Control) ->
     assert next_command(control) == Command("start")
     assert control.refused > 0
     assert control.reason
+
+
+def bundle(address: str, count: int) -> bytes:
+    builder = OscBundleBuilder(IMMEDIATELY)
+    for _ in range(count):
+        builder.add_content(OscMessageBuilder(address).build())
+    return bytes(builder.build().dgram)
+
+
+def test_a_bundle_full_of_questions_is_answered_once_and_holds_up_nobody(control: Control) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.settimeout(0.5)
+        begun = time.monotonic()
+        for address in ("/sensors/reload", "/sensors/list"):
+            sender.sendto(bundle(address, 150), ("127.0.0.1", control.port))
+        SimpleUDPClient("127.0.0.1", control.port).send_message("/player/stop", [])
+        assert [next_command(control).name, next_command(control).name] == ["reload", "stop"]
+        assert time.monotonic() - begun < 5.0
+        assert [OscMessage(sender.recv(4096)).address for _ in range(3)][-1] == "/sensors/end"
+        with pytest.raises(TimeoutError):
+            sender.recv(4096)
+    assert control.refused == 2 * 149
+
+
+def test_a_key_file_that_has_not_changed_is_not_read_again(
+    control: Control, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reads: list[Path] = []
+
+    def read(path: Path) -> dict[str, SensorKey]:
+        reads.append(path)
+        return load_keys(path)
+
+    monkeypatch.setattr("appliance.stage.control.load_keys", read)
+    client = SimpleUDPClient("127.0.0.1", control.port)
+    for _ in range(20):
+        client.send_message("/sensors/reload", [])
+        assert len(next_command(control).keys) == 2
+    assert len(reads) == 1
+    (tmp_path / "sensors.keys").unlink()
+    create_keys(tmp_path / "sensors.keys", ["left-wrist", "spare-1", "spare-2"])
+    client.send_message("/sensors/reload", [])
+    assert len(next_command(control).keys) == 3
+
+
+def test_a_reason_may_be_shown_on_any_terminal(control: Control) -> None:
+    SimpleUDPClient("127.0.0.1", control.port).send_message("/\x1b]0;mine\x07\x9b31m", [])
+    until = time.monotonic() + 10.0
+    while not control.reason and time.monotonic() < until:
+        time.sleep(0.001)
+    assert control.reason.isprintable()
 
 
 def test_a_taken_port_raises_and_a_closed_one_is_free_again() -> None:

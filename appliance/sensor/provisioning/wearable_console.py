@@ -28,6 +28,7 @@ _ASK_AGAIN_S = 3.0
 _IMU_STARTS_S = 2.0  # the BNO055 takes 0.65 s after power-on, and some tries
 _ASK_FOR_IMU_S = 0.2
 _QUIET_S = 0.15
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f]")  # nothing that a terminal would obey is ever shown
 _LONGEST_ANSWER = 256
 _IDENTITY = re.compile(
     r"ok bunraku-wearable (?P<firmware>\S+) wire (?P<wire>[0-9a-f]{8}) "
@@ -189,7 +190,7 @@ class TextOnCable:
                 lines += complete
             self._rest = self._rest[-_LONGEST_ANSWER:]
         texts = (line.strip(b"\r").decode("utf-8", "replace") for line in lines)
-        return [text for text in texts if text and min(text) >= " "]
+        return [text for text in texts if text and not _CONTROL.search(text)]
 
 
 def _cannot_open(device: str, error: Exception) -> str:
