@@ -76,6 +76,7 @@ constexpr uint32_t WDT_CTRL_ENABLE = 1ul << 1, WDT_CONFIG_PER_16K = 0xB, WDT_STA
 constexpr uint32_t WDT_CLEAR_CLEAR_KEY = 0xA5;
 
 constexpr uint32_t GCLK_STATUS_SYNCBUSY = 1ul << 7, GCLK_CLKCTRL_CLKEN = 1ul << 14;
+constexpr uint32_t GCLK_CLKCTRL_ID_SERCOMX_SLOW = 0x13, GCLK_CLKCTRL_GEN_GCLK1 = 1ul << 8;
 constexpr uint32_t GCLK_GENCTRL_SRC_OSCULP32K = 3ul << 8, GCLK_GENCTRL_GENEN = 1ul << 16;
 constexpr uint32_t GCLK_GENCTRL_DIVSEL = 1ul << 20;
 #define GCLK_CLKCTRL_ID(value) (0x3Ful & (value))

@@ -73,12 +73,16 @@ uint32_t MkrBoard::serial_number() {
 // 32 kHz oscillator divided by 2^(4+1).
 void MkrBoard::start_watchdog() {
   GCLK->GENDIV.reg = GCLK_GENDIV_ID(kWatchdogClock) | GCLK_GENDIV_DIV(4);
+  while (GCLK->STATUS.reg & GCLK_STATUS_SYNCBUSY) {
+  }
   GCLK->GENCTRL.reg =
       GCLK_GENCTRL_ID(kWatchdogClock) | GCLK_GENCTRL_GENEN | GCLK_GENCTRL_SRC_OSCULP32K | GCLK_GENCTRL_DIVSEL;
   while (GCLK->STATUS.reg & GCLK_STATUS_SYNCBUSY) {
   }
   GCLK->CLKCTRL.reg = static_cast<uint16_t>(GCLK_CLKCTRL_ID(kWatchdogClient) | GCLK_CLKCTRL_CLKEN |
                                             GCLK_CLKCTRL_GEN(kWatchdogClock));
+  while (GCLK->STATUS.reg & GCLK_STATUS_SYNCBUSY) {
+  }
   WDT->CTRL.reg = 0;
   while (WDT->STATUS.reg & WDT_STATUS_SYNCBUSY) {
   }

@@ -58,13 +58,23 @@ void WireBus::recover() {
   begin();
 }
 
+// Wire returns before its stop is on the bus, and the chip may stretch that too: a moment is granted.
 bool WireBus::is_free() {
-  return digitalRead(PIN_WIRE_SDA) == HIGH && digitalRead(PIN_WIRE_SCL) == HIGH;
+  for (unsigned waited = 0; waited < kStretchUs; waited += kHalfClockUs) {
+    if (digitalRead(PIN_WIRE_SDA) == HIGH && digitalRead(PIN_WIRE_SCL) == HIGH) return true;
+    delayMicroseconds(kHalfClockUs);
+  }
+  return false;
 }
 
 // SAM D21 data sheet, SERCOM I2C CTRLA: LOWTOUTEN ends a transaction whose clock is low for 25 to 35 ms.
-// INACTOUT stays off: its 200 us are less than the BNO055 stretches.
+// It counts by the SERCOMs' slow clock, which the core leaves without a source: here the 32 kHz crystal, which
+// the core has put on generator 1. INACTOUT stays off: its 200 us are less than the BNO055 stretches.
 void WireBus::limit_waits() {
+  GCLK->CLKCTRL.reg =
+      static_cast<uint16_t>(GCLK_CLKCTRL_ID_SERCOMX_SLOW | GCLK_CLKCTRL_GEN_GCLK1 | GCLK_CLKCTRL_CLKEN);
+  while (GCLK->STATUS.reg & GCLK_STATUS_SYNCBUSY) {
+  }
   auto& i2c = SERCOM2->I2CM;
   i2c.CTRLA.reg &= ~SERCOM_I2CM_CTRLA_ENABLE;  // the field is locked while enabled
   while (i2c.SYNCBUSY.reg & SERCOM_I2CM_SYNCBUSY_ENABLE) {
