@@ -8,17 +8,22 @@ namespace {
 
 constexpr unsigned long kJoinMs = 10000;   // begin() waits so long at most; its own default is a minute
 constexpr uint8_t kJoinsBeforeRestart = 3;  // then the Wi-Fi module is restarted: it can hang for good
+constexpr unsigned long kDisconnectMs = 500;  // its answer is waited for so long at most
+constexpr uint8_t kUnsentBeforeReopening = 5;
 
 }  // namespace
 
-bool WifiLink::is_up() { return is_started_ && WiFi.status() == WL_CONNECTED; }
+bool WifiLink::is_up() { return is_started_ && !is_socket_lost_ && WiFi.status() == WL_CONNECTED; }
 
 bool WifiLink::join(const char* network, const char* password) {
   board_.feed_watchdog();
-  is_started_ = WiFi.status() != WL_NO_SHIELD;
+  const uint8_t before = WiFi.status();
+  is_started_ = before != WL_NO_SHIELD;
+  is_socket_lost_ = false;
   if (!is_started_) return false;
-  WiFi.setTimeout(kJoinMs);
   board_.feed_watchdog();
+  if (before == WL_CONNECTED) disconnect();
+  WiFi.setTimeout(kJoinMs);
   const bool is_open = password[0] == '\0';
   const uint8_t status = is_open ? WiFi.begin(network) : WiFi.begin(network, password);
   board_.feed_watchdog();
@@ -27,6 +32,8 @@ bool WifiLink::join(const char* network, const char* password) {
       failed_joins_ = 0;
       is_started_ = false;
       WiFi.end();
+    } else if (status != WL_DISCONNECTED) {
+      disconnect();  // it may be joining still
     }
     return false;
   }
@@ -36,19 +43,33 @@ bool WifiLink::join(const char* network, const char* password) {
 }
 
 void WifiLink::leave() {
-  if (!is_started_) return;
+  if (is_started_) disconnect();
+}
+
+// The module tells later that it has left. A begin() before that would take it for its own failure.
+void WifiLink::disconnect() {
   udp_.stop();
   WiFi.disconnect();
+  const unsigned long asked_ms = millis();
+  while (WiFi.status() != WL_DISCONNECTED && millis() - asked_ms < kDisconnectMs) {
+  }
 }
 
 bool WifiLink::open(uint16_t port) {
+  port_ = port;
+  unsent_ = 0;
   udp_.stop();
   return udp_.begin(port) == 1;
 }
 
+// WiFi101 closes the socket by itself, and says so to nobody, when a packet without content comes in.
 bool WifiLink::send(const Address& to, const uint8_t* data, uint16_t count) {
+  if (is_socket_lost_) return false;  // without one, endPacket() reads beside its table
   if (udp_.beginPacket(IPAddress(to.ip), to.port) != 1) return false;
-  return udp_.write(data, count) == count && udp_.endPacket() == 1;
+  const bool is_sent = udp_.write(data, count) == count && udp_.endPacket() == 1;
+  unsent_ = is_sent ? uint8_t{0} : static_cast<uint8_t>(unsent_ + 1);
+  if (unsent_ >= kUnsentBeforeReopening) is_socket_lost_ = !open(port_);
+  return is_sent;
 }
 
 // To the network's own broadcast address: a limited one (255.255.255.255) says nothing about the network.

@@ -20,10 +20,15 @@ class WifiLink final : public DatagramLink {
   uint16_t receive(uint8_t* data, uint16_t room, Address& from) override;
 
  private:
+  void disconnect();
+
   Board& board_;
   WiFiUDP udp_;
+  uint16_t port_ = 0;
   bool is_started_ = false;  // else even status() starts the module, which blocks for about a second
+  bool is_socket_lost_ = false;  // closed by the driver and not to be had again: down until the next join
   uint8_t failed_joins_ = 0;
+  uint8_t unsent_ = 0;  // in a row
 };
 
 }  // namespace bunraku

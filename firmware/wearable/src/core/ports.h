@@ -35,7 +35,7 @@ class DatagramLink {
  public:
   virtual bool is_up() = 0;  // joined, by the driver's own word, which can be stale: the heartbeat tells
   virtual bool join(const char* network, const char* password) = 0;  // (blocks, up to 10 s) true: joined
-  virtual void leave() = 0;
+  virtual void leave() = 0;  // (blocks, up to 0.5 s)
   virtual bool open(uint16_t port) = 0;  // (blocks, up to 2 s) a disconnect has closed the socket
   virtual bool send(const Address& to, const uint8_t* data, uint16_t count) = 0;
   virtual bool broadcast(uint16_t port, const uint8_t* data, uint16_t count) = 0;
