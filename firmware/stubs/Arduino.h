@@ -43,6 +43,7 @@ void delayMicroseconds(unsigned int microseconds);
 class Serial_ {
  public:
   void begin(unsigned long baudrate);
+  void end();
   int available();
   int availableForWrite();  // always 63
   int read();
@@ -53,6 +54,12 @@ class Serial_ {
 };
 extern Serial_ SerialUSB;
 #define Serial SerialUSB
+
+class USBDeviceClass {
+ public:
+  bool configured();
+};
+extern USBDeviceClass USBDevice;
 
 void setup();
 void loop();

@@ -23,6 +23,10 @@ bool endpoint_is_free() {
 void UsbSerial::begin() { Serial.begin(115200); }
 
 bool UsbSerial::is_connected() {
+  if (!USBDevice.configured()) {  // plugged in anew: the core still has the DTR of the last time
+    Serial.end();
+    return false;
+  }
   const uint16_t frame = USB->DEVICE.FNUM.reg;
   const uint32_t now_ms = millis();
   if (frame != bus_frame_) {
