@@ -98,7 +98,9 @@ class RunningBox:
 
     def _nobody(self) -> NoBoxError:
         if self._control is None:
-            return NoBoxError("The box file opens no control port that could be asked (`control`).")
+            return NoBoxError(
+                "This box file has no control port that could be asked. Write `control: {port: 9002}` in it."
+            )
         host, port = self._control
         return NoBoxError(f"No box answers on {host}:{port}.")
 

@@ -8,7 +8,7 @@ from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
 from appliance.show.bundle import CHECKSUMS, bundle_bytes, bundle_files, default_show_path, write_checksums
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
-from appliance.stage.cast import admission, assemble
+from appliance.stage.cast import admission, assemble, reach
 from appliance.stage.stage_error import StageError
 
 
@@ -27,6 +27,8 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
         raise StageError(verdict.sentence())
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
+    for warning in reach(cast, box):
+        print(warning)
 
 
 def pack_show(directory: Path) -> None:

@@ -11,6 +11,7 @@ from appliance.commands.emulation import Emulation
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
+from appliance.stage.cast import reach
 from appliance.stage.run import Stage, stop_signals
 from appliance.stage.speaker import Speaker
 
@@ -43,7 +44,7 @@ def play_show(
         opened.callback(speaker.close)
         stage = Stage(show, box, journal, speaker.say)
         try:
-            for line in _introduction(stage):
+            for line in _introduction(stage, emulate):
                 speaker.say(line)
             stage.dance(seconds, stopped)
         finally:
@@ -58,7 +59,7 @@ def play_show(
     return 0
 
 
-def _introduction(stage: Stage) -> list[str]:
+def _introduction(stage: Stage, emulate: bool) -> list[str]:
     show = stage.show
     hands = ", ".join(f"{hand.sensor or hand.kind} holds {hand.joint}" for hand in show.config.hands)
     receivers = ", ".join(receiver.name for receiver in stage.cast.outputs.receivers) or "nobody"
@@ -68,6 +69,8 @@ def _introduction(stage: Stage) -> list[str]:
         stage.admission.sentence(),
     ]
     lines += stage.cast.complaints
+    if not emulate:
+        lines += reach(stage.cast, stage.box)
     return lines
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from appliance.commands.sensors import NOT_TAKEN, Venue, clear_errors, people_console, reload
+from appliance.commands.sensors import NOT_TAKEN, Venue, clear_errors, people_console, reload, require_folder
 from appliance.sensor.provisioning.provisioning import (
     DEFAULT_PORT,
     Provisioned,
@@ -20,6 +20,7 @@ from appliance.sensor.provisioning.provisioning import (
 )
 from appliance.sensor.provisioning.serial_ports import NoWearableError, found_ports, only_wearable
 from appliance.sensor.provisioning.wearable_console import ConsoleError, WearableConsole
+from appliance.show.box import out_of_reach
 from appliance.stage.stage_error import StageError
 
 STDIN = Path("-")
@@ -41,6 +42,7 @@ def provision_sensor(
     def say(what: str, words: str) -> None:
         _step(console, what, words)
 
+    require_folder(place.keys)
     try:
         settings = Settings(name, network or "", "", _udp_port(place), fusion, _axes(axes))
         is_asked = network is not None and password_file is None and sys.stdin.isatty()
@@ -129,11 +131,8 @@ def _hints(place: Venue, done: Provisioned, settings: Settings, device: str) -> 
         hints.append(
             f"{name} is ready: unplug it, switch it on, and it looks for its box on '{settings.network}'."
         )
-        if place.box_file is not None and (sensors.udp is None or sensors.udp.host.startswith("127.")):
-            hints.append(
-                f"But {place.box_file} listens to this machine alone: "
-                f"write `udp: {{host: 0.0.0.0, port: {settings.port}}}` under sensors."
-            )
+        if place.box_file is not None and (why := out_of_reach(sensors)):
+            hints.append(why)
     else:
         hints.append(f"{name} is ready: it speaks to the box by cable, as long as it is plugged in.")
         if device not in [line.device for line in sensors.serial]:

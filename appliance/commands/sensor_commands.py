@@ -169,3 +169,11 @@ def rename(
     from appliance.commands.sensors import rename, venue
 
     raise typer.Exit(rename(venue(box, keys), name, new))
+
+
+@sensors.command("reload")
+def read_again(box: BoxFile = None, keys: KeyFile = None) -> None:
+    """Let the running box read the key file that you changed by hand."""
+    from appliance.commands.sensors import read_again, venue
+
+    raise typer.Exit(read_again(venue(box, keys)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import time
 from collections.abc import Callable, Iterator
@@ -67,6 +68,9 @@ def list_sensors(place: Venue, watch: bool, as_json: bool) -> None:
     if not watch:
         console.print(_picture(place))
         return
+    if not console.is_terminal:
+        _watch_in_pipe(place, console)
+        return
     try:
         with Live(_picture(place), console=console, auto_refresh=False, screen=False) as live:
             while True:
@@ -76,12 +80,23 @@ def list_sensors(place: Venue, watch: bool, as_json: bool) -> None:
         return
 
 
+def _watch_in_pipe(place: Venue, console: Console) -> None:
+    """Table after table, each at once: whoever reads may stop at any time."""
+    try:
+        while True:
+            console.print(_picture(place), "")
+            console.file.flush()
+            time.sleep(1.0)
+    except KeyboardInterrupt:
+        return
+
+
 def tell(place: Venue, address: str, *arguments: str) -> None:
     """Send one command to the running box and print its answer. Raises StageError when it is not done."""
     try:
         answer = place.running.ask(address, *arguments)
     except NoBoxError as error:
-        raise StageError(f"{error} {_WHICH_BOX}") from None
+        raise StageError(str(error) if _no_port(place) else f"{error} {_WHICH_BOX}") from None
     if not answer.done:
         raise StageError(answer.words)
     print(answer.words)
@@ -102,8 +117,7 @@ def revoke(place: Venue, name: str) -> int:
     return _edit(
         place,
         lambda change: change.remove(name),
-        f"{name} is revoked: whoever has that sensor moves nothing any more. "
-        "To use it again, provision it again.",
+        f"{name} is revoked: with that key nobody is let in any more. To use it again, provision it again.",
     )
 
 
@@ -114,17 +128,25 @@ def rename(place: Venue, name: str, new: str) -> int:
     )
 
 
+def read_again(place: Venue) -> int:
+    """After a change by hand: have the running box take the key file. The exit status."""
+    with clear_errors(place.keys):
+        load_keys(place.keys)
+    is_well, words = reload(place)
+    print(words)
+    return 0 if is_well else NOT_TAKEN
+
+
 def reload(place: Venue) -> tuple[bool, str]:
     """Have the running box read the key file again: whether it is as it should be, and a sentence."""
     try:
         roll = place.running.roll()
         if roll.key_file is not None and roll.key_file.resolve() != place.keys.resolve():
-            return False, (
-                f"The running box reads another key file ({roll.key_file}) and knows nothing of this change. "
-                "Give the box file of that box with --box."
-            )
+            return False, f"{_other_file(roll.key_file)} and knows nothing of this change. {_THAT_BOX}"
         answer = place.running.ask("/sensors/reload")
     except NoBoxError as error:
+        if _no_port(place):
+            return True, "The box has no control port to be told by: the change counts when it starts again."
         return True, f"{error} The change counts when it starts."
     return answer.done, f"The running box {'took it' if answer.done else 'did not take it'}. {answer.words}"
 
@@ -137,15 +159,25 @@ def clear_errors(path: Path) -> Iterator[None]:
     except KeyFileError as error:
         raise StageError(f"{error}.") from None
     except FileNotFoundError:
-        missing = f"key file {path}" if path.parent.is_dir() else f"folder {path.parent} for the key file"
-        raise StageError(f"There is no {missing}. {_WHICH_KEYS}") from None
+        require_folder(path)
+        raise StageError(f"There is no key file {path}. {_WHICH_KEYS}") from None
     except OSError as error:
+        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        cure = "Free some space, then run this again." if is_full else "May this user read and write there?"
+        raise StageError(f"{path}: {error.strerror}. Nothing was changed. {cure}") from None
+
+
+def require_folder(path: Path) -> None:
+    """Raises StageError when the key file's folder is not there."""
+    if not path.parent.is_dir():
         raise StageError(
-            f"{path}: {error.strerror}. Nothing was changed. May this user read and write there?"
-        ) from None
+            f"There is no folder {path.parent} for the key file. Nothing was changed. "
+            "Make it, or correct `keys` under sensors in the box file."
+        )
 
 
 _WHICH_BOX = "Is it running here? Its box file (--box) tells the control port, if it is not the usual one."
+_THAT_BOX = "Give the box file of that box with --box."
 _WHICH_KEYS = "Name it with --keys, or the box file with --box; the first bunraku provision makes one."
 
 
@@ -180,8 +212,39 @@ def _picture(place: Venue) -> Group:
     if roll.age_s > _OLD_ROLL_S:
         parts.append(Text(f"\nThis is {roll.age_s:.0f} s old: the box hangs, or is very busy.", style="red"))
     complaints = [line.complaint for line in roll.lines if line.complaint]
+    complaints += _about_file(place, roll)
     parts += [Text(f"\n{words}", style="yellow") for words in complaints]
     return Group(*parts)  # type: ignore[arg-type]
+
+
+def _no_port(place: Venue) -> bool:
+    control = place.box.control
+    return control is None or control.port == 0
+
+
+def _other_file(key_file: Path) -> str:
+    return f"The running box reads another key file ({key_file})"
+
+
+def _about_file(place: Venue, roll: Roll) -> list[str]:
+    """What would surprise at the next start: another key file, a damaged one, a changed or an open one."""
+    if roll.age_s < 0 or roll.key_file is None:
+        return []
+    if place.box_file is not None and roll.key_file.resolve() != place.keys.resolve():
+        return [f"{_other_file(roll.key_file)}, not {place.keys}. {_THAT_BOX}"]
+    try:
+        in_file = {(key.name, f"{key.device_id:08x}") for key in load_keys(roll.key_file).values()}
+        warning = exposure(roll.key_file)
+    except KeyFileError as error:
+        return [
+            f"{error}. The box goes on with the keys that it has; it lets nobody in when it starts again."
+        ]
+    except OSError:  # another user's file, or another machine's: the box's own matter
+        return []
+    notes = [warning] if warning else []
+    if in_file != {(line.name, line.device_id) for line in roll.lines}:
+        notes.append(f"{roll.key_file} has other sensors than the running box. Run: bunraku sensors reload")
+    return notes
 
 
 def _picture_of_file(place: Venue, why: str) -> Group:

@@ -69,7 +69,7 @@ class KeyEditing:
         self._require(name)
         self._require_good_name(new)
         if new in self.keys:
-            raise KeyFileError(self.path, 1, f"there is a sensor {new!r} already; choose another name")
+            raise KeyFileError(self.path, None, f"there is a sensor {new!r} already; choose another name")
         self._rename({name: new})
 
     def swap(self, name: str, other: str) -> None:
@@ -114,12 +114,12 @@ class KeyEditing:
 
     def _require(self, name: str) -> None:
         if name not in self.keys:
-            raise KeyFileError(self.path, 1, unknown_sensor(name, dict(self.keys)))
+            raise KeyFileError(self.path, None, unknown_sensor(name, dict(self.keys)))
 
     def _require_good_name(self, name: str) -> None:
         fault = name_fault(name)
         if fault:
-            raise KeyFileError(self.path, 1, fault)
+            raise KeyFileError(self.path, None, fault)
 
 
 @contextmanager
@@ -152,7 +152,7 @@ def _lock(folder: int, path: Path) -> None:
         except BlockingIOError:
             if time.monotonic() > until:
                 raise KeyFileError(
-                    path, 1, "another bunraku is changing this file; try again when it is done"
+                    path, None, "another bunraku is changing this file; try again when it is done"
                 ) from None
             time.sleep(0.05)
 

@@ -24,8 +24,8 @@ ENTRY = "one entry looks like: 'left-wrist: {device: 0x1a2b3c4d, key: 32 hexadec
 class KeyFileError(ValueError):
     """A key file that cannot be used: which line, what is wrong, what to do. Never contains a key."""
 
-    def __init__(self, path: Path, line: int, message: str) -> None:
-        super().__init__(f"{path}:{line}: {message}")
+    def __init__(self, path: Path, line: int | None, message: str) -> None:
+        super().__init__(f"{path}: {message}" if line is None else f"{path}:{line}: {message}")
         self.path = path
         self.line = line
         self.message = message

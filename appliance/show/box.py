@@ -18,7 +18,9 @@ class UdpConfig(Section):
     """Where sensors' datagrams arrive."""
 
     host: Ipv4 = Field(
-        default="127.0.0.1", description="Address to listen on; 0.0.0.0 for all of the box's networks."
+        default="127.0.0.1",
+        description="Address to listen on. Wearables on Wi-Fi need 0.0.0.0: they call everybody on the "
+        "network, and no other address hears that.",
     )
     port: int = Field(default=9750, ge=0, le=65535, description="UDP port; 0 takes any free one.")
 
@@ -45,6 +47,24 @@ class SensorsConfig(Section):
         default=True,
         description="A short flash of a sensor's lamp each 3 seconds says that it is linked; false: it stays "
         "dark on stage. Lights that ask for something are shown all the same.",
+    )
+
+
+def out_of_reach(sensors: SensorsConfig) -> str | None:
+    """Why wearables on Wi-Fi do not reach the box, and what to do; None when they do.
+
+    Their hello is a broadcast, which the kernel gives to sockets on 0.0.0.0 alone.
+    """
+    udp = sensors.udp
+    if udp is not None and udp.host == "0.0.0.0":
+        return None
+    where = "to no network" if udp is None else f"on {udp.host} alone, and they call everybody on the network"
+    if udp is not None and udp.host.startswith("127."):
+        where = "to this machine alone"
+    port = udp.port if udp is not None and udp.port else UdpConfig().port
+    return (
+        f"No wearable on Wi-Fi reaches the box: it listens {where}. "
+        f"Write `udp: {{host: 0.0.0.0, port: {port}}}` under sensors in the box file."
     )
 
 

@@ -30,13 +30,13 @@ from appliance.sensor.keys import KeyFileError, SensorKey, load_keys, unknown_se
 from appliance.sensor.link import SensorLink, SensorReading, open_link
 from appliance.sensor.neutral import Mounting, joint_from_reading
 from appliance.sensor.ways.udp import PortError
-from appliance.show.box import BoxConfig
+from appliance.show.box import BoxConfig, out_of_reach
 from appliance.show.show import HandConfig, Show
 from appliance.stage.budget import Admission, admit
 from appliance.stage.realtime import borrowed_priority
 from appliance.stage.stage_error import StageError
 
-_CURE = "Check sensors.keys in the box file, or run: bunraku provision."
+_MOVES_FREELY = "No sensor is let in, and the dancer moves freely."
 
 
 @dataclass(slots=True)
@@ -139,6 +139,15 @@ def admission(cast: Cast, show: Show, box: BoxConfig) -> Admission:
         )
 
 
+def reach(cast: Cast, box: BoxConfig) -> list[str]:
+    """A warning when keys are there, but no wearable can reach this box: neither by Wi-Fi nor by cable."""
+    sensors = box.sensors
+    if not cast.worn or sensors.keys is None or sensors.serial:
+        return []
+    why = out_of_reach(sensors)
+    return [why] if why else []
+
+
 def _puppeteer(hand: HandConfig) -> Puppeteer:
     if hand.sensor is not None:
         mounting = _mounting(hand)
@@ -206,12 +215,17 @@ def _keys(path: Path | None, sensors: Sequence[str]) -> tuple[dict[str, SensorKe
         )
     try:
         keys = load_keys(path)
-    except (KeyFileError, OSError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        place = f"{path}: the sensors' key file cannot be read" if isinstance(error, OSError) else "Key file"
-        return {}, (f"{place} ({reason}). No sensor is let in, and the dancer moves freely. {_CURE}",)
+    except KeyFileError as error:
+        return {}, (f"{error}. {_MOVES_FREELY} Mend the key file.",)
+    except FileNotFoundError:
+        cure = "Correct `keys` under sensors in the box file, or run: bunraku provision."
+        return {}, (f"There is no key file {path}. {_MOVES_FREELY} {cure}",)
+    except OSError as error:
+        reason = f"{path}: the key file cannot be read ({error.strerror})"
+        return {}, (f"{reason}. {_MOVES_FREELY} Let this user read it, or play as the user who provisioned.",)
     return keys, tuple(
-        f"{path}: {unknown_sensor(name, keys)}. It is not let in, and the dancer moves freely there. {_CURE}"
+        f"{path}: {unknown_sensor(name, keys)}. It is not let in, and the dancer moves freely there. "
+        f"Provision it (bunraku provision --name {name}), or rename another one (bunraku sensors rename)."
         for name in sensors
         if name not in keys
     )

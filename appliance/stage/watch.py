@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 
 from appliance.sensor import wire
 from appliance.sensor.link import SensorState
@@ -33,7 +33,7 @@ class Watch:
         """
         for sensor in sensors:
             yield from self._links(sensor)
-        yield from self._silences(now)
+        yield from self._silences(now, {sensor.name for sensor in sensors})
         yield from self._receivers()
         if self._cast.puppet.is_broken != self._network_failed:
             self._network_failed = self._cast.puppet.is_broken
@@ -67,7 +67,8 @@ class Watch:
         joints = [puppeteer.joint for puppeteer in self._cast.worn.get(name, ())]
         return f"and holds {', '.join(joints)}" if joints else "and holds no joint of this show"
 
-    def _silences(self, now: float) -> Iterator[str]:
+    def _silences(self, now: float, known: Set[str]) -> Iterator[str]:
+        """`known`: who has a key; one that was revoked is silent for good, and that was said."""
         for name, joints in self._cast.worn.items():
             silent_s = joints[0].silent_s(now)
             if silent_s <= SILENT_S:
@@ -75,7 +76,7 @@ class Watch:
                 if name in self._silent:
                     self._silent.remove(name)
                     yield f"Sensor {name} is back. It takes its joint again."
-            elif name in self._heard and name not in self._silent:
+            elif name in self._heard and name not in self._silent and name in known:
                 self._silent.add(name)
                 yield (
                     f"Sensor {name} silent for {silent_s:.1f} s. The dancer moves freely. Check its battery."

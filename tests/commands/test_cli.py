@@ -14,6 +14,7 @@ import typer
 
 from appliance.cli import main, plug_in
 from appliance.pose.bvh import write_bvh
+from appliance.sensor.keys import create_keys
 from appliance.show.bundle import write_checksums
 from appliance.stage.journal import Journal
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show
@@ -122,7 +123,7 @@ def test_check_refuses_iterations_that_the_budget_cannot_hold(
             "no sensor 'left-wrist' in the key file",
         ),
         ("left-wrist: {device: 7}\n", "sensors.keys:1: sensor 'left-wrist' has no key"),
-        (None, "cannot be read (No such file or directory)"),
+        (None, "There is no key file"),
     ],
     ids=["revoked", "damaged", "absent"],
 )
@@ -140,6 +141,30 @@ def test_without_a_sensors_key_check_refuses_and_play_dances(
     assert said in words
     assert "the dancer moves freely" in words
     assert re.search(r"Danced [1-9]\d* ticks", words)
+
+
+@pytest.mark.parametrize(
+    ("udp", "said"),
+    [
+        ("{host: 127.0.0.1, port: 0}", "it listens to this machine alone"),
+        ("{host: 0.0.0.0, port: 0}", ""),
+        ("null", "it listens to no network"),
+    ],
+)
+def test_a_box_that_no_wearable_reaches_is_said(
+    udp: str, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    show = write_show(tmp_path / "show")
+    write_checksums(show)
+    box = tmp_path / "box.yaml"
+    box.write_text(f"sensors: {{udp: {udp}, keys: sensors.keys}}\ncontrol: null\noutputs: {{osc: []}}\n")
+    create_keys(tmp_path / "sensors.keys", ["left-wrist"])
+    for words in (
+        succeeded(capfd, "check", str(show), "--box", str(box)),
+        succeeded(capfd, "play", "--show", str(show), "--box", str(box), "--seconds", "0.2"),
+    ):
+        assert ("No wearable on Wi-Fi reaches the box" in words) == bool(said)
+        assert said in words
 
 
 def test_a_filmstrip_of_a_recording_and_of_a_journal(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import re
 import signal
 import socket
@@ -171,7 +173,7 @@ def test_without_a_box_it_lists_the_key_file(tmp_path: Path, capsys: pytest.Capt
     box_file = tmp_path / "box.yaml"
     box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
     with ends(capsys, 0, "--box", str(box_file)) as (out, _):
-        assert "opens no control port" in out
+        assert "has no control port" in out
         assert re.search(r"^left-wrist  [0-9a-f]{8}", out, re.MULTILINE)
         assert load_keys(tmp_path / "sensors.keys")["head"].key.hex() not in out
     (tmp_path / "sensors.keys").chmod(0o644)
@@ -240,12 +242,74 @@ def test_a_box_with_another_key_file_is_named(tmp_path: Path, capsys: pytest.Cap
     box.close()
 
 
+def test_what_is_wrong_with_the_key_file_of_a_running_box_is_said(
+    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keys = tmp_path / "sensors.keys"
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "has other sensors than the running box. Run: bunraku sensors reload" in out
+    keys.write_text(
+        "".join(
+            f"{one.name}: {{device: {one.device_id}, key: {one.device_id:032x}}}\n" for one in (LEFT, SPARE)
+        )
+        + f"head: {{device: {LOST.device_id + 1}, key: {7:032x}}}\n"
+    )
+    states = [LEFT, SPARE, LOST._replace(device_id=LOST.device_id + 1)]
+    box.roster.refresh(states, lambda _: "", time.monotonic())
+    keys.chmod(0o644)
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "has other sensors" not in out
+        assert "can be read by other users" in out
+    keys.write_text("left-wrist: {devise: 7}\n")
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "unknown field 'devise'" in out
+        assert "goes on with the keys that it has" in out
+    with ends(capsys, 2, "reload", "--box", str(box.box_file)) as (_, err):
+        assert "unknown field 'devise'" in err
+    assert box.obeyed == []
+
+
+def test_a_key_file_changed_by_hand_reaches_the_box(
+    box: RunningBox, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with ends(capsys, 0, "reload", "--box", str(box.box_file)) as (out, _):
+        assert "The running box took it." in out
+    assert [order.name for order in box.obeyed] == ["reload"]
+
+
+def test_watching_through_a_pipe_is_told_at_once(box: RunningBox) -> None:
+    command = [sys.executable, "-m", "appliance.cli", "sensors", "--watch", "--box", str(box.box_file)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        while not (line := process.stdout.readline()).startswith("left-wrist"):
+            assert line
+        process.stdout.close()  # as `head` does
+        process.wait(60)
+        assert process.stderr.read() == ""
+
+
+def test_a_folder_that_is_not_there_and_a_full_disk_are_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keys = tmp_path / "sensors.keys"
+    create_keys(keys, ["head"])
+    monkeypatch.setattr(os, "fsync", lambda _: (_ for _ in ()).throw(OSError(errno.ENOSPC, "No space left")))
+    with ends(capsys, 2, "revoke", "head", "--keys", str(keys)) as (_, err):
+        assert "No space left. Nothing was changed. Free some space" in err
+    nowhere = str(tmp_path / "nowhere" / "sensors.keys")
+    with pytest.raises(SystemExit) as ended:  # before it asks for a password or opens a port
+        main(["provision", "--name", "head", "--network", "stage", "--keys", nowhere])
+    assert ended.value.code == 2
+    assert "There is no folder" in capsys.readouterr().err
+
+
 def test_without_a_box_a_change_counts_later(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     create_keys(tmp_path / "sensors.keys", ["head"])
     box_file = tmp_path / "box.yaml"
     box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
     with ends(capsys, 0, "revoke", "head", "--box", str(box_file)) as (out, _):
-        assert "The change counts when it starts." in out
+        assert "the change counts when it starts again" in out
     assert load_keys(tmp_path / "sensors.keys") == {}
 
 

@@ -41,12 +41,21 @@ def test_a_silent_sensor_and_its_return(cast: Cast) -> None:
     assert list(watch.news(10.0)) == []  # never heard: the introduction and the status line say so
     hear(cast, 11.0)
     assert list(watch.news(11.1)) == []
-    assert list(watch.news(11.5 + 0.001)) == [
+    absent = [sensor(state="lost")]
+    assert list(watch.news(11.5 + 0.001, absent)) == [
         "Sensor left-wrist silent for 0.5 s. The dancer moves freely. Check its battery."
     ]
-    assert list(watch.news(12.5)) == []
+    assert list(watch.news(12.5, absent)) == []
     hear(cast, 13.0)
     assert list(watch.news(13.1)) == ["Sensor left-wrist is back. It takes its joint again."]
+
+
+def test_a_revoked_sensor_has_no_battery_to_be_checked(cast: Cast) -> None:
+    watch = Watch(cast)
+    hear(cast, 11.0)
+    assert len(list(watch.news(11.1, [sensor()]))) == 1
+    assert list(watch.news(12.0)) == []
+    assert list(watch.news(20.0)) == []
 
 
 def sensor(

@@ -153,7 +153,8 @@ def _prepare(one: socket.socket, buffer_bytes: int) -> None:
 
 
 def _advice(host: str, port: int, error: Exception) -> str:
+    reason = (error.strerror if isinstance(error, OSError) else None) or error
     return (
-        f"UDP port {port} on {host} cannot be opened ({error}). No sensor can reach the box by network. "
+        f"UDP port {port} on {host} cannot be opened for sensors ({reason}). Nothing dances. "
         "Is a second bunraku running? Stop it, or give another port or host under sensors: udp: in box.yaml."
     )
