@@ -36,7 +36,7 @@ GROUPS: tuple[tuple[str, tuple[Row, ...]], ...] = (
                 "joining",
                 "flickers, stays lit",
                 "It looks for the network.",
-                "Longer than a minute: is the box on?",
+                "Longer than a minute: is the Wi-Fi on?",
             ),
             Row(
                 "neutral", "blinks slowly", "Stand still.", "Arms hanging, face to the front, until it stops."
