@@ -159,13 +159,14 @@ class FakeFlash : public FlashStore {
   }
   bool save(uint8_t slot, const uint8_t* data, uint16_t count) override {
     ++saves;
-    if (is_broken) return false;
+    if (is_broken || slot == worn_out_slot) return false;
     records[slot] = Bytes(data, data + count);
     return true;
   }
 
   std::map<uint8_t, Bytes> records;
   bool is_broken = false;
+  int worn_out_slot = -1;
   int saves = 0;
 };
 

@@ -121,6 +121,15 @@ TEST_CASE("power-ons are counted, and a power cut while counting loses at most t
   CHECK(count_boot(flash) == 22);
 }
 
+TEST_CASE("power-ons are counted on when one of the two records is worn out") {
+  for (const int slot : {2, 3}) {
+    fakes::FakeFlash flash;
+    for (uint32_t boot = 1; boot <= 5; ++boot) CHECK(count_boot(flash) == boot);
+    flash.worn_out_slot = slot;
+    for (uint32_t boot = 6; boot <= 20; ++boot) CHECK(count_boot(flash) == boot);
+  }
+}
+
 TEST_CASE("boot nonces do not repeat while either the count or the noise works") {
   for (const bool is_noisy : {true, false}) {
     std::set<uint32_t> drawn;

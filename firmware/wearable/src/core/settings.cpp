@@ -139,7 +139,8 @@ uint32_t count_boot(FlashStore& flash) {
   CountRecord record;
   uint8_t* at = record.content();
   wire::put(at, boot);
-  record.save(flash, one > other ? kOtherCountSlot : kCountSlot);
+  const Slot older = one > other ? kOtherCountSlot : kCountSlot;
+  if (!record.save(flash, older)) record.save(flash, one > other ? kCountSlot : kOtherCountSlot);  // worn out
   return boot;
 }
 
