@@ -87,6 +87,13 @@ def test_the_same_wearable_again_gets_a_new_key_under_its_old_id(path: Path) -> 
     assert "left-wrist has its new key" in said[-1]
 
 
+def test_a_sensor_whose_name_is_a_word_of_the_console_is_known_again(path: Path) -> None:
+    with FakeWearable() as fake:
+        provisioned(fake, path, Settings("device"))
+        done, _ = provisioned(fake, path, Settings("device"))
+    assert done.replaced
+
+
 def test_after_new_firmware_it_takes_its_name_again(path: Path) -> None:
     old = create_keys(path, ["left-wrist", "head"])
     with FakeWearable() as blank:

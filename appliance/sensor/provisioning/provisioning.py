@@ -199,8 +199,8 @@ def _way(settings: Settings) -> str:
 
 
 def _word_after(word: str, line: str) -> str:
-    words = line.split()
-    return words[words.index(word) + 1] if word in words[:-1] else ""
+    words = line.split()  # in pairs: the value of one may be the word of another
+    return next((words[at + 1] for at in range(0, len(words) - 1, 2) if words[at] == word), "")
 
 
 def _network_fault(network: str, password: str) -> str | None:
