@@ -17,6 +17,16 @@ from appliance.stage.speaker import Speaker
 
 _PICTURED_S = 10.0
 _NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
+# In a technician's words; what is not here goes by its name in docs/wire.md.
+_REFUSALS = {
+    "no packets of ours": ("length", "magic", "version", "kind"),
+    "from sensors without a key": ("device",),
+    "forged or damaged": ("tag",),
+    "of an earlier link": ("old_session", "old_hello"),
+    "doubled or too late": ("duplicate", "reordered", "old"),
+    "no orientation that a hand could have": ("zero", "norm", "torn", "rate"),
+    "damaged on the cable": ("frame_length", "frame_stuffing", "frame_crc"),
+}
 
 
 def play_show(
@@ -66,12 +76,21 @@ def _introduction(stage: Stage, emulate: bool) -> list[str]:
     lines = [
         f"{show.config.name}: {hands or 'no hands, the dancer moves freely'}.",
         f"The dance goes to {receivers}.",
+        _ears(stage),
         stage.admission.sentence(),
     ]
     lines += stage.cast.complaints
     if not emulate:
         lines += reach(stage.cast, stage.box)
     return lines
+
+
+def _ears(stage: Stage) -> str:
+    """Where sensors and commands are heard."""
+    sensors = ", ".join(intake.name for intake in stage.cast.link.intakes) or "no port"
+    control = stage.box.control
+    commands = f"{control.host}:{stage.control.port}" if control is not None and stage.control else "no port"
+    return f"Sensors are heard on {sensors}, commands on {commands}."
 
 
 def _conclusion(stage: Stage) -> list[str]:
@@ -88,11 +107,16 @@ def _conclusion(stage: Stage) -> list[str]:
 
 
 def _readings(counts: dict[str, int]) -> str:
-    """What became of the sensors' datagrams, refusals by reason."""
+    """What became of the sensors' packets, refusals by reason."""
     accepted = counts["accepted"] + counts["relocated"]
-    refused = {reason: count for reason, count in counts.items() if count and reason not in _NO_REFUSAL}
-    reasons = ", ".join(f"{reason} {count}" for reason, count in refused.items())
+    words = {reason: words for words, reasons in _REFUSALS.items() for reason in reasons}
+    refused: dict[str, int] = {}
+    for reason, count in counts.items():
+        if count and reason not in _NO_REFUSAL:
+            said = words.get(reason, reason)
+            refused[said] = refused.get(said, 0) + count
     lost = f", {counts['lost']} lost on the way" if counts["lost"] else ""
+    reasons = ", ".join(f"{count} {said}" for said, count in refused.items())
     return f"Readings: {accepted} accepted{lost}" + (f"; refused: {reasons}." if refused else ".")
 
 

@@ -15,7 +15,7 @@ from appliance.show.show import ShowConfig
 _INTRODUCTION = """\
 # Configuration
 
-<!-- Made from the models by `python -m appliance.show.reference`; edit their descriptions, not this page. -->
+<!-- Made by `python -m appliance.show.reference > docs/configuration.md`; edit the models instead. -->
 
 Two YAML files. `show.yaml` belongs to the artist and lies in the show bundle; `box.yaml` belongs to the
 venue and is given with `--box`. Every key may be left out unless it is marked **needed**. An unknown key, a

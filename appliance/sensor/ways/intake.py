@@ -14,6 +14,7 @@ Origin: TypeAlias = tuple[Any, ...]  # whom an intake heard: (host, port) of a d
 class Intake(Protocol):
     """UdpIntake, SerialIntake. Nothing here waits or raises; troubles are counted."""
 
+    name: str  # for people: host and port, or the device
     counts: Counter[str]
 
     def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:

@@ -30,7 +30,7 @@ class SerialIntake:
     """
 
     def __init__(self, device: str, baud: int = 115200, clock: Callable[[], float] = time.monotonic) -> None:
-        self.device = device
+        self.device = self.name = device
         self.counts: Counter[str] = Counter()
         # For people; None while the port is open.
         self.trouble: str | None = f"{device} is being opened. Sensors on this cable are silent until it is."

@@ -52,6 +52,7 @@ class UdpIntake:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         self._bound: Origin = self._socket.getsockname()
         self.address: tuple[str, int] = (self._bound[0], self._bound[1])
+        self.name = f"{self._bound[0]}:{self._bound[1]}"
         self._own: dict[Origin, socket.socket] = {}
         self._left: list[socket.socket] = []  # drained once more before they close
         self._astray: set[Origin] = set()  # have a socket of their own, but were heard on the common one
