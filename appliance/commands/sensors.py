@@ -195,12 +195,16 @@ def _edit(place: Venue, change_it: Callable[[KeyEditing], None], words: str) -> 
 
 
 def _picture(place: Venue) -> Group:
-    """The table, and below it what should be looked at."""
+    """What should be looked at, and below it the table: a short terminal shows the beginning."""
     try:
         roll = place.running.roll()
     except NoBoxError as error:
         return _picture_of_file(place, str(error))
-    parts: list[object] = []
+    complaints = [line.complaint for line in roll.lines if line.complaint]
+    complaints += _about_file(place, roll)
+    parts: list[object] = [Text(f"{words}\n", style="yellow") for words in complaints]
+    if roll.age_s > _OLD_ROLL_S:
+        parts.append(Text(f"This is {roll.age_s:.0f} s old: the box hangs, or is very busy.\n", style="red"))
     if roll.age_s < 0:
         parts.append(Text("The box is still starting. Ask again in a moment.", style="yellow"))
     elif roll.lines:
@@ -209,11 +213,6 @@ def _picture(place: Venue) -> Group:
         parts.append(
             Text("The running box knows no sensor. Provision one: bunraku provision --name left-wrist")
         )
-    if roll.age_s > _OLD_ROLL_S:
-        parts.append(Text(f"\nThis is {roll.age_s:.0f} s old: the box hangs, or is very busy.", style="red"))
-    complaints = [line.complaint for line in roll.lines if line.complaint]
-    complaints += _about_file(place, roll)
-    parts += [Text(f"\n{words}", style="yellow") for words in complaints]
     return Group(*parts)  # type: ignore[arg-type]
 
 
@@ -257,7 +256,9 @@ def _picture_of_file(place: Venue, why: str) -> Group:
     notes = [Text(f"{why} These sensors may come in ({place.keys}):\n", style="yellow")]
     if not lines:
         notes = [Text(f"{why} {place.keys} has no sensor yet.", style="yellow")]
-    return Group(*notes, known_table(lines) if lines else "", *([Text(f"\n{warning}")] if warning else []))
+    if warning:
+        notes.insert(0, Text(f"{warning}\n", style="yellow"))
+    return Group(*notes, known_table(lines) if lines else "")
 
 
 def _plain(place: Venue) -> dict[str, object]:

@@ -98,7 +98,7 @@ def test_the_table_has_everything_that_the_box_knows(
     box: RunningBox, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        heading, left, head, spare, *rest = out.splitlines()
+        *first, heading, left, head, spare = out.splitlines()
     assert re.split(r"  +", heading.strip()) == [
         *("name", "state", "rate", "loss", "round trip", "age", "battery"),
         *("calibration", "neutral", "firmware", "id", "way"),
@@ -109,7 +109,7 @@ def test_the_table_has_everything_that_the_box_knows(
     ]
     assert re.split(r"  +", head.strip())[:7] == ["head", "lost", "-", "-", "-", "3 min", "-"]
     assert "absent" in spare
-    assert "Its firmware is older." in rest
+    assert "Its firmware is older." in first
 
 
 def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
