@@ -107,15 +107,9 @@ def verdict(
     source, built = folder / "core.cpp", folder / "core.elf"
     source.write_text(CORE.format(words=words, frame=frame, extra=extra))
     compiled = (*FLAGS, "-fcallgraph-info=su", "-c", str(source), "-o", str(folder / "core.o"))
-    linked = (
-        *FLAGS,
-        "--specs=nano.specs",
-        "-nostartfiles",
-        "-Wl,--entry=run_wearable",
-        str(folder / "core.o"),
-    )
+    linked = (*FLAGS, "-nostartfiles", "-nodefaultlibs", "-Wl,--entry=run_wearable", str(folder / "core.o"))
     subprocess.run([COMPILER, *compiled], check=True)
-    subprocess.run([COMPILER, *linked, "-o", str(built)], check=True)
+    subprocess.run([COMPILER, *linked, "-lc_nano", "-lgcc", "-o", str(built)], check=True)
     return subprocess.run(
         [sys.executable, str(SCRIPT), str(built), str(folder)], capture_output=True, text=True, check=False
     )
