@@ -12,6 +12,16 @@ from hw_sim.latency import Transport
 from hw_sim.probe import Run
 
 IVORY, VERMILION, SLATE, BACKDROP = "#efe6d8", "#f5452a", "#8f9bb3", "#14151b"
+LOOK: Any = {
+    "figure.facecolor": BACKDROP,
+    "axes.facecolor": BACKDROP,
+    "text.color": IVORY,
+    "axes.labelcolor": IVORY,
+    "axes.edgecolor": SLATE,
+    "xtick.color": SLATE,
+    "ytick.color": SLATE,
+    "font.size": 10,
+}
 LONGEST_SHOWN_MS = 45.0
 
 
@@ -23,17 +33,7 @@ def draw_report(path: Path, evidence: Evidence) -> Path:
     from matplotlib import pyplot
 
     way, free = evidence.ways
-    look: Any = {
-        "figure.facecolor": BACKDROP,
-        "axes.facecolor": BACKDROP,
-        "text.color": IVORY,
-        "axes.labelcolor": IVORY,
-        "axes.edgecolor": SLATE,
-        "xtick.color": SLATE,
-        "ytick.color": SLATE,
-        "font.size": 10,
-    }
-    with matplotlib.rc_context(look):
+    with matplotlib.rc_context(LOOK):
         figure, axes = pyplot.subplots(4, 1, figsize=(11, 14), layout="constrained")
         _histogram(axes[0], way, free)
         _timeline(axes[1], way)

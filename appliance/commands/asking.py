@@ -59,6 +59,11 @@ class RunningBox:
             return cls(None)
         return cls(("127.0.0.1" if control.host == "0.0.0.0" else control.host, control.port))
 
+    @property
+    def has_port(self) -> bool:
+        """Whether it can be asked at all."""
+        return self._control is not None
+
     def ask(self, address: str, *arguments: str) -> Answer:
         """Have one command carried out. Raises NoBoxError."""
         for reply in self._replies((address, *arguments)):

@@ -96,7 +96,7 @@ def tell(place: Venue, address: str, *arguments: str) -> None:
     try:
         answer = place.running.ask(address, *arguments)
     except NoBoxError as error:
-        raise StageError(str(error) if _no_port(place) else f"{error} {_WHICH_BOX}") from None
+        raise StageError(f"{error} {_WHICH_BOX}" if place.running.has_port else str(error)) from None
     if not answer.done:
         raise StageError(answer.words)
     print(answer.words)
@@ -132,9 +132,7 @@ def read_again(place: Venue) -> int:
     """After a change by hand: have the running box take the key file. The exit status."""
     with clear_errors(place.keys):
         load_keys(place.keys)
-    is_well, words = reload(place)
-    print(words)
-    return 0 if is_well else NOT_TAKEN
+    return _tell_box(place)
 
 
 def reload(place: Venue) -> tuple[bool, str]:
@@ -145,7 +143,7 @@ def reload(place: Venue) -> tuple[bool, str]:
             return False, f"{_other_file(roll.key_file)} and knows nothing of this change. {_THAT_BOX}"
         answer = place.running.ask("/sensors/reload")
     except NoBoxError as error:
-        if _no_port(place):
+        if not place.running.has_port:
             return True, "The box has no control port to be told by: the change counts when it starts again."
         return True, f"{error} The change counts when it starts."
     return answer.done, f"The running box {'took it' if answer.done else 'did not take it'}. {answer.words}"
@@ -189,6 +187,11 @@ def _edit(place: Venue, change_it: Callable[[KeyEditing], None], words: str) -> 
             change_it(change)
             change.commit()
     print(words)
+    return _tell_box(place)
+
+
+def _tell_box(place: Venue) -> int:
+    """Have the running box take the key file, and say whether it did. The exit status."""
     is_well, words = reload(place)
     print(words)
     return 0 if is_well else NOT_TAKEN
@@ -214,11 +217,6 @@ def _picture(place: Venue) -> Group:
             Text("The running box knows no sensor. Provision one: bunraku provision --name left-wrist")
         )
     return Group(*parts)  # type: ignore[arg-type]
-
-
-def _no_port(place: Venue) -> bool:
-    control = place.box.control
-    return control is None or control.port == 0
 
 
 def _other_file(key_file: Path) -> str:

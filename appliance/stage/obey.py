@@ -36,7 +36,7 @@ def obey_for_sensors(order: Command, cast: Cast, wearing: Wearing, now: float) -
             _require_heard([order.sensor], cast.link, now)
             cast.link.strobe(order.sensor, now, STROBE_S)
             return True, f"{order.sensor} flashes for {STROBE_S:g} s."
-        _require_heard(_worn(order.sensor, list(cast.worn)), cast.link, now)
+        _require_heard(wearing.named(order.sensor or None), cast.link, now)
     except ValueError as error:
         return False, str(error)
     if order.name == "neutral":
@@ -53,15 +53,6 @@ def _admit(order: Command, cast: Cast) -> str:
     if not missing:
         return f"{known}."
     return f"{known}, but not {', '.join(missing)} of this show: the dancer moves freely there."
-
-
-def _worn(name: str, worn: list[str]) -> list[str]:
-    """The sensors that are meant: one of the show's, or all of them."""
-    if not worn:
-        raise ValueError("No hand of this show is held by a sensor.")
-    if name and name not in worn:
-        raise ValueError(f"No hand of this show is held by a sensor '{name}'. {did_you_mean(name, worn)}")
-    return [name] if name else worn
 
 
 def _require_heard(names: list[str], link: SensorLink, now: float) -> None:

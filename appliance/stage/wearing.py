@@ -77,6 +77,16 @@ class Wearing:
             self._say(sentence)
         self._news.clear()
 
+    def named(self, sensor: str | None) -> list[str]:
+        """The sensors that a person means: one that the show knows, or all (None). Raises ValueError."""
+        worn = list(self._wearers)
+        if not worn:
+            raise ValueError("No hand of this show is held by a sensor.")
+        if sensor is not None and sensor not in worn:
+            cure = did_you_mean(sensor, worn)
+            raise ValueError(f"No hand of this show is held by a sensor '{sensor}'. {cure}")
+        return worn if sensor is None else [sensor]
+
     def take_neutral(self, sensor: str | None, now: float) -> None:
         """Asked for by a person: take the neutral pose of a sensor (all: None) at the next stillness."""
         for wearer, _ in self._asked(sensor, now):
@@ -175,12 +185,13 @@ class Wearing:
 
     def _asked(self, sensor: str | None, now: float) -> list[tuple[_Wearer, SensorReading]]:
         """The sensors that a person means, with a fresh reading; of the others it is said why not."""
-        if sensor is not None and sensor not in self._wearers:
-            cure = did_you_mean(sensor, list(self._wearers))
-            self._news.append(f"No hand of this show is held by a sensor '{sensor}'. {cure}")
+        try:
+            names = self.named(sensor)
+        except ValueError as error:
+            self._news.append(str(error))
             return []
         asked = []
-        for wearer in self._wearers.values() if sensor is None else [self._wearers[sensor]]:
+        for wearer in (self._wearers[name] for name in names):
             if wearer.reading is not None and now - wearer.reading.arrival <= FRESH_S:
                 asked.append((wearer, wearer.reading))
             elif sensor is not None:

@@ -18,8 +18,8 @@ import yaml
 
 from appliance.sensor.keys import SensorKey, create_keys
 from hw_sim.osc_receiver import OscReceiver
+from hw_sim.peers import HOST, free_ports
 
-HOST = "127.0.0.1"
 PATIENCE_S = 60.0  # for a machine that is busy with other things; nothing here waits without a reason
 PLAY = (sys.executable, "-m", "appliance.cli", "play")
 
@@ -125,16 +125,6 @@ def _start(command: Sequence[str], words: IO[bytes]) -> subprocess.Popen[bytes]:
         stderr=subprocess.STDOUT,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
-
-
-def free_ports(count: int) -> list[int]:
-    with contextlib.ExitStack() as opened:
-        sockets = [
-            opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)
-        ]
-        for one in sockets:
-            one.bind((HOST, 0))
-        return [one.getsockname()[1] for one in sockets]
 
 
 def is_free(port: int) -> bool:

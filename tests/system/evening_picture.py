@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from hw_sim.firmware_library import State
+from hw_sim.report import IVORY, LOOK, VERMILION
 from tests.system.evening import LOOK_S, NAMES, Act, Evening, Look
 from tests.system.lockstep import EPOCH_S
 
-IVORY, VERMILION, SLATE, BACKDROP, LAMP = "#efe6d8", "#f5452a", "#8f9bb3", "#14151b", "#ffd873"
+LAMP = "#ffd873"
 STATES = {
     None: ("off", "#22242d"),
     State.JOINING: ("looks for its network", "#37435c"),
@@ -31,17 +32,7 @@ def draw_evening(path: Path, evening: Evening) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    look: Any = {
-        "figure.facecolor": BACKDROP,
-        "axes.facecolor": BACKDROP,
-        "text.color": IVORY,
-        "axes.labelcolor": IVORY,
-        "axes.edgecolor": SLATE,
-        "xtick.color": SLATE,
-        "ytick.color": IVORY,
-        "font.size": 10,
-    }
-    with matplotlib.rc_context(look):
+    with matplotlib.rc_context({**LOOK, "ytick.color": IVORY}):
         figure, axes = pyplot.subplots(figsize=(15, 8.5), layout="constrained")
         for row, (looks, sensor) in enumerate(zip(evening.looks, evening.sensors, strict=True)):
             _draw_row(axes, row, looks)

@@ -15,8 +15,9 @@ import pytest
 from pythonosc.udp_client import SimpleUDPClient
 
 from appliance.stage.journal import LATE, NOT_FINITE, read_journal
+from hw_sim.peers import HOST, free_ports
 from tests.stage.bundles import write_show
-from tests.system.box import HOST, PATIENCE_S, PLAY, free_ports, is_free, playing
+from tests.system.box import PATIENCE_S, PLAY, is_free, playing
 from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
