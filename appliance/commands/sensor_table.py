@@ -10,10 +10,10 @@ from rich.table import Table
 from rich.text import Text
 
 from appliance.sensor.keys import SensorKey
+from appliance.sensor.state import LOW_BATTERY
 from appliance.sensor.wire import BATTERY_UNKNOWN, HAS_PROFILE, IS_NDOF
 from appliance.stage.roster import UNKNOWN_S, RosterLine
 
-LOW_BATTERY = 15
 HIGH_LOSS = 0.05
 HIGH_ROUND_TRIP_S = 0.1
 OLD_S = 0.5

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from appliance.sensor.plausibility import Orientation
 
+LOW_BATTERY = 15  # percent; below it the sensor's own lamp warns too
+
 
 class SensorReading(NamedTuple):
     """One believed reading. `measured_at` and `arrival` are monotonic seconds of the box."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence, Set
 
 from appliance.sensor import wire
-from appliance.sensor.link import SensorState
+from appliance.sensor.state import LOW_BATTERY, SensorState
 from appliance.stage.cast import Cast
 
 SILENT_S = 0.5
-LOW_BATTERY, CHARGED = 15, 25  # percent: below the one it is said, above the other it may be said again
+CHARGED = 25  # percent: above it a low battery may be said again
 
 
 class Watch:
