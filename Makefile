@@ -9,7 +9,10 @@ TEST_ARGS ?=
 
 # What is needed from the system, as package:command or package:file (where the package brings no command).
 DEBIAN_FOR_FIRMWARE := cmake:cmake g++:g++ make:make
-DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) liblo-tools:oscdump iproute2:ip \
+DEBIAN_FOR_GL := libgl1-mesa-dri:/usr/lib/*/dri/swrast_dri.so libegl1:/usr/lib/*/libEGL.so.1 \
+    libgles2:/usr/lib/*/libGLESv2.so.2 libgbm1:/usr/lib/*/libgbm.so.1
+DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump iproute2:ip \
+    ola:olad xvfb:Xvfb \
     doctest-dev:/usr/include/doctest/doctest.h cppcheck:cppcheck clang-14:clang++-14 \
     libclang-rt-14-dev:/usr/lib/llvm-14/lib/clang/*/lib/linux/libclang_rt.fuzzer-* \
     gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \

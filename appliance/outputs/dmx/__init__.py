@@ -1,0 +1,1 @@
+"""DMX: universes and the wires that carry them (Art-Net, sACN, USB)."""
