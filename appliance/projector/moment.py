@@ -1,0 +1,32 @@
+"""Moment: where the dancer is at the time for which one picture is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(slots=True)
+class Moment:
+    """What a look draws; J joints in the skeleton's order, world frame, Y up, metres.
+
+    time_s: the dance's time of this picture, monotonic seconds (at least a tick behind the clock);
+    positions: (J, 3); world: (J, 4) unit quaternions w, x, y, z, both interpolated to time_s;
+    trail: (positions, world) at the ticks of the last 1.2 s up to time_s, newest last, never empty;
+    trail_times: when each of these was, seconds, same clock as time_s, ascending, none later than time_s;
+    held: joints that hands of this show hold.
+
+    Drawing code reads the arrays and keeps none.
+    """
+
+    time_s: float
+    positions: Floats
+    world: Floats
+    trail: Sequence[tuple[Floats, Floats]]
+    trail_times: Sequence[float]
+    held: tuple[int, ...] = ()
