@@ -1,0 +1,60 @@
+"""How often a universe leaves: at its wire's rate while it changes, as a keep-alive while it does not."""
+
+from __future__ import annotations
+
+from appliance.outputs.dmx.wire import Wire
+from appliance.show.dmx import FASTEST_HZ, SLOTS, DmxConfig
+
+KEEP_ALIVE_S = 0.85  # E1.31 section 6.6.2: 0.8 to 1.0 s; Art-Net 4 asks for 4 s at the latest
+REPEATS = 3  # E1.31 section 6.6.2: so often what does not change any more, before only keep-alives follow
+
+
+class Universe:
+    """One universe on one wire. Offer it as often as `next_due` says; what comes early waits for nothing.
+
+    The rate holds on average, however late a caller wakes, and two universes are never closer than a full
+    one lasts on a DMX cable (22.7 ms).
+    """
+
+    def __init__(self, config: DmxConfig, wire: Wire) -> None:
+        self.config = config
+        self.wire = wire
+        self.number = config.universe  # as the show's fixtures name it
+        self._period_s = 1.0 / config.rate
+        self._due = float("-inf")
+        self._newest = bytearray(SLOTS)
+        self._changed = False  # since the last one that left
+        self._same = 0  # how many alike have left
+        self._sent_at = float("-inf")
+
+    def offer(self, data: bytes | bytearray, now: float) -> bool:
+        """512 levels as they are now; whether they left. Monotonic seconds; never waits, never raises."""
+        if len(data) != SLOTS:
+            raise ValueError(f"A universe has {SLOTS} channels, not {len(data)}.")
+        if data != self._newest:
+            self._newest[:] = data
+            self._changed = True
+        if now < self._due or not (self._changed or self._is_repeated(now)):
+            return False
+        self._leave(now)
+        return True
+
+    def next_due(self, now: float) -> float:
+        """When an offer leaves at the earliest, monotonic seconds; `now` if at once."""
+        return max(self._due, now)
+
+    def close(self, now: float) -> None:
+        """What was offered last leaves, then the wire is closed."""
+        if self._changed:
+            self._leave(now)
+        self.wire.close(now)
+
+    def _is_repeated(self, now: float) -> bool:
+        return self._same < REPEATS or now - self._sent_at >= KEEP_ALIVE_S
+
+    def _leave(self, now: float) -> None:
+        self._same = 0 if self._changed else self._same + 1
+        self._changed = False
+        self._sent_at = now
+        self._due = max(self._due + self._period_s, now + 1.0 / FASTEST_HZ)
+        self.wire.send(self._newest, now)

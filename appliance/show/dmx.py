@@ -1,0 +1,170 @@
+"""outputs.dmx of box.yaml: which universe of lights leaves by which wire."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from appliance.show.section import Ipv4, Section, refusal
+
+WireKind = Literal["artnet", "sacn", "usb-pro", "open-dmx", "udmx"]
+
+SLOTS = 512  # of a universe
+FASTEST_HZ = 44.0  # a full universe lasts 22.7 ms on the wire (ANSI E1.11)
+NUMBERS = {"artnet": (0, 32767), "sacn": (1, 63999)}  # 15 bits; E1.31 section 6.2.7
+IN_WORDS = {
+    "artnet": "Art-Net",
+    "sacn": "sACN",
+    "usb-pro": "ENTTEC DMX USB Pro",
+    "open-dmx": "Open DMX",
+    "udmx": "uDMX",
+}
+_USUAL_HZ = {"open-dmx": 30.0}
+_PORTS = {"artnet": 6454, "sacn": 5568}
+_OWN_KEYS: dict[str, tuple[str, ...]] = {
+    "number": ("artnet", "sacn"),
+    "host": ("artnet", "sacn"),
+    "port": ("artnet", "sacn"),
+    "interface": ("artnet", "sacn"),
+    "broadcast": ("artnet",),
+    "priority": ("sacn",),
+    "source_name": ("sacn",),
+    "preview": ("sacn",),
+    "ttl": ("sacn",),
+    "device": ("usb-pro", "open-dmx"),
+    "serial": ("usb-pro", "open-dmx", "udmx"),
+}
+
+
+class DmxConfig(Section):
+    """One universe of lights on one wire. A universe may leave by several wires."""
+
+    universe: int = Field(
+        description="The universe that the show's fixtures name, and its number on the network: artnet 0 to "
+        "32767, sacn 1 to 63999."
+    )
+    wire: WireKind = Field(
+        description="artnet and sacn: over the network; usb-pro: ENTTEC DMX USB Pro and what speaks like it; "
+        "open-dmx: a bare FTDI cable, not recommended for shows; udmx: anyma uDMX."
+    )
+    rate_hz: float | None = Field(
+        default=None, ge=1, le=FASTEST_HZ, description="Universes a second at most; null: 40, open-dmx 30."
+    )
+    channels: int = Field(
+        default=SLOTS, ge=24, le=SLOTS, description="How many channels are sent, from the first on."
+    )
+    number: int | None = Field(
+        default=None,
+        description="artnet (net, subnet and universe in one) and sacn: the number on the network where it "
+        "differs from the universe.",
+    )
+    host: Ipv4 | None = Field(
+        default=None,
+        description="artnet: the node's address, null: this machine; sacn: send to this address alone, null: "
+        "multicast.",
+    )
+    port: int | None = Field(
+        default=None, ge=1, le=65535, description="artnet, sacn: UDP port; null: the usual one (6454, 5568)."
+    )
+    interface: Ipv4 | None = Field(
+        default=None,
+        description="artnet, sacn: this machine's own address in the lights' network. null: artnet takes the "
+        "way to its host; sacn stays inside this machine.",
+    )
+    broadcast: bool = Field(default=False, description="artnet: host is a broadcast address.")
+    priority: int = Field(
+        default=100, ge=0, le=200, description="sacn: among sources of a universe, higher wins."
+    )
+    source_name: str = Field(
+        default="Bunraku", min_length=1, max_length=63, description="sacn: what consoles call this box."
+    )
+    preview: bool = Field(default=False, description="sacn: for visualisers alone, no light shall follow.")
+    ttl: int = Field(
+        default=1, ge=1, le=255, description="sacn: through how many routers less one multicast goes."
+    )
+    device: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=200,
+        description="usb-pro, open-dmx: the serial device, like /dev/ttyUSB0.",
+    )
+    serial: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=100,
+        description="usb-pro, open-dmx, udmx: USB serial number of the adapter; null: the first that is found.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _keys_of_this_wire(cls, values: Any) -> Any:
+        if not isinstance(values, dict) or values.get("wire") not in IN_WORDS:
+            return values
+        for key, wires in _OWN_KEYS.items():
+            if key in values and values["wire"] not in wires:
+                raise refusal(
+                    f"'{key}' belongs to {' and '.join(wires)}, and this wire is {values['wire']}.",
+                    "Remove it.",
+                    at=key,
+                )
+        return values
+
+    @model_validator(mode="after")
+    def _number_exists(self) -> DmxConfig:
+        low, high = NUMBERS.get(self.wire, (0, 63999))
+        if not low <= self.number_on_wire <= high:
+            raise refusal(
+                f"{IN_WORDS[self.wire]} has universes from {low} to {high}; "
+                f"{self.number_on_wire} is none of them.",
+                f"Write a number from {low} to {high}.",
+                at="universe" if self.number is None else "number",
+            )
+        if self.host == "255.255.255.255" and not self.broadcast:
+            raise refusal(
+                "This address means every machine of the network.",
+                "Write the node's own address, or add `broadcast: true`.",
+                at="host",
+            )
+        return self
+
+    @property
+    def number_on_wire(self) -> int:
+        """Art-Net's port address or sACN's universe."""
+        return self.universe if self.number is None else self.number
+
+    @property
+    def rate(self) -> float:
+        """Universes a second at most."""
+        return self.rate_hz or _USUAL_HZ.get(self.wire, 40.0)
+
+    @property
+    def udp_port(self) -> int:
+        """Where Art-Net or sACN goes to."""
+        return self.port or _PORTS[self.wire]
+
+    @property
+    def destination(self) -> tuple[object, ...]:
+        """What no second entry may have: the light that hears it cannot tell the two apart."""
+        if self.wire in NUMBERS:
+            host = self.host or ("127.0.0.1" if self.wire == "artnet" else None)
+            return (self.wire, host, self.udp_port, self.number_on_wire, self.interface)
+        return ("usb" if self.wire == "udmx" else "cable", self.device, self.serial)
+
+
+def _each_destination_once(wires: list[DmxConfig]) -> list[DmxConfig]:
+    taken = [wire.destination for wire in wires]
+    for place, wire in enumerate(wires):
+        if wire.destination in taken[:place]:
+            first = taken.index(wire.destination)
+            raise refusal(
+                f"dmx[{first}] and dmx[{place}] send to the same place by {IN_WORDS[wire.wire]}.",
+                "Remove one, or give it another universe."
+                if wire.wire in NUMBERS
+                else "Say by device or serial which adapter each of them is.",
+                at=place,
+            )
+    return wires
+
+
+DmxWires = Annotated[list[DmxConfig], AfterValidator(_each_destination_once)]
