@@ -7,6 +7,10 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
+from appliance.show.control import ControlConfig
+from appliance.show.dmx import DmxWires
+from appliance.show.posistagenet import PosiStageNetConfig
+from appliance.show.projector import ProjectorConfig
 from appliance.show.section import Ipv4, LocalFile, Section, refusal
 from appliance.show.validation import validated
 from appliance.show.yaml_file import read_yaml
@@ -89,6 +93,14 @@ class OutputsConfig(Section):
     osc: list[OscConfig] = Field(
         default_factory=lambda: [OscConfig()], max_length=16, description="Receivers by OSC; [] for none."
     )
+    posistagenet: list[PosiStageNetConfig] = Field(
+        default_factory=list,
+        max_length=8,
+        description="Joints' positions by PosiStageNet, for media servers and followspots.",
+    )
+    dmx: DmxWires = Field(
+        default_factory=list, max_length=32, description="Universes of DMX, each on its wire."
+    )
 
     @field_validator("osc")
     @classmethod
@@ -98,15 +110,6 @@ class OutputsConfig(Section):
             if receiver in seen[:place]:
                 raise refusal("This receiver stands here twice.", "Remove one, or change its port.", at=place)
         return receivers
-
-
-class ControlConfig(Section):
-    """Where commands by OSC arrive."""
-
-    host: Ipv4 = Field(
-        default="127.0.0.1", description="Address to listen on; 0.0.0.0 lets the whole network command."
-    )
-    port: int = Field(default=9002, ge=0, le=65535, description="UDP port; 0 takes any free one.")
 
 
 class LimitsConfig(Section):
@@ -154,6 +157,14 @@ class BoxConfig(Section):
     outputs: OutputsConfig = Field(default_factory=OutputsConfig, description=str(OutputsConfig.__doc__))
     control: ControlConfig | None = Field(
         default_factory=ControlConfig, description="Where commands by OSC arrive; null: nowhere."
+    )
+    projector: ProjectorConfig = Field(
+        default_factory=ProjectorConfig, description=str(ProjectorConfig.__doc__)
+    )
+    runtime: LocalFile | None = Field(
+        default=None,
+        description="Folder where the box's processes meet, relative to the box file; a folder in memory. "
+        "null: the one that systemd gives, else one of the user who plays.",
     )
     limits: LimitsConfig = Field(default_factory=LimitsConfig, description=str(LimitsConfig.__doc__))
     realtime: RealtimeConfig = Field(default_factory=RealtimeConfig, description=str(RealtimeConfig.__doc__))

@@ -8,6 +8,8 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from appliance.show.section import BundleFile, Section, refusal
 
+MAIN = "main"  # the phrase that the show starts with
+
 
 class DancerConfig(Section):
     """The puppet: which network dances, and how often it goes over a window."""
@@ -56,9 +58,19 @@ class DancerConfig(Section):
 class MotionConfig(Section):
     """What the puppet starts from: playback of a phrase."""
 
-    phrase: BundleFile = Field(default="phrase.bvh", description="The phrase's file in the bundle.")
+    phrase: BundleFile = Field(
+        default="phrase.bvh",
+        description="The file in the bundle of the phrase that the show starts with; "
+        "cues and `/phrase` call it `main`.",
+    )
+    phrases: dict[str, BundleFile] = Field(
+        default_factory=dict,
+        max_length=32,
+        description="Further phrases, each with the name that cues and `/phrase` call it by, like "
+        "`quiet: quiet.bvh`. They are played from their start to their end.",
+    )
     start_s: float = Field(
-        default=0.0, ge=0, le=86400, description="Where in the phrase the excerpt starts, in seconds."
+        default=0.0, ge=0, le=86400, description="Where in `phrase` the excerpt starts, in seconds."
     )
     end_s: float | None = Field(
         default=None,
@@ -73,11 +85,36 @@ class MotionConfig(Section):
         description="Speed of playback: 1 as recorded, 0 stands still, below 0 runs backwards.",
     )
     crossfade_s: float = Field(
-        default=0.5, ge=0, le=5, description="How long the loop's end melts into its start, in seconds."
+        default=0.5,
+        ge=0,
+        le=5,
+        description="How long a loop's end melts into its start, and one phrase into another where nobody "
+        "says how long, in seconds.",
     )
     grounded: bool = Field(
         default=True, description="Keep the lowest foot on the floor after the puppet has changed the legs."
     )
+
+    @field_validator("phrases")
+    @classmethod
+    def _names_that_can_be_called(cls, phrases: dict[str, str]) -> dict[str, str]:
+        for name in phrases:
+            if name == MAIN:
+                raise refusal(
+                    f"'{MAIN}' is what the phrase that the show starts with is called.",
+                    "Give this one another name.",
+                    at=name,
+                )
+            if not 0 < len(name) <= 64:
+                raise refusal(
+                    "A phrase's name has 1 to 64 characters.", "Write it like `quiet: quiet.bvh`.", at=name
+                )
+        return phrases
+
+    @property
+    def files(self) -> dict[str, str]:
+        """All phrases by their names, the one that the show starts with first."""
+        return {MAIN: self.phrase, **self.phrases}
 
     @field_validator("end_s")
     @classmethod

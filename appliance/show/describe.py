@@ -78,6 +78,8 @@ def _one_kind(annotation: Any) -> str:
         return f"{len(get_args(annotation))} numbers in brackets"
     if get_origin(annotation) is list:
         return "a list"
+    if get_origin(annotation) is dict:
+        return f"names, each with {kind(get_args(annotation)[1])}"
     return _PLAIN.get(annotation, "a group of keys")
 
 
@@ -91,7 +93,8 @@ def _field_infos(annotation: Any) -> list[FieldInfo]:
 
 
 def _length_bounds(limits: dict[str, Any], field: FieldInfo) -> str:
-    unit = "entries" if is_list(field.annotation) else "characters"
+    has_entries = any(get_origin(part) in (list, dict) for part in _flat(field.annotation))
+    unit = "entries" if has_entries else "characters"
     low, high = limits.get("min_length", 0), limits.get("max_length")
     if high is None:
         return "not empty"

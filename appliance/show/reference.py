@@ -104,7 +104,7 @@ def _shown(value: Any) -> str:
     if isinstance(value, list) and value:
         return "one receiver with the defaults below"
     if isinstance(value, tuple):
-        return f"`[{', '.join(f'{part:g}' for part in value)}]`"
+        return f"`[{', '.join(part if isinstance(part, str) else f'{part:g}' for part in value)}]`"
     words = {None: "null", True: "true", False: "false", "": '""'}
     return f"`{words[value] if isinstance(value, bool) or value in (None, '') else value}`"
 

@@ -12,7 +12,10 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.skeleton import Skeleton
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
+from appliance.show.cues import CueConfig, cue_problems
 from appliance.show.dance import DancerConfig, MotionConfig
+from appliance.show.lights import LightsConfig
+from appliance.show.look import LookConfig, looks_by_name
 from appliance.show.section import Axis, Orientation, Section, refusal
 from appliance.show.validation import validated
 from appliance.show.yaml_file import YamlFile, read_yaml
@@ -123,6 +126,16 @@ class ShowConfig(Section):
         max_length=MAX_HANDS,
         description="Who holds which joints, each joint at most once.",
     )
+    looks: list[LookConfig] = Field(
+        default_factory=list,
+        max_length=32,
+        description="How the projection looks; the first one is shown at the start. "
+        "[]: the four built-in looks, under the names of their styles.",
+    )
+    lights: LightsConfig = Field(default_factory=LightsConfig, description=str(LightsConfig.__doc__))
+    cues: list[CueConfig] = Field(
+        default_factory=list, max_length=200, description="What show control can call up by name, in order."
+    )
 
     @field_validator("hands")
     @classmethod
@@ -142,11 +155,30 @@ class ShowConfig(Section):
             )
         return hands
 
+    @field_validator("looks")
+    @classmethod
+    def _each_look_once(cls, looks: list[LookConfig]) -> list[LookConfig]:
+        names = [look.name for look in looks]
+        for place, name in enumerate(names):
+            if name in names[:place]:
+                raise refusal(f"Two looks are called '{name}'.", "Give one another name.", at=place)
+        return looks
+
     @property
     def primary_sensor(self) -> str | None:
         """Name of the sensor that the tick's phase follows; None without sensors."""
         sensors = sorted((hand for hand in self.hands if hand.sensor), key=lambda hand: not hand.primary)
         return sensors[0].sensor if sensors else None
+
+    @property
+    def names(self) -> dict[str, tuple[str, ...]]:
+        """What a cue may name under phrase, hands, look and lights, each first what is in force at start."""
+        return {
+            "phrase": tuple(self.motion.files),
+            "hands": tuple(hand.joint for hand in self.hands),
+            "look": tuple(looks_by_name(self.looks)),
+            "lights": tuple(mapping.name for mapping in self.lights.mappings),
+        }
 
 
 @dataclass(frozen=True)
@@ -167,6 +199,11 @@ class Show:
     def phrase(self) -> Path:
         """The BVH file that playback starts from."""
         return self.directory / self.config.motion.phrase
+
+    @property
+    def phrases(self) -> dict[str, Path]:
+        """All phrases' BVH files by their names, the one that playback starts from first."""
+        return {name: self.directory / file for name, file in self.config.motion.files.items()}
 
     def require_moving(self, joints: Sequence[str]) -> None:
         """Refuse hands on joints that the network does not move; `joints` are those that it does."""
@@ -201,6 +238,8 @@ def load_show(directory: Path | str) -> Show:
         config = validated(ShowConfig, file, context)
     except ConfigError as error:
         problems.extend(error.problems)
+    else:
+        problems.extend(cue_problems(config.cues, config.names, file))
     if problems or skeleton is None:
         raise ConfigError(problems)
     return Show(config, directory, skeleton, file)

@@ -1,0 +1,102 @@
+"""Cues: what show control can call up at one word, and whether all that they name is there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from appliance.show.config_error import Problem, did_you_mean
+from appliance.show.section import Section, refusal
+from appliance.show.yaml_file import Location, YamlFile
+
+FADE_S = 2.0
+MOST_ITERATIONS = 64  # as often as DancerConfig admits
+
+Name = Annotated[str, Field(min_length=1, max_length=64)]
+_Times = Annotated[int, Field(ge=0, le=MOST_ITERATIONS)]
+
+
+class CueConfig(Section):
+    """One cue. What it leaves out stays as it is."""
+
+    name: str = Field(min_length=1, max_length=64, description="What `/cue` calls it.")
+    phrase: Name | None = Field(
+        default=None,
+        description="The phrase that the puppet starts from: `main`, or a name under motion.phrases. "
+        "It begins at its start; one that plays already goes on.",
+    )
+    iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = Field(
+        default=None, description="Coding and interaction iterations; more than fit the box are lowered."
+    )
+    hands: list[Name] | None = Field(
+        default=None,
+        max_length=8,
+        description="Joints whose hands hold in this cue; the other hands let go. []: all let go.",
+    )
+    look: Name | None = Field(default=None, description="Name of the look.")
+    lights: Name | None = Field(default=None, description="Name of the set of light mappings.")
+    master: float | None = Field(
+        default=None, ge=0, le=1, description="Brightness of lights and picture, 0 to 1."
+    )
+    fade_s: float = Field(
+        default=FADE_S,
+        ge=0,
+        le=60,
+        description="How long phrase, look, lights and master take to change, in seconds. "
+        "Hands take 0.5 s to hold and 1 s to let go, whatever stands here.",
+    )
+
+    @field_validator("iterations")
+    @classmethod
+    def _coding_then_interaction(cls, times: tuple[int, int] | None) -> tuple[int, int] | None:
+        if times is not None and times[0] < 1:
+            raise refusal("A cue cannot have 0 coding iterations: nothing would dance.", "Write 1 or more.")
+        if times is not None and times[1] > times[0]:
+            raise refusal(
+                f"{times[1]} interaction iterations are more than {times[0]} coding iterations.",
+                f"Write [{times[0]}, {max(times[0] - 1, 1)}], which leaves the last pass free.",
+            )
+        return times
+
+
+def cue_problems(
+    cues: Sequence[CueConfig], known: Mapping[str, Sequence[str]], file: YamlFile
+) -> Iterator[Problem]:
+    """What cues name that the show has not, and names that stand twice, each with its line.
+
+    `known`: which names there are for the keys phrase, hands, look and lights of a cue.
+    """
+    names = [cue.name for cue in cues]
+    for place, cue in enumerate(cues):
+        if cue.name in names[:place]:
+            first = file.line(("cues", names.index(cue.name), "name"))
+            yield Problem(
+                file.path,
+                file.line(("cues", place, "name")),
+                f"Two cues are called '{cue.name}' (the first on line {first}).",
+                "Give one of them another name.",
+            )
+        for key, location, word in _named(cue, place):
+            if word not in known[key]:
+                cure = did_you_mean(word, known[key]) if known[key] else f"Remove `{key}` from the cue."
+                yield Problem(file.path, file.line(location), _UNKNOWN[key].format(word), cure)
+
+
+_UNKNOWN = {
+    "phrase": "This show has no phrase '{}'.",
+    "hands": "No hand of this show holds the joint '{}'.",
+    "look": "This show has no look '{}'.",
+    "lights": "This show has no set of light mappings '{}'.",
+}
+
+
+def _named(cue: CueConfig, place: int) -> Iterator[tuple[str, Location, str]]:
+    """Each name in a cue: its key, where it stands, the name."""
+    for key in ("phrase", "look", "lights"):
+        word = getattr(cue, key)
+        if word is not None:
+            yield key, ("cues", place, key), word
+    for hand, joint in enumerate(cue.hands or ()):
+        yield "hands", ("cues", place, "hands", hand), joint
