@@ -1,16 +1,62 @@
-"""box.yaml's section about show control: where commands by OSC arrive."""
+"""box.yaml's section about show control: where commands by OSC arrive, from whom, and who hears how it is."""
 
 from __future__ import annotations
 
-from pydantic import Field
+import ipaddress
+from typing import Annotated
 
-from appliance.show.section import Ipv4, Section
+from pydantic import AfterValidator, Field, model_validator
+
+from appliance.show.section import Ipv4, Section, refusal
+
+
+def _network(text: str) -> str:
+    try:
+        return str(ipaddress.IPv4Network(text, strict=False))
+    except ValueError:
+        raise refusal(
+            f"'{text}' is neither an IPv4 address nor a network.",
+            "Write an address like 192.168.0.20, or a network like 192.168.0.0/24.",
+        ) from None
+
+
+Senders = Annotated[str, AfterValidator(_network)]
+
+
+class HeartbeatConfig(Section):
+    """Somebody who hears once a second how the box is."""
+
+    host: Ipv4 = Field(default="127.0.0.1", description="The listener's address in numbers.")
+    port: int = Field(default=9003, ge=1, le=65535, description="The listener's UDP port.")
 
 
 class ControlConfig(Section):
-    """Where commands by OSC arrive."""
+    """Where commands by OSC arrive, and from whom."""
 
     host: Ipv4 = Field(
-        default="127.0.0.1", description="Address to listen on; 0.0.0.0 lets the whole network command."
+        default="127.0.0.1",
+        description="Address to listen on; 0.0.0.0: on every network, for those named under `senders`.",
     )
     port: int = Field(default=9002, ge=0, le=65535, description="UDP port; 0 takes any free one.")
+    senders: list[Senders] = Field(
+        default_factory=list,
+        max_length=32,
+        description="Who may command the box: addresses (192.168.0.20) or networks (192.168.0.0/24). "
+        "This machine always may; []: nobody else.",
+    )
+    heartbeat: list[HeartbeatConfig] = Field(
+        default_factory=list,
+        max_length=16,
+        description="Who gets /bunraku/status once a second; docs/osc.md explains it.",
+    )
+
+    @model_validator(mode="after")
+    def _open_to_somebody(self) -> ControlConfig:
+        if not self.host.startswith("127.") and not self.senders:
+            raise refusal(
+                f"Commands are heard on {self.host}, but from nobody: no senders are listed.",
+                "List who may command the box, like `senders: [192.168.0.20]` or a whole network "
+                "`[192.168.0.0/24]`; or listen on 127.0.0.1 for this machine alone.",
+                at="host",
+            )
+        return self
