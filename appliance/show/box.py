@@ -9,6 +9,7 @@ from pydantic import Field, field_validator
 
 from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
+from appliance.show.lights import VenueLightsConfig
 from appliance.show.posistagenet import PosiStageNetConfig
 from appliance.show.projector import ProjectorConfig
 from appliance.show.section import Ipv4, LocalFile, Section, refusal
@@ -157,6 +158,9 @@ class BoxConfig(Section):
     outputs: OutputsConfig = Field(default_factory=OutputsConfig, description=str(OutputsConfig.__doc__))
     control: ControlConfig | None = Field(
         default_factory=ControlConfig, description="Where commands by OSC arrive; null: nowhere."
+    )
+    lights: VenueLightsConfig = Field(
+        default_factory=VenueLightsConfig, description=str(VenueLightsConfig.__doc__)
     )
     projector: ProjectorConfig = Field(
         default_factory=ProjectorConfig, description=str(ProjectorConfig.__doc__)

@@ -1,21 +1,270 @@
-"""show.yaml's section about lights: fixtures, and what of the dance moves them."""
+"""Lights of a show: fixtures, addresses, places, mappings, the safe look; and a venue's changes."""
 
 from __future__ import annotations
 
-from pydantic import Field
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from appliance.show.section import Section
+from pydantic import Field, ValidationInfo, field_validator
+
+from appliance.show.config_error import did_you_mean
+from appliance.show.fixture_profile import COLOURS, DIMMER, PAN, TILT, base, load_profile, profile_refusal
+from appliance.show.light_rules import AIM, COLOUR, Colour, MappingConfig, Metres, Pair, RuleConfig
+from appliance.show.section import Section, refusal
+
+if TYPE_CHECKING:
+    from appliance.show.box import BoxConfig
+    from appliance.show.show import Show
+
+MAX_FIXTURES = 512
+UNIVERSE_CHANNELS = 512
+Universe = Annotated[int, Field(ge=0, le=63999)]
+Address = Annotated[int, Field(ge=1, le=UNIVERSE_CHANNELS)]
+Pose = Literal["hanging", "standing"]
 
 
-class MappingSetConfig(Section):
-    """What the lights do with the dance, under one name."""
+class FixtureConfig(Section):
+    """One fixture of the rig: what it is, where it listens, where it hangs."""
 
-    name: str = Field(min_length=1, max_length=64, description="What cues and /lights call it.")
+    name: str = Field(min_length=1, max_length=64, description="What rules, cues and pictures call it.")
+    profile: str = Field(
+        min_length=1,
+        max_length=100,
+        description="Its profile: a file in the show's folder `profiles`, or a built-in one.",
+    )
+    mode: str | None = Field(default=None, description="Mode of the profile; left out: its first one.")
+    universe: Universe = Field(default=1, description="Its universe; box.yaml says on which wire that is.")
+    address: Address = Field(description="Its first channel, as on the fixture's display.")
+    place: Metres = Field(
+        default=(0.0, 3.0, 0.0),
+        description="Where it is, metres: x to the dancer's left, y up, z towards the audience; the origin "
+        "is on the floor, where the phrase has its own.",
+    )
+    pose: Pose = Field(default="hanging", description="Hanging from a bar, or standing on its base.")
+    turn: Metres = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Turned from there, in degrees: yaw about the vertical, pitch about x, roll about z.",
+    )
+    pan_limits: Pair | None = Field(
+        default=None, description="Pan stays between these degrees from its middle; left out: its range."
+    )
+    tilt_limits: Pair | None = Field(
+        default=None, description="Tilt stays between these degrees from its middle; left out: its range."
+    )
+    invert_pan: bool = Field(default=False, description="Pan runs the other way round here.")
+    invert_tilt: bool = Field(default=False, description="Tilt runs the other way round here.")
+
+    @field_validator("profile")
+    @classmethod
+    def _known_profile(cls, name: str, info: ValidationInfo) -> str:
+        fault = profile_refusal(name, _directory(info))
+        if fault is not None:
+            raise fault
+        return name
+
+    @field_validator("mode")
+    @classmethod
+    def _known_mode(cls, name: str | None, info: ValidationInfo) -> str | None:
+        if name is not None and "profile" in info.data:
+            modes = [mode.name for mode in load_profile(info.data["profile"], _directory(info)).modes]
+            if name not in modes:
+                raise refusal(
+                    f"The profile '{info.data['profile']}' has no mode '{name}'.", did_you_mean(name, modes)
+                )
+        return name
+
+    @field_validator("address")
+    @classmethod
+    def _ends_within_the_universe(cls, address: int, info: ValidationInfo) -> int:
+        if "profile" in info.data and "mode" in info.data:
+            profile = load_profile(info.data["profile"], _directory(info))
+            count = len(profile.mode(info.data["mode"]).channels)
+            if address + count - 1 > UNIVERSE_CHANNELS:
+                raise refusal(
+                    f"'{info.data.get('name')}' takes {count} channels and would end on channel "
+                    f"{address + count - 1}; a universe has {UNIVERSE_CHANNELS}.",
+                    f"Write an address of at most {UNIVERSE_CHANNELS + 1 - count}, or another universe.",
+                )
+        return address
+
+    @field_validator("pan_limits", "tilt_limits")
+    @classmethod
+    def _in_order(cls, limits: tuple[float, float] | None) -> tuple[float, float] | None:
+        if limits is not None and limits[0] >= limits[1]:
+            raise refusal(f"{list(limits)} leaves no room to move.", "Write [lowest, highest] in degrees.")
+        return limits
+
+
+class SafeConfig(Section):
+    """The safe look: on panic, after a stop, when the stage is lost, at the end. Dark unless told otherwise."""
+
+    dimmer: float = Field(default=0.0, ge=0, le=1, description="How bright; 0 is dark.")
+    colour: Colour = Field(default=(1.0, 1.0, 1.0), description="Red, green, blue as shares 0 to 1.")
+    fixtures: list[str] = Field(
+        default_factory=list, max_length=MAX_FIXTURES, description="Those that shine then; []: all of them."
+    )
+    heads: Literal["hold", "home"] = Field(
+        default="hold", description="Moving heads stay where they point, or go to their default."
+    )
 
 
 class LightsConfig(Section):
-    """The fixtures of the show, and what of the dance moves them."""
+    """The rig: fixtures, how the dance drives them, and what they show when nothing dances."""
 
-    mappings: list[MappingSetConfig] = Field(
-        default_factory=list, max_length=64, description="Mapping sets; the first is in force at the start."
+    fixtures: list[FixtureConfig] = Field(
+        default_factory=list, max_length=MAX_FIXTURES, description="The patch."
     )
+    mappings: list[MappingConfig] = Field(
+        default_factory=list, max_length=64, description="Sets of rules; the first is in force at the start."
+    )
+    safe: SafeConfig = Field(default_factory=SafeConfig, description=str(SafeConfig.__doc__))
+
+    @field_validator("fixtures")
+    @classmethod
+    def _each_channel_once(cls, fixtures: list[FixtureConfig], info: ValidationInfo) -> list[FixtureConfig]:
+        names = [fixture.name for fixture in fixtures]
+        for place, name in enumerate(names):
+            if name in names[:place]:
+                raise refusal(f"Two fixtures are called '{name}'.", "Give one another name.", at=place)
+        for place, words, cure in overlaps(fixtures, _directory(info)):
+            raise refusal(words, cure, at=place)
+        return fixtures
+
+    @field_validator("mappings")
+    @classmethod
+    def _rules_fit_the_rig(cls, mappings: list[MappingConfig], info: ValidationInfo) -> list[MappingConfig]:
+        names = [mapping.name for mapping in mappings]
+        for place, mapping in enumerate(mappings):
+            if mapping.name in names[:place]:
+                raise refusal(f"Two mappings are called '{mapping.name}'.", "Give one another name.", place)
+            for rule in mapping.rules:
+                fault = _misfit(rule, info.data.get("fixtures"), _directory(info))
+                if fault is not None:
+                    raise refusal(f"In the mapping '{mapping.name}': {fault[0]}", fault[1], at=place)
+        return mappings
+
+    @field_validator("safe")
+    @classmethod
+    def _known_fixtures(cls, safe: SafeConfig, info: ValidationInfo) -> SafeConfig:
+        names = [fixture.name for fixture in info.data.get("fixtures", ())]
+        for name in safe.fixtures:
+            if names and name not in names:
+                raise refusal(f"There is no fixture '{name}'.", did_you_mean(name, names), at="fixtures")
+        return safe
+
+
+class VenuePlaceConfig(Section):
+    """What is different about one fixture in this venue; what is left out stays as in the show."""
+
+    fixture: str = Field(min_length=1, description="Its name in the show.")
+    universe: Universe | None = Field(default=None, description="Its universe here.")
+    address: Address | None = Field(default=None, description="Its first channel here.")
+    place: Metres | None = Field(default=None, description="Where it is here, metres (x, y, z).")
+    pose: Pose | None = Field(default=None, description="Hanging or standing here.")
+    turn: Metres | None = Field(
+        default=None, description="How it is turned here: yaw, pitch, roll in degrees."
+    )
+
+
+class VenueLightsConfig(Section):
+    """The rig as it hangs in this venue."""
+
+    rate_hz: float = Field(
+        default=40.0, ge=1, le=44, description="How often lights are reckoned; a full universe takes 22.7 ms."
+    )
+    places: list[VenuePlaceConfig] = Field(
+        default_factory=list, max_length=MAX_FIXTURES, description="Fixtures that differ from the show."
+    )
+
+
+def overlaps(fixtures: Sequence[FixtureConfig], directory: Path | None) -> Sequence[tuple[int, str, str]]:
+    """(place in the list, message, cure) of each fixture that sits on another one's channels."""
+    owners: dict[tuple[int, int], FixtureConfig] = {}
+    found = []
+    for place, fixture in enumerate(fixtures):
+        count = len(load_profile(fixture.profile, directory).mode(fixture.mode).channels)
+        channels = [(fixture.universe, fixture.address + offset) for offset in range(count)]
+        taken = next((channel for channel in channels if channel in owners), None)
+        if taken is not None:
+            other = owners[taken]
+            message = (
+                f"'{other.name}' and '{fixture.name}' are both on channel {taken[1]} of universe {taken[0]}."
+            )
+            end = other.address + len(load_profile(other.profile, directory).mode(other.mode).channels)
+            found.append((place, message, f"'{other.name}' ends on {end - 1}: write another address."))
+        owners.update(dict.fromkeys(channels, fixture))
+    return found
+
+
+def unwired(show: Show, box: BoxConfig) -> list[str]:
+    """A sentence for each universe that the show's fixtures are on and the box file has no wire for."""
+    wired = {wire.universe for wire in box.outputs.dmx}
+    fixtures = at_venue(show.config.lights, box.lights).fixtures
+    return [
+        f"Universe {universe} has no wire: {_names(fixtures, universe)} stay dark. "
+        f"Add {{universe: {universe}, wire: artnet}} (or another wire) under outputs: dmx: in the box file."
+        for universe in sorted({fixture.universe for fixture in fixtures} - wired)
+    ]
+
+
+def misplaced(show: Show, box: BoxConfig) -> list[str]:
+    """What is wrong with the box file's changes to the rig: unknown fixtures, channels used twice."""
+    names = [fixture.name for fixture in show.config.lights.fixtures]
+    unknown = [
+        f"The show has no fixture '{place.fixture}' to change (lights: places: in the box file). "
+        + did_you_mean(place.fixture, names)
+        for place in box.lights.places
+        if place.fixture not in names
+    ]
+    fixtures = at_venue(show.config.lights, box.lights).fixtures
+    return unknown + [f"{words} {cure}" for _, words, cure in overlaps(fixtures, show.directory)]
+
+
+def at_venue(lights: LightsConfig, venue: VenueLightsConfig) -> LightsConfig:
+    """The rig with the venue's changes."""
+    changes = {
+        place.fixture: {key: value for key, value in place if key != "fixture" and value is not None}
+        for place in venue.places
+    }
+    fixtures = [fixture.model_copy(update=changes.get(fixture.name, {})) for fixture in lights.fixtures]
+    return lights.model_copy(update={"fixtures": fixtures})
+
+
+def drivable(fixture: FixtureConfig, directory: Path | None) -> tuple[str, ...]:
+    """What rules can drive on a fixture: its attributes, `red` for all of `red 1`, ..., aim and colour."""
+    names = list(load_profile(fixture.profile, directory).mode(fixture.mode).attributes)
+    bases = {base(name) for name in names}
+    if {PAN, TILT} <= bases:
+        names.append(AIM)
+    if bases & set(COLOURS):
+        names += [COLOUR, DIMMER]  # colours without a dimmer are scaled in its place
+    return tuple(dict.fromkeys([*names, *sorted(bases)]))
+
+
+def _misfit(
+    rule: RuleConfig, fixtures: Sequence[FixtureConfig] | None, directory: Path | None
+) -> tuple[str, str] | None:
+    """Message and cure when a rule names a fixture or an attribute that there is not."""
+    if fixtures is None:
+        return None
+    by_name = {fixture.name: fixture for fixture in fixtures}
+    for name in rule.fixtures:
+        if name not in by_name:
+            return f"There is no fixture '{name}'.", did_you_mean(name, list(by_name))
+        can = drivable(by_name[name], directory)
+        if rule.drives not in can:
+            return f"The fixture '{name}' has no '{rule.drives}'.", did_you_mean(rule.drives, can)
+    everything = sorted({word for fixture in fixtures for word in drivable(fixture, directory)})
+    if not rule.fixtures and rule.drives not in everything:
+        return f"No fixture has '{rule.drives}'.", did_you_mean(rule.drives, everything)
+    return None
+
+
+def _names(fixtures: Sequence[FixtureConfig], universe: int) -> str:
+    return ", ".join(fixture.name for fixture in fixtures if fixture.universe == universe)
+
+
+def _directory(info: ValidationInfo) -> Path | None:
+    directory: Path | None = (info.context or {}).get("directory")
+    return directory

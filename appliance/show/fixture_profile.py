@@ -1,0 +1,181 @@
+"""Fixture profiles: what each channel of a lamp does; YAML files of the show or built in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, field_validator, model_validator
+
+from appliance.show.config_error import ConfigError, did_you_mean
+from appliance.show.section import Section, refusal
+from appliance.show.validation import validated
+from appliance.show.yaml_file import read_yaml
+
+FOLDER = "profiles"  # inside a show bundle
+UNUSED = "-"  # a channel that nothing drives
+FINE = (" fine", " finer")  # the second and third byte of an attribute
+DIMMER, PAN, TILT = "dimmer", "pan", "tilt"
+COLOURS = ("red", "green", "blue", "white", "cyan", "magenta", "yellow")
+MAX_CHANNELS = 512
+
+Byte = Annotated[int, Field(ge=0, le=255)]
+BytePair = Annotated[tuple[Byte, Byte], Field(strict=False)]
+
+
+class AttributeConfig(Section):
+    """What is special about an attribute; one that is not listed has the defaults."""
+
+    name: str = Field(min_length=1, max_length=64, description="As in the modes' channels, without 'fine'.")
+    default: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="Where it stands when no rule drives it, share of its range. Left out: pan and tilt in "
+        "the middle, colours white, everything else 0.",
+    )
+    limits: BytePair = Field(
+        default=(0, 255),
+        description="First and last value (0 to 255) of the part of the channel that is used.",
+    )
+    degrees: float | None = Field(
+        default=None, gt=0, le=1440, description="For pan (540) and tilt (270): the whole range in degrees."
+    )
+    invert: bool = Field(default=False, description="The channel runs the other way round.")
+    slew: float | None = Field(
+        default=None, gt=0, le=2000, description="For pan and tilt (180): at most so many degrees a second."
+    )
+    dims: bool = Field(
+        default=False,
+        description="Master and blackout scale it, as they scale the dimmer: for fog, strobes, lasers.",
+    )
+
+    @field_validator("limits")
+    @classmethod
+    def _in_order(cls, limits: tuple[int, int]) -> tuple[int, int]:
+        if limits[0] >= limits[1]:
+            raise refusal(f"{list(limits)} has no room between its ends.", "Write [first, last].")
+        return limits
+
+
+class ModeConfig(Section):
+    """One layout of channels, as chosen in the fixture's own menu."""
+
+    name: str = Field(min_length=1, max_length=64, description="What the fixture's menu calls it.")
+    channels: list[str] = Field(
+        min_length=1,
+        max_length=MAX_CHANNELS,
+        description="Attributes from the first channel on; 'pan fine' is the second byte of pan, 'pan finer' "
+        "the third, '-' a channel that stays 0.",
+    )
+
+    @field_validator("channels")
+    @classmethod
+    def _each_byte_once(cls, channels: list[str]) -> list[str]:
+        for place, channel in enumerate(channels):
+            if channel != UNUSED and channel in channels[:place]:
+                raise refusal(
+                    f"'{channel}' stands on channels {channels.index(channel) + 1} and {place + 1}.",
+                    f"Number them ('{channel} 1', '{channel} 2'), or write '{UNUSED}' for one of them.",
+                    at=place,
+                )
+            coarse = next((channel.removesuffix(fine) for fine in FINE if channel.endswith(fine)), "")
+            if coarse and coarse not in channels:
+                raise refusal(
+                    f"'{channel}' has no coarse channel '{coarse}'.",
+                    did_you_mean(coarse, [name for name in channels if not name.endswith(FINE)]),
+                    at=place,
+                )
+        return channels
+
+    @property
+    def attributes(self) -> tuple[str, ...]:
+        """Names of its attributes, in the order of their first channels."""
+        return tuple(name for name in self.channels if name != UNUSED and not name.endswith(FINE))
+
+
+class ProfileConfig(Section):
+    """A fixture profile: modes and what is special about attributes."""
+
+    name: str = Field(min_length=1, max_length=200, description="Manufacturer and model.")
+    modes: list[ModeConfig] = Field(
+        min_length=1, max_length=64, description="Layouts; the first one is taken unless the patch says."
+    )
+    attributes: list[AttributeConfig] = Field(
+        default_factory=list, max_length=MAX_CHANNELS, description="What is special about some of them."
+    )
+
+    @model_validator(mode="after")
+    def _known_attributes(self) -> ProfileConfig:
+        known = [name for mode in self.modes for name in mode.attributes]
+        for attribute in self.attributes:
+            if attribute.name not in known:
+                raise refusal(
+                    f"No mode has a channel '{attribute.name}'.",
+                    did_you_mean(attribute.name, known),
+                    "attributes",
+                )
+        return self
+
+    def mode(self, name: str | None) -> ModeConfig:
+        """The mode of that name, None: the first. Raises KeyError."""
+        if name is None:
+            return self.modes[0]
+        return {mode.name: mode for mode in self.modes}[name]
+
+    def attribute(self, name: str) -> AttributeConfig:
+        """What is special about an attribute; the defaults where nothing is."""
+        return next((known for known in self.attributes if known.name == name), AttributeConfig(name=name))
+
+
+def base(attribute: str) -> str:
+    """'red' for 'red 2': what the attribute is, of whichever cell."""
+    name, _, number = attribute.rpartition(" ")
+    return name if name and number.isdigit() else attribute
+
+
+def built_in_folder() -> Path:
+    """Where the profiles lie that come with the box."""
+    return Path(__file__).resolve().parent / FOLDER
+
+
+def profile_names(show: Path | None) -> Sequence[str]:
+    """Names of all profiles that a show can use."""
+    folders = [built_in_folder()] + ([show / FOLDER] if show is not None else [])
+    return sorted({path.stem for folder in folders for path in folder.glob("*.yaml")})
+
+
+def find_profile(name: str, show: Path | None) -> Path | None:
+    """The profile's file: the show's own first, then the built-in one; None where there is none."""
+    folders = ([show / FOLDER] if show is not None else []) + [built_in_folder()]
+    if "/" in name or "\\" in name:
+        return None
+    return next((path for folder in folders if (path := folder / f"{name}.yaml").is_file()), None)
+
+
+_read: dict[tuple[Path, int], ProfileConfig] = {}
+
+
+def load_profile(name: str, show: Path | None) -> ProfileConfig:
+    """A profile by its name; raises ConfigError for one that is faulty, KeyError where there is none."""
+    path = find_profile(name, show)
+    if path is None:
+        raise KeyError(name)
+    key = (path, path.stat().st_mtime_ns)
+    if key not in _read:
+        _read[key] = validated(ProfileConfig, read_yaml(path), {})
+    return _read[key]
+
+
+def profile_refusal(name: str, show: Path | None) -> Exception | None:
+    """Why a fixture cannot have this profile, to be raised by validators; None when it can."""
+    try:
+        load_profile(name, show)
+    except KeyError:
+        return refusal(f"There is no fixture profile '{name}'.", did_you_mean(name, profile_names(show)))
+    except ConfigError as error:
+        return refusal(
+            f"The fixture profile '{name}' is faulty: {error.problems[0]}", "Mend that file first."
+        )
+    return None
