@@ -93,7 +93,7 @@ class DmxConfig(Section):
         default=None,
         min_length=1,
         max_length=100,
-        description="usb-pro, open-dmx, udmx: USB serial number of the adapter; null: the first that is found.",
+        description="usb-pro, open-dmx, udmx: the adapter's USB serial number; null: the first one found.",
     )
 
     @model_validator(mode="before")
@@ -147,9 +147,11 @@ class DmxConfig(Section):
     def destination(self) -> tuple[object, ...]:
         """What no second entry may have: the light that hears it cannot tell the two apart."""
         if self.wire in NUMBERS:
-            host = self.host or ("127.0.0.1" if self.wire == "artnet" else None)
+            host = self.host or ("127.0.0.1" if self.wire == "artnet" else "multicast")
             return (self.wire, host, self.udp_port, self.number_on_wire, self.interface)
-        return ("usb" if self.wire == "udmx" else "cable", self.device, self.serial)
+        if self.device or self.serial:
+            return ("usb" if self.wire == "udmx" else "cable", self.device, self.serial)
+        return (self.wire,)
 
 
 def _each_destination_once(wires: list[DmxConfig]) -> list[DmxConfig]:

@@ -4,14 +4,57 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from appliance.outputs.dmx import sacn_packet
+from appliance.outputs.dmx.art_net import ArtNetWire
+from appliance.outputs.dmx.datagram_sender import DatagramPath
+from appliance.outputs.dmx.identity import component_identifier
+from appliance.outputs.dmx.open_dmx import open_dmx_wire
 from appliance.outputs.dmx.pace import Universe
+from appliance.outputs.dmx.sacn import LOOPBACK, SacnSource, SacnWire
+from appliance.outputs.dmx.udmx import udmx_wire
+from appliance.outputs.dmx.usb_pro import usb_pro_wire
+from appliance.outputs.dmx.wire import Wire
 from appliance.show.dmx import DmxConfig
 
 
-def open_universes(configs: Sequence[DmxConfig], state: Path | None = None) -> tuple[Universe, ...]:
+def open_universes(
+    configs: Sequence[DmxConfig], state: Path | None = None, usb_backend: Any = None
+) -> tuple[Universe, ...]:
     """All universes of a box, in the order of its box file. Never raises: a wire that is not there says so.
 
     state: the box's state folder; it keeps the identity by which sACN receivers know this box again.
+    usb_backend: pyusb's; None for the machine's libusb.
     """
-    raise NotImplementedError
+    sources = _sources(configs, state)
+    return tuple(Universe(config, open_wire(config, sources, usb_backend)) for config in configs)
+
+
+def open_wire(config: DmxConfig, sources: dict[str, SacnSource], usb_backend: Any = None) -> Wire:
+    """The wire of one entry; `sources` by the interface's address, for sACN alone."""
+    if config.wire == "artnet":
+        return ArtNetWire(config)
+    if config.wire == "sacn":
+        return SacnWire(config, sources[config.interface or LOOPBACK])
+    if config.wire == "usb-pro":
+        return usb_pro_wire(config)
+    if config.wire == "open-dmx":
+        return open_dmx_wire(config)
+    return udmx_wire(config, usb_backend)
+
+
+def _sources(configs: Sequence[DmxConfig], state: Path | None) -> dict[str, SacnSource]:
+    """One source for each network that sACN leaves by, all with this box's identity."""
+    sacn = [config for config in configs if config.wire == "sacn"]
+    if not sacn:
+        return {}
+    cid = component_identifier(state)
+    sources: dict[str, SacnSource] = {}
+    for config in sacn:
+        interface = config.interface or LOOPBACK
+        if interface not in sources:
+            everyone = sacn_packet.group(sacn_packet.DISCOVERY_UNIVERSE)
+            path = DatagramPath(everyone, config.udp_port, interface, hops=config.ttl)
+            sources[interface] = SacnSource(cid, config.source_name, path)
+    return sources

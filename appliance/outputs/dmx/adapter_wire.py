@@ -1,0 +1,139 @@
+"""A universe on a USB adapter: a thread of its own writes the newest one and opens the device again."""
+
+from __future__ import annotations
+
+import errno
+import threading
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+FIRST_PAUSE_S = 0.1
+LONGEST_PAUSE_S = 2.0
+ENDS_WITHIN_S = 1.0  # what was sent last leaves within it, unless the device hangs
+_IN_WORDS = {
+    errno.ENOENT: "it is not plugged in",
+    errno.ENODEV: "it is not plugged in",
+    errno.ENXIO: "it is not plugged in",
+    errno.EIO: "it was unplugged",
+    errno.EACCES: "this user may not open it: add the user to the group dialout, or give the device to it",
+    errno.EPERM: "this user may not open it: add the user to the group dialout, or give the device to it",
+    errno.EBUSY: "another program uses it",
+    errno.EAGAIN: "another program uses it",
+}
+
+
+class AdapterError(OSError):
+    """An adapter that does not work; the message is for people."""
+
+
+class Adapter(Protocol):
+    """An adapter that is plugged in."""
+
+    def write(self, data: bytes) -> None:
+        """Hand over one universe, 512 levels. May take as long as DMX takes. Raises OSError when it is gone."""
+
+    def close(self) -> None:
+        """Give the device back, without waiting for what it has not taken. Raises nothing."""
+
+
+class AdapterWire:
+    """Newest wins: a universe that has not left when the next one comes is dropped and counted.
+
+    period_s: how often the adapter has to be told even what does not change; None: when there is news alone.
+    """
+
+    def __init__(self, name: str, open_adapter: Callable[[], Adapter], period_s: float | None = None) -> None:
+        self.name = name
+        self.sent = 0
+        self.dropped = 0
+        self.last_error = ""
+        self.is_open = False
+        self._open_adapter = open_adapter
+        self._period_s = period_s
+        self._newest: bytes | None = None  # waits to leave
+        self._last: bytes | None = None  # what the adapter has to show
+        self._closing = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    @property
+    def trouble(self) -> str | None:
+        """What happened, what the audience sees, what to do."""
+        if self.is_open or not self.last_error:
+            return None
+        return (
+            f"{self.name}: {self.last_error}. Its lights do not follow; the show goes on. "
+            "It is tried again every 2 seconds: plug it in, or check device and serial in the box file."
+        )
+
+    def send(self, data: bytes | bytearray, now: float) -> None:
+        """Leave one universe for the thread; never waits for the device."""
+        with self._changed:
+            if self._newest is not None:
+                self.dropped += 1
+            self._newest = bytes(data)
+            self._changed.notify()
+
+    def close(self, now: float) -> None:
+        """What was sent last leaves, then the device is given back; one that hangs is left to itself."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify()
+        self._thread.join(ENDS_WITHIN_S)
+
+    def _run(self) -> None:
+        pause_s = FIRST_PAUSE_S
+        while not self._closing:
+            try:
+                adapter = self._open_adapter()
+            except (OSError, ValueError) as error:
+                self._failed(error)
+            else:
+                before = self.sent
+                self._feed(adapter)
+                pause_s = FIRST_PAUSE_S if self.sent > before else pause_s
+            self._rest(pause_s)
+            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+    def _feed(self, adapter: Adapter) -> None:
+        """Write until it fails or the wire is closed and all has left."""
+        self.is_open = True
+        due = time.monotonic()
+        try:
+            while (data := self._next(due)) is not None:
+                adapter.write(data)
+                self.sent += 1
+                due = max(due + (self._period_s or 0.0), time.monotonic())
+        except OSError as error:
+            self.dropped += 1
+            self._failed(error)
+        finally:
+            self.is_open = False
+            adapter.close()
+
+    def _next(self, due: float) -> bytes | None:
+        """Waits for the next universe to write; None when there is none and the wire is closed."""
+        with self._changed:
+            if self._period_s is not None:
+                self._changed.wait_for(lambda: self._closing, timeout=max(0.0, due - time.monotonic()))
+            while self._newest is None and not self._closing:
+                if self._period_s is not None and self._last is not None:
+                    return self._last
+                self._changed.wait()
+            data, self._newest = self._newest, None
+            self._last = data or self._last
+            return data
+
+    def _rest(self, pause_s: float) -> None:
+        """Before the next try; an adapter that comes back is shown the last universe at once."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._closing, timeout=pause_s)
+            self._newest = self._newest or self._last
+
+    def _failed(self, error: Exception) -> None:
+        number = error.errno if isinstance(error, OSError) else None
+        self.last_error = (
+            str(error) if isinstance(error, AdapterError) else _IN_WORDS.get(number or 0, str(error))
+        )

@@ -1,0 +1,104 @@
+"""Datagrams to one address: what the network does not take is dropped, what failed is opened again."""
+
+from __future__ import annotations
+
+import errno
+import ipaddress
+import socket
+from dataclasses import dataclass
+
+FIRST_PAUSE_S = 0.1
+LONGEST_PAUSE_S = 1.0
+WELL_AFTER_S = 2.0  # longer than the pause between two keep-alives: a refusal comes back with the next one
+_PASSING = (errno.EAGAIN, errno.ENOBUFS)  # a full buffer: the next universe may go through
+_IN_WORDS = {
+    errno.ECONNREFUSED: "nobody listens there",
+    errno.ENETUNREACH: "no network leads there",
+    errno.EHOSTUNREACH: "that machine does not answer",
+    errno.EADDRNOTAVAIL: "this machine does not have the interface's address",
+    errno.ENODEV: "this machine does not have the interface's address",
+    errno.EACCES: "the network allows no broadcast to that address",
+    errno.EPERM: "this machine's firewall refuses it",
+    errno.EAGAIN: "the network does not take more",
+}
+
+
+@dataclass(frozen=True)
+class DatagramPath:
+    """Where datagrams go, and out of which network interface (its own address; None: the kernel's choice)."""
+
+    host: str
+    port: int
+    interface: str | None = None
+    broadcast: bool = False
+    hops: int = 1  # of multicast, IP_MULTICAST_TTL
+
+    def open(self) -> socket.socket:
+        """A connected socket: only for those does Linux say that nobody listens. Raises OSError."""
+        opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            opened.setblocking(False)
+            if self.broadcast:
+                opened.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            if ipaddress.IPv4Address(self.host).is_multicast:
+                opened.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self.hops)
+                if self.interface:
+                    own = socket.inet_aton(self.interface)
+                    opened.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, own)
+            if self.interface:
+                opened.bind((self.interface, 0))
+            opened.connect((self.host, self.port))
+        except OSError:
+            opened.close()
+            raise
+        return opened
+
+
+class DatagramSender:
+    """One socket that opens itself again. `send` never waits and never raises."""
+
+    def __init__(self, path: DatagramPath) -> None:
+        self.path = path
+        self.sent = 0
+        self.dropped = 0
+        self.last_error = ""  # why the last one was dropped; stays when all is well again
+        self.is_open = False  # whether the newest datagram left
+        self._socket: socket.socket | None = None
+        self._pause_s = FIRST_PAUSE_S
+        self._retry_at = float("-inf")
+        self._well_since = float("inf")
+
+    def send(self, packet: memoryview | bytes | bytearray, now: float) -> bool:
+        """Whether the datagram left; `now` in monotonic seconds."""
+        if now < self._retry_at:
+            self.dropped += 1
+            return False
+        try:
+            if self._socket is None:
+                self._socket = self.path.open()
+                self._well_since = now
+            self._socket.send(packet)
+        except OSError as error:
+            self._failed(error, now)
+            return False
+        self.sent += 1
+        self.is_open = True
+        if now - self._well_since >= WELL_AFTER_S:
+            self._pause_s = FIRST_PAUSE_S
+        return True
+
+    def close(self) -> None:
+        """Close the socket."""
+        if self._socket is not None:
+            self._socket.close()
+        self._socket = None
+        self.is_open = False
+
+    def _failed(self, error: OSError, now: float) -> None:
+        self.dropped += 1
+        self.last_error = _IN_WORDS.get(error.errno or 0, str(error.strerror))
+        if error.errno in _PASSING:
+            return
+        self.close()
+        self._retry_at = now + self._pause_s
+        self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)

@@ -1,0 +1,36 @@
+"""The component identifier (CID) by which sACN receivers know a box again: made once, kept for good."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from uuid import UUID, uuid4
+
+FILE = "sacn-cid"
+
+
+def component_identifier(state: Path | None) -> UUID:
+    """The one in the state folder, made where there is none (E1.31 section 5.6).
+
+    Without a folder, or where it cannot be written, a new one each time: receivers then see a new source.
+    """
+    fresh = uuid4()
+    if state is None:
+        return fresh
+    kept = _read(state / FILE)
+    if kept is not None:
+        return kept
+    with contextlib.suppress(OSError):
+        state.mkdir(parents=True, exist_ok=True)
+        draft = state / f"{FILE}.{os.getpid()}"
+        draft.write_text(f"{fresh}\n", encoding="ascii")
+        draft.replace(state / FILE)
+    return fresh
+
+
+def _read(file: Path) -> UUID | None:
+    try:
+        return UUID(file.read_text(encoding="ascii").strip())
+    except (OSError, ValueError):
+        return None

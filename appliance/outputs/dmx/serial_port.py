@@ -1,0 +1,50 @@
+"""The serial device of a DMX adapter: by its path, by its USB serial number, or the first of its kind."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+
+import serial
+from serial.tools import list_ports
+from serial.tools.list_ports_common import ListPortInfo
+
+from appliance.outputs.dmx.adapter_wire import AdapterError
+
+WRITE_TIMEOUT_S = 0.25  # ten universes: an adapter that takes nothing for so long hangs
+FTDI = (0x0403, 0x6001)
+
+
+def find_device(device: str | None, number: str | None, is_kind: Callable[[ListPortInfo], bool]) -> str:
+    """The path of the adapter. Raises AdapterError where no such adapter is plugged in."""
+    if device is not None:
+        return device
+    for port in sorted(list_ports.comports()):
+        if port.serial_number == number if number is not None else is_kind(port):
+            return str(port.device)
+    wanted = f"with the USB serial number {number}" if number is not None else "of this kind"
+    raise AdapterError(f"no adapter {wanted} is plugged in")
+
+
+def is_usb_pro(port: ListPortInfo) -> bool:
+    """Whether it calls itself a DMX USB Pro, as ENTTEC's and DMXking's do."""
+    return "DMX USB PRO" in (port.product or "").upper()
+
+
+def is_bare_ftdi(port: ListPortInfo) -> bool:
+    """Whether it is an FTDI chip without a controller behind it, as far as USB tells."""
+    return (port.vid, port.pid) == FTDI and not is_usb_pro(port)
+
+
+def open_port(device: str, baud: int, stopbits: float = serial.STOPBITS_ONE) -> serial.Serial:
+    """The device, for this program alone. Raises OSError."""
+    return serial.Serial(
+        device, baud, stopbits=stopbits, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True
+    )
+
+
+def close_port(port: serial.Serial) -> None:
+    """Close without waiting: a hung adapter would keep Linux waiting for 30 s for what it has not taken."""
+    for step in (port.reset_output_buffer, port.close):
+        with contextlib.suppress(OSError):
+            step()
