@@ -31,7 +31,7 @@ class Adapter(Protocol):
     """An adapter that is plugged in."""
 
     def write(self, data: bytes) -> None:
-        """Hand over one universe, 512 levels. May take as long as DMX takes. Raises OSError when it is gone."""
+        """One universe, 512 levels. May take as long as DMX takes. Raises OSError when it is gone."""
 
     def close(self) -> None:
         """Give the device back, without waiting for what it has not taken. Raises nothing."""
@@ -85,20 +85,19 @@ class AdapterWire:
 
     def _run(self) -> None:
         pause_s = FIRST_PAUSE_S
-        while not self._closing:
+        while True:
+            before = self.sent
             try:
-                adapter = self._open_adapter()
-            except (OSError, ValueError) as error:
+                self._feed(self._open_adapter())
+            except Exception as error:  # whatever a driver raises: the lights come back when the device does
                 self._failed(error)
-            else:
-                before = self.sent
-                self._feed(adapter)
-                pause_s = FIRST_PAUSE_S if self.sent > before else pause_s
+            if self._closing:
+                return
+            pause_s = FIRST_PAUSE_S if self.sent > before else min(2 * pause_s, LONGEST_PAUSE_S)
             self._rest(pause_s)
-            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
 
     def _feed(self, adapter: Adapter) -> None:
-        """Write until it fails or the wire is closed and all has left."""
+        """Write until the wire is closed and all has left; raises what the adapter raises."""
         self.is_open = True
         due = time.monotonic()
         try:
@@ -106,9 +105,6 @@ class AdapterWire:
                 adapter.write(data)
                 self.sent += 1
                 due = max(due + (self._period_s or 0.0), time.monotonic())
-        except OSError as error:
-            self.dropped += 1
-            self._failed(error)
         finally:
             self.is_open = False
             adapter.close()
@@ -127,13 +123,12 @@ class AdapterWire:
             return data
 
     def _rest(self, pause_s: float) -> None:
-        """Before the next try; an adapter that comes back is shown the last universe at once."""
+        """Wait before the next try; an adapter that comes back is shown the last universe at once."""
         with self._changed:
             self._changed.wait_for(lambda: self._closing, timeout=pause_s)
             self._newest = self._newest or self._last
 
     def _failed(self, error: Exception) -> None:
+        self.dropped += 1
         number = error.errno if isinstance(error, OSError) else None
-        self.last_error = (
-            str(error) if isinstance(error, AdapterError) else _IN_WORDS.get(number or 0, str(error))
-        )
+        self.last_error = _IN_WORDS.get(number or 0, str(error))

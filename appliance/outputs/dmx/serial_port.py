@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import termios
 from collections.abc import Callable
 
 import serial
@@ -38,13 +39,27 @@ def is_bare_ftdi(port: ListPortInfo) -> bool:
 
 def open_port(device: str, baud: int, stopbits: float = serial.STOPBITS_ONE) -> serial.Serial:
     """The device, for this program alone. Raises OSError."""
-    return serial.Serial(
-        device, baud, stopbits=stopbits, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True
-    )
+    try:
+        return serial.Serial(
+            device, baud, stopbits=stopbits, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True
+        )
+    except termios.error as error:  # no OSError, although it is one
+        raise OSError(*error.args) from None
+
+
+def write(port: serial.Serial, data: bytes) -> None:
+    """All of it, and away with what came in meanwhile. Raises AdapterError."""
+    try:
+        port.reset_input_buffer()
+        port.write(data)
+    except serial.SerialTimeoutException:
+        raise AdapterError("it takes no more data") from None
+    except (OSError, termios.error):
+        raise AdapterError("it was unplugged") from None
 
 
 def close_port(port: serial.Serial) -> None:
     """Close without waiting: a hung adapter would keep Linux waiting for 30 s for what it has not taken."""
     for step in (port.reset_output_buffer, port.close):
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, termios.error):
             step()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from appliance.outputs.dmx.adapter_wire import AdapterWire
-from appliance.outputs.dmx.serial_port import close_port, find_device, is_usb_pro, open_port
+from appliance.outputs.dmx.serial_port import close_port, find_device, is_usb_pro, open_port, write
 from appliance.show.dmx import DmxConfig
 
 BAUD = 57600  # the widget is asked by USB and knows no speed; Linux wants one
@@ -23,8 +23,7 @@ class UsbPro:
 
     def write(self, data: bytes) -> None:
         """One universe; what the widget said meanwhile (DMX that it receives, garbage) is thrown away."""
-        self._port.reset_input_buffer()
-        self._port.write(self._head + data[: self._channels] + _END)
+        write(self._port, self._head + data[: self._channels] + _END)
 
     def close(self) -> None:
         """Close the port."""

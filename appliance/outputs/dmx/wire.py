@@ -12,13 +12,19 @@ class Wire(Protocol):
     opens itself again, after 0.1 s at first and 2 s at last.
     """
 
-    sent: int  # universes that left
-    dropped: int  # universes that did not
-    last_error: str  # why the last one was dropped, in a few words; stays after the wire is well again
+    name: str  # how to call it in front of people: 'Art-Net 192.168.0.30, universe 1'
 
     @property
-    def name(self) -> str:
-        """How to call it in front of people: 'Art-Net 192.168.0.30, universe 1'."""
+    def sent(self) -> int:
+        """Universes that left."""
+
+    @property
+    def dropped(self) -> int:
+        """Universes that did not."""
+
+    @property
+    def last_error(self) -> str:
+        """Why the last one was dropped, in a few words; stays after the wire is well again."""
 
     @property
     def is_open(self) -> bool:
