@@ -1,0 +1,114 @@
+"""Poses between the ticks: what the display shows at its own rate, exactly one tick behind the stage."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from appliance.outputs.frame_reader import FrameReader, SeenFrame
+from appliance.pose import quaternion
+from appliance.projector.moment import Floats, Moment
+
+TICK_S = 0.02
+TRAIL_S = 1.2
+_KEPT = 64  # frames: the ring of the shared frame, a little more than the trail
+_READ_AT_ONCE = 3  # a display of 25 Hz or more misses none; after a gap all of them are read
+_LONGEST_GAP_S = 0.1  # nobody knows where the dancer was in a longer one: the later pose simply follows
+_SLEW = 0.1  # how much faster or slower the dance may seem while the delay is corrected
+
+
+class _Seen(NamedTuple):
+    time: float
+    left: float  # when it left the stage
+    positions: Floats
+    world: Floats
+
+
+class Interpolation:
+    """Follows one stage's frames. Between two of them positions go straight, world rotations turn (slerp).
+
+    The dance is shown one tick later than its newest frame can be here, so that the frame after the wanted
+    time has come; when it has not, the newest one is held: nothing is ever extrapolated.
+    """
+
+    def __init__(self, reader: FrameReader, held: tuple[int, ...]) -> None:
+        self._reader, self._held = reader, held
+        self._seen: deque[_Seen] = deque(maxlen=_KEPT)
+        self._tick = -1
+        self._way_s: float | None = None  # from a frame's time to its leaving the stage
+        self._before = 0.0
+
+    @property
+    def newest(self) -> float | None:
+        """Time of the newest frame, monotonic seconds; None before the first."""
+        return self._seen[-1].time if self._seen else None
+
+    def take(self, now: float) -> None:
+        """Read what the stage has written since the last time."""
+        frames = self._reader.frames(_READ_AT_ONCE if self._seen else _KEPT, now)
+        if self._seen and frames and frames[0].tick > self._tick + 1:
+            frames = self._reader.frames(_KEPT, now)
+        for frame in frames:
+            self._note(frame)
+        self._learn_the_way(now)
+
+    def moment(self, now: float) -> Moment | None:
+        """What to draw at `now` (monotonic seconds); None before the first frame."""
+        if not self._seen:
+            return None
+        time_s = max(now - self.delay_s, self._seen[0].time)
+        after = next((k for k, seen in enumerate(self._seen) if seen.time > time_s), len(self._seen))
+        trail = [seen for seen in list(self._seen)[:after] if seen.time >= time_s - TRAIL_S]
+        before = self._seen[after - 1]
+        positions, world = before.positions, before.world
+        if after < len(self._seen):
+            positions, world = _between(before, self._seen[after], time_s)
+        return Moment(
+            time_s=time_s,
+            positions=positions,
+            world=world,
+            trail=[(seen.positions, seen.world) for seen in trail or [before]],
+            trail_times=[seen.time for seen in trail or [before]],
+            held=self._held,
+        )
+
+    @property
+    def delay_s(self) -> float:
+        """How far behind the clock the dance is shown: the way out of the stage, and one tick."""
+        return TICK_S + (self._way_s or 0.0)
+
+    def left_stage(self, moment: Moment) -> float:
+        """When what this moment shows left the stage, monotonic seconds."""
+        return min(moment.time_s, self._seen[-1].time) + (self._way_s or 0.0)
+
+    def _note(self, frame: SeenFrame) -> None:
+        if frame.tick <= self._tick or (self._seen and frame.frame_time <= self._seen[-1].time):
+            return
+        self._tick = frame.tick
+        self._seen.append(_Seen(frame.frame_time, frame.written, frame.positions, frame.world))
+
+    def _learn_the_way(self, now: float) -> None:
+        """Nine of ten frames take at most so long; followed slowly, so that nobody sees it."""
+        if not self._seen:
+            return
+        ways = sorted(min(max(seen.left - seen.time, 0.0), TICK_S) for seen in self._seen)
+        way_s = ways[(len(ways) * 9) // 10]
+        if self._way_s is None:
+            self._way_s = way_s
+        else:
+            most_s = _SLEW * max(0.0, now - self._before)
+            self._way_s += min(max(way_s - self._way_s, -most_s), most_s)
+        self._before = now
+
+
+def _between(before: _Seen, after: _Seen, time_s: float) -> tuple[Floats, Floats]:
+    """Positions (J, 3) and world rotations (J, 4) at a time between two frames."""
+    gap_s = after.time - before.time
+    if gap_s > _LONGEST_GAP_S:
+        return before.positions, before.world
+    share = np.float32((time_s - before.time) / gap_s)
+    positions = before.positions + share * (after.positions - before.positions)
+    world = quaternion.slerp(before.world, after.world, share)
+    return positions.astype(np.float32), world.astype(np.float32)
