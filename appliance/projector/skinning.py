@@ -1,4 +1,4 @@
-"""Skinning: the body's surface follows the joints, by dual quaternions, so that twisted limbs keep their volume.
+"""Skinning: the surface follows the joints, by dual quaternions, so that twisted limbs keep their volume.
 
 A dual quaternion is 8 numbers: a rotation r (w, x, y, z) and a dual part d = 0.5 * t * r, where t is the
 translation as a quaternion without a real part (Kavan et al. 2007, Skinning with Dual Quaternions). A
@@ -9,6 +9,7 @@ p + 2 * cross(r.xyz, cross(r.xyz, p) + r.w * p) + 2 * (r.w * d.xyz - d.w * r.xyz
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
+from appliance.projector.volumes import Slab
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,3 +58,42 @@ def skin(mesh: BodyMesh, positions: Array, world: Array) -> tuple[NDArray[np.flo
     shift = 2.0 * quaternion.multiply(dual, quaternion.inverse(turn))[:, 1:]
     vertices = quaternion.rotate(turn, mesh.vertices) + shift
     return vertices.astype(np.float32), quaternion.rotate(turn, mesh.normals).astype(np.float32)
+
+
+SPREAD_STEPS = 18  # how often weights flow to the neighbours on the surface
+MOVERS = 4
+
+
+def weights_of(
+    vertices: NDArray[np.float32], faces: NDArray[np.int32], slabs: Sequence[Slab], joints: int
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Which joints move each vertex, (V, 4), and how much, (V, 4): those whose volume is nearest, softened
+    along the surface alone, so that an arm at the hip is not moved by the hip."""
+    owners = sorted({slab.owner for slab in slabs})
+    place = {owner: number for number, owner in enumerate(owners)}
+    away = np.full((len(vertices), len(owners)), np.inf, dtype=np.float32)
+    x, y, z = vertices.T
+    for slab in slabs:
+        column = away[:, place[slab.owner]]
+        np.minimum(column, slab.distance(x, y, z), out=column)
+    weights = np.zeros_like(away)
+    weights[np.arange(len(away)), away.argmin(axis=1)] = 1.0
+    weights = _spread_along(faces, weights)
+    strongest = np.argsort(-weights, axis=1, kind="stable")[:, :MOVERS]
+    kept = np.take_along_axis(weights, strongest, axis=1)
+    kept /= kept.sum(axis=1, keepdims=True)
+    missing = MOVERS - kept.shape[1]
+    movers = np.pad(np.array(owners)[strongest], ((0, 0), (0, max(missing, 0))), mode="edge")
+    return movers.astype(np.uint8), np.pad(kept, ((0, 0), (0, max(missing, 0)))).astype(np.float32)
+
+
+def _spread_along(faces: NDArray[np.int32], weights: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Mean with the neighbours on the surface, some times over."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])  # each both ways: closed
+    edges = edges[np.argsort(edges[:, 0], kind="stable")]
+    counts = np.bincount(edges[:, 0], minlength=len(weights))
+    begins = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    for _ in range(SPREAD_STEPS):
+        around = np.add.reduceat(weights[edges[:, 1]], begins, axis=0) / counts[:, None]
+        weights = (0.5 * (weights + around)).astype(np.float32)
+    return weights

@@ -1,0 +1,156 @@
+"""What a skeleton's joints are to a sculptor: trunk, limbs, hands, feet, head, and which way the body faces."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.skeleton import Skeleton
+
+LONG_BRANCH = 0.25  # of the height: a branch that reaches further is a limb, a shorter one a finger or a face
+LONG_BONE = 0.08  # of the height: where a limb's first bone of this length begins, the limb begins
+_UP = np.array([0.0, 1.0, 0.0])
+
+
+class Anatomy:
+    """The parts of a skeleton of any kind, from its shape; names matter for the head alone."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+        joints = len(skeleton)
+        self.world = np.tile(quaternion.IDENTITY.astype(float), (joints, 1))
+        self.positions, self.world = skeleton.forward_kinematics(self.world, np.zeros(3))
+        self.children: list[list[int]] = [[] for _ in range(joints)]
+        for joint, parent in enumerate(skeleton.parents):
+            if parent >= 0:
+                self.children[parent].append(joint)
+        self.tips = [(joint, self.positions[joint] + np.array(offset)) for joint, offset in skeleton.ends]
+        points = np.vstack([self.positions, *(tip for _, tip in self.tips)])
+        self.height = float(np.ptp(points, axis=0).max()) or 1.0
+        self.reach = self._reaches()
+        self.head = next((j for j in range(joints) if "head" in skeleton.names[j].casefold()), None)
+        self.trunk = self._trunk()
+
+    def length(self, joint: int) -> float:
+        """Metres from the parent joint."""
+        return float(np.linalg.norm(self.skeleton.offsets[joint]))
+
+    def below(self, joint: int) -> list[int]:
+        """All joints that hang below one."""
+        found: list[int] = []
+        for child in self.children[joint]:
+            found += [child, *self.below(child)]
+        return found
+
+    def long_children(self, joint: int) -> list[int]:
+        """Children that a limb, or more of the trunk, hangs below."""
+        return [child for child in self.children[joint] if self.reach[child] > LONG_BRANCH * self.height]
+
+    def limbs(self) -> list[tuple[int, int]]:
+        """(trunk joint, first joint beyond it) of each limb: arms, legs, but not the neck."""
+        return [
+            (joint, child)
+            for joint in self.trunk
+            for child in self.long_children(joint)
+            if child not in self.trunk and not self._leads_to_head(child)
+        ]
+
+    def chain(self, joint: int) -> list[int]:
+        """From a joint down the branch that reaches furthest until it ends or falls apart into fingers."""
+        chain = [joint]
+        while (below := self.children[chain[-1]]) and len(below) < 3:
+            chain.append(max(below, key=lambda child: (self.reach[child] + self.length(child), -child)))
+        return chain
+
+    def limb_start(self, chain: list[int]) -> int:
+        """The place in a limb's chain where its first long bone begins: shoulder or hip."""
+        for place in range(len(chain) - 1):
+            if self.length(chain[place + 1]) > LONG_BONE * self.height:
+                return place
+        return 0
+
+    @cached_property
+    def neck(self) -> list[int]:
+        """From the first joint beyond the trunk to the head; empty without a head."""
+        if self.head is None:
+            return []
+        chain = [self.head]
+        while (parent := self.skeleton.parents[chain[0]]) >= 0 and parent not in self.trunk:
+            chain.insert(0, parent)
+        return chain
+
+    @cached_property
+    def across(self) -> Array:
+        """Unit vector to the dancer's side: along which pairs of limbs lie apart; (3,)."""
+        total = np.zeros(3)
+        for joint in self.trunk:
+            starts = [
+                self.positions[chain[self.limb_start(chain)]]
+                for trunk, first in self.limbs()
+                if trunk == joint
+                for chain in [self.chain(first)]
+            ]
+            for number, one in enumerate(starts):
+                for other in starts[number + 1 :]:
+                    apart = one - other
+                    total += apart if float(apart @ (total if total.any() else apart)) >= 0 else -apart
+        length = float(np.linalg.norm(total))
+        side = total / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+        return side if side[int(np.argmax(np.abs(side)))] > 0 else -side
+
+    @cached_property
+    def forward(self) -> Array:
+        """Unit vector to the dancer's front: where toes or eyes are, else +Z; horizontal, (3,)."""
+        hints = [offset for joint, offset in self._feet_forward()]
+        if self.head is not None:
+            hints += [self.positions[j] - self.positions[self.head] for j in self.children[self.head]]
+        total = np.sum(hints, axis=0) if hints else np.array([0.0, 0.0, 1.0])
+        total = total * np.array([1.0, 0.0, 1.0])
+        total -= self.across * float(total @ self.across)
+        length = float(np.linalg.norm(total))
+        if length < 0.01 * self.height:
+            total = np.cross(self.across, _UP)
+            length = float(np.linalg.norm(total)) or 1.0
+        front: Array = total / length
+        return front
+
+    def tip_of(self, joint: int) -> Array | None:
+        """Where the bone of a joint without children ends, metres; None where the skeleton does not say."""
+        return next((tip for end, tip in self.tips if end == joint), None)
+
+    def _feet_forward(self) -> list[tuple[int, Array]]:
+        found = []
+        for foot in self.skeleton.feet:
+            ahead = [self.positions[child] for child in self.children[foot]]
+            tip = self.tip_of(foot)
+            ahead += [tip] if tip is not None else []
+            found += [(foot, place - self.positions[foot]) for place in ahead]
+        return found
+
+    def _leads_to_head(self, joint: int) -> bool:
+        return self.head is not None and (joint == self.head or self.head in self.below(joint))
+
+    def _reaches(self) -> NDArray[np.float64]:
+        """Metres of the longest chain of bones below each joint."""
+        reach = np.zeros(len(self.skeleton))
+        for joint, offset in self.skeleton.ends:
+            reach[joint] = max(reach[joint], float(np.linalg.norm(offset)))
+        for joint in reversed(range(1, len(self.skeleton))):
+            parent = self.skeleton.parents[joint]
+            reach[parent] = max(reach[parent], reach[joint] + self.length(joint))
+        return reach
+
+    def _trunk(self) -> list[int]:
+        """Joints from which several limbs branch and those between, from the pelvis outwards."""
+        branching = [joint for joint in range(len(self.skeleton)) if len(self.long_children(joint)) >= 2]
+        pelvis = branching[0] if branching else 0
+        trunk = {pelvis}
+        for joint in branching:
+            while joint not in trunk and joint >= 0:
+                trunk.add(joint)
+                joint = self.skeleton.parents[joint]
+        return sorted(trunk)

@@ -1,0 +1,32 @@
+"""A smooth body for a skeleton of any kind: modelled, covered with a surface, tied to the joints."""
+
+from __future__ import annotations
+
+from appliance.pose.skeleton import Skeleton
+from appliance.projector.anatomy import Anatomy
+from appliance.projector.sculpture import sculpture
+from appliance.projector.skinning import BodyMesh, weights_of
+from appliance.projector.surface import surface_of
+from appliance.projector.volumes import sampled
+
+SPACING = 0.0065  # of the height between samples: about 14,000 vertices for a figure with fingers
+
+
+def body_mesh(skeleton: Skeleton) -> BodyMesh:
+    """The figure's surface; takes a good half second, once."""
+    anatomy = Anatomy(skeleton)
+    trunk, limbs = sculpture(anatomy)
+    field, grid = sampled(trunk, limbs, SPACING * anatomy.height)
+    vertices, normals, faces = surface_of(field, grid)
+    slabs = [slab for group in (trunk, *limbs) for slab in group.slabs]
+    joints, weights = weights_of(vertices, faces, slabs, len(skeleton))
+    return BodyMesh(
+        vertices,
+        normals,
+        faces,
+        joints,
+        weights,
+        anatomy.height,
+        anatomy.positions.astype("float32"),
+        anatomy.world.astype("float32"),
+    )

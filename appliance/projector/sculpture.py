@@ -1,0 +1,205 @@
+"""A figure modelled around a skeleton of any kind: chest, pelvis, tapered limbs, head, hands and feet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from appliance.pose.quaternion import Array
+from appliance.projector.anatomy import LONG_BONE, Anatomy
+from appliance.projector.extremities import foot, hand, head
+from appliance.projector.volumes import Cut, Group, Slab
+
+# Along the spine from the pelvis (0) to the neck (1): half the width as a share of the hips' and of the
+# shoulders' half width, plus metres of flesh and half the depth, both in heights.
+_SPINE = np.array([0.0, 0.16, 0.40, 0.62, 0.82, 1.0])
+_OF_HIPS = np.array([0.95, 0.95, 0.50, 0.10, 0.0, 0.0])
+_OF_SHOULDERS = np.array([0.0, 0.0, 0.35, 0.80, 0.80, 0.35])
+_FLESH = np.array([0.047, 0.045, 0.022, 0.026, 0.024, 0.012])
+_DEPTH = np.array([0.054, 0.056, 0.050, 0.060, 0.054, 0.034])
+
+
+def sculpture(anatomy: Anatomy) -> tuple[Group, list[Group]]:
+    """The trunk and the limbs that grow out of it, in the skeleton's rest pose."""
+    limbs = [_limb(anatomy, trunk, first) for trunk, first in anatomy.limbs()]
+    if anatomy.head is not None:
+        limbs.append(Group((*_neck(anatomy), *head(anatomy)), 0.022 * anatomy.height))
+    covered = {slab.owner for group in limbs for slab in group.slabs} | set(anatomy.trunk)
+    limbs += _twigs(anatomy, covered)
+    return Group(tuple(_trunk(anatomy)), 0.0), limbs
+
+
+def thickness(anatomy: Anatomy, joint: int) -> float:
+    """Radius of a limb at a joint, metres: thick where much hangs below."""
+    share = anatomy.reach[joint] / anatomy.height
+    return float(anatomy.height * min(0.0165 + 0.092 * share * share, 0.056))
+
+
+def cone(
+    anatomy: Anatomy, owner: int, start: Array, end: Array, radii: tuple[float, float], softness: float
+) -> Slab:
+    """A rounded cone; the softness counts in heights, the radii in metres."""
+    return Slab(owner, start, end, *radii, softness * anatomy.height, anatomy.across)
+
+
+def _trunk(anatomy: Anatomy) -> list[Slab]:
+    """Slabs along the spine; a single ball where nothing branches."""
+    places, height = anatomy.positions, anatomy.height
+    spine = _spine(anatomy)
+    if len(spine) < 2:
+        ball = min(thickness(anatomy, spine[0]), 0.045 * height)
+        return [cone(anatomy, spine[0], places[spine[0]], places[spine[0]], (ball, ball), 0.0)]
+    ends = [places[joint] for joint in spine]
+    lengths = [float(np.linalg.norm(b - a)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    whole = sum(lengths) or 1.0
+    hips, shoulders = _half_width(anatomy, spine[0]), _half_width(anatomy, spine[-2])
+    slabs, before = [], 0.0
+    for owner, start, end, length in zip(spine, ends, ends[1:], lengths, strict=False):
+        pieces = max(1, round(length / (0.045 * height)))
+        for piece in range(pieces):
+            shares = np.array([piece, piece + 1]) / pieces
+            along = (before + shares * length) / whole
+            flesh, depth = (np.interp(along, _SPINE, table) * height for table in (_FLESH, _DEPTH))
+            half = np.interp(along, _SPINE, _OF_HIPS) * hips
+            half = half + np.interp(along, _SPINE, _OF_SHOULDERS) * shoulders + flesh - depth
+            low, high = (start + share * (end - start) for share in shares)
+            side = _perpendicular(anatomy.across, high - low)
+            slabs.append(
+                Slab(
+                    owner, low, high, float(depth[0]), float(depth[1]), 0.012 * height, side,
+                    max(float(half[0]), 0.0), max(float(half[1]), 0.0),
+                )
+            )  # fmt: skip
+        before += length
+    return slabs
+
+
+def _spine(anatomy: Anatomy) -> list[int]:
+    """Trunk joints from the pelvis to the furthest one, then the first joint of the neck."""
+    last = anatomy.trunk[-1]
+    spine = [last]
+    while spine[0] != anatomy.trunk[0]:
+        spine.insert(0, anatomy.skeleton.parents[spine[0]])
+    if anatomy.neck and anatomy.skeleton.parents[anatomy.neck[0]] == last:
+        spine.append(anatomy.neck[0])
+    return spine
+
+
+def _half_width(anatomy: Anatomy, joint: int) -> float:
+    """How far to the side the limbs of a trunk joint begin, metres."""
+    sides = []
+    for trunk, first in anatomy.limbs():
+        if trunk == joint:
+            chain = anatomy.chain(first)
+            start = anatomy.positions[chain[anatomy.limb_start(chain)]]
+            sides.append(abs(float((start - anatomy.positions[joint]) @ anatomy.across)))
+    return max(sides, default=0.03 * anatomy.height)
+
+
+def _limb(anatomy: Anatomy, trunk: int, first: int) -> Group:
+    """From the trunk to the finger tips or toes."""
+    chain = anatomy.chain(first)
+    begin, last = anatomy.limb_start(chain), _extremity(anatomy, chain)
+    is_leg = _is_leg(anatomy, chain, last)
+    steps: list[Slab | Cut] = list(foot(anatomy, chain[last]) if is_leg else hand(anatomy, chain[last]))
+    for place in reversed(range(begin, last)):
+        steps += _bone(anatomy, chain[place], chain[place + 1], is_leg)
+    steps += _root_of_limb(anatomy, trunk, chain[: begin + 1], is_leg)
+    return Group(tuple(steps), (0.030 if is_leg else 0.026) * anatomy.height)
+
+
+def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
+    """A muscle from the joint to below its middle, and the taper to the next joint."""
+    start, end = anatomy.positions[joint], anatomy.positions[child]
+    first, last = thickness(anatomy, joint), thickness(anatomy, child)
+    belly = start + 0.32 * (end - start)
+    if is_leg and anatomy.reach[child] < 0.5 * anatomy.reach[joint]:
+        belly = belly - 0.010 * anatomy.height * anatomy.forward  # the calf lies behind the bone
+    full = (first + 0.32 * (last - first)) * 1.12
+    return [
+        cone(anatomy, joint, belly, end, (full, last), 0.006),
+        cone(anatomy, joint, start, belly, (first, full), 0.008),
+    ]
+
+
+def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bool) -> list[Slab]:
+    """What joins a limb to the trunk: shoulder girdle and chest muscle, or hip and seat."""
+    places, height = anatomy.positions, anatomy.height
+    start = places[chain[-1]]
+    thick = thickness(anatomy, chain[-1])
+    owner = chain[-2] if len(chain) > 1 else trunk
+    inner = start - anatomy.across * 0.6 * float((start - places[trunk]) @ anatomy.across)
+    if is_leg:
+        seat = start - 0.022 * height * anatomy.forward + 0.4 * (inner - start)
+        return [
+            cone(anatomy, trunk, seat, start, (1.05 * thick, thick), 0.02),
+            cone(anatomy, trunk, inner, start, (thick, thick), 0.02),
+        ]
+    middle = inner + 0.45 * (places[trunk] - inner)
+    middle = middle - anatomy.across * float((middle - inner) @ anatomy.across)
+    return [
+        cone(anatomy, owner, inner, start, (0.030 * height, 1.0 * thick), 0.015),
+        cone(anatomy, trunk, middle, start, (0.034 * height, 0.8 * thick), 0.02),
+    ]
+
+
+def _neck(anatomy: Anatomy) -> list[Slab]:
+    """From the trunk to the head."""
+    height, places = anatomy.height, anatomy.positions
+    joints = anatomy.neck
+    above = [anatomy.skeleton.parents[joints[0]], *joints]
+    slabs = [
+        cone(anatomy, a, places[a], places[b], (0.031 * height, 0.029 * height), 0.01)
+        for a, b in zip(above[1:], above[2:], strict=False)
+    ]
+    base = above[0]
+    if base >= 0:
+        low = places[joints[0]] + 0.35 * (places[base] - places[joints[0]])
+        slabs.insert(0, cone(anatomy, base, low, places[joints[0]], (0.036 * height, 0.031 * height), 0.01))
+    return slabs
+
+
+def _twigs(anatomy: Anatomy, covered: set[int]) -> list[Group]:
+    """Everything else that has bones: tails, ears, wings."""
+    face = set(anatomy.below(anatomy.head)) if anatomy.head is not None else set()
+    groups = []
+    for joint, parent in enumerate(anatomy.skeleton.parents):
+        slabs = []
+        if parent >= 0 and parent not in covered | face and joint not in face:
+            slabs.append(_twig(anatomy, parent, anatomy.positions[joint]))
+        tip = anatomy.tip_of(joint)
+        if tip is not None and joint not in covered | face:
+            slabs.append(_twig(anatomy, joint, tip))
+        if slabs:
+            groups.append(Group(tuple(slabs), 0.015 * anatomy.height))
+    return groups
+
+
+def _twig(anatomy: Anatomy, joint: int, end: Array) -> Slab:
+    thick = thickness(anatomy, joint)
+    return cone(anatomy, joint, anatomy.positions[joint], end, (thick, 0.8 * thick), 0.01)
+
+
+def _extremity(anatomy: Anatomy, chain: Sequence[int]) -> int:
+    """The place in a limb's chain of its hand or foot: behind its last long bone."""
+    long = [p for p in range(1, len(chain)) if anatomy.length(chain[p]) > LONG_BONE * anatomy.height]
+    return long[-1] if long else len(chain) - 1
+
+
+def _is_leg(anatomy: Anatomy, chain: Sequence[int], last: int) -> bool:
+    if any(joint in anatomy.skeleton.feet for joint in chain):
+        return True
+    drop = anatomy.positions[chain[0]] - anatomy.positions[chain[last]]
+    return not anatomy.skeleton.feet and float(drop[1]) > 0.8 * float(np.linalg.norm(drop))
+
+
+def _perpendicular(side: Array, direction: Array) -> Array:
+    """The side, made perpendicular to a direction, unit length; any perpendicular where they are parallel."""
+    length2 = float(direction @ direction)
+    for candidate in (side, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])):
+        rest = candidate - direction * float(candidate @ direction) / max(length2, 1e-12)
+        if float(rest @ rest) > 0.05:
+            unit: Array = rest / np.linalg.norm(rest)
+            return unit
+    return side
