@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -9,10 +11,24 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.outputs.shared_frame import Facts
+from appliance.outputs.ring_file import RingFileReader
+from appliance.outputs.shared_frame import (
+    FACTS,
+    FILE,
+    FORMAT,
+    FRAME_HEAD,
+    FRAMES,
+    HEALTH,
+    KIND,
+    LATE,
+    WRITER,
+    Facts,
+    FrameLayout,
+)
 
 State = Literal["absent", "fresh", "stale"]
 STALE_S = 0.5
+_LOOK_S = 0.1  # how often the file system is asked for a new stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,33 +50,107 @@ class FrameReader:
     """Reads the shared frame of whichever stage runs; never waits, never raises, never disturbs the stage.
 
     facts: of the newest stage, None before the first one. generation: a number that changes with each new
-    stage. complaint: why a file cannot be read, in a sentence; else empty.
+    stage. Frames and facts of a stage that is gone stay until there is another one.
     """
 
     def __init__(self, folder: Path) -> None:
+        self._file = RingFileReader(folder / FILE, KIND, FORMAT, WRITER)
+        self._looked_at = -math.inf
+        self._writer_lives = False
+        self._layout = FrameLayout(0)
         self.facts: Facts | None = None
         self.generation = 0
-        self.complaint = ""
+        self._open()
+
+    @property
+    def complaint(self) -> str:
+        """Why a file that is there cannot be read, in a sentence; else empty."""
+        return self._file.complaint
 
     def newest(self, now: float) -> SeenFrame | None:
         """The newest whole frame, however old it is; None before the first one."""
-        raise NotImplementedError
+        self._look(now)
+        if not self._file.rings:
+            return None
+        found = self._file.rings[FRAMES].newest()
+        return self._frame(found[1]) if found else None
 
     def frames(self, count: int, now: float) -> list[SeenFrame]:
-        """The newest frames of this stage, at most `count`, newest last."""
-        raise NotImplementedError
+        """The newest frames of this stage, at most `count`, newest last; torn ones are left out."""
+        self._look(now)
+        if not self._file.rings:
+            return []
+        ring = self._file.rings[FRAMES]
+        newest = ring.newest_sequence()
+        payloads = map(ring.payload, range(max(newest - count, 0) + 1, newest + 1))
+        seen = (self._frame(payload) for payload in payloads if payload is not None)
+        return [frame for frame in seen if frame is not None]
 
     def health(self) -> dict[str, Any] | None:
         """What the stage last said about itself; None before it did."""
-        raise NotImplementedError
+        found = self._file.rings[HEALTH].newest() if self._file.rings else None
+        if found is None:
+            return None
+        try:
+            said = json.loads(found[1])
+        except ValueError:
+            return None
+        return said if isinstance(said, dict) else None
 
     def state(self, now: float) -> State:
         """absent: no stage; stale: its newest frame is older than STALE_S, or it died; else fresh."""
-        raise NotImplementedError
+        newest = self.newest(now)
+        if not self._file.is_there or newest is None:
+            return "absent"
+        return "fresh" if self._writer_lives and now - newest.frame_time <= STALE_S else "stale"
 
     def is_alive(self, now: float) -> bool:
-        """Whether the process that writes the frames lives (it may hang)."""
-        raise NotImplementedError
+        """Whether the process that writes the frames lives; it may hang, then `state` says stale."""
+        self._look(now)
+        return self._writer_lives
 
     def close(self) -> None:
         """Let go of the file."""
+        self._file.close()
+
+    def _look(self, now: float) -> None:
+        if abs(now - self._looked_at) >= _LOOK_S:
+            self._looked_at = now
+            self._open()
+
+    def _open(self) -> None:
+        """Follow the path to the newest stage's file, and look whether that stage lives."""
+        if self._file.look():
+            self._understand()
+        self._writer_lives = self._file.is_there and self._file.writer_lives()
+
+    def _understand(self) -> None:
+        """Take the facts of another file than before."""
+        rings = self._file.rings
+        if not rings:
+            return
+        found = rings[FACTS].newest() if len(rings) > FRAMES else None
+        try:
+            self.facts = Facts.unpacked(found[1] if found else b"")
+        except (ValueError, KeyError, TypeError):
+            self._file.refuse(f"holds no facts about a show. Start {WRITER} again.")
+            return
+        self._layout = FrameLayout(len(self.facts.skeleton))
+        self.generation += 1
+
+    def _frame(self, payload: bytes) -> SeenFrame | None:
+        layout, joints = self._layout, self._layout.joints
+        if len(payload) != layout.bytes:
+            return None
+        tick, frame_time, sequence, arrival, flags, _ = FRAME_HEAD.unpack_from(payload)
+        return SeenFrame(
+            tick,
+            frame_time,
+            bool(flags & LATE),
+            sequence,
+            arrival,
+            np.frombuffer(payload, "<f4", 4 * joints, layout.pose_at).reshape(joints, 4),
+            np.frombuffer(payload, "<f4", 4 * joints, layout.world_at).reshape(joints, 4),
+            np.frombuffer(payload, "<f4", 3 * joints, layout.positions_at).reshape(joints, 3),
+            np.frombuffer(payload, "<f4", 3, layout.root_at),
+        )

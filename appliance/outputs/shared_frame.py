@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.ring_file import RingFileWriter
 from appliance.pose.skeleton import Skeleton
+
+FILE, KIND, FORMAT, WRITER = "frame", "frame", 1, "the stage (bunraku play)"
+FACTS, HEALTH, FRAMES = range(3)  # the file's rings
+FRAME_SLOTS = 64  # 1.28 s: a reader has that long to copy the newest one
+HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
+LATE = 1  # flag
+FRAME_HEAD = struct.Struct("<qdqdII")  # tick, time, sensor's sequence and arrival, flags, joints
 
 
 @dataclass(frozen=True)
@@ -31,6 +43,54 @@ class Facts:
     pid: int
     started: float  # seconds on the monotonic clock
 
+    def packed(self) -> bytes:
+        """As JSON."""
+        skeleton = self.skeleton
+        facts = {name: getattr(self, name) for name in self.__dataclass_fields__} | {
+            "show_directory": str(self.show_directory),
+            "box_file": None if self.box_file is None else str(self.box_file),
+            "skeleton": {
+                "joints": skeleton.names,
+                "parents": [int(parent) for parent in skeleton.parents],
+                "offsets": np.asarray(skeleton.offsets).tolist(),
+                "ends": [(int(joint), [float(part) for part in offset]) for joint, offset in skeleton.ends],
+            },
+        }
+        return json.dumps(facts).encode()
+
+    @classmethod
+    def unpacked(cls, packed: bytes) -> Facts:
+        """From JSON; raises ValueError, KeyError or TypeError where that is none of ours."""
+        facts = json.loads(packed)
+        skeleton, box_file = facts["skeleton"], facts["box_file"]
+        names = ("held", "hands", "phrases", "cues", "looks", "lights")
+        return cls(
+            **facts
+            | {name: tuple(facts[name]) for name in names}
+            | {
+                "show_directory": Path(facts["show_directory"]),
+                "box_file": None if box_file is None else Path(box_file),
+                "skeleton": Skeleton(
+                    tuple(skeleton["joints"]),
+                    tuple(skeleton["parents"]),
+                    np.asarray(skeleton["offsets"], np.float64),
+                    tuple((joint, (x, y, z)) for joint, (x, y, z) in skeleton["ends"]),
+                ),
+            }
+        )
+
+
+class FrameLayout:
+    """Where the arrays of J joints lie in a frame's payload: all float32, little-endian, in this order."""
+
+    def __init__(self, joints: int) -> None:
+        self.joints = joints
+        self.root_at = FRAME_HEAD.size
+        self.pose_at = self.root_at + 12
+        self.world_at = self.pose_at + 16 * joints
+        self.positions_at = self.world_at + 16 * joints
+        self.bytes = self.positions_at + 12 * joints
+
 
 class FrameWriter:
     """The stage's end: a file `frame` in the runtime folder, a new one for each stage.
@@ -39,13 +99,48 @@ class FrameWriter:
     """
 
     def __init__(self, folder: Path, facts: Facts) -> None:
-        raise NotImplementedError
+        packed, layout = facts.packed(), FrameLayout(len(facts.skeleton))
+        shapes = [(1, len(packed)), (HEALTH_SLOTS, HEALTH_BYTES), (FRAME_SLOTS, layout.bytes)]
+        self._file = RingFileWriter.new(folder / FILE, KIND, FORMAT, shapes)
+        self._file.rings[FACTS].write(packed)
+        self._ring = self._file.rings[FRAMES]
+        self._payload = payload = self._ring.payload
+        self._joints = layout.joints
+        self._root = np.frombuffer(payload, "<f4", 3, layout.root_at)
+        self._pose, self._world, self._positions = (
+            np.frombuffer(payload, "<f4", layout.joints * width, at).reshape(layout.joints, width)
+            for width, at in ((4, layout.pose_at), (4, layout.world_at), (3, layout.positions_at))
+        )
+        self._file.publish()
 
     def write(self, frame: JointFrame) -> None:
         """Publish a frame: one copy, no system call, nothing for the collector."""
+        FRAME_HEAD.pack_into(
+            self._payload,
+            0,
+            frame.tick,
+            frame.frame_time,
+            frame.sensor_sequence,
+            frame.sensor_arrival,
+            LATE if frame.late else 0,
+            self._joints,
+        )
+        self._root[...] = frame.root
+        self._pose[...] = frame.pose
+        self._world[...] = frame.world
+        self._positions[...] = frame.positions
+        self._ring.publish()
 
     def write_health(self, health: Mapping[str, Any]) -> None:
-        """Publish how the box is; after the frame has left."""
+        """Publish how the box is, after the frame has left; the end of a list that is too long is left out."""
+        said = dict(health)
+        packed = json.dumps(said).encode()
+        while len(packed) > HEALTH_BYTES:
+            longest = max(said, key=lambda name: len(json.dumps(said[name])))
+            said[longest] = said[longest][: len(said[longest]) // 2]
+            packed = json.dumps(said).encode()
+        self._file.rings[HEALTH].write(packed)
 
     def close(self) -> None:
         """The show is over: readers find no stage any more."""
+        self._file.close(remove=True)
