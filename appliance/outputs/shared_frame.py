@@ -132,7 +132,7 @@ class FrameWriter:
         self._ring.publish()
 
     def write_health(self, health: Mapping[str, Any]) -> None:
-        """Publish how the box is, after the frame has left; the end of a list that is too long is left out."""
+        """Publish how the box is, after the frame has left; a list that is too long loses its end."""
         said = dict(health)
         packed = json.dumps(said).encode()
         while len(packed) > HEALTH_BYTES:
