@@ -92,6 +92,7 @@ class AdapterWire:
             except Exception as error:  # whatever a driver raises: the lights come back when the device does
                 self._failed(error)
             if self._closing:
+                self.dropped += self._newest is not None
                 return
             pause_s = FIRST_PAUSE_S if self.sent > before else min(2 * pause_s, LONGEST_PAUSE_S)
             self._rest(pause_s)
@@ -129,6 +130,5 @@ class AdapterWire:
             self._newest = self._newest or self._last
 
     def _failed(self, error: Exception) -> None:
-        self.dropped += 1
         number = error.errno if isinstance(error, OSError) else None
         self.last_error = _IN_WORDS.get(number or 0, str(error))
