@@ -86,15 +86,20 @@ class Grounding:
         self._before: list[list[float]] | None = None
         self._shift = np.zeros(3, dtype=np.float32)
 
-    def stand(self, pose: FloatArray, root: FloatArray, lift_m: float) -> Figure:
+    def stand(
+        self, pose: FloatArray, root: FloatArray, lift_m: float, rest_heights: FloatArray | None = None
+    ) -> Figure:
         """Stand the figure in a pose (J, 4), the phrase's root at (3,) metres and its feet lifted so far.
 
+        rest_heights (S,): the floor of the phrase that plays now, where it changes; None: still the same.
         Its positions and world rotations, and `root`, hold until the next call.
         """
         self.figure.stand(pose, root)
         self.root[:] = root
         if self._rest is None:
             return self.figure
+        if rest_heights is not None:
+            self._rest = rest_heights.tolist()
         points = self.figure.soles.tolist()
         clearances = [point[1] - rest for point, rest in zip(points, self._rest, strict=True)]
         lowest = min(clearances)

@@ -34,12 +34,14 @@ class Target:
 
 class Puppeteer(ABC):
     """Holds one joint. The weight grows over TAKE_S when it takes the joint and fades over GIVE_BACK_S when
-    it lets go, level at both ends; a new `weight` is reached at the pace of taking.
+    it lets go, level at both ends; a new `weight` is reached at the pace of taking. One that is not `enabled`
+    lets go, whatever it hears, and takes the joint again when it is.
     """
 
     def __init__(self, joint: str, weight: float = 1.0) -> None:
         self.joint = joint
         self.weight = weight
+        self.enabled = True
         self._target = Target(joint, quaternion.IDENTITY.copy())
         self._presence = 0.0
         self._level = weight
@@ -55,7 +57,7 @@ class Puppeteer(ABC):
         elapsed = 0.0 if self._pulled_at is None else max(0.0, now - self._pulled_at)
         self._pulled_at = now
         self._point(self._target.orientation, now, elapsed)
-        if self._holds(now):
+        if self.enabled and self._holds(now):
             self._presence = min(1.0, self._presence + elapsed / TAKE_S)
         else:
             self._presence = max(0.0, self._presence - elapsed / GIVE_BACK_S)
@@ -185,6 +187,11 @@ class Remote(Puppeteer):
             raise ValueError(f"The axis {list(axis)} with the angle {angle} is no rotation.")
         sine = math.sin(angle / 2) / length
         self._held = _unit((math.cos(angle / 2), *(sine * value for value in axis)))
+
+    def hold_here(self, orientation: Sequence[float]) -> None:
+        """Hold the joint where it is (w, x, y, z), unless it was told another orientation before."""
+        if self._held is None:
+            self.hold(orientation)
 
     def release(self) -> None:
         """Give the joint back to the puppet."""

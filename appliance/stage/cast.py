@@ -7,12 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import NDArray
-
 from appliance.dancer.blending import Blending
-from appliance.dancer.grounding import Grounding, GroundingError, survey
-from appliance.dancer.motion_source import PhraseError, Playback
+from appliance.dancer.grounding import Floor, Grounding, GroundingError, survey
+from appliance.dancer.motion_source import Playback
+from appliance.dancer.phrase import FPS, PhraseError
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.dancer.puppeteers import (
     FixedOrientation,
@@ -23,7 +21,7 @@ from appliance.dancer.puppeteers import (
     WornSensor,
 )
 from appliance.outputs.receivers import OscOutputs
-from appliance.pose.bvh import read_bvh
+from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.sensor.keys import KeyFileError, SensorKey, load_keys, unknown_sensor
@@ -31,6 +29,7 @@ from appliance.sensor.link import SensorLink, SensorReading, open_link
 from appliance.sensor.neutral import Mounting, joint_from_reading
 from appliance.sensor.ways.udp import PortError
 from appliance.show.box import BoxConfig, out_of_reach
+from appliance.show.cues import CueConfig
 from appliance.show.show import HandConfig, Show
 from appliance.stage.budget import Admission, admit
 from appliance.stage.realtime import borrowed_priority
@@ -53,7 +52,8 @@ class Cast:
     """Everything that dances, hears and speaks.
 
     `hand_places`: where the hands' joints stand among the moving ones; `worn`: which joints a sensor holds;
-    `mountings`: how it is worn for each of these joints; `complaints`: why sensors are not let in.
+    `mountings`: how it is worn for each of these joints; `complaints`: why sensors are not let in;
+    `cue`: the newest that was carried out, "" for none yet.
     """
 
     skeleton: Skeleton
@@ -62,6 +62,7 @@ class Cast:
     blending: Blending
     grounding: Grounding
     hands: Hands
+    cues: dict[str, CueConfig]
     hand_places: list[int]
     worn: dict[str, list[WornSensor]]
     mountings: dict[str, Mounting]
@@ -69,6 +70,7 @@ class Cast:
     link: SensorLink
     outputs: OscOutputs
     complaints: tuple[str, ...] = ()
+    cue: str = ""
     newest_primary: SensorReading | None = field(default=None)
 
     def hear(self, reading: SensorReading) -> None:
@@ -93,10 +95,8 @@ def assemble(show: Show, box: BoxConfig, profiles: Mapping[bytes, bytes] = Mappi
     try:
         puppet = Puppet(show.network, show.skeleton)
         show.require_moving(puppet.joints)
-        phrase = _phrase(show)
-        floor = survey(phrase) if show.config.motion.grounded else None
-        motion = _playback(show, phrase, puppet.window, None if floor is None else floor.lifts)
-    except (PuppetError, PhraseError, GroundingError) as error:
+        motion, floor = _playback(show, puppet.window)
+    except PuppetError as error:
         raise StageError(str(error)) from error
     puppeteers = [_puppeteer(hand) for hand in show.config.hands]
     worn: dict[str, list[WornSensor]] = {}
@@ -113,6 +113,7 @@ def assemble(show: Show, box: BoxConfig, profiles: Mapping[bytes, bytes] = Mappi
         blending=Blending(len(puppet.joints), puppet.window, show.config.dancer.hop),
         grounding=Grounding(show.skeleton, floor),
         hands=Hands(puppeteers, puppet.joints),
+        cues={cue.name: cue for cue in show.config.cues},
         hand_places=[puppet.joints.index(hand.joint) for hand in show.config.hands],
         worn=worn,
         mountings=mountings,
@@ -163,27 +164,39 @@ def _mounting(hand: HandConfig) -> Mounting:
     return Mounting(hand.facing, hand.at_neutral, hand.neutral)
 
 
-def _phrase(show: Show) -> Recording:
-    phrase = read_bvh(show.phrase)
+def _playback(show: Show, window: int) -> tuple[Playback, Floor | None]:
+    """All phrases of a show, ready to be switched, and the floor of the one that it starts with."""
+    motion, (path, *others) = show.config.motion, show.phrases.values()
+    try:
+        phrase, floor = _phrase(show, path)
+        playback = Playback(
+            phrase,
+            start_s=motion.start_s,
+            end_s=motion.end_s,
+            rate=motion.rate,
+            crossfade_s=motion.crossfade_s,
+            window=window,
+            floor=floor,
+        )
+        for name, path in zip(motion.phrases, others, strict=True):
+            playback.add(name, *_phrase(show, path))
+    except BvhError as error:
+        raise StageError(str(error)) from error
+    except (PhraseError, GroundingError) as error:
+        raise StageError(f"{path}: {error}") from error
+    return playback, floor
+
+
+def _phrase(show: Show, path: Path) -> tuple[Recording, Floor | None]:
+    """A phrase at the tick's rate, and what its survey learnt of the floor."""
+    phrase = read_bvh(path)
     if not phrase.skeleton.same_joints(show.skeleton):
         raise StageError(
-            f"{show.phrase}: the phrase has other joints than {show.directory / 'skeleton.bvh'}. "
+            f"{path}: the phrase has other joints than {show.directory / 'skeleton.bvh'}. "
             "Nothing can be danced. Export the show again."
         )
-    return phrase
-
-
-def _playback(show: Show, phrase: Recording, window: int, lifts: NDArray[np.float32] | None) -> Playback:
-    motion = show.config.motion
-    return Playback(
-        phrase,
-        start_s=motion.start_s,
-        end_s=motion.end_s,
-        rate=motion.rate,
-        crossfade_s=motion.crossfade_s,
-        window=window,
-        lifts=lifts,
-    )
+    phrase = phrase.resampled(FPS)
+    return phrase, survey(phrase) if show.config.motion.grounded else None
 
 
 def _link(

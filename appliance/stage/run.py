@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from appliance.control.orders import Order
 from appliance.sensor.link import SensorState
 from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig
@@ -17,7 +18,7 @@ from appliance.stage.clock import Slot, TickClock
 from appliance.stage.control import Control
 from appliance.stage.health import Health
 from appliance.stage.journal import JUMPED, LATE, NOT_FINITE, Journal, JournalError
-from appliance.stage.obey import SENSOR_COMMANDS, obey, obey_for_sensors
+from appliance.stage.obey import SENSOR_ORDERS, obey, obey_for_sensors
 from appliance.stage.phase_lock import PhaseLock
 from appliance.stage.realtime import enter_realtime, leave_realtime
 from appliance.stage.roster import Roster
@@ -144,15 +145,16 @@ class Stage:
         if self.control is None:
             return
         for _ in range(_COMMANDS_A_TICK):
-            order = self.control.take()
-            if order is None:
+            command = self.control.take()
+            if command is None:
                 return
-            if order.name in SENSOR_COMMANDS:
+            order = Order(command.name, command.values, command.sensor or command.joint, command.keys)
+            if order.name in SENSOR_ORDERS:
                 done, words = obey_for_sensors(order, self.cast, self.wearing, now)
                 self._look_at_sensors(now)
-                self.control.answer(order, done, words)
+                self.control.answer(command, done, words)
             else:
-                words = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
+                done, words = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
             if words:
                 self.say(words)
 

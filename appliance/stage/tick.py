@@ -114,8 +114,8 @@ class Tick:
 
     def _stand(self) -> None:
         """Put the pose on the floor and into the world."""
-        cast, frame = self.cast, self.frame
-        figure = cast.grounding.stand(frame.pose, cast.motion.roots()[0], cast.motion.lift)
+        cast, frame, motion = self.cast, self.frame, self.cast.motion
+        figure = cast.grounding.stand(frame.pose, motion.roots()[0], motion.lift, motion.rest_heights)
         frame.world[:] = figure.world
         frame.positions[:] = figure.positions
         frame.root[:] = cast.grounding.root

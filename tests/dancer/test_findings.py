@@ -51,7 +51,7 @@ class Dancer:
         self, coding: int, interaction: int, hand: Puppeteer | None = None, ticks: int = TICKS
     ) -> Dance:
         puppet = self.puppet
-        motion = Playback(self.recording, lifts=self.floor.lifts)
+        motion = Playback(self.recording, floor=self.floor)
         hands = Hands([hand] if hand else [], puppet.joints)
         blending = Blending(len(puppet.joints), puppet.window)
         grounding = Grounding(self.recording.skeleton, self.floor)

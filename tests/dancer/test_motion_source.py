@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement, yaws
-from appliance.dancer.motion_source import PhraseError, Playback
+from appliance.dancer.motion_source import Playback
+from appliance.dancer.phrase import PhraseError
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from tests.dancer.conftest import random_quaternions
@@ -242,7 +244,7 @@ def test_a_recording_at_another_rate_is_resampled(swaying: Recording) -> None:
 
 def test_the_lift_is_carried_along_with_its_pose(swaying: Recording) -> None:
     lifts = np.arange(200, dtype=np.float32) / 1000
-    playback = Playback(swaying, lifts=lifts)
+    playback = Playback(swaying, floor=Floor(np.zeros(4, np.float32), lifts))
     for tick in range(100):
         assert playback.lift == pytest.approx(tick / 1000, abs=1e-6)
         playback.advance()

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.control.orders import Order
 from appliance.pose import quaternion
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, SensorState
@@ -15,7 +16,6 @@ from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import Cast, Iterations, assemble
-from appliance.stage.control import Command
 from appliance.stage.obey import obey, obey_for_sensors
 from appliance.stage.wearing import Wearing
 from tests.stage.bundles import write_show
@@ -37,34 +37,35 @@ def test_iterations_change_within_what_fits(
     cast: Cast, asked: tuple[int, int], danced: tuple[int, int]
 ) -> None:
     iterations = Iterations(3, 2, most=8)
-    complaint = obey(Command("iterations", tuple(map(float, asked))), cast, iterations, 1.0)
+    done, words = obey(Order("iterations", tuple(map(float, asked))), cast, iterations, 1.0)
     assert (iterations.coding, iterations.interaction) == danced
-    assert bool(complaint) == (asked != danced)
+    assert done and bool(words) == (asked != danced)
 
 
 def test_playback_stops_starts_jumps_and_plays_excerpts(cast: Cast) -> None:
     iterations = Iterations(3, 2, 8)
-    obey(Command("stop"), cast, iterations, 0.5)
+    obey(Order("stop"), cast, iterations, 0.5)
     assert cast.motion.rate == 0.0
-    obey(Command("start"), cast, iterations, 0.5)
+    obey(Order("start"), cast, iterations, 0.5)
     assert cast.motion.rate == 0.5
-    obey(Command("rate", (-2.0,)), cast, iterations, 0.5)
+    obey(Order("rate", (-2.0,)), cast, iterations, 0.5)
     assert cast.motion.rate == -2.0
-    assert obey(Command("jump", (1.5,)), cast, iterations, 0.5) == ""
+    assert obey(Order("jump", (1.5,)), cast, iterations, 0.5) == (True, "")
     cast.motion.advance()
     assert cast.motion.jumped
-    assert "from 2 s to 2.04 s" in obey(Command("excerpt", (2.0, 2.04)), cast, iterations, 0.5)
+    done, words = obey(Order("excerpt", (2.0, 2.04)), cast, iterations, 0.5)
+    assert not done and "from 2 s to 2.04 s" in words
 
 
 def test_a_joint_is_held_and_released_by_osc(cast: Cast) -> None:
     iterations = Iterations(3, 2, 8)
-    assert obey(Command("hold", (1.0, 0.0, 0.0, np.pi / 2), "lShldr"), cast, iterations, 1.0) == ""
+    assert obey(Order("hold", (1.0, 0.0, 0.0, np.pi / 2), "lShldr"), cast, iterations, 1.0) == (True, "")
     for tick in range(100):
         cast.hands.pull(10.0 + 0.02 * tick)
     place = cast.hand_places[0]
     assert quaternion.angle_between(cast.hands.targets[place], np.array([0.5**0.5, 0.5**0.5, 0, 0])) < 1e-3
     assert cast.hands.weights[place] == 1.0
-    assert obey(Command("release", (), 2), cast, iterations, 1.0) == ""  # the same joint by its number
+    assert obey(Order("release", (), 2), cast, iterations, 1.0) == (True, "")  # the same joint by its number
     for tick in range(100):
         cast.hands.pull(12.0 + 0.02 * tick)
     assert cast.hands.weights[place] == 0.0
@@ -72,11 +73,15 @@ def test_a_joint_is_held_and_released_by_osc(cast: Cast) -> None:
 
 def test_a_joint_that_no_hand_holds_by_osc_is_refused_in_words(cast: Cast) -> None:
     iterations = Iterations(3, 2, 8)
-    assert "No hand of this show holds 'Chest'" in obey(
-        Command("hold", (1.0, 0.0, 0.0, 1.0), "Chest"), cast, iterations, 1.0
-    )
-    assert "no joint 99" in obey(Command("release", (), 99), cast, iterations, 1.0)
-    assert "no rotation" in obey(Command("hold", (0.0, 0.0, 0.0, 1.0), "lShldr"), cast, iterations, 1.0)
+    for order, words in [
+        (Order("hold", (1.0, 0.0, 0.0, 1.0), "Chest"), "No hand of this show holds 'Chest'"),
+        (Order("release", (), 99), "no joint 99"),
+        (Order("hold", (0.0, 0.0, 0.0, 1.0), "lShldr"), "no rotation"),
+        (Order("hand", (1.0,), "lSholder"), "Did you mean 'lShldr'?"),
+        (Order("dance"), "knows no order 'dance'"),
+    ]:
+        done, said = obey(order, cast, iterations, 1.0)
+        assert not done and words in said
 
 
 class HeardLink(SensorLink):
@@ -119,38 +124,38 @@ def worn(tmp_path: Path) -> Iterator[Cast]:
 @pytest.mark.parametrize(
     ("order", "done", "words"),
     [
-        (Command("strobe", sensor="left-wrist"), True, "left-wrist flashes for 10 s"),
-        (Command("strobe", sensor="spare-1"), True, "spare-1 flashes"),
-        (Command("strobe", sensor="head"), False, "Sensor head is silent"),
-        (Command("strobe", sensor="left-wirst"), False, "Did you mean 'left-wrist'?"),
-        (Command("neutral"), True, "stand still now"),
-        (Command("neutral", sensor="left-wrist"), True, "stand still now"),
-        (Command("neutral", sensor="head"), False, "Sensor head is silent"),
-        (Command("neutral", sensor="spare-1"), False, "No hand of this show is held by a sensor 'spare-1'"),
-        (Command("heading"), True, "is the front"),
-        (Command("heading", sensor="nobody"), False, "No hand of this show"),
+        (Order("strobe", text="left-wrist"), True, "left-wrist flashes for 10 s"),
+        (Order("strobe", text="spare-1"), True, "spare-1 flashes"),
+        (Order("strobe", text="head"), False, "Sensor head is silent"),
+        (Order("strobe", text="left-wirst"), False, "Did you mean 'left-wrist'?"),
+        (Order("neutral"), True, "stand still now"),
+        (Order("neutral", text="left-wrist"), True, "stand still now"),
+        (Order("neutral", text="head"), False, "Sensor head is silent"),
+        (Order("neutral", text="spare-1"), False, "No hand of this show is held by a sensor 'spare-1'"),
+        (Order("heading"), True, "is the front"),
+        (Order("heading", text="nobody"), False, "No hand of this show"),
         (
-            Command("reload", keys={"left-wrist": SensorKey("left-wrist", 1, bytes(16))}),
+            Order("reload", keys={"left-wrist": SensorKey("left-wrist", 1, bytes(16))}),
             True,
             "The box knows 1 sensor now, but not head of this show",
         ),
     ],
 )
 def test_commands_about_sensors_are_done_or_refused_in_words(
-    worn: Cast, order: Command, done: bool, words: str
+    worn: Cast, order: Order, done: bool, words: str
 ) -> None:
     assert isinstance(worn.link, HeardLink)
     wearing = Wearing(worn, SensorMemory(None, print), print)
     outcome = obey_for_sensors(order, worn, wearing, 100.0)
     assert outcome[0] == done
     assert words in outcome[1]
-    assert worn.link.strobed == ([order.sensor] if order.name == "strobe" and done else [])
+    assert worn.link.strobed == ([order.text] if order.name == "strobe" and done else [])
     assert worn.link.admitted == order.keys
 
 
 def test_a_show_without_sensors_has_no_neutral_pose(cast: Cast) -> None:
     wearing = Wearing(cast, SensorMemory(None, print), print)
-    assert obey_for_sensors(Command("neutral"), cast, wearing, 100.0) == (
+    assert obey_for_sensors(Order("neutral"), cast, wearing, 100.0) == (
         False,
         "No hand of this show is held by a sensor.",
     )

@@ -1,0 +1,74 @@
+"""Reading head: a place in a loop, where that stands on the stage, and how its pose is read from there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from appliance.dancer.loop import Loop, Placement
+from appliance.dancer.phrase import AT, FPS, X, Z
+from appliance.dancer.slerp import FloatArray, Slerp
+
+
+@dataclass
+class ReadingHead:
+    """Its position in a loop (frames and fractions), where that stands on the stage, and the pose (J, 4) that
+    it read last; the next one takes its signs.
+    """
+
+    loop: Loop
+    position: float
+    pose: FloatArray
+    placement: Placement = field(default_factory=Placement)
+
+    @property
+    def standing(self) -> tuple[float, float, float]:
+        """Where the root stands on the stage: x, z in metres, heading in radians."""
+        index = int(self.position)
+        x, z = self.loop.track[index, [X, Z]].tolist()
+        w, _, y, _ = self.loop.poses[index, 0].tolist()
+        return *self.placement.point(x, z), 2 * math.atan2(y, w) + self.placement.yaw
+
+    def move(self, rate: float) -> None:
+        """Go on by `rate` frames, through the loop's seam where it comes to it."""
+        loop, before = self.loop, self.position
+        self.position += rate
+        if self.position >= loop.length:
+            self.position -= loop.period
+            self.placement = self.placement.after(loop.step)
+        elif before >= loop.fade > self.position and rate < 0:
+            self.position += loop.period
+            self.placement = self.placement.after(loop.step.inverse)
+        elif self.position < 0:
+            self.position = 0.0
+
+
+class Reader:
+    """Reads poses and tracks at the positions of heads, into arrays that are there already."""
+
+    def __init__(self, joints: int) -> None:
+        self._between_frames = Slerp(joints)
+        self._sampled = np.empty((joints, 4), dtype=np.float32)
+        self._signs = np.empty((joints, 1), dtype=np.float32)
+
+    def read(self, head: ReadingHead, track: FloatArray) -> None:
+        """Write head.pose (J, 4) and the track (C,) at the head's position, placed on the stage."""
+        loop, placement, pose = head.loop, head.placement, self._sampled
+        index = int(head.position)
+        share = head.position - index
+        if share:
+            self._between_frames(loop.poses[index], loop.poses[index + 1], share, pose)
+            track[:] = loop.track[index] + share * (loop.track[index + 1] - loop.track[index])
+        else:
+            pose[:] = loop.poses[index]
+            track[:] = loop.track[index]
+        w, x, y, z = pose[0].tolist()
+        cosine, sine = math.cos(placement.yaw / 2), math.sin(placement.yaw / 2)
+        pose[0] = cosine * w - sine * y, cosine * x + sine * z, cosine * y + sine * w, cosine * z - sine * x
+        track[X], track[Z] = placement.point(float(track[X]), float(track[Z]))
+        track[AT] = loop.start_s + head.position / FPS
+        np.einsum("jk,jk->j", pose, head.pose, out=self._signs[:, 0])
+        np.copysign(1.0, self._signs, out=self._signs)
+        np.multiply(pose, self._signs, out=head.pose)
