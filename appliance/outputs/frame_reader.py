@@ -37,6 +37,7 @@ class SeenFrame:
 
     tick: int
     frame_time: float  # seconds on the monotonic clock
+    left: float  # when it left the stage, same clock
     late: bool
     sensor_sequence: int  # -1 without a sensor
     sensor_arrival: float  # seconds on the monotonic clock
@@ -142,10 +143,11 @@ class FrameReader:
         layout, joints = self._layout, self._layout.joints
         if len(payload) != layout.bytes:
             return None
-        tick, frame_time, sequence, arrival, flags, _ = FRAME_HEAD.unpack_from(payload)
+        tick, frame_time, left, sequence, arrival, flags, _ = FRAME_HEAD.unpack_from(payload)
         return SeenFrame(
             tick,
             frame_time,
+            left,
             bool(flags & LATE),
             sequence,
             arrival,

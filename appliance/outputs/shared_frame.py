@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,9 @@ FACTS, HEALTH, FRAMES = range(3)  # the file's rings
 FRAME_SLOTS = 64  # 1.28 s: a reader has that long to copy the newest one
 HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
 LATE = 1  # flag
-FRAME_HEAD = struct.Struct("<qdqdII")  # tick, time, sensor's sequence and arrival, flags, joints
+FRAME_HEAD = struct.Struct(
+    "<qddqdII"
+)  # tick, time, when it left, sensor's sequence and arrival, flags, joints
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,7 @@ class FrameWriter:
             0,
             frame.tick,
             frame.frame_time,
+            time.monotonic(),  # after the tick's work: how long that took shifts what the projector shows
             frame.sensor_sequence,
             frame.sensor_arrival,
             LATE if frame.late else 0,
