@@ -7,6 +7,7 @@ from pathlib import Path
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
 from appliance.show.bundle import CHECKSUMS, bundle_bytes, bundle_files, default_show_path, write_checksums
 from appliance.show.check import verify_bundle
+from appliance.show.cues import too_much
 from appliance.show.show import load_show
 from appliance.stage.cast import admission, assemble, reach
 from appliance.stage.stage_error import StageError
@@ -27,7 +28,7 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
         raise StageError(verdict.sentence())
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
-    for warning in reach(cast, box):
+    for warning in (*reach(cast, box), *too_much(show.config.cues, verdict.most_coding, show.file)):
         print(warning)
 
 

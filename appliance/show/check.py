@@ -15,6 +15,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import CHECKSUMS, bundle_bytes, checksum_problems, unlisted_files
 from appliance.show.config_error import ConfigError, Problem
+from appliance.show.dance import MAIN
 from appliance.show.network import WINDOW, inspect_network
 from appliance.show.show import Show, load_show
 
@@ -81,11 +82,11 @@ def _show(directory: Path) -> Iterator[Finding]:
             show.require_moving(joints)
         except ConfigError as error:
             yield from map(_error, error.problems)
-    yield from _phrase(show)
+    for name, path in show.phrases.items():
+        yield from _phrase(show, name, path)
 
 
-def _phrase(show: Show) -> Iterator[Finding]:
-    path = show.phrase
+def _phrase(show: Show, name: str, path: Path) -> Iterator[Finding]:
     try:
         phrase = read_bvh(path)
     except BvhError as error:
@@ -100,7 +101,11 @@ def _phrase(show: Show) -> Iterator[Finding]:
             f"The phrase has {phrase.fps:.4g} poses a second and is resampled to {RATE_HZ:g} at each start."
         )
         yield Finding(path, 0, message, "Pack it at 50 Hz.", "warning")
-    yield from _excerpt(show, phrase)
+    if name == MAIN:
+        yield from _excerpt(show, phrase)
+    elif len(phrase) * RATE_HZ / phrase.fps < WINDOW:
+        message = f"The phrase '{name}' has {len(phrase)} poses; one window needs {WINDOW}."
+        yield Finding(path, 0, message, "Use a longer phrase.")
 
 
 def _phrase_skeleton(path: Path, found: Skeleton, wanted: Skeleton) -> Iterator[Finding]:

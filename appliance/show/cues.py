@@ -84,6 +84,19 @@ def cue_problems(
                 yield Problem(file.path, file.line(location), _UNKNOWN[key].format(word), cure)
 
 
+def too_much(cues: Sequence[CueConfig], most: int, file: YamlFile) -> Iterator[Problem]:
+    """Cues that ask for more coding iterations than fit this machine: they run with fewer."""
+    for place, cue in enumerate(cues):
+        if cue.iterations is not None and cue.iterations[0] > most:
+            yield Problem(
+                file.path,
+                file.line(("cues", place, "iterations")),
+                f"The cue '{cue.name}' asks for {cue.iterations[0]} coding iterations; {most} fit the tick's "
+                "budget here, and it runs with those.",
+                "Ask for fewer, or give the box a faster machine.",
+            )
+
+
 _UNKNOWN = {
     "phrase": "This show has no phrase '{}'.",
     "hands": "No hand of this show holds the joint '{}'.",
