@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
+from appliance.show.config_error import did_you_mean
 from appliance.show.section import Ipv4, Section, refusal
+from appliance.show.yaml_file import Location
+
+LAST_TRACKER = 65535
 
 Direction = Literal["x", "-x", "y", "-y", "z", "-z"]
 Axes = Annotated[tuple[Direction, Direction, Direction], Field(strict=False)]
@@ -37,7 +42,7 @@ class PosiStageNetConfig(Section):
     first_tracker: int = Field(
         default=0,
         ge=0,
-        le=65000,
+        le=LAST_TRACKER,
         description="Number of the first joint's tracker; the next ones follow. Two boxes in one network "
         "need numbers of their own.",
     )
@@ -69,3 +74,19 @@ class PosiStageNetConfig(Section):
         if sorted(axis[-1] for axis in axes) != ["x", "y", "z"]:
             raise refusal("Each of x, y and z is needed once.", "Write for instance [x, -z, y].")
         return axes
+
+
+def misfits(
+    outputs: Sequence[PosiStageNetConfig], joints: Sequence[str]
+) -> Iterator[tuple[Location, str, str]]:
+    """What does not fit a skeleton with these joints: where in the box file, what is wrong, what to do."""
+    for place, output in enumerate(outputs):
+        here: Location = ("outputs", "posistagenet", place)
+        for number, joint in enumerate(output.joints):
+            if joint not in joints:
+                message = f"The show's skeleton has no joint '{joint}'."
+                yield (*here, "joints", number), message, did_you_mean(joint, joints)
+        last = output.first_tracker + len(output.joints or joints) - 1
+        if last > LAST_TRACKER:
+            message = f"Trackers are numbered up to {LAST_TRACKER}, and these would end at {last}."
+            yield (*here, "first_tracker"), message, "Begin with a lower number, or name fewer joints."

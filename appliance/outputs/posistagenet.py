@@ -1,0 +1,110 @@
+"""PosiStageNet out: chosen joints as trackers for media servers and followspots (posistage.net)."""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.outputs.dmx.datagram_sender import DatagramPath, DatagramSender
+from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.posistagenet_packets import DataPackets, InfoPackets
+from appliance.pose.skeleton import Skeleton
+from appliance.show.posistagenet import PosiStageNetConfig
+
+INFO_PERIOD_S = 1.0
+_AXES = {"x": 0, "y": 1, "z": 2}
+
+
+class PosiStageNet:
+    """One output: a frame of data packets for every n-th joint frame, and once a second the names.
+
+    A frame that is late repeats positions and speeds: the dancer did not stop, the box did.
+    """
+
+    def __init__(self, config: PosiStageNetConfig, skeleton: Skeleton) -> None:
+        names = tuple(config.joints) or skeleton.names
+        self._joints = np.array([skeleton.names.index(name) for name in names])
+        numbers = range(config.first_tracker, config.first_tracker + len(names))
+        self._data = DataPackets(numbers, config.speed)
+        self._info = InfoPackets(config.system_name, dict(zip(numbers, names, strict=True)))
+        self._turn = _turn(config.axes) * np.float32(config.scale)
+        self._offset = np.array(config.offset, np.float32)
+        self._taken, self._positions, self._before, self._speeds = np.zeros((4, len(names), 3), np.float32)
+        self._every, self._frames = config.every, 0
+        self._started: float | None = None
+        self._time_before = self._next_info = 0.0
+        self._sender = DatagramSender(DatagramPath(config.host, config.port, _way_out(config)))
+        self.name = f"{config.host}:{config.port} (posistagenet)"
+
+    @property
+    def sent(self) -> int:
+        """Datagrams handed to the network."""
+        return self._sender.sent
+
+    @property
+    def dropped(self) -> int:
+        """Datagrams that were not."""
+        return self._sender.dropped
+
+    @property
+    def last_error(self) -> str:
+        """Why the last one was dropped; stays after all is well again."""
+        return self._sender.last_error
+
+    def send(self, frame: JointFrame) -> None:
+        """This frame, if it is its turn. Never waits, never raises."""
+        is_its_turn = self._frames % self._every == 0
+        self._frames += 1
+        if is_its_turn:
+            for packet in self.encode(frame):
+                self._sender.send(packet, frame.frame_time)
+
+    def encode(self, frame: JointFrame) -> Sequence[memoryview]:
+        """Datagrams of this frame, the same buffers each time; once a second those with the names first."""
+        if self._started is None:
+            self._started = self._next_info = self._time_before = frame.frame_time
+            self._place(frame, self._before)
+        self._place(frame, self._positions)
+        self._note_speeds(frame)
+        self._data.fill(self._positions, self._speeds)
+        time_us = round(1e6 * (frame.frame_time - self._started))
+        if frame.frame_time < self._next_info:
+            return self._data.stamped(time_us)
+        self._next_info = frame.frame_time + INFO_PERIOD_S
+        return (*self._info.stamped(time_us), *self._data.stamped(time_us))
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._sender.close()
+
+    def _place(self, frame: JointFrame, out: NDArray[np.float32]) -> None:
+        """Positions of the trackers, (T, 3), in the receiver's axes and units."""
+        np.take(frame.positions, self._joints, axis=0, out=self._taken)
+        np.matmul(self._taken, self._turn, out=out)
+        np.add(out, self._offset, out=out)
+
+    def _note_speeds(self, frame: JointFrame) -> None:
+        """What the trackers moved since the last frame that was not late, a second."""
+        passed_s = frame.frame_time - self._time_before
+        if frame.late or passed_s <= 0.0:
+            return
+        np.subtract(self._positions, self._before, out=self._speeds)
+        np.divide(self._speeds, passed_s, out=self._speeds)
+        self._before[...] = self._positions
+        self._time_before = frame.frame_time
+
+
+def _turn(axes: Sequence[str]) -> NDArray[np.float32]:
+    """(3, 3): a row of the box's x, y, z times this is a row of the receiver's."""
+    turn = np.zeros((3, 3), np.float32)
+    for column, axis in enumerate(axes):
+        turn[_AXES[axis[-1]], column] = -1.0 if axis.startswith("-") else 1.0
+    return turn
+
+
+def _way_out(config: PosiStageNetConfig) -> str | None:
+    """The interface that multicast leaves by; to one receiver the kernel knows the way."""
+    return config.interface if ipaddress.IPv4Address(config.host).is_multicast else None
