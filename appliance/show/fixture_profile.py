@@ -50,6 +50,10 @@ class AttributeConfig(Section):
         default=False,
         description="Master and blackout scale it, as they scale the dimmer: for fog, strobes, lasers.",
     )
+    snap: bool = Field(
+        default=False,
+        description="It jumps in the middle of a fade instead of sliding: for gobo and colour wheels.",
+    )
 
     @field_validator("limits")
     @classmethod

@@ -97,7 +97,7 @@ class FixtureConfig(Section):
 
 
 class SafeConfig(Section):
-    """The safe look: on panic, after a stop, when the stage is lost, at the end. Dark unless told otherwise."""
+    """The safe look: on panic, after a stop, when the stage is lost, at the end. Dark unless told so."""
 
     dimmer: float = Field(default=0.0, ge=0, le=1, description="How bright; 0 is dark.")
     colour: Colour = Field(default=(1.0, 1.0, 1.0), description="Red, green, blue as shares 0 to 1.")

@@ -1,0 +1,89 @@
+"""What the lights read from the dance: places, heights, speeds and orientations of joints."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.outputs.frame_reader import SeenFrame
+from appliance.pose import quaternion
+from appliance.pose.skeleton import Skeleton
+from appliance.show.light_rules import RuleConfig
+
+SMOOTHING_S = 0.06  # of speeds: three ticks, so that one late frame is no step
+PAUSE_S = 0.2  # after so long without a new frame nothing moves any more
+FASTEST_M_S = 15.0  # no joint of a dancer is faster; a phrase that jumps is
+ROOT = 0
+_COORDINATE = {"across": 0, "height": 1, "depth": 2}
+
+
+class Dance:
+    """The newest frame and how fast its joints move. Arrays are (J, ...) in the skeleton's order."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+        joints = len(skeleton)
+        self.positions: NDArray[np.float64] = np.zeros((joints, 3))  # world, metres
+        self.pose: NDArray[np.float64] = np.tile(quaternion.IDENTITY.astype(float), (joints, 1))
+        self.world = self.pose.copy()
+        self.speeds: NDArray[np.float64] = np.zeros(joints)  # metres a second
+        self.body_speed = 0.0
+        self._time = -math.inf
+        self._tick: tuple[int, int] | None = None
+
+    def see(self, frame: SeenFrame, generation: int, now: float) -> None:
+        """The newest frame, perhaps the same one again; `generation` is that of the stage."""
+        tick = (generation, frame.tick)
+        if tick == self._tick:
+            if now - self._time > PAUSE_S:
+                self._settle(np.zeros_like(self.speeds), PAUSE_S)
+            return
+        if (not frame.late or self._tick is None) and np.isfinite(frame.positions).all():
+            self._measure(frame, generation)
+        self._tick = tick
+
+    def read(self, rule: RuleConfig) -> float:
+        """What a rule reads now: metres, metres a second or degrees."""
+        joint = ROOT if rule.joint is None else self.skeleton.index(rule.joint)
+        if rule.reads in _COORDINATE:
+            return float(self.positions[joint, _COORDINATE[rule.reads]])
+        if rule.reads == "speed":
+            return self.body_speed if rule.joint is None else float(self.speeds[joint])
+        turned = self.pose[joint] if rule.relative else self.world[joint]
+        return turn(turned, rule.axis) if rule.reads == "turn" else lean(turned, rule.axis)
+
+    def place(self, joint: str | None) -> NDArray[np.float64]:
+        """Where a joint is, (3,) metres; None: the root."""
+        where: NDArray[np.float64] = self.positions[ROOT if joint is None else self.skeleton.index(joint)]
+        return where
+
+    def _measure(self, frame: SeenFrame, generation: int) -> None:
+        elapsed_s = frame.frame_time - self._time
+        continues = self._tick is not None and self._tick[0] == generation
+        if continues and 0.0 < elapsed_s < PAUSE_S:
+            speeds = np.linalg.norm(frame.positions - self.positions, axis=-1) / elapsed_s
+            self._settle(np.minimum(speeds, FASTEST_M_S), elapsed_s)
+        else:
+            self._settle(np.zeros_like(self.speeds), PAUSE_S)
+        self.positions[:], self.pose[:], self.world[:] = frame.positions, frame.pose, frame.world
+        self._time = frame.frame_time
+
+    def _settle(self, speeds: NDArray[np.float64], elapsed_s: float) -> None:
+        self.speeds += (speeds - self.speeds) * (1.0 - math.exp(-elapsed_s / SMOOTHING_S))
+        self.body_speed = float(self.speeds.mean())
+
+
+def turn(q: NDArray[np.float64], axis: tuple[float, float, float]) -> float:
+    """Degrees, -180..180, by which an orientation (w, x, y, z) turns about an axis: its twist."""
+    w, x, y, z = q.tolist()
+    along = x * axis[0] + y * axis[1] + z * axis[2]
+    angle = math.degrees(2.0 * math.atan2(along, w))
+    return (angle + 180.0) % 360.0 - 180.0
+
+
+def lean(q: NDArray[np.float64], axis: tuple[float, float, float]) -> float:
+    """Degrees, 0..180, by which an orientation (w, x, y, z) tips an axis away from where it rests."""
+    tipped = quaternion.rotate(q, np.array(axis))
+    return math.degrees(math.acos(min(max(float(tipped @ np.array(axis)), -1.0), 1.0)))

@@ -1,0 +1,155 @@
+"""Moving heads: from a point on the stage to pan and tilt, without a flip and no faster than the head moves.
+
+A head's own axes while it stands: y from its base upwards, z to its front, x to the left of one who looks
+along z. At pan 0 and tilt 0 its beam goes along y; tilt leans it towards z, pan turns it from z towards x.
+Each direction can be had in two ways, tilt to the one side or to the other with pan half a turn away, and
+each pan again a whole turn further where the range allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pose import quaternion
+from appliance.show.fixture_profile import PAN, TILT
+from appliance.show.lights import FixtureConfig
+
+if TYPE_CHECKING:
+    from appliance.lights.patch import Slot
+
+Array = NDArray[np.float64]
+
+USUAL_DEGREES = {PAN: 540.0, TILT: 270.0}
+USUAL_SLEW = 180.0  # degrees a second
+TURNS = np.arange(-2.0, 3.0) * 360.0  # enough for ranges of two whole turns to either side
+OTHER_WAY = 10.0  # degrees of pan that the other of the two ways must save before a head takes it
+QUIET_CONE = np.sin(np.radians(4.0))  # so close to its own axis a head pans slower: pan hardly moves the beam
+LONGEST_STEP_S = 0.1  # after a pause heads go on from where they were, no faster than ever
+
+
+@dataclass(frozen=True)
+class Head:
+    """One moving head: the slots of its pan and tilt."""
+
+    fixture: FixtureConfig
+    pan: int
+    tilt: int
+
+
+class Axes:
+    """Pan and tilt slots (A): range, limits and slew in degrees. Angles count from the range's middle."""
+
+    def __init__(self, places: Sequence[int], slots: Sequence[Slot]) -> None:
+        own = [slots[place] for place in places]
+        self.slots = np.array(places, np.intp)
+        self.degrees = np.array([slot.config.degrees or USUAL_DEGREES[slot.base] for slot in own])
+        limits = [_limits(slot, degrees) for slot, degrees in zip(own, self.degrees, strict=True)]
+        self.low, self.high = np.array(limits, float).reshape(-1, 2).T
+        self.slew = np.array([slot.config.slew or USUAL_SLEW for slot in own])
+
+    def angles(self, values: Array) -> Array:
+        """Degrees (A,) of slot values (S,), within the limits."""
+        angles: Array = np.clip((values[self.slots] - 0.5) * self.degrees, self.low, self.high)
+        return angles
+
+    def shares(self, angles: Array) -> Array:
+        """Slot values 0..1 (A,) of angles in degrees (A,)."""
+        shares: Array = angles / self.degrees + 0.5
+        return shares
+
+
+class Heads:
+    """The moving heads (H) of a rig and all its pan and tilt slots (A): `angles` (A,) is where they are."""
+
+    def __init__(self, axes: Axes, heads: Sequence[Head]) -> None:
+        self.axes, self.heads = axes, tuple(heads)
+        places = {int(slot): place for place, slot in enumerate(axes.slots)}
+        self.pans = np.array([places[head.pan] for head in heads], np.intp)
+        self.tilts = np.array([places[head.tilt] for head in heads], np.intp)
+        self.places = np.array([head.fixture.place for head in heads], float).reshape(-1, 3)
+        self.local_from_world = np.array([own_axes(head.fixture) for head in heads]).reshape(-1, 3, 3)
+        self.angles = np.clip(np.zeros(len(axes.slots)), axes.low, axes.high)
+        self._ways = np.ones(len(heads))  # 1: tilt towards the front, -1: to the other side
+
+    def follow(self, wanted: Array, aims: Array, aimed: NDArray[np.bool_], seconds: float) -> None:
+        """Move towards angles `wanted` (A,), where `aimed` (H,) towards points `aims` (H, 3) in metres."""
+        axes, wanted = self.axes, wanted.copy()
+        reach = axes.slew * min(seconds, LONGEST_STEP_S)
+        heading, polar, sideways = self._directions(aims)
+        pan, way = self._nearest(heading, polar)
+        pans, tilts = self.pans[aimed], self.tilts[aimed]
+        self._ways[aimed] = way[aimed]
+        wanted[pans] = np.clip(pan[aimed], axes.low[pans], axes.high[pans])
+        reach[pans] *= np.minimum(1.0, sideways[aimed] / QUIET_CONE)
+        self._step(pans, wanted, reach)
+        off = np.radians(heading[aimed] - self.angles[pans])
+        wanted[tilts] = np.clip(polar[aimed] * np.cos(off), axes.low[tilts], axes.high[tilts])
+        reach[pans] = 0.0  # they have moved already
+        self._step(slice(None), wanted, reach)
+
+    def beams(self) -> Array:
+        """Directions of the beams on the stage, unit vectors (H, 3)."""
+        pan, tilt = np.radians(self.angles[self.pans]), np.radians(self.angles[self.tilts])
+        own = np.stack([np.sin(tilt) * np.sin(pan), np.cos(tilt), np.sin(tilt) * np.cos(pan)], axis=-1)
+        world: Array = np.einsum("hji,hj->hi", self.local_from_world, own)
+        return world
+
+    def _step(self, which: NDArray[np.intp] | slice, wanted: Array, reach: Array) -> None:
+        way = wanted[which] - self.angles[which]
+        self.angles[which] += np.clip(way, -reach[which], reach[which])
+
+    def _directions(self, aims: Array) -> tuple[Array, Array, Array]:
+        """Heading from the front, angle from the head's axis, both in degrees; its sine; each (H,)."""
+        own = np.einsum("hij,hj->hi", self.local_from_world, aims - self.places)
+        aside = np.hypot(own[:, 0], own[:, 2])
+        far = np.maximum(np.hypot(aside, own[:, 1]), 1e-9)
+        heading = np.degrees(np.arctan2(own[:, 0], own[:, 2]))
+        return heading, np.degrees(np.arctan2(aside, own[:, 1])), aside / far
+
+    def _nearest(self, heading: Array, polar: Array) -> tuple[Array, Array]:
+        """The pan (H,) that is the shortest way from here among all that show the direction; 1 or -1 (H,)."""
+        axes, pans, tilts = self.axes, self.pans, self.tilts
+        pan = np.concatenate([heading[:, None] + TURNS, heading[:, None] + 180.0 + TURNS], axis=1)
+        way = np.repeat([1.0, -1.0], len(TURNS))
+        tilt = way * polar[:, None]
+        out = np.maximum(axes.low[pans][:, None] - pan, pan - axes.high[pans][:, None]).clip(0.0)
+        out += np.maximum(axes.low[tilts][:, None] - tilt, tilt - axes.high[tilts][:, None]).clip(0.0)
+        cost = np.abs(pan - self.angles[pans][:, None]) + OTHER_WAY * (way != self._ways[:, None])
+        best = np.argmin(cost + 1000.0 * out, axis=1)
+        return pan[np.arange(len(best)), best], way[best]
+
+
+def own_axes(fixture: FixtureConfig) -> Array:
+    """Rotation matrix (3, 3) from the stage's axes into the fixture's own."""
+    yaw, pitch, roll = np.radians(fixture.turn)
+    world_from_local = quaternion.from_euler(np.array([yaw, pitch, roll]), "yxz")
+    if fixture.pose == "hanging":
+        upside_down = quaternion.from_axis_angle([0.0, 0.0, 1.0], np.pi)
+        world_from_local = quaternion.multiply(world_from_local, upside_down)
+    matrix: Array = quaternion.to_matrix(world_from_local).T.astype(float)
+    return matrix
+
+
+def heads_of(slots: Sequence[Slot]) -> Heads:
+    """The heads of a rig: each pan with the tilt of the same fixture and number."""
+    axes = [place for place, slot in enumerate(slots) if slot.base in (PAN, TILT)]
+    tilts = {(slots[place].fixture.name, slots[place].name): place for place in axes}
+    heads = []
+    for place in axes:
+        slot = slots[place]
+        twin = (slot.fixture.name, slot.name.replace(PAN, TILT, 1))
+        if slot.base == PAN and twin in tilts:
+            heads.append(Head(slot.fixture, place, tilts[twin]))
+    return Heads(Axes(axes, slots), heads)
+
+
+def _limits(slot: Slot, degrees: float) -> tuple[float, float]:
+    """Lowest and highest angle: the range, and within it what the patch allows."""
+    allowed = slot.fixture.pan_limits if slot.base == PAN else slot.fixture.tilt_limits
+    low, high = allowed or (-degrees / 2, degrees / 2)
+    return max(low, -degrees / 2), min(high, degrees / 2)

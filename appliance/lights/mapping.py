@@ -1,0 +1,152 @@
+"""A mapping at work: its rules read the dance and write wishes, which fade into those of the next mapping."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.lights.colour import between, mixed
+from appliance.lights.curve import bent, eased, share
+from appliance.lights.dance import Dance
+from appliance.lights.patch import Patch, Places, Values
+from appliance.show.light_rules import AIM, COLOUR, MappingConfig, RuleConfig
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a mapping wants: slots (S,) 0..1, points to aim at (H, 3) metres; what of the heads it moves."""
+
+    values: Values
+    aims: NDArray[np.float64]
+    aimed: Mask  # (H,)
+    steered: Mask  # (A,) pan and tilt slots that rules set directly
+
+
+class Mapping:
+    """A set of rules. What no rule drives rests at its default; heads that none moves stay where they are."""
+
+    def __init__(self, config: MappingConfig, patch: Patch) -> None:
+        self.name = config.name
+        self._patch = patch
+        driven = np.zeros(len(patch.slots), bool)
+        self._rules: list[_Rule | _Aim] = []
+        aimed = np.zeros(len(patch.heads.heads), bool)
+        steered = np.zeros(len(patch.heads.axes.slots), bool)
+        for rule in config.rules:
+            if rule.drives == AIM:
+                aim = _Aim(rule, patch)
+                self._rules.append(aim)
+                aimed[aim.heads] = True
+                continue
+            one = _Rule(rule, patch, driven)
+            self._rules.append(one)
+            driven[one.slots] = True
+            axes = np.isin(patch.heads.axes.slots, one.slots)
+            steered |= axes
+            aimed &= ~(axes[patch.heads.pans] | axes[patch.heads.tilts])  # the later rule counts
+        self._aimed, self._steered = aimed, steered
+
+    def begin(self) -> None:
+        """It comes into force: the first pass takes readings as they are, without attack and release."""
+        for rule in self._rules:
+            rule.begin()
+
+    def wishes(self, dance: Dance, seconds: float) -> Wishes:
+        """What its rules want now, `seconds` after the pass before."""
+        wishes = Wishes(
+            self._patch.defaults.copy(),
+            np.zeros((len(self._aimed), 3)),
+            self._aimed,
+            self._steered,
+        )
+        for rule in self._rules:
+            rule.apply(dance, seconds, wishes)
+        return wishes
+
+
+def faded(before: Wishes, after: Wishes, part: float, snaps: Mask) -> Wishes:
+    """Between two mappings, `part` 0..1 of the way; `snaps` (S,) jump in the middle.
+
+    Points to aim at slide across the stage; a head that only one of them moves follows that one.
+    """
+    if part >= 1.0:
+        return after
+    weight = np.where(snaps, float(part >= 0.5), part)
+    values = before.values + (after.values - before.values) * weight
+    aims = before.aims + (after.aims - before.aims) * part
+    aims[~after.aimed] = before.aims[~after.aimed]
+    aims[~before.aimed] = after.aims[~before.aimed]
+    newest = after if part >= 0.5 else before
+    aimed = np.where(before.aimed & after.aimed, True, newest.aimed)
+    return Wishes(values, aims, aimed, newest.steered)
+
+
+class _Rule:
+    """A rule that drives slots by a number."""
+
+    def __init__(self, config: RuleConfig, patch: Patch, driven: Mask) -> None:
+        self.slots: Places = patch.select(config.fixtures, config.drives)
+        self._config = config
+        self._components = patch.components[self.slots] if config.drives == COLOUR else None
+        self._colours = np.array(config.colours or [(1.0, 1.0, 1.0)])
+        self._again = driven[self.slots] if config.mix != "last" else np.zeros(len(self.slots), bool)
+        self._level: float | None = None
+
+    def begin(self) -> None:
+        self._level = None
+
+    def apply(self, dance: Dance, seconds: float, wishes: Wishes) -> None:
+        config = self._config
+        if config.reads == "steady":
+            wanted = config.value
+        else:
+            wanted = bent(config, share(dance.read(config), config.ends))
+        if self._level is not None:
+            wanted = eased(self._level, wanted, config.attack_s, config.release_s, seconds)
+        self._level = wanted
+        low, high = config.output
+        level = low + (high - low) * wanted
+        shown = np.full(len(self.slots), level)
+        if self._components is not None:
+            shown = mixed(between(self._colours, level))[self._components]
+        earlier = wishes.values[self.slots]
+        wishes.values[self.slots] = np.where(self._again, _MIXES[config.mix](earlier, shown), shown)
+
+
+class _Aim:
+    """A rule that points heads at a joint or at a point of the stage."""
+
+    def __init__(self, config: RuleConfig, patch: Patch) -> None:
+        self.heads = [
+            place
+            for place, head in enumerate(patch.heads.heads)
+            if not config.fixtures or head.fixture.name in config.fixtures
+        ]
+        self._joint = config.joint
+        self._point = None if config.reads == "place" else np.array(config.at)
+        self._offset = np.array(config.offset)
+
+    def begin(self) -> None:
+        """It has no memory: the heads' own speed is the limit."""
+
+    def apply(self, dance: Dance, seconds: float, wishes: Wishes) -> None:
+        point = dance.place(self._joint) if self._point is None else self._point
+        wishes.aims[self.heads] = point + self._offset
+
+
+_MIXES: dict[str, Callable[[Values, Values], Values]] = {
+    "last": lambda earlier, shown: shown,
+    "highest": np.maximum,
+    "sum": lambda earlier, shown: np.minimum(earlier + shown, 1.0),
+    "product": np.multiply,
+}
+
+
+def mappings_of(configs: Sequence[MappingConfig], patch: Patch) -> dict[str, Mapping]:
+    """All mappings of a show by name, the first one first; one without rules where the show has none."""
+    return {config.name: Mapping(config, patch) for config in configs or [MappingConfig(name="none")]}
