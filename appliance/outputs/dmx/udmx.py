@@ -24,18 +24,7 @@ class Udmx:
     def __init__(self, number: str | None, channels: int, backend: Any = None) -> None:
         self._channels = channels
         self._shown: bytes | None = None
-        try:
-            self._device = usb.core.find(
-                idVendor=VENDOR,
-                idProduct=PRODUCT,
-                backend=backend,
-                custom_match=lambda device: _is_wanted(device, number),
-            )
-        except usb.core.NoBackendError:
-            raise AdapterError("libusb is missing; on Debian: sudo apt-get install libusb-1.0-0") from None
-        if self._device is None:
-            wanted = f" with the USB serial number {number}" if number is not None else ""
-            raise AdapterError(f"no uDMX{wanted} is plugged in")
+        self._device = _find(number, backend)
 
     def write(self, data: bytes) -> None:
         """The channels that changed, in one range; all of them when none did, in case it forgot."""
@@ -53,11 +42,22 @@ class Udmx:
             usb.util.dispose_resources(self._device)
 
 
-def _is_wanted(device: Any, number: str | None) -> bool:
-    """Whether its words say that it is the uDMX that is meant; one that does not answer is not."""
-    with contextlib.suppress(usb.core.USBError, ValueError):
-        return device.product == PRODUCT_WORD and number in (None, device.serial_number)
-    return False
+def _find(number: str | None, backend: Any) -> Any:
+    """The uDMX that is meant. Raises AdapterError where there is none, with what to do."""
+    try:
+        devices = list(usb.core.find(find_all=True, idVendor=VENDOR, idProduct=PRODUCT, backend=backend))
+    except usb.core.NoBackendError:
+        raise AdapterError("libusb is missing; on Debian: sudo apt-get install libusb-1.0-0") from None
+    mute = 0
+    for device in devices:
+        try:
+            if device.product == PRODUCT_WORD and number in (None, device.serial_number):
+                return device
+        except (usb.core.USBError, ValueError):  # pyusb's words for a device that this user may not read
+            mute += 1
+    if mute:
+        raise AdapterError("this user may not open it: give the USB device 16c0:05dc to the user (udev rule)")
+    raise AdapterError(f"no uDMX{f' with the USB serial number {number}' if number else ''} is plugged in")
 
 
 def _changed(shown: bytes | None, data: bytes) -> tuple[int, int]:

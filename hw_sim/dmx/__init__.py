@@ -1,0 +1,1 @@
+"""What receives DMX, by itself: Art-Net and sACN nodes and USB adapters, written from their standards."""
