@@ -268,3 +268,35 @@ def test_a_joint_that_the_network_does_not_move_is_refused_with_the_nearest_one(
 def test_two_hands_on_one_joint_are_refused() -> None:
     with pytest.raises(HandError, match="Two hands hold 'head'"):
         Hands([Remote("head"), FixedOrientation("head", LEFT)], JOINTS)
+
+
+def test_a_hand_that_is_disabled_lets_go_over_one_second_and_takes_again_over_half_of_one() -> None:
+    sensor = worn(1.0)
+    sensor.enabled = False
+    course = []
+    for tick in range(51, 120):
+        sensor.hear(RIGHT, tick * TICK_S)  # the dancer goes on moving
+        course.append(sensor.pull(tick * TICK_S).weight)
+    assert course[24] == pytest.approx(0.5, abs=0.04)
+    assert course[48] > 0.0 and course[50] == 0.0
+    assert np.diff(course).min() > -0.04
+    sensor.enabled = True
+    course = []
+    for tick in range(120, 150):
+        sensor.hear(RIGHT, tick * TICK_S)
+        course.append(sensor.pull(tick * TICK_S).weight)
+    assert course[12] == pytest.approx(0.5, abs=0.06)
+    assert course[26] == pytest.approx(1.0)
+    assert quaternion.angle_between(sensor.pull(3.0).orientation, np.array(RIGHT)) < 1e-3
+
+
+def test_a_hand_by_osc_holds_where_its_joint_is_unless_it_was_told_before() -> None:
+    remote = Remote("lShldr")
+    remote.hold_here(LEFT)
+    assert weights(remote, 0.0, 1.0)[-1] == pytest.approx(1.0)
+    assert quaternion.angle_between(remote.pull(1.0).orientation, np.array(LEFT)) < 1e-3
+    remote.hold(RIGHT)
+    remote.hold_here(LEFT)
+    assert quaternion.angle_between(remote.pull(1.02).orientation, np.array(RIGHT)) < 1e-3
+    remote.release()
+    assert weights(remote, 1.04, 3.0)[-1] == 0.0
