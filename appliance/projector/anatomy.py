@@ -1,7 +1,8 @@
-"""What a skeleton's joints are to a sculptor: trunk, limbs, hands, feet, head, and which way the body faces."""
+"""What a skeleton's joints are to a sculptor: trunk, limbs, hands, feet, head, and where its front is."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -105,9 +106,8 @@ class Anatomy:
     @cached_property
     def forward(self) -> Array:
         """Unit vector to the dancer's front: where toes or eyes are, else +Z; horizontal, (3,)."""
-        hints = [offset for joint, offset in self._feet_forward()]
-        if self.head is not None:
-            hints += [self.positions[j] - self.positions[self.head] for j in self.children[self.head]]
+        ahead = self.bones([*self.skeleton.feet, *([] if self.head is None else [self.head])])
+        hints = [end - start for _, start, end in ahead]
         total = np.sum(hints, axis=0) if hints else np.array([0.0, 0.0, 1.0])
         total = total * np.array([1.0, 0.0, 1.0])
         total -= self.across * float(total @ self.across)
@@ -118,18 +118,15 @@ class Anatomy:
         front: Array = total / length
         return front
 
-    def tip_of(self, joint: int) -> Array | None:
-        """Where the bone of a joint without children ends, metres; None where the skeleton does not say."""
-        return next((tip for end, tip in self.tips if end == joint), None)
-
-    def _feet_forward(self) -> list[tuple[int, Array]]:
-        found = []
-        for foot in self.skeleton.feet:
-            ahead = [self.positions[child] for child in self.children[foot]]
-            tip = self.tip_of(foot)
-            ahead += [tip] if tip is not None else []
-            found += [(foot, place - self.positions[foot]) for place in ahead]
-        return found
+    def bones(self, joints: Sequence[int]) -> list[tuple[int, Array, Array]]:
+        """(joint that moves it, where it begins, where it ends) of all bones of some joints, tips included."""
+        found = [
+            (joint, self.positions[joint], self.positions[child])
+            for joint in joints
+            for child in self.children[joint]
+        ]
+        found += [(joint, self.positions[joint], tip) for joint, tip in self.tips if joint in joints]
+        return [bone for bone in found if float(np.linalg.norm(bone[2] - bone[1])) > 1e-4 * self.height]
 
     def _leads_to_head(self, joint: int) -> bool:
         return self.head is not None and (joint == self.head or self.head in self.below(joint))

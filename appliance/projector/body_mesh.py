@@ -18,8 +18,8 @@ def body_mesh(skeleton: Skeleton) -> BodyMesh:
     trunk, limbs = sculpture(anatomy)
     field, grid = sampled(trunk, limbs, SPACING * anatomy.height)
     vertices, normals, faces = surface_of(field, grid)
-    slabs = [slab for group in (trunk, *limbs) for slab in group.slabs]
-    joints, weights = weights_of(vertices, faces, slabs, len(skeleton))
+    movers = [mover for group in (trunk, *limbs) for mover in group.movers]
+    joints, weights = weights_of(vertices, faces, movers)
     return BodyMesh(
         vertices,
         normals,

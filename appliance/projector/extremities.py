@@ -9,137 +9,143 @@ from appliance.projector.anatomy import Anatomy
 from appliance.projector.volumes import Cut, Slab
 
 _UP = np.array([0.0, 1.0, 0.0])
+_LEVEL = np.array([1.0, 0.0, 1.0])
+# The head, in heights: places as (to the front, upwards) from its middle, radii, halves to the sides.
+_CRANIUM = ((-0.018, 0.010), (0.012, 0.004), (0.052, 0.049), (0.000, 0.000))
+_JAW = ((0.006, -0.014), (0.032, -0.064), (0.040, 0.018), (0.002, 0.005))
+_RIDGE = ((0.048, 0.014), (0.059, -0.020), (0.006, 0.008), (0.000, 0.000))
+_FACE_AT, _FACE_TURNED = 0.050, 0.42  # the two halves of the face: how far before the middle, how turned
+_REACH = 0.115  # from the head joint to the crown, where the skeleton does not say
 
 
 def head(anatomy: Anatomy) -> list[Slab | Cut]:
-    """A skull with a jaw and a flat face with a ridge, turned to the front; empty without a head."""
+    """A skull with a jaw and a face of two planes that meet in a ridge; empty without a head."""
     joint = anatomy.head
     if joint is None:
         return []
-    height, place = anatomy.height, anatomy.positions[joint]
+    height, side = anatomy.height, anatomy.across
     up, reach = _head_axis(anatomy, joint)
-    side = anatomy.across
     front = np.cross(side, up)
     front = front if float(front @ anatomy.forward) >= 0 else -front
-    middle = place + min(max(reach - 0.05 * height, 0.03 * height), 0.06 * height) * up
+    middle = anatomy.positions[joint] + min(max(reach - 0.055 * height, 0.03 * height), 0.062 * height) * up
 
     def at(forward: float, above: float) -> Array:
         there: Array = middle + height * (forward * front + above * up)
         return there
 
-    def part(
-        a: Array, b: Array, radii: tuple[float, float], halves: tuple[float, float], soft: float
-    ) -> Slab:
+    def part(shape: tuple[tuple[float, float], ...], softness: float) -> Slab:
+        low, high, radii, halves = shape
         return Slab(
-            joint, a, b, radii[0] * height, radii[1] * height, soft * height, side,
-            halves[0] * height, halves[1] * height,
-        )  # fmt: skip
+            joint,
+            at(*low),
+            at(*high),
+            radii[0] * height,
+            radii[1] * height,
+            softness * height,
+            side,
+            halves[0] * height,
+            halves[1] * height,
+        )
 
-    face = front - 0.06 * up
-    return [
-        part(at(-0.016, 0.008), at(0.010, 0.010), (0.047, 0.044), (0.001, 0.001), 0.0),
-        part(at(0.008, -0.012), at(0.024, -0.048), (0.036, 0.016), (0.003, 0.008), 0.020),
-        Cut(at(0.047, 0.0), face / np.linalg.norm(face), 0.09 * height, 0.012 * height),
-        part(at(0.043, 0.010), at(0.052, -0.016), (0.005, 0.006), (0.0, 0.0), 0.006),
-    ]
+    planes: list[Slab | Cut] = []
+    for turned in (-_FACE_TURNED, _FACE_TURNED):
+        normal = front + turned * side + 0.10 * up
+        planes.append(Cut(at(_FACE_AT, 0.0), normal / np.linalg.norm(normal), 0.10 * height, 0.010 * height))
+    return [part(_CRANIUM, 0.0), part(_JAW, 0.022), *planes, part(_RIDGE, 0.008)]
 
 
-def hand(anatomy: Anatomy, joint: int) -> list[Slab | Cut]:
-    """A palm, and fingers that lie close: a mitten with a thumb where the skeleton has one."""
+def hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:
+    """A mitten, with a thumb where the skeleton has one; and the bones that move it, finger by finger."""
     height, wrist = anatomy.height, anatomy.positions[joint]
-    below = anatomy.children[joint]
-    thick = 0.0115 * height
-    if len(below) < 3:
+    fingers = sorted(anatomy.children[joint], key=anatomy.length)[1:]
+    if len(fingers) < 2:
         return _plain_hand(anatomy, joint)
-    knuckles = sorted(below, key=anatomy.length)[1:]
-    middle = anatomy.positions[knuckles].mean(axis=0)
-    spread = anatomy.positions[knuckles] - middle
-    aside = np.linalg.svd(spread)[2][0]
-    half = float(np.abs(spread @ aside).max())
+    thumb = min(anatomy.children[joint], key=anatomy.length)
+    knuckles = anatomy.positions[fingers]
+    tips = np.array([_furthest(anatomy, finger, wrist) for finger in fingers])
+    aside = np.linalg.svd(knuckles - knuckles.mean(axis=0))[2][0]
+    half = float(np.abs((knuckles - knuckles.mean(axis=0)) @ aside).max())
+    row, end = knuckles.mean(axis=0), tips.mean(axis=0)
+    end = end + 0.020 * height * (end - row) / max(float(np.linalg.norm(end - row)), 1e-9)
+    base = wrist + 0.35 * (anatomy.positions[thumb] - wrist)
+    thick = 0.0125 * height
     steps: list[Slab | Cut] = [
-        Slab(joint, wrist, middle, 0.0155 * height, thick, 0.0, aside, 0.3 * half, half)
+        Slab(joint, wrist, row, 0.0165 * height, thick, 0.0, aside, 0.25 * half, half),
+        Slab(joint, row, end, thick, 0.0075 * height, 0.0, aside, half, 0.62 * half),
+        Slab(joint, base, anatomy.positions[thumb], 0.014 * height, 0.011 * height, 0.012 * height, aside),
     ]
-    for finger in anatomy.below(joint):
-        ends = [anatomy.positions[child] for child in anatomy.children[finger]]
-        tip = anatomy.tip_of(finger)
-        for end in [*ends, *([tip] if tip is not None else [])]:
-            steps.append(
-                Slab(
-                    finger, anatomy.positions[finger], end, 0.0085 * height, 0.0072 * height,
-                    0.007 * height, anatomy.across,
-                )
-            )  # fmt: skip
-    thumb = min(below, key=anatomy.length)
-    start = wrist + 0.3 * (middle - wrist)
-    steps.append(
-        Slab(joint, start, anatomy.positions[thumb], thick, 0.009 * height, 0.01 * height, anatomy.across)
-    )
-    return steps
+    for bone in anatomy.bones([thumb, *anatomy.below(thumb)]):
+        steps.append(Slab(*bone, 0.0105 * height, 0.0085 * height, 0.006 * height, aside))
+    bones = [Slab(*bone, thick, thick, 0.0, aside) for bone in anatomy.bones(anatomy.below(joint))]
+    palm = [Slab(joint, wrist, knuckle, thick, thick, 0.0, aside) for knuckle in knuckles]
+    return steps, [*palm, Slab(joint, base, anatomy.positions[thumb], thick, thick, 0.0, aside), *bones]
 
 
-def _plain_hand(anatomy: Anatomy, joint: int) -> list[Slab | Cut]:
-    """A mitten where the skeleton has no fingers, along the bone that ends there."""
+def _plain_hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:
+    """A mitten where the skeleton has no fingers, along the bones that end there."""
     height, wrist = anatomy.height, anatomy.positions[joint]
-    parent = anatomy.skeleton.parents[joint]
-    ends = [anatomy.positions[child] for child in anatomy.below(joint)]
-    ends += [tip for end, tip in anatomy.tips if end in (joint, *anatomy.below(joint))]
-    far = max(ends, key=lambda end: float(np.linalg.norm(end - wrist)), default=None)
-    if far is None or float(np.linalg.norm(far - wrist)) < 0.03 * height:
-        bone = wrist - anatomy.positions[parent]
-        far = wrist + 0.085 * height * bone / max(float(np.linalg.norm(bone)), 1e-9)
+    far = _furthest(anatomy, joint, wrist)
+    if float(np.linalg.norm(far - wrist)) < 0.03 * height:
+        bone = wrist - anatomy.positions[anatomy.skeleton.parents[joint]]
+        far = wrist + 0.09 * height * bone / max(float(np.linalg.norm(bone)), 1e-9)
     direction = (far - wrist) / np.linalg.norm(far - wrist)
     aside = anatomy.forward - direction * float(anatomy.forward @ direction)
     aside = aside / max(float(np.linalg.norm(aside)), 1e-9)
-    knuckles = wrist + 0.45 * (far - wrist)
+    row = wrist + 0.45 * (far - wrist)
+    wide, thick = 0.016 * height, 0.0125 * height
+    bones = [Slab(*bone, thick, thick, 0.0, aside) for bone in anatomy.bones(anatomy.below(joint))]
     return [
-        Slab(joint, wrist, knuckles, 0.0155 * height, 0.012 * height, 0.0, aside, 0.003 * height, 0.016 * height),
-        Slab(joint, knuckles, far, 0.012 * height, 0.007 * height, 0.004 * height, aside, 0.016 * height,
-             0.008 * height),
-    ]  # fmt: skip
+        Slab(joint, wrist, row, 0.0165 * height, thick, 0.0, aside, 0.25 * wide, wide),
+        Slab(joint, row, far, thick, 0.0075 * height, 0.0, aside, wide, 0.6 * wide),
+    ], [Slab(joint, wrist, row if bones else far, thick, thick, 0.0, aside), *bones]
 
 
 def foot(anatomy: Anatomy, joint: int) -> list[Slab | Cut]:
     """Heel, instep and toes over a flat sole."""
     height, ankle = anatomy.height, anatomy.positions[joint]
-    below = anatomy.below(joint)
-    ends = [anatomy.positions[child] for child in below]
-    ends += [tip for end, tip in anatomy.tips if end in (joint, *below)]
-    toes = max(ends, key=lambda end: float(np.linalg.norm(end - ankle)), default=None)
-    if toes is None or float(np.linalg.norm((toes - ankle) * [1, 0, 1])) < 0.02 * height:
+    toes = _furthest(anatomy, joint, ankle)
+    if float(np.linalg.norm((toes - ankle) * _LEVEL)) < 0.02 * height:
         toes = ankle + 0.08 * height * anatomy.forward - 0.026 * height * _UP
-    ahead = (toes - ankle) * np.array([1.0, 0.0, 1.0])
-    ahead = ahead / np.linalg.norm(ahead)
+    ahead = (toes - ankle) * _LEVEL / np.linalg.norm((toes - ankle) * _LEVEL)
     aside = np.cross(_UP, ahead)
     sole = min(float(toes[1]), float(ankle[1]) - 0.020 * height) - 0.008 * height
-    ball = ankle + 0.72 * (toes - ankle)
-    ball[1] = sole + 0.014 * height
-    tip = toes + 0.012 * height * ahead
-    tip[1] = sole + 0.010 * height
-    heel = ankle - 0.022 * height * ahead
-    heel[1] = sole + 0.020 * height
-    mover = next((child for child in anatomy.children[joint] if anatomy.children[child] or
-                  anatomy.tip_of(child) is not None), joint)  # fmt: skip
-    middle = 0.5 * (anatomy.positions[joint] + ball)
+
+    def at(place: Array, forward: float, above_sole: float) -> Array:
+        there: Array = place + forward * height * ahead
+        there[1] = sole + above_sole * height
+        return there
+
+    def part(owner: int, a: Array, b: Array, radii: tuple[float, float], halves: tuple[float, float]) -> Slab:
+        (first, last), (one, other) = np.array([radii, halves]) * height
+        return Slab(owner, a, b, first, last, 0.008 * height, aside, one, other)
+
+    ball, tip = at(ankle + 0.72 * (toes - ankle), 0.0, 0.014), at(toes, 0.012, 0.010)
+    heel = at(ankle, -0.018, 0.020)
+    mover = next(iter(bone[0] for bone in anatomy.bones(anatomy.children[joint])), joint)
     return [
-        Slab(joint, ankle, heel, 0.019 * height, 0.021 * height, 0.0, aside),
-        Slab(joint, ankle + 0.004 * height * ahead, ball, 0.020 * height, 0.015 * height, 0.010 * height, aside,
-             0.0, 0.014 * height),
-        Slab(joint, heel, middle, 0.019 * height, 0.018 * height, 0.010 * height, aside, 0.002 * height,
-             0.006 * height),
-        Slab(mover, ball, tip, 0.014 * height, 0.009 * height, 0.004 * height, aside, 0.014 * height,
-             0.011 * height),
-        Cut(np.array([ankle[0], sole, ankle[2]]), -_UP, 0.14 * height, 0.006 * height),
-    ]  # fmt: skip
+        part(joint, ankle, heel, (0.018, 0.020), (0.0, 0.0)),
+        part(joint, ankle + 0.004 * height * ahead, ball, (0.019, 0.014), (0.0, 0.013)),
+        part(joint, heel, 0.5 * (ankle + ball), (0.018, 0.017), (0.002, 0.006)),
+        part(mover, ball, tip, (0.014, 0.009), (0.013, 0.011)),
+        Cut(at(ankle, 0.0, 0.0), -_UP, 0.14 * height, 0.006 * height),
+    ]
+
+
+def _furthest(anatomy: Anatomy, joint: int, place: Array) -> Array:
+    """The end of a bone below a joint, or of its own, that lies furthest from a place; the joint without any."""
+    ends = [bone[2] for bone in anatomy.bones([joint, *anatomy.below(joint)])]
+    return max(ends, key=lambda end: float(np.linalg.norm(end - place)), default=anatomy.positions[joint])
 
 
 def _head_axis(anatomy: Anatomy, joint: int) -> tuple[Array, float]:
     """Unit vector from the head joint to the crown, and how far that is, metres."""
     place = anatomy.positions[joint]
-    tip = anatomy.tip_of(joint)
-    if tip is not None and float(np.linalg.norm(tip - place)) > 0.04 * anatomy.height:
-        return (tip - place) / np.linalg.norm(tip - place), float(np.linalg.norm(tip - place))
+    for _, _, end in anatomy.bones([joint]):
+        reach = float(np.linalg.norm(end - place))
+        if reach > 0.04 * anatomy.height and abs(float((end - place) @ anatomy.across)) < 0.2 * reach:
+            return (end - place) / reach, reach
     parent = anatomy.skeleton.parents[joint]
     neck = place - anatomy.positions[parent] if parent >= 0 else _UP
     if float(neck @ _UP) > 0.5 * float(np.linalg.norm(neck)):
         neck = _UP
-    return neck / max(float(np.linalg.norm(neck)), 1e-9), 0.105 * anatomy.height
+    return neck / max(float(np.linalg.norm(neck)), 1e-9), _REACH * anatomy.height

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,12 +13,13 @@ from appliance.projector.extremities import foot, hand, head
 from appliance.projector.volumes import Cut, Group, Slab
 
 # Along the spine from the pelvis (0) to the neck (1): half the width as a share of the hips' and of the
-# shoulders' half width, plus metres of flesh and half the depth, both in heights.
-_SPINE = np.array([0.0, 0.16, 0.40, 0.62, 0.82, 1.0])
-_OF_HIPS = np.array([0.95, 0.95, 0.50, 0.10, 0.0, 0.0])
-_OF_SHOULDERS = np.array([0.0, 0.0, 0.35, 0.80, 0.80, 0.35])
-_FLESH = np.array([0.047, 0.045, 0.022, 0.026, 0.024, 0.012])
-_DEPTH = np.array([0.054, 0.056, 0.050, 0.060, 0.054, 0.034])
+# shoulders' half width; flesh beside it, half the depth, and how far before the bones, in heights.
+_SPINE = np.array([0.0, 0.18, 0.42, 0.64, 0.82, 1.0])
+_OF_HIPS = np.array([0.90, 0.86, 0.50, 0.10, 0.0, 0.0])
+_OF_SHOULDERS = np.array([0.0, 0.0, 0.35, 0.80, 0.85, 0.20])
+_FLESH = np.array([0.036, 0.036, 0.018, 0.023, 0.027, 0.018])
+_DEPTH = np.array([0.050, 0.052, 0.047, 0.057, 0.052, 0.034])
+_AHEAD = np.array([-0.004, -0.002, 0.004, 0.010, 0.009, 0.0])
 
 
 def sculpture(anatomy: Anatomy) -> tuple[Group, list[Group]]:
@@ -25,7 +27,7 @@ def sculpture(anatomy: Anatomy) -> tuple[Group, list[Group]]:
     limbs = [_limb(anatomy, trunk, first) for trunk, first in anatomy.limbs()]
     if anatomy.head is not None:
         limbs.append(Group((*_neck(anatomy), *head(anatomy)), 0.022 * anatomy.height))
-    covered = {slab.owner for group in limbs for slab in group.slabs} | set(anatomy.trunk)
+    covered = {slab.owner for group in limbs for slab in group.movers} | set(anatomy.trunk)
     limbs += _twigs(anatomy, covered)
     return Group(tuple(_trunk(anatomy)), 0.0), limbs
 
@@ -33,7 +35,7 @@ def sculpture(anatomy: Anatomy) -> tuple[Group, list[Group]]:
 def thickness(anatomy: Anatomy, joint: int) -> float:
     """Radius of a limb at a joint, metres: thick where much hangs below."""
     share = anatomy.reach[joint] / anatomy.height
-    return float(anatomy.height * min(0.0165 + 0.092 * share * share, 0.056))
+    return float(anatomy.height * min(0.0165 + 0.078 * share * share, 0.050))
 
 
 def cone(
@@ -51,28 +53,36 @@ def _trunk(anatomy: Anatomy) -> list[Slab]:
         ball = min(thickness(anatomy, spine[0]), 0.045 * height)
         return [cone(anatomy, spine[0], places[spine[0]], places[spine[0]], (ball, ball), 0.0)]
     ends = [places[joint] for joint in spine]
-    lengths = [float(np.linalg.norm(b - a)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    lengths = [float(np.linalg.norm(b - a)) for a, b in pairwise(ends)]
     whole = sum(lengths) or 1.0
     hips, shoulders = _half_width(anatomy, spine[0]), _half_width(anatomy, spine[-2])
     slabs, before = [], 0.0
     for owner, start, end, length in zip(spine, ends, ends[1:], lengths, strict=False):
-        pieces = max(1, round(length / (0.045 * height)))
+        pieces = max(1, round(length / (0.025 * height)))
         for piece in range(pieces):
             shares = np.array([piece, piece + 1]) / pieces
             along = (before + shares * length) / whole
-            flesh, depth = (np.interp(along, _SPINE, table) * height for table in (_FLESH, _DEPTH))
-            half = np.interp(along, _SPINE, _OF_HIPS) * hips
-            half = half + np.interp(along, _SPINE, _OF_SHOULDERS) * shoulders + flesh - depth
-            low, high = (start + share * (end - start) for share in shares)
+            flesh, depth, ahead = (_at(along, table) * height for table in (_FLESH, _DEPTH, _AHEAD))
+            half = _at(along, _OF_HIPS) * hips + _at(along, _OF_SHOULDERS) * shoulders + flesh - depth
+            low, high = (
+                start + share * (end - start) + shift * anatomy.forward
+                for share, shift in zip(shares, ahead, strict=True)
+            )
             side = _perpendicular(anatomy.across, high - low)
             slabs.append(
                 Slab(
-                    owner, low, high, float(depth[0]), float(depth[1]), 0.012 * height, side,
+                    owner, low, high, float(depth[0]), float(depth[1]), 0.0, side,
                     max(float(half[0]), 0.0), max(float(half[1]), 0.0),
                 )
             )  # fmt: skip
         before += length
     return slabs
+
+
+def _at(along: Array, table: Array) -> Array:
+    """The table's smooth curve (a polynomial through all its values) at places along the spine, 0 to 1."""
+    curve: Array = np.polyval(np.polyfit(_SPINE, table, len(_SPINE) - 1), along)
+    return curve
 
 
 def _spine(anatomy: Anatomy) -> list[int]:
@@ -102,11 +112,11 @@ def _limb(anatomy: Anatomy, trunk: int, first: int) -> Group:
     chain = anatomy.chain(first)
     begin, last = anatomy.limb_start(chain), _extremity(anatomy, chain)
     is_leg = _is_leg(anatomy, chain, last)
-    steps: list[Slab | Cut] = list(foot(anatomy, chain[last]) if is_leg else hand(anatomy, chain[last]))
+    steps, bones = (foot(anatomy, chain[last]), []) if is_leg else hand(anatomy, chain[last])
     for place in reversed(range(begin, last)):
         steps += _bone(anatomy, chain[place], chain[place + 1], is_leg)
     steps += _root_of_limb(anatomy, trunk, chain[: begin + 1], is_leg)
-    return Group(tuple(steps), (0.030 if is_leg else 0.026) * anatomy.height)
+    return Group(tuple(steps), (0.030 if is_leg else 0.026) * anatomy.height, tuple(bones))
 
 
 def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
@@ -116,10 +126,10 @@ def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
     belly = start + 0.32 * (end - start)
     if is_leg and anatomy.reach[child] < 0.5 * anatomy.reach[joint]:
         belly = belly - 0.010 * anatomy.height * anatomy.forward  # the calf lies behind the bone
-    full = (first + 0.32 * (last - first)) * 1.12
+    full = (first + 0.32 * (last - first)) * (1.18 if is_leg else 1.12)
     return [
-        cone(anatomy, joint, belly, end, (full, last), 0.006),
-        cone(anatomy, joint, start, belly, (first, full), 0.008),
+        cone(anatomy, joint, belly, end, (full, last), 0.0),
+        cone(anatomy, joint, start, belly, (first, full), 0.0),
     ]
 
 
@@ -150,35 +160,29 @@ def _neck(anatomy: Anatomy) -> list[Slab]:
     joints = anatomy.neck
     above = [anatomy.skeleton.parents[joints[0]], *joints]
     slabs = [
-        cone(anatomy, a, places[a], places[b], (0.031 * height, 0.029 * height), 0.01)
-        for a, b in zip(above[1:], above[2:], strict=False)
+        cone(anatomy, a, places[a], places[b], (0.027 * height, 0.027 * height), 0.01)
+        for a, b in pairwise(joints)
     ]
     base = above[0]
     if base >= 0:
         low = places[joints[0]] + 0.35 * (places[base] - places[joints[0]])
-        slabs.insert(0, cone(anatomy, base, low, places[joints[0]], (0.036 * height, 0.031 * height), 0.01))
+        slabs.insert(0, cone(anatomy, base, low, places[joints[0]], (0.034 * height, 0.028 * height), 0.01))
     return slabs
 
 
 def _twigs(anatomy: Anatomy, covered: set[int]) -> list[Group]:
     """Everything else that has bones: tails, ears, wings."""
     face = set(anatomy.below(anatomy.head)) if anatomy.head is not None else set()
-    groups = []
-    for joint, parent in enumerate(anatomy.skeleton.parents):
-        slabs = []
-        if parent >= 0 and parent not in covered | face and joint not in face:
-            slabs.append(_twig(anatomy, parent, anatomy.positions[joint]))
-        tip = anatomy.tip_of(joint)
-        if tip is not None and joint not in covered | face:
-            slabs.append(_twig(anatomy, joint, tip))
-        if slabs:
-            groups.append(Group(tuple(slabs), 0.015 * anatomy.height))
-    return groups
+    left = [joint for joint in range(len(anatomy.skeleton)) if joint not in covered | face]
+    return [
+        Group((_twig(anatomy, owner, start, end),), 0.015 * anatomy.height)
+        for owner, start, end in anatomy.bones(left)
+    ]
 
 
-def _twig(anatomy: Anatomy, joint: int, end: Array) -> Slab:
+def _twig(anatomy: Anatomy, joint: int, start: Array, end: Array) -> Slab:
     thick = thickness(anatomy, joint)
-    return cone(anatomy, joint, anatomy.positions[joint], end, (thick, 0.8 * thick), 0.01)
+    return cone(anatomy, joint, start, end, (thick, 0.8 * thick), 0.0)
 
 
 def _extremity(anatomy: Anatomy, chain: Sequence[int]) -> int:

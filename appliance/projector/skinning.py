@@ -60,40 +60,45 @@ def skin(mesh: BodyMesh, positions: Array, world: Array) -> tuple[NDArray[np.flo
     return vertices.astype(np.float32), quaternion.rotate(turn, mesh.normals).astype(np.float32)
 
 
-SPREAD_STEPS = 18  # how often weights flow to the neighbours on the surface
-MOVERS = 4
+MOVERS = 4  # joints that move a vertex
+SPREAD_STEPS = 40  # how often weights flow to the neighbours on the surface
 
 
 def weights_of(
-    vertices: NDArray[np.float32], faces: NDArray[np.int32], slabs: Sequence[Slab], joints: int
+    vertices: NDArray[np.float32], faces: NDArray[np.int32], volumes: Sequence[Slab]
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """Which joints move each vertex, (V, 4), and how much, (V, 4): those whose volume is nearest, softened
-    along the surface alone, so that an arm at the hip is not moved by the hip."""
-    owners = sorted({slab.owner for slab in slabs})
+    """Which joints move each vertex, (V, 4), and how much, (V, 4), strongest first.
+
+    The owner of the nearest volume, softened along the surface alone: what the hand of a hanging arm comes
+    near to is not moved by it. faces: as `surface_of` gives them.
+    """
+    owners = sorted({volume.owner for volume in volumes})
     place = {owner: number for number, owner in enumerate(owners)}
-    away = np.full((len(vertices), len(owners)), np.inf, dtype=np.float32)
+    away = np.full((len(vertices), max(len(owners), MOVERS)), np.inf, dtype=np.float32)
     x, y, z = vertices.T
-    for slab in slabs:
-        column = away[:, place[slab.owner]]
-        np.minimum(column, slab.distance(x, y, z), out=column)
+    for volume in volumes:
+        column = away[:, place[volume.owner]]
+        np.minimum(column, volume.distance(x, y, z), out=column)
     weights = np.zeros_like(away)
     weights[np.arange(len(away)), away.argmin(axis=1)] = 1.0
     weights = _spread_along(faces, weights)
     strongest = np.argsort(-weights, axis=1, kind="stable")[:, :MOVERS]
     kept = np.take_along_axis(weights, strongest, axis=1)
-    kept /= kept.sum(axis=1, keepdims=True)
-    missing = MOVERS - kept.shape[1]
-    movers = np.pad(np.array(owners)[strongest], ((0, 0), (0, max(missing, 0))), mode="edge")
-    return movers.astype(np.uint8), np.pad(kept, ((0, 0), (0, max(missing, 0)))).astype(np.float32)
+    joints = np.array([*owners, *owners[:1] * MOVERS])[strongest]
+    return joints.astype(np.uint8), (kept / kept.sum(axis=1, keepdims=True)).astype(np.float32)
 
 
 def _spread_along(faces: NDArray[np.int32], weights: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Mean with the neighbours on the surface, some times over."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])  # each both ways: closed
-    edges = edges[np.argsort(edges[:, 0], kind="stable")]
-    counts = np.bincount(edges[:, 0], minlength=len(weights))
-    begins = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    """Weights (V, C) after they flowed to the neighbours on the surface, some times over."""
+    quads = faces.reshape(-1, 6)[:, [0, 1, 2, 5]]
+    edges = np.unique(np.concatenate([quads[:, [a, (a + 1) % 4]] for a in range(4)]), axis=0)
+    first = np.searchsorted(edges[:, 0], np.arange(len(weights) + 1))
+    most = int(np.diff(first).max())
+    around = np.tile(np.arange(len(weights))[:, None], (1, most))
+    around[edges[:, 0], np.arange(len(edges)) - first[edges[:, 0]]] = edges[:, 1]
     for _ in range(SPREAD_STEPS):
-        around = np.add.reduceat(weights[edges[:, 1]], begins, axis=0) / counts[:, None]
-        weights = (0.5 * (weights + around)).astype(np.float32)
+        flow = weights[around[:, 0]]
+        for neighbour in around.T[1:]:
+            flow += weights[neighbour]
+        weights = 0.5 * weights + (0.5 / most) * flow
     return weights

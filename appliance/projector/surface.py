@@ -50,7 +50,7 @@ def surface_of(
 
 
 def _without_ambiguity(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """The field and each cell's corners inside, as bits, after cells that two sheets would share are filled."""
+    """The field and each cell's corners inside, as bits; cells that two sheets would share are filled."""
     while True:
         codes = _codes(field < 0)
         doubtful = np.argwhere(_DOUBTFUL[codes])
@@ -71,7 +71,7 @@ def _codes(inside: NDArray[np.bool_]) -> NDArray[np.uint8]:
 
 
 def _is_doubtful(code: int) -> bool:
-    """Whether the corners inside, or those outside, hang together by a diagonal alone, in the cell or in a face."""
+    """Whether corners inside, or those outside, hang together by a diagonal alone, in the cell or a face."""
     inside = [corner for corner in range(8) if code >> corner & 1]
     if not (_hangs_together(inside) and _hangs_together([c for c in range(8) if c not in inside])):
         return True
