@@ -13,7 +13,7 @@ from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
 from appliance.stage.cast import reach
 from appliance.stage.run import Stage, stop_signals
-from appliance.stage.speaker import Speaker
+from appliance.control.speaker import Speaker
 
 _PICTURED_S = 10.0
 _NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")

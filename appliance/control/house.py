@@ -90,11 +90,10 @@ class House:
 
     def settled(self, now: float) -> House:
         """With fades that began in the future done: the machine's clock has started anew since."""
-        house = self
-        for part in ("going", "master", "look", "lights"):
-            if getattr(house, f"{part}_since") > now:
-                house = replace(house, **{f"{part}_since": now, f"{part}_fade_s": 0.0})
-        return house
+        late = max(self.going_since, self.master_since, self.look_since, self.lights_since) > now
+        if not late:
+            return self
+        return replace(self, going_fade_s=0.0, master_fade_s=0.0, look_fade_s=0.0, lights_fade_s=0.0)
 
 
 class HouseReader:
@@ -148,6 +147,9 @@ def _parsed(payload: bytes | None) -> House:
     """A house of another version of this program keeps what both know."""
     if payload is None:
         return House()
-    values: dict[str, Any] = json.loads(payload)
     known = {one.name for one in fields(House)}
-    return House(**{name: value for name, value in values.items() if name in known})
+    try:
+        values: dict[str, Any] = json.loads(payload)
+        return House(**{name: value for name, value in values.items() if name in known})
+    except (ValueError, TypeError, AttributeError):
+        return House()

@@ -18,13 +18,14 @@ if TYPE_CHECKING:
     from appliance.sensor.keys import SensorKey
 
 Place = Literal["stage", "projector", "lights"]
+Delivery = Literal["sent", "full", "absent"]  # full: too many wait there already; absent: nobody is there
 ANSWERS = "control"
 _LARGEST = 65536
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One thing to do, already checked for bounds; names that only the show knows are the receiver's to check.
+    """One thing to do, within its bounds; names that only the show knows are the receiver's to check.
 
     For the stage:  start, stop, jump (s), rate (r), excerpt (start s[, end s]), iterations (coding,
     interaction), hold (x, y, z, angle; text: joint), release (text: joint), hand (0|1; text: joint: the hand
@@ -95,8 +96,8 @@ class OrderSender:
         """For whoever sleeps until an answer comes."""
         return self._socket.fileno()
 
-    def send(self, to: Place, order: Order) -> bool:
-        """Hand it over; False when nobody is there or their socket is full. Never blocks."""
+    def send(self, to: Place, order: Order) -> Delivery:
+        """Hand it over; never blocks, never raises."""
         return self._socket.send(to, _payload(order))
 
     def take(self) -> Answer | None:
@@ -113,7 +114,7 @@ class OrderSender:
 
 
 class _Mailbox:
-    """A Unix datagram socket in a folder. Through /proc, as a socket's own path has at most 107 characters."""
+    """A Unix datagram socket in a folder, reached through /proc: a socket's own path ends after 107 bytes."""
 
     def __init__(self, folder: Path, place: str) -> None:
         self._folder = os.open(folder, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -138,12 +139,14 @@ class _Mailbox:
         except OSError:
             return None
 
-    def send(self, place: str, payload: bytes) -> bool:
+    def send(self, place: str, payload: bytes) -> Delivery:
         try:
             self._socket.sendto(payload, self._path(f"{place}.sock"))
+        except BlockingIOError:
+            return "full"
         except OSError:
-            return False
-        return True
+            return "absent"
+        return "sent"
 
     def close(self) -> None:
         with contextlib.suppress(OSError):

@@ -1,0 +1,109 @@
+"""Errands: orders on their way to stage, projector and lights, and who waits for what came of them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import get_args
+
+from appliance.control.orders import Order, OrderSender, Place
+
+PATIENCE_S = 0.5
+WAITING = 64  # orders that may wait for a place; then the oldest gives way
+AT_ONCE, EVERY_S = 4, 0.02  # four orders a tick at most: a flood cannot touch the tick
+
+Then = Callable[[bool, str], None]  # what to do when it is known whether it was done, and in what words
+
+_SILENT = {
+    "stage": "The stage does not answer, and nothing is changed. If it hangs, it is started anew by itself "
+    "or with: bunraku play.",
+    "projector": "The projector does not answer, and nothing is changed.",
+    "lights": "The lights do not answer, and nothing is changed.",
+}
+_ABSENT = {
+    "stage": "No stage dances on this box: nothing is changed. Start it: bunraku play.",
+    "projector": "No projector runs on this box: nothing is changed. Start it: bunraku project.",
+    "lights": "No lights run on this box: nothing is changed. Start them: bunraku lights.",
+}
+_TOO_MANY = "Too many commands came at once: this one gave way, and nothing is changed."
+
+
+@dataclass(slots=True)
+class _Errand:
+    place: Place
+    order: Order
+    then: Then
+
+
+@dataclass(slots=True)
+class _Way:
+    """To one place: what waits, and how much may still be sent until when."""
+
+    waiting: deque[_Errand] = field(default_factory=deque)
+    left: int = AT_ONCE
+    fills_at: float = 0.0  # monotonic seconds
+
+
+class Errands:
+    """Sends orders at a bounded pace, and tells what came of each once; of quiet ones, refusals alone."""
+
+    def __init__(self, sender: OrderSender) -> None:
+        self._sender = sender
+        self._ways: dict[Place, _Way] = {place: _Way() for place in get_args(Place)}
+        self._sent: dict[int, _Errand] = {}
+        self._asks = 0
+
+    def begin(self, place: Place, order: Order, now: float, then: Then) -> None:
+        """Have an order carried out within PATIENCE_S; `then` hears of it, later or at once."""
+        self._asks += 1
+        order = replace(order, ask=self._asks, until=now + PATIENCE_S)
+        waiting = self._ways[place].waiting
+        given_way = waiting.popleft() if len(waiting) >= WAITING else None
+        waiting.append(_Errand(place, order, then))
+        if given_way is not None:
+            given_way.then(False, _TOO_MANY)
+        self._send(place, now)
+
+    def go_on(self, now: float) -> None:
+        """Take answers, send what waits, and end what nobody answered."""
+        while (answer := self._sender.take()) is not None:
+            errand = self._sent.pop(answer.ask, None)
+            if errand is not None:
+                errand.then(answer.done, answer.words)
+        for place in self._ways:
+            self._send(place, now)
+        self._give_up(now)
+
+    def due(self, now: float) -> float:
+        """Monotonic seconds at which go_on has something to do without any answer; infinite: nothing."""
+        times = [errand.order.until for errand in self._sent.values()]
+        times += [max(way.fills_at, now) for way in self._ways.values() if way.waiting]
+        return min(times, default=float("inf"))
+
+    def _send(self, place: Place, now: float) -> None:
+        way = self._ways[place]
+        if now >= way.fills_at:
+            way.left, way.fills_at = AT_ONCE, now + EVERY_S
+        while way.waiting and way.left:
+            delivery = self._sender.send(place, way.waiting[0].order)
+            if delivery == "full":
+                way.left = 0
+                return
+            errand = way.waiting.popleft()
+            way.left -= 1
+            if delivery == "sent":
+                self._sent[errand.order.ask] = errand
+            else:
+                errand.then(False, _ABSENT[place])
+
+    def _give_up(self, now: float) -> None:
+        """End what is older than anyone waits for; a quiet order that was sent is taken for done."""
+        for way in self._ways.values():
+            while way.waiting and way.waiting[0].order.until < now:
+                errand = way.waiting.popleft()
+                errand.then(False, _SILENT[errand.place])
+        for ask in [ask for ask, errand in self._sent.items() if errand.order.until < now]:
+            errand = self._sent.pop(ask)
+            if not errand.order.quiet:
+                errand.then(False, _SILENT[errand.place])

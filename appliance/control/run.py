@@ -1,0 +1,146 @@
+"""Show control as a process: the port, the house, orders and the heartbeat, until it is told to end."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import select
+import signal
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from appliance.control.desk import Desk
+from appliance.control.errands import Errands
+from appliance.control.heartbeat import Heartbeat
+from appliance.control.house import House, HouseReader, HouseWriter
+from appliance.control.key_file import KeyFile
+from appliance.control.orders import OrderSender
+from appliance.control.port import Port
+from appliance.control.settings import Settings
+from appliance.control.sight import StageSight
+
+_LONGEST_SLEEP_S = 0.25  # a stage that was started anew is found so soon
+_AT_ONCE = 64  # datagrams; then answers, heartbeat and signals have their turn
+_REST_S = 0.002  # after so many at once: a flood leaves the processor to others
+
+
+class ControlProcess:
+    """Everything open. Raises OSError where the folder takes no file, or another one is at work there."""
+
+    def __init__(self, settings: Settings, say: Callable[[str], None], now: float) -> None:
+        folder = Path(settings.folder)
+        self._say = say
+        with ExitStack() as opened:
+            self.port = Port(socket.socket(fileno=settings.descriptor), settings.senders)
+            opened.callback(self.port.close)
+            house = _house_left(folder, now)
+            writer = HouseWriter(folder)
+            opened.callback(writer.close)
+            sender = OrderSender(folder)
+            opened.callback(sender.close)
+            sight = StageSight(folder)
+            opened.callback(sight.close)
+            self._errands = Errands(sender)
+            self._heartbeat = Heartbeat(settings.heartbeat, now)
+            opened.callback(self._heartbeat.close)
+            keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
+            self.desk = Desk(house, sight, self._errands, keys, self.port.send, writer.write)
+            self._poll = select.poll()
+            for one in (self.port, sender):
+                self._poll.register(one.fileno(), select.POLLIN)
+            self._closing = opened.pop_all()
+        writer.write(house)
+        if words := _in_force(house):
+            say(words)
+
+    def run(self, ended: Callable[[], bool], wake: int) -> None:
+        """Until `ended` says so; `wake` is a descriptor that can be read when it may."""
+        self._poll.register(wake, select.POLLIN)
+        while not ended():
+            self._poll.poll(1000.0 * self._sleep_s(time.monotonic()))
+            self.turn(time.monotonic())
+
+    def turn(self, now: float) -> None:
+        """Everything that waits or is due; monotonic seconds."""
+        taken = 0
+        while taken < _AT_ONCE and (found := self.port.take()) is not None:
+            received, asker = found
+            taken += 1
+            if received:
+                self.desk.hear(received, asker, now)
+        self._errands.go_on(now)
+        self.desk.look(now)
+        if now >= self._heartbeat.due:
+            self._heartbeat.beat(self.desk.status(self.port.strangers, now), now)
+        if words := self.port.news(now):
+            self._say(words)
+        if taken == _AT_ONCE:
+            time.sleep(_REST_S)
+
+    def conclusion(self) -> str:
+        """What was refused, in a sentence; empty when nothing was."""
+        refused = self.desk.refused + self.port.too_large
+        if not refused:
+            return ""
+        reason = self.desk.reason or "A datagram was too long for a command."
+        return f"Commands: {refused} refused, the last one: {reason}"
+
+    def close(self) -> None:
+        """Free the port and the house; what is in force stays in force."""
+        self._closing.close()
+
+    def _sleep_s(self, now: float) -> float:
+        due = min(self._heartbeat.due, self._errands.due(now), now + _LONGEST_SLEEP_S)
+        return max(due - now, 0.0)
+
+
+def control(settings: Settings, say: Callable[[str], None]) -> int:
+    """Show control until SIGTERM, Ctrl-C or a closed terminal; the exit status."""
+    logging.disable(logging.CRITICAL)  # python-osc logs what it cannot read, in the sender's own signs
+    with _stop_signals() as (ended, wake):
+        process = ControlProcess(settings, say, time.monotonic())
+        try:
+            process.run(ended, wake)
+        finally:
+            process.close()
+        if words := process.conclusion():
+            say(words)
+    return 0
+
+
+def _house_left(folder: Path, now: float) -> House:
+    """What an earlier show control left in force: panic stays panic."""
+    with contextlib.closing(HouseReader(folder)) as reader:
+        return reader.read().settled(now)
+
+
+def _in_force(house: House) -> str:
+    """What an audience would miss, in a sentence; empty where nothing is held back."""
+    if house.panic:
+        return "Panic is still in force: black, lights safe. /go or /panic 0 lifts it."
+    if not house.going:
+        return "The show is still stopped: dark. /go lets it go on."
+    return "Blackout is still in force. /blackout 0 lifts it." if house.blackout else ""
+
+
+@contextmanager
+def _stop_signals() -> Iterator[tuple[Callable[[], bool], int]]:
+    """While inside: whether one came, and a descriptor that can be read when one did."""
+    came: list[int] = []
+    reading, writing = socket.socketpair()
+    for one in (reading, writing):
+        one.setblocking(False)
+    signals = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+    before = [signal.signal(number, lambda caught, _: came.append(caught)) for number in signals]
+    wake_before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
+    try:
+        yield (lambda: bool(came)), reading.fileno()
+    finally:
+        signal.set_wakeup_fd(wake_before)
+        for number, handler in zip(signals, before, strict=True):
+            signal.signal(number, handler)
+        reading.close()
+        writing.close()

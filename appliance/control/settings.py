@@ -1,0 +1,30 @@
+"""What show control needs to know of a box file, as it is handed to its process."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+
+Listener = tuple[str, int]  # address and port
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The port's socket is open already: `descriptor`. `key_file`: empty for none."""
+
+    folder: str
+    descriptor: int
+    senders: tuple[str, ...] = ()
+    heartbeat: tuple[Listener, ...] = ()
+    key_file: str = ""
+
+    def packed(self) -> str:
+        """As one argument of a command line; there are no secrets in it."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def unpacked(cls, text: str) -> Settings:
+        """From that argument."""
+        values = json.loads(text)
+        listeners = tuple((str(host), int(port)) for host, port in values["heartbeat"])
+        return cls(**values | {"senders": tuple(values["senders"]), "heartbeat": listeners})

@@ -1,0 +1,47 @@
+"""What show control sees of the stage: in the shared frame, without ever asking it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from appliance.outputs.frame_reader import FrameReader
+from appliance.outputs.shared_frame import Facts
+
+StageState = Literal["dancing", "stopped", "hung", "absent"]
+
+
+class StageSight:
+    """The stage of a runtime folder, whether it is there or not."""
+
+    def __init__(self, folder: Path) -> None:
+        self._reader = FrameReader(folder)
+
+    def state(self, now: float) -> StageState:
+        """hung: the process lives, but no frame came for half a second; absent: no process, or none yet."""
+        frames = self._reader.state(now)
+        if frames == "fresh":
+            return "stopped" if self.health().get("state") == "stopped" else "dancing"
+        return "hung" if frames == "stale" and self._reader.is_alive(now) else "absent"
+
+    def lives(self, now: float) -> bool:
+        """Whether there is a stage at all: one that dances, hangs, or is about to begin."""
+        return self._reader.is_alive(now)
+
+    def health(self) -> dict[str, Any]:
+        """What the stage last said about itself; empty before it did."""
+        return self._reader.health() or {}
+
+    @property
+    def facts(self) -> Facts | None:
+        """Of the newest stage, also of one that has ended; None before the first."""
+        return self._reader.facts
+
+    @property
+    def generation(self) -> int:
+        """Another number for each new stage."""
+        return self._reader.generation
+
+    def close(self) -> None:
+        """Let go of the shared frame."""
+        self._reader.close()

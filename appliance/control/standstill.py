@@ -1,0 +1,46 @@
+"""Standstill: the phrase stands while the show is stopped and dark, also when the stage was started anew."""
+
+from __future__ import annotations
+
+from appliance.control.errands import Errands
+from appliance.control.house import House
+from appliance.control.orders import Order
+from appliance.control.sight import StageSight
+
+_AGAIN_S = 1.0  # when the stage did not answer
+
+
+class Standstill:
+    """Orders the stage to stop and to start, until it has done so."""
+
+    def __init__(self, sight: StageSight, errands: Errands) -> None:
+        self._sight, self._errands = sight, errands
+        self._generation = -1
+        self._stands = False
+        self._next_try = 0.0
+
+    def go(self, house: House, now: float) -> None:
+        """The show is about to go on: the stage is asked first, if it may stand."""
+        if self._stands or not house.going or self._sight.state(now) == "stopped":
+            self._order("start", now)
+
+    def look(self, house: House, now: float) -> None:
+        """See to it; call it often."""
+        if self._sight.generation != self._generation:
+            self._generation, self._stands = self._sight.generation, False  # a new stage dances
+            self._next_try = now
+        if now < self._next_try:
+            return
+        if house.going and self._stands:
+            self._order("start", now)
+        elif not house.going and not self._stands and house.going_level(now) <= 0.0:
+            self._order("stop", now)
+
+    def _order(self, name: str, now: float) -> None:
+        self._next_try = now + _AGAIN_S
+
+        def then(done: bool, words: str) -> None:
+            if done:
+                self._stands = name == "stop"
+
+        self._errands.begin("stage", Order(name), now, then)
