@@ -83,6 +83,24 @@ app.add_typer(sensor_commands.sensors, name="sensors")
 
 
 @app.command()
+def project(
+    box: BoxFile = None,
+    window: Annotated[bool, typer.Option("--window", help="In a window, for a rehearsal.")] = False,
+    fullscreen: Annotated[bool, typer.Option("--fullscreen", help="On the whole display.")] = False,
+    offscreen: Annotated[
+        str | None, typer.Option(metavar="WIDTHxHEIGHT", help="On no display, in this size.")
+    ] = None,
+    frames: Annotated[Path | None, typer.Option(help="Write each picture as a PNG into this folder.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so long.")] = None,
+    info: Annotated[bool, typer.Option("--info", help="Figures on the wall and on the terminal.")] = False,
+) -> None:
+    """Show what the stage dances, on a projector: before it starts, while it dances and when it is back."""
+    from appliance.projector.project_command import project_show, wish
+
+    raise typer.Exit(project_show(box, wish(window, fullscreen, offscreen, frames, seconds, info)))
+
+
+@app.command()
 def filmstrip(
     recording: Annotated[Path, typer.Argument(help="A BVH recording, or the journal of a run.")],
     out: Annotated[Path | None, typer.Option(help="The PNG; left out: beside the recording.")] = None,

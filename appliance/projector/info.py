@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 _REMEMBERED = 3600  # pictures: a minute on most displays
 
 # Five rows of three pixels a letter, one octal digit a row.
-_WORDS = """
-    0 75557  1 26227  2 71747  3 71717  4 55711  5 74717  6 74757  7 71122  8 75757  9 75717
-    A 25755  B 65656  C 34443  D 65556  E 74647  F 74644  G 34553  H 55755  I 72227  J 11152
-    K 55655  L 44447  M 57755  N 65555  O 25552  P 65644  Q 25563  R 65655  S 34216  T 72222
-    U 55557  V 55552  W 55775  X 55255  Y 55222  Z 71247  . 00002  , 00024  : 02020  - 00700
-    % 51245  / 11244  ( 24442  ) 21112  _ 00007  + 02720
-""".split()
-_LETTERS = dict(zip(_WORDS[::2], _WORDS[1::2], strict=True))
+_SIGNS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ.,:-%/()_+"
+_ROWS = (
+    "755572622771747717175571174717747577112275757757172575565656344436555674647"
+    "746443455355755722271115255655444475775565555255526564425563656553421672222"
+    "555575555255775552555522271247000020002402020007005124511244244422111200007"
+    "02720"
+)
+_LETTERS = {sign: _ROWS[5 * k : 5 * k + 5] for k, sign in enumerate(_SIGNS)}
 _ADVANCE, _LINE = 4, 7  # pixels from letter to letter, from line to line
 
 
@@ -44,6 +44,7 @@ class Figures:
     age_p50_ms: float | None
     age_p99_ms: float | None
     pictures: int
+    dances: int  # of these, how many of the last minute showed a dance
 
     def sentence(self) -> str:
         """One line for the terminal."""
@@ -75,6 +76,6 @@ class Meter:
         span_s = self._swaps[-1] - self._swaps[0] if len(self._swaps) > 1 else 0.0
         rate = (len(self._swaps) - 1) / span_s if span_s > 0 else 0.0
         if not self._ages_s:
-            return Figures(rate, None, None, self.pictures)
+            return Figures(rate, None, None, self.pictures, 0)
         p50_s, p99_s = np.percentile(self._ages_s, (50, 99))
-        return Figures(rate, 1000 * float(p50_s), 1000 * float(p99_s), self.pictures)
+        return Figures(rate, 1000 * float(p50_s), 1000 * float(p99_s), self.pictures, len(self._ages_s))

@@ -87,7 +87,7 @@ class Interpolation:
         if frame.tick <= self._tick or (self._seen and frame.frame_time <= self._seen[-1].time):
             return
         self._tick = frame.tick
-        self._seen.append(_Seen(frame.frame_time, frame.written, frame.positions, frame.world))
+        self._seen.append(_Seen(frame.frame_time, frame.left, frame.positions, frame.world))
 
     def _learn_the_way(self, now: float) -> None:
         """Nine of ten frames take at most so long; followed slowly, so that nobody sees it."""

@@ -1,0 +1,149 @@
+"""How the picture lies on the wall, and the file in which the box keeps it from night to night."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from appliance.projector.corners import WHOLE, Corners, complaint
+from appliance.sensor.private_file import replace_private
+from appliance.show.box import BoxConfig
+from appliance.show.projector import ProjectorConfig
+
+FILE_NAME = "projector.alignment"
+_HEADER = (
+    "# How the picture lies on the wall; written by bunraku project, corners clockwise from the top left.\n"
+)
+_LARGEST_FILE = 4096
+MOST_BRIGHT = 2.0
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """corners: where the picture's corners lie, clockwise from its top left as the audience sees it, in
+    shares of the display's width and height, y down; mirror: for rear projection; brightness: a factor."""
+
+    corners: Corners = WHOLE
+    mirror: bool = False
+    brightness: float = 1.0
+
+
+def alignment_folder(
+    box: BoxConfig, box_file: Path | None, environment: Mapping[str, str] = os.environ
+) -> Path:
+    """Where the alignment is kept: the box's state folder, else beside the box file, else with the user."""
+    if box.state_folder is not None:
+        return box.state_folder
+    if box_file is not None:
+        return box_file.resolve().parent
+    return Path(environment.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "bunraku"
+
+
+class AlignmentFile:
+    """Keeps an alignment in a file, which is replaced as a whole by a thread of its own: pictures never wait.
+
+    What was chosen by hand goes over the box file, until somebody changes it in the box file. Nothing here
+    raises; what goes wrong is said in one sentence, and then the alignment holds for this run.
+    """
+
+    def __init__(self, folder: Path, config: ProjectorConfig, say: Callable[[str], None]) -> None:
+        self.path = folder / FILE_NAME
+        self._from_box, self._say = Alignment(WHOLE, config.mirror, config.brightness), say
+        self._kept = self._wanted = self._load()
+        self._is_wanted = threading.Event()
+        self._closing = False
+        self._thread = threading.Thread(target=self._write_on, name="alignment", daemon=True)
+        self._thread.start()
+
+    @property
+    def alignment(self) -> Alignment:
+        """The newest one, kept or on its way."""
+        return self._wanted
+
+    def keep(self, alignment: Alignment) -> None:
+        """Remember this one."""
+        self._wanted = alignment
+        self._is_wanted.set()
+
+    def close(self) -> None:
+        """Write what is not written yet, and end the thread."""
+        self._closing = True
+        self._is_wanted.set()
+        self._thread.join()
+
+    def _write_on(self) -> None:
+        while True:
+            self._is_wanted.wait()
+            self._is_wanted.clear()
+            is_last, wanted = self._closing, self._wanted
+            if wanted != self._kept and self._write(wanted):
+                self._kept = wanted
+            if is_last:
+                return
+
+    def _write(self, alignment: Alignment) -> bool:
+        try:
+            self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            replace_private(self.path, _text(alignment, self._from_box))
+        except OSError as error:
+            self._say(
+                f"{self.path}: the alignment cannot be kept ({error.strerror}). The picture lies as you put "
+                "it until the projector ends. Make the folder writable, or name another one under `state` in "
+                "the box file."
+            )
+            return False
+        return True
+
+    def _load(self) -> Alignment:
+        try:
+            if self.path.stat().st_size > _LARGEST_FILE:
+                raise ValueError("it is too large")
+            return _read(yaml.safe_load(self.path.read_text(encoding="utf-8")), self._from_box)
+        except (FileNotFoundError, NotADirectoryError):
+            return self._from_box
+        except OSError as error:
+            self._say(
+                f"{self.path}: the alignment cannot be read ({error.strerror}). The picture fills the "
+                "display. Check who may read this file."
+            )
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError, yaml.YAMLError):
+            broken = self.path.with_name(self.path.name + ".broken")
+            with contextlib.suppress(OSError):
+                self.path.replace(broken)
+            self._say(
+                f"{self.path}: the alignment is damaged and set aside as {broken.name}. The picture fills "
+                "the display. Lay it onto the wall again: key c."
+            )
+        return self._from_box
+
+
+def _text(alignment: Alignment, from_box: Alignment) -> str:
+    """By each thing that the box file sets as well stands what it said then."""
+    corners = ", ".join(f"[{x!r}, {y!r}]" for x, y in alignment.corners)
+    mirror, box_mirror = str(alignment.mirror).lower(), str(from_box.mirror).lower()
+    return (
+        f"{_HEADER}corners: [{corners}]\n"
+        f"mirror: {{chosen: {mirror}, box_file: {box_mirror}}}\n"
+        f"brightness: {{chosen: {alignment.brightness!r}, box_file: {from_box.brightness!r}}}\n"
+    )
+
+
+def _read(values: Any, from_box: Alignment) -> Alignment:
+    """Raises ValueError, TypeError, KeyError or OverflowError for nonsense."""
+    a, b, c, d = ((float(x), float(y)) for x, y in values["corners"])
+    brightness, mirror = values["brightness"], values["mirror"]
+    chosen = Alignment(
+        (a, b, c, d),
+        bool(mirror["chosen"]) if mirror["box_file"] == from_box.mirror else from_box.mirror,
+        float(brightness["chosen"]) if brightness["box_file"] == from_box.brightness else from_box.brightness,
+    )
+    if complaint(chosen.corners) or not 0.0 <= chosen.brightness <= MOST_BRIGHT:
+        raise ValueError("no alignment")
+    return chosen

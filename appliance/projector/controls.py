@@ -1,0 +1,125 @@
+"""What a technician has in hand at the projector: corners, mirror, brightness, grid, information."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from appliance.control.orders import Order
+from appliance.projector.alignment import MOST_BRIGHT, Alignment
+from appliance.projector.corners import WHOLE, Corners, Point, complaint
+
+_CORNER_NAMES = ("top left", "top right", "bottom right", "bottom left")
+
+
+class Controls:
+    """The state behind keys and orders. Each change gives a sentence for whoever asked for it.
+
+    `keep` gets each new alignment. corner: which one keys move in corner mode, 0 to 3; None outside of it.
+    """
+
+    def __init__(
+        self, alignment: Alignment, keep: Callable[[Alignment], None], shows_info: bool = False
+    ) -> None:
+        self.alignment = alignment
+        self._keep = keep
+        self.corner: int | None = None
+        self._chosen = 0
+        self.has_grid = False
+        self.shows_info = shows_info
+        self.is_over = False
+        self.wants_fullscreen = False  # whoever owns the window toggles it and takes this back
+
+    @property
+    def shows_grid(self) -> bool:
+        """Whether the grid lies over the picture: on demand, and always in corner mode."""
+        return self.has_grid or self.corner is not None
+
+    def enter_corners(self) -> str:
+        """Corner mode, with the corner that was chosen last."""
+        self.corner = self._chosen
+        return f"Corner mode: arrows move the {_CORNER_NAMES[self._chosen]} corner, 1 to 4 choose, Esc ends."
+
+    def choose(self, corner: int) -> str:
+        """Another corner, 0 to 3 clockwise from the top left; enters corner mode."""
+        self._chosen = corner % 4
+        return self.enter_corners()
+
+    def leave_corners(self) -> str:
+        """End of corner mode."""
+        self.corner = None
+        return "Corner mode is over; the alignment is kept."
+
+    def move(self, dx: float, dy: float) -> str:
+        """Move the chosen corner by shares of the display's width and height."""
+        if self.corner is None:
+            return ""
+        x, y = self.alignment.corners[self.corner]
+        return self.place(self.corner, (x + dx, y + dy))[1]
+
+    def place(self, corner: int, point: Point) -> tuple[bool, str]:
+        """Put one corner there, 0 to 3; whether it was done, and a sentence."""
+        corners = list(self.alignment.corners)
+        corners[corner] = point
+        a, b, c, d = corners
+        return self.place_all((a, b, c, d))
+
+    def place_all(self, corners: Corners) -> tuple[bool, str]:
+        """Put all four corners; whether it was done, and a sentence."""
+        refused = complaint(corners)
+        if refused:
+            return False, refused
+        self._change(replace(self.alignment, corners=corners))
+        places = ", ".join(f"({x:.4f}, {y:.4f})" for x, y in corners)
+        return True, f"The picture's corners lie at {places}."
+
+    def reset(self) -> str:
+        """The picture fills the display again."""
+        self._change(replace(self.alignment, corners=WHOLE))
+        return "The picture fills the display."
+
+    def set_mirror(self, mirror: bool) -> str:
+        """For rear projection or not."""
+        self._change(replace(self.alignment, mirror=mirror))
+        return "The picture is mirrored." if mirror else "The picture is not mirrored."
+
+    def set_brightness(self, brightness: float) -> str:
+        """A factor; what lies beyond the bounds is taken to them."""
+        brightness = round(min(max(brightness, 0.0), MOST_BRIGHT), 4)
+        self._change(replace(self.alignment, brightness=brightness))
+        return f"Brightness {100 * brightness:.0f} %."
+
+    def set_grid(self, grid: bool) -> str:
+        """Show or hide the grid."""
+        self.has_grid = grid
+        return "The grid is on the wall." if grid else "The grid is off."
+
+    def set_info(self, info: bool) -> str:
+        """Show or hide the figures."""
+        self.shows_info = info
+        return "Figures are on the wall." if info else "No figures on the wall."
+
+    def obey(self, order: Order) -> tuple[bool, str]:
+        """An order by OSC: whether it was done, and a sentence."""
+        values = order.values
+        match order.name, len(values):
+            case "corner", 3 if values[0] in (1, 2, 3, 4):
+                return self.place(int(values[0]) - 1, (values[1], values[2]))
+            case "corners", 8:
+                a, b, c, d = ((values[k], values[k + 1]) for k in range(0, 8, 2))
+                return self.place_all((a, b, c, d))
+            case "corners/reset", _:
+                return True, self.reset()
+            case "brightness", 1:
+                return True, self.set_brightness(values[0])
+            case "mirror", 1:
+                return True, self.set_mirror(values[0] != 0)
+            case "grid", 1:
+                return True, self.set_grid(values[0] != 0)
+            case "info", 1:
+                return True, self.set_info(values[0] != 0)
+        return False, f"The projector knows no order '{order.name}' with these values. Nothing has changed."
+
+    def _change(self, alignment: Alignment) -> None:
+        self.alignment = alignment
+        self._keep(alignment)

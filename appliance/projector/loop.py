@@ -1,0 +1,152 @@
+"""One picture: follow the stage, read the house, draw the dance, lay it onto the wall."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+import moderngl
+import numpy as np
+
+from appliance.control.house import HouseReader
+from appliance.outputs.frame_reader import FrameReader
+from appliance.outputs.shared_frame import Facts
+from appliance.pose.skeleton import Skeleton
+from appliance.projector.controls import Controls
+from appliance.projector.final_pass import FinalPass, picture_size
+from appliance.projector.interpolation import Interpolation
+from appliance.projector.moment import Moment
+from appliance.projector.presence import Presence
+from appliance.projector.renderer import Renderer
+from appliance.projector.window import Size
+from appliance.show.config_error import ConfigError
+from appliance.show.look import LookConfig, looks_by_name
+from appliance.show.projector import ProjectorConfig
+from appliance.show.show import load_show
+
+Looks = Mapping[str, LookConfig]
+
+
+class Painter(Protocol):
+    """What draws the looks of one show."""
+
+    def draw(
+        self, moment: Moment, look: str, look_before: str, mix: float, target: moderngl.Framebuffer
+    ) -> None: ...
+
+    def resize(self, size: Size) -> None: ...
+
+    def release(self) -> None: ...
+
+
+MakePainter = Callable[[moderngl.Context, Size, Skeleton, Looks], Painter]
+
+
+class Projector:
+    """Shows whatever stage there is, black while there is none; a restarted one is shown as it comes."""
+
+    def __init__(
+        self,
+        gl: moderngl.Context,
+        config: ProjectorConfig,
+        reader: FrameReader,
+        house: HouseReader,
+        controls: Controls,
+        say: Callable[[str], None],
+        make_painter: MakePainter = Renderer,
+    ) -> None:
+        self._gl, self._config, self._make_painter = gl, config, make_painter
+        self._reader, self._house, self._controls, self._say = reader, house, controls, say
+        self._final = FinalPass(gl, config)
+        self._presence = Presence()
+        self._generation = 0
+        self._poses: Interpolation | None = None
+        self._painter: Painter | None = None
+        self._drawn: tuple[Skeleton, Looks] | None = None  # what the painter was made for
+        self._to_draw: tuple[Skeleton, Looks] | None = None  # a show that waits for its painter
+
+    def draw(
+        self, now: float, screen: moderngl.Framebuffer, display: Size, lines: tuple[str, ...] = ()
+    ) -> float | None:
+        """Draw the picture for `now` (monotonic seconds) onto a display of so many pixels.
+
+        lines: figures to show. Gives when what is shown left the stage; None while no dance is seen.
+        """
+        self._follow_stage(now, display)
+        presence, moment = self._present(now)
+        house = self._house.read()
+        level = house.level(now) * presence
+        is_drawn = self._painter is not None and moment is not None and level > 0.0
+        if self._painter is not None and moment is not None and is_drawn:
+            self._fit(display)
+            self._painter.draw(
+                moment, house.look, house.look_before, house.look_mix(now), self._final.picture
+            )
+        house = self._house.read()  # again: a panic that came meanwhile is in this picture already
+        if house.panic or house.blackout:
+            self._final.black(screen, display)
+            return None
+        seen = min(level, house.level(now)) if is_drawn else 0.0
+        self._final.draw(screen, display, self._controls, seen, lines)
+        return self._poses.left_stage(moment) if self._poses and moment and is_drawn else None
+
+    def release(self) -> None:
+        """Give the GPU's memory back."""
+        if self._painter is not None:
+            self._painter.release()
+        self._final.release()
+
+    def _present(self, now: float) -> tuple[float, Moment | None]:
+        """How far the dance is there, 0..1, and where the dancer is."""
+        newest = moment = None
+        if self._poses is not None:
+            self._poses.take(now)
+            newest, moment = self._poses.newest, self._poses.moment(now)
+        return self._presence.step(newest if self._painter is not None else None, now), moment
+
+    def _follow_stage(self, now: float, display: Size) -> None:
+        """Another stage may bring another show. Its painter takes a moment to make, so it is black before."""
+        self._reader.is_alive(now)  # looks for another stage
+        if self._reader.generation != self._generation and self._reader.facts is not None:
+            self._generation = self._reader.generation
+            self._meet(self._reader.facts)
+        elif self._to_draw is not None:
+            self._final.resize(picture_size(self._config, display))
+            self._painter = self._make_painter(self._gl, self._final.picture.size, *self._to_draw)
+            self._drawn, self._to_draw = self._to_draw, None
+
+    def _meet(self, facts: Facts) -> None:
+        self._poses = Interpolation(self._reader, facts.held)
+        show = (facts.skeleton, self._looks(facts))
+        if self._drawn is not None and _are_alike(self._drawn, show):
+            return
+        if self._painter is not None:
+            self._painter.release()
+        self._painter = self._drawn = None
+        self._presence.hide()
+        self._to_draw = show
+
+    def _looks(self, facts: Facts) -> Looks:
+        try:
+            return looks_by_name(load_show(facts.show_directory).config.looks)
+        except ConfigError as error:
+            self._say(
+                f"{error} The audience sees the built-in looks. Correct the show, then start the stage again."
+            )
+            return looks_by_name(())
+
+    def _fit(self, display: Size) -> None:
+        """The window may have another size than before."""
+        size = picture_size(self._config, display)
+        if self._painter is not None and self._final.picture.size != size:
+            self._final.resize(size)
+            self._painter.resize(size)
+
+
+def _are_alike(one: tuple[Skeleton, Looks], other: tuple[Skeleton, Looks]) -> bool:
+    return (
+        one[0].same_joints(other[0])
+        and np.array_equal(one[0].offsets, other[0].offsets)
+        and one[0].ends == other[0].ends
+        and list(one[1].items()) == list(other[1].items())
+    )

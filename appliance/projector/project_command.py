@@ -1,0 +1,71 @@
+"""`bunraku project`: show what the stage dances, until somebody ends it; the exit status for a supervisor."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+
+import typer
+
+from appliance.projector.projector_error import ProjectorError
+from appliance.projector.run import Run, Wish
+from appliance.projector.window import Kind, Size
+from appliance.show.box import load_box
+
+_LARGEST = 16384
+
+
+def wish(
+    window: bool,
+    fullscreen: bool,
+    offscreen: str | None,
+    frames: Path | None,
+    seconds: float | None,
+    info: bool,
+) -> Wish:
+    """The command line's options as one wish; raises typer.BadParameter where they contradict each other."""
+    if window + fullscreen + (offscreen is not None) > 1:
+        raise typer.BadParameter("Give one of --window, --fullscreen and --offscreen.")
+    kind: Kind | None = "window" if window else "fullscreen" if fullscreen else None
+    if offscreen is None:
+        return Wish(kind, None, frames, seconds, info)
+    return Wish("offscreen", _size(offscreen), frames, seconds, info)
+
+
+def project_show(box_file: Path | None, wish: Wish) -> int:
+    """0: ended as asked; 69: no display or no OpenGL; 75: graphics card reset, start again."""
+    stopped: list[int] = []
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, lambda came, _: stopped.append(came))
+    if wish.frames is not None:
+        wish.frames.mkdir(parents=True, exist_ok=True)
+    try:
+        run = Run(load_box(box_file), box_file, wish, _say)
+        try:
+            for line in run.introduction():
+                _say(line)
+            _say(f"Shown: {run.project(lambda: bool(stopped)).sentence()}.")
+        finally:
+            run.close()
+    except ProjectorError as error:
+        print(f"bunraku: {error}", file=sys.stderr)
+        return error.status
+    return 0
+
+
+def _size(text: str) -> Size:
+    width, times, height = text.partition("x")
+    if not (times and width.isdecimal() and height.isdecimal()):
+        raise typer.BadParameter(f"'{text}' is no size. Write it like 1280x720.")
+    if not all(1 <= int(part) <= _LARGEST for part in (width, height)):
+        raise typer.BadParameter(f"Width and height are from 1 to {_LARGEST} pixels.")
+    return int(width), int(height)
+
+
+def _say(words: str) -> None:
+    """A terminal that is gone does not end the show."""
+    try:
+        print(words, flush=True)
+    except OSError:
+        sys.stdout = None

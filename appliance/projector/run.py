@@ -1,0 +1,203 @@
+"""The projector's own process: window, keys and orders, one picture after the other, until it is stopped."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import moderngl
+
+from appliance.control.house import HouseReader
+from appliance.control.orders import OrderInbox
+from appliance.outputs.frame_reader import FrameReader
+from appliance.outputs.runtime_folder import AlreadyHereError, Claim, runtime_folder
+from appliance.projector.alignment import AlignmentFile, alignment_folder
+from appliance.projector.context import GlContext
+from appliance.projector.controls import Controls
+from appliance.projector.info import Figures, Meter
+from appliance.projector.keys import press
+from appliance.projector.loop import Projector
+from appliance.projector.pacing import USUAL_RATE, Pacing
+from appliance.projector.png import write_png
+from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, ProjectorError
+from appliance.projector.window import Kind, Size, Window
+from appliance.show.box import BoxConfig
+
+_ORDERS_A_PICTURE = 8
+_REPORT_S = 1.0
+_JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What was asked for on the command line. kind None: as the box file says; frames: a folder for PNGs."""
+
+    kind: Kind | None = None
+    size: Size | None = None
+    frames: Path | None = None
+    seconds: float | None = None
+    shows_info: bool = False
+
+
+class Run:
+    """All that is open while the projector runs. Raises ProjectorError, ConfigError or RuntimeFolderError."""
+
+    def __init__(self, box: BoxConfig, box_file: Path | None, wish: Wish, say: Callable[[str], None]) -> None:
+        config = box.projector
+        self._wish, self._say = wish, say
+        with ExitStack() as opened:
+            folder = runtime_folder(box)
+            self._window = Window(
+                config, wish.kind or ("fullscreen" if config.fullscreen else "window"), wish.size
+            )
+            opened.callback(self._window.close)
+            self._context = GlContext(self._window)
+            opened.callback(self._context.close)
+            self._file = AlignmentFile(alignment_folder(box, box_file), config, say)
+            opened.callback(self._file.close)
+            self._controls = Controls(self._file.alignment, self._file.keep, wish.shows_info)
+            self._inbox = _inbox(folder, opened, say)
+            self._reader = FrameReader(folder)
+            opened.callback(self._reader.close)
+            self._house = HouseReader(folder)
+            opened.callback(self._house.close)
+            self._projector = Projector(
+                self._context.gl, config, self._reader, self._house, self._controls, say
+            )
+            opened.callback(self._projector.release)
+            self._closing = opened.pop_all()
+        rate = config.rate or self._window.display_rate or USUAL_RATE
+        self._pacing = Pacing(rate, self._window.set_pace(config.vsync))
+        self._meter = Meter()
+        self._lines: tuple[str, ...] = ()
+        self._warned = not self._context.is_software
+
+    def introduction(self) -> list[str]:
+        """What a technician should know at the start."""
+        width, height = self._window.size
+        lines = [
+            f"The picture is {width}x{height} ({self._window.driver}, {self._context.renderer}). "
+            f"Its alignment is kept in {self._file.path}.",
+        ]
+        if self._window.kind != "offscreen":
+            lines.append("Keys work in the picture's window: h tells which, q ends.")
+        return lines
+
+    def project(self, stopped: Callable[[], bool]) -> Figures:
+        """Show pictures until `stopped`, the seconds are over or somebody ends it; how they came out."""
+        try:
+            self._show_on(stopped)
+        except moderngl.Error as error:
+            self._check_context()
+            raise ProjectorError(
+                f"The graphics card refuses to draw ({error}). The audience sees no picture; the dance goes "
+                "on. Update its driver, or use another machine.",
+                NO_DISPLAY,
+            ) from error
+        return self._meter.figures()
+
+    def close(self) -> None:
+        """Give display, graphics card and files back."""
+        self._closing.close()
+
+    def _show_on(self, stopped: Callable[[], bool]) -> None:
+        begun = reported = time.monotonic()
+        while not stopped() and not self._controls.is_over:
+            now = self._pacing.next()
+            if self._wish.seconds is not None and now - begun >= self._wish.seconds:
+                return
+            self._press_keys()
+            self._obey(now)
+            self._show(now)
+            if now - reported >= _REPORT_S:
+                reported = now
+                self._report(now)
+
+    def _show(self, now: float) -> None:
+        screen, size = self._context.gl.screen, self._window.size
+        left_stage = self._projector.draw(now, screen, size, self._lines if self._controls.shows_info else ())
+        if self._wish.frames is not None:
+            pixels = screen.read(viewport=(0, 0, *size), components=4)
+            write_png(self._wish.frames / f"frame-{self._meter.pictures:06d}.png", pixels, *size)
+        self._window.show()
+        self._context.gl.finish()  # without it the driver lets pictures queue up, each one older
+        self._meter.shown(time.monotonic(), left_stage)
+        self._check_context()
+
+    def _press_keys(self) -> None:
+        for key in self._window.events():
+            if key is None:
+                self._controls.is_over = True
+                continue
+            words = press(key, self._controls, self._window.size)
+            if words:
+                self._say(words)
+        if self._controls.wants_fullscreen:
+            self._controls.wants_fullscreen = False
+            self._window.toggle_fullscreen()
+
+    def _obey(self, now: float) -> None:
+        if self._inbox is None:
+            return
+        for _ in range(_ORDERS_A_PICTURE):
+            order = self._inbox.take(now)
+            if order is None:
+                return
+            self._inbox.answer(order, *self._controls.obey(order))
+
+    def _report(self, now: float) -> None:
+        """Once a second."""
+        figures = self._meter.figures()
+        state = self._reader.state(now)
+        width, height = self._window.size
+        age = "-" if figures.age_p50_ms is None else f"{figures.age_p50_ms:.0f} / {figures.age_p99_ms:.0f} ms"
+        self._lines = (
+            f"{figures.rate:.1f} pictures/s",
+            f"frame age {age}",
+            f"stage {state}",
+            f"look {self._house.read().look or 'of the show'}",
+            f"{width}x{height} {'software' if self._context.is_software else self._window.driver}",
+        )
+        if self._wish.shows_info:
+            self._say(f"{figures.sentence()}, stage {state}")
+        if not self._warned and figures.dances >= _JUDGED_AFTER:
+            self._warned = True
+            self._say(
+                f"No graphics card draws here but the processor ({self._context.renderer}): about "
+                f"{figures.rate:.0f} pictures a second at {width}x{height}. The audience sees a jerky dance. "
+                "Use a machine with a graphics card and its driver, or a smaller `picture` in the "
+                "projector's part of the box file."
+            )
+
+    def _check_context(self) -> None:
+        if self._context.is_lost:
+            raise ProjectorError(
+                "The graphics card was reset, and all that was on it is gone. The audience sees black; the "
+                "dance goes on. Start the projector again (a supervisor does it by itself); if it happens "
+                "often, look at the card's cooling and power.",
+                GPU_LOST,
+            )
+
+
+def _inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> OrderInbox | None:
+    """Where orders by OSC arrive. Without them keys still work, and the dance is shown all the same."""
+    try:
+        opened.callback(Claim(folder, "projector").close)
+        inbox = OrderInbox(folder, "projector")
+    except AlreadyHereError:
+        say(
+            "Another projector of this box takes the orders by OSC. The audience sees the dance on both. "
+            "End one of them if that was not meant."
+        )
+        return None
+    except OSError as error:
+        say(
+            f"{folder}: no place for orders by OSC ({error.strerror}). The dance is shown; corners and "
+            "brightness are set by keys alone. Make room in this folder."
+        )
+        return None
+    opened.callback(inbox.close)
+    return inbox
