@@ -119,7 +119,7 @@ class Anatomy:
         return front
 
     def bones(self, joints: Sequence[int]) -> list[tuple[int, Array, Array]]:
-        """(joint that moves it, where it begins, where it ends) of all bones of some joints, tips included."""
+        """(joint that moves it, where it begins, where it ends) of the bones of some joints, tips included."""
         found = [
             (joint, self.positions[joint], self.positions[child])
             for joint in joints

@@ -74,8 +74,10 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:
         Slab(joint, row, end, thick, 0.0075 * height, 0.0, aside, half, 0.62 * half),
         Slab(joint, base, anatomy.positions[thumb], 0.014 * height, 0.011 * height, 0.012 * height, aside),
     ]
-    for bone in anatomy.bones([thumb, *anatomy.below(thumb)]):
-        steps.append(Slab(*bone, 0.0105 * height, 0.0085 * height, 0.006 * height, aside))
+    steps += [
+        Slab(*bone, 0.0105 * height, 0.0085 * height, 0.006 * height, aside)
+        for bone in anatomy.bones([thumb, *anatomy.below(thumb)])
+    ]
     bones = [Slab(*bone, thick, thick, 0.0, aside) for bone in anatomy.bones(anatomy.below(joint))]
     palm = [Slab(joint, wrist, knuckle, thick, thick, 0.0, aside) for knuckle in knuckles]
     return steps, [*palm, Slab(joint, base, anatomy.positions[thumb], thick, thick, 0.0, aside), *bones]
@@ -132,7 +134,7 @@ def foot(anatomy: Anatomy, joint: int) -> list[Slab | Cut]:
 
 
 def _furthest(anatomy: Anatomy, joint: int, place: Array) -> Array:
-    """The end of a bone below a joint, or of its own, that lies furthest from a place; the joint without any."""
+    """The end of a bone of a joint, or below it, that is furthest from a place; without bones the joint."""
     ends = [bone[2] for bone in anatomy.bones([joint, *anatomy.below(joint)])]
     return max(ends, key=lambda end: float(np.linalg.norm(end - place)), default=anatomy.positions[joint])
 

@@ -24,8 +24,8 @@ class Grid:
 
     def axis(self, number: int) -> NDArray[np.float32]:
         """The coordinates of the samples along one axis, metres."""
-        along = self.origin[number] + self.spacing * np.arange(self.shape[number])
-        return along.astype(np.float32)
+        along: NDArray[np.float32] = (self.spacing * np.arange(self.shape[number])).astype(np.float32)
+        return along + np.float32(self.origin[number])
 
 
 def surface_of(
@@ -41,7 +41,7 @@ def surface_of(
     number = np.full(codes.shape, -1, dtype=np.int32)
     number[tuple(cells.T)] = np.arange(len(cells), dtype=np.int32)
     places = _places(field, cells)
-    slopes = np.stack(np.gradient(field), axis=-1)
+    slopes = np.stack([np.gradient(field, axis=axis) for axis in range(3)], axis=-1)
     normals = _interpolated(slopes, places)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     vertices = grid.origin + grid.spacing * places

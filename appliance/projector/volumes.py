@@ -55,7 +55,7 @@ class Slab:
         if self.start_half or self.end_half:
             aside = _dot(dx, dy, dz, self.across)
             half = np.float32(self.start_half) + np.float32(self.end_half - self.start_half) * part
-            held = aside * half / np.sqrt(half * half + aside * aside)  # a soft clip: no flat front
+            held = aside * half / np.sqrt(half * half + aside * aside + np.float32(1e-12))  # no flat front
             squared = squared + held * (held - 2 * aside)
         radius = np.float32(self.start_radius) + np.float32(self.end_radius - self.start_radius) * part
         away: Array = np.sqrt(np.maximum(squared, 0.0)) - radius
@@ -92,7 +92,7 @@ class Group:
 
     @property
     def movers(self) -> list[Slab]:
-        """What says which joint moves which part; bones stand for all slabs of the joint that they begin at."""
+        """What says which joint moves which part; bones stand for all slabs of the joint of the first one."""
         by_bones = self.bones[0].owner if self.bones else None
         return [*(slab for slab in self.slabs if slab.owner != by_bones), *self.bones]
 
