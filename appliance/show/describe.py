@@ -79,7 +79,7 @@ def _one_kind(annotation: Any) -> str:
     if get_origin(annotation) is list:
         return "a list"
     if get_origin(annotation) is dict:
-        return f"names, each with {kind(get_args(annotation)[1])}"
+        return f"a group of names, each with {kind(get_args(annotation)[1])}"
     return _PLAIN.get(annotation, "a group of keys")
 
 

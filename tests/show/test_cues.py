@@ -129,7 +129,7 @@ def test_iterations_that_do_not_fit_this_machine_are_said_beforehand(
         ("\n    quiet: quite.bvh", 4, ["There is no file 'quite.bvh'"]),
         ("\n    quiet: ../phrase.bvh", 4, ["is not inside the show's folder"]),
         ("\n    quiet: 5", 4, ["'motion.phrases.quiet' is 5"]),
-        ("[quiet.bvh]", 3, ["is a list of 1, which is not names, each with text"]),
+        ("[quiet.bvh]", 3, ["is a list of 1, which is not a group of names, each with text"]),
         ("\n    quiet: phrase.bvh\n    quiet: phrase.bvh", 5, ["'quiet' stands here twice"]),
     ],
 )
