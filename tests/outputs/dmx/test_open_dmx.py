@@ -1,0 +1,102 @@
+"""Open DMX: what leaves the cable and when, on a pseudo-terminal and on a port that writes down times."""
+
+from __future__ import annotations
+
+import os
+import pty
+import time
+import tty
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from appliance.outputs.dmx import open_dmx
+from appliance.outputs.dmx.open_dmx import OpenDmx, open_dmx_wire
+from tests.outputs.dmx.conftest import config, universe
+
+Until = Callable[[Callable[[], bool]], None]
+
+
+class Port:
+    """A serial port that writes down what happens to it, and when."""
+
+    def __init__(self) -> None:
+        self.events: list[tuple[str, float, bytes]] = []
+
+    @property
+    def break_condition(self) -> bool:
+        return False
+
+    @break_condition.setter
+    def break_condition(self, is_on: bool) -> None:
+        self.events.append(("break" if is_on else "mark", time.monotonic(), b""))
+
+    def reset_input_buffer(self) -> None:
+        self.events.append(("emptied", time.monotonic(), b""))
+
+    def write(self, data: bytes) -> int:
+        self.events.append(("data", time.monotonic(), data))
+        return len(data)
+
+
+def test_break_mark_and_slots_are_as_long_as_dmx_wants(monkeypatch: pytest.MonkeyPatch) -> None:
+    port = Port()
+    monkeypatch.setattr(open_dmx, "open_port", lambda *_: port)
+    cable = OpenDmx("cable", 512)
+    for _ in range(10):
+        cable.write(universe())
+    times = {kind: [at for what, at, _ in port.events if what == kind] for kind in ("break", "mark", "data")}
+    breaks = [mark - start for start, mark in zip(times["break"], times["mark"], strict=True)]
+    marks = [data - mark for mark, data in zip(times["mark"], times["data"], strict=True)]
+    assert min(breaks) >= 92e-6
+    assert min(marks) >= 12e-6
+    # 513 slots of 44 us have to be out before the next break begins.
+    assert all(
+        after - data >= 513 * 44e-6 for data, after in zip(times["data"], times["break"][1:], strict=False)
+    )
+    assert {data for what, _, data in port.events if what == "data"} == {b"\0" + universe()}
+
+
+def test_the_port_speaks_250000_baud_with_two_stop_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[tuple[object, ...]] = []
+    monkeypatch.setattr(open_dmx, "open_port", lambda *settings: opened.append(settings))
+    OpenDmx("/dev/ttyUSB0", 512)
+    assert opened == [("/dev/ttyUSB0", 250_000, 2)]
+
+
+@pytest.fixture
+def cable(tmp_path: Path) -> Iterator[tuple[int, Path]]:
+    """A pseudo-terminal: the end that listens, and the device."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    path = tmp_path / "ttyUSB3"
+    path.symlink_to(os.ttyname(slave))
+    yield master, path
+    os.close(slave)
+    os.close(master)
+
+
+def test_a_universe_is_told_again_and_again(cable: tuple[int, Path]) -> None:
+    master, path = cable
+    wire = open_dmx_wire(config("open-dmx", device=str(path)))
+    wire.send(universe(), 0.0)
+    received = b""
+    while len(received) < 6 * 513:
+        received += os.read(master, 4096)
+    assert received[: 6 * 513] == (b"\0" + universe()) * 6
+    assert wire.dropped == 0
+    wire.send(bytes(512), 0.0)
+    wire.close(0.0)
+    while not received.endswith(bytes(513)):
+        received += os.read(master, 4096)
+
+
+def test_nothing_is_told_before_there_is_something(cable: tuple[int, Path], until: Until) -> None:
+    master, path = cable
+    os.set_blocking(master, False)
+    wire = open_dmx_wire(config("open-dmx", device=str(path)))
+    until(lambda: wire.is_open)
+    wire.close(0.0)
+    with pytest.raises(BlockingIOError):
+        os.read(master, 1)

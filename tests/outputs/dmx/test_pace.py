@@ -1,0 +1,136 @@
+"""How often a universe leaves, with a clock of the test's own."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from appliance.outputs.dmx.pace import KEEP_ALIVE_S, REPEATS, Universe
+from tests.outputs.dmx.conftest import config, universe
+
+
+class Listener:
+    """A wire that remembers."""
+
+    name = "listener"
+    sent = dropped = 0
+    last_error = ""
+    is_open = True
+    trouble = None
+
+    def __init__(self) -> None:
+        self.heard: list[tuple[float, bytes]] = []
+        self.closed_at: float | None = None
+
+    def send(self, data: bytes | bytearray, now: float) -> None:
+        self.heard.append((now, bytes(data)))
+
+    def close(self, now: float) -> None:
+        self.closed_at = now
+
+
+def paced(**keys: object) -> tuple[Universe, Listener]:
+    listener = Listener()
+    return Universe(config("artnet", **keys), listener), listener
+
+
+@pytest.mark.parametrize("offers_hz", [50, 60, 200, 1000])
+@pytest.mark.parametrize("rate_hz", [1.0, 30.0, 40.0, 44.0])
+def test_what_changes_leaves_at_the_wire_s_rate(offers_hz: int, rate_hz: float) -> None:
+    one, listener = paced(rate_hz=rate_hz)
+    seconds = 20
+    for offer in range(seconds * offers_hz):
+        one.offer(universe(offer), offer / offers_hz)
+    times = [now for now, _ in listener.heard]
+    gaps = [late - early for early, late in pairwise(times)]
+    assert len(times) <= seconds * rate_hz + 1
+    assert min(gaps) >= 1 / 44 - 1e-9
+    if offers_hz == 1000:
+        assert len(times) >= 0.97 * seconds * rate_hz
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.001, 0.0023])
+def test_who_wakes_when_told_keeps_the_rate_however_late(late_s: float) -> None:
+    one, listener = paced()
+    now = 0.0
+    for tick in range(400):
+        one.offer(universe(tick), now + (late_s if tick % 2 else 0.0))
+        now = one.next_due(now)
+    assert len(listener.heard) == 400
+    assert now == pytest.approx(10.0, abs=0.03)
+
+
+def test_the_newest_leaves() -> None:
+    one, listener = paced()
+    one.offer(universe(1), 0.0)
+    one.offer(universe(2), 0.010)
+    one.offer(universe(3), 0.020)
+    one.offer(universe(3), 0.026)
+    assert [data for _, data in listener.heard] == [universe(1), universe(3)]
+
+
+def test_what_does_not_change_is_repeated_and_then_kept_alive() -> None:
+    one, listener = paced()
+    for tick in range(4000):
+        one.offer(universe(), tick * 0.001)
+    times = [now for now, _ in listener.heard]
+    assert times[: REPEATS + 1] == pytest.approx([0.0, 0.025, 0.05, 0.075], abs=0.003)
+    gaps = [late - early for early, late in pairwise(times[REPEATS:])]
+    assert gaps == pytest.approx([KEEP_ALIVE_S] * len(gaps), abs=0.002)
+    assert gaps
+
+
+def test_a_change_after_a_rest_leaves_at_once() -> None:
+    one, listener = paced()
+    for tick in range(2000):
+        one.offer(universe(), tick * 0.001)
+    before = len(listener.heard)
+    assert one.offer(universe(1), 2.0)
+    assert len(listener.heard) == before + 1
+
+
+def test_darkness_at_the_start_is_sent_too() -> None:
+    one, listener = paced()
+    assert one.offer(bytes(512), 0.0)
+    assert listener.heard == [(0.0, bytes(512))]
+
+
+def test_what_was_offered_last_leaves_before_the_end() -> None:
+    one, listener = paced()
+    one.offer(universe(), 0.0)
+    one.offer(bytes(512), 0.001)
+    one.close(0.002)
+    assert listener.heard[-1] == (0.002, bytes(512))
+    assert listener.closed_at == 0.002
+
+
+def test_after_a_stall_nothing_leaves_in_a_burst() -> None:
+    one, listener = paced()
+    one.offer(universe(0), 0.0)
+    for tick in range(90):
+        one.offer(universe(tick), 5.0 + tick * 0.001)
+    assert [now for now, _ in listener.heard] == pytest.approx([0.0, 5.0, 5.023, 5.048, 5.073], abs=0.002)
+
+
+@pytest.mark.parametrize("channels", [0, 511, 513])
+def test_a_universe_has_512_channels(channels: int) -> None:
+    one, listener = paced()
+    with pytest.raises(ValueError, match=f"512 channels, not {channels}"):
+        one.offer(bytes(channels), 0.0)
+    assert not listener.heard
+
+
+def test_a_buffer_that_is_used_again_is_seen_to_change() -> None:
+    one, listener = paced()
+    levels = bytearray(512)
+    one.offer(levels, 0.0)
+    levels[0] = 255
+    one.offer(levels, 0.030)
+    assert listener.heard[-1][1][0] == 255
+
+
+def test_an_adapter_without_memory_has_its_usual_rate() -> None:
+    assert config("open-dmx").rate == 30.0
+    assert config("open-dmx", rate_hz=20.0).rate == 20.0
+    assert config("sacn").rate == 40.0

@@ -1,0 +1,191 @@
+"""The USB Pro driver against a widget on a pseudo-terminal: pulled out, plugged in, garbage, hanging."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from serial.tools import list_ports
+from serial.tools.list_ports_common import ListPortInfo
+
+from appliance.outputs.dmx.adapter_wire import AdapterError, AdapterWire
+from appliance.outputs.dmx.serial_port import find_device, is_bare_ftdi, is_usb_pro
+from appliance.outputs.dmx.usb_pro import usb_pro_wire
+from hw_sim.dmx.usb_pro import UsbProWidget
+from tests.outputs.dmx.conftest import config, universe
+
+Until = Callable[[Callable[[], bool]], None]
+
+
+@pytest.fixture
+def widget(tmp_path: Path) -> UsbProWidget:
+    """Not plugged in yet."""
+    return UsbProWidget(tmp_path / "ttyUSB7")
+
+
+def wire_to(widget: UsbProWidget, **keys: object) -> AdapterWire:
+    return usb_pro_wire(config("usb-pro", device=str(widget.path), **keys))
+
+
+def test_a_universe_arrives_framed(widget: UsbProWidget, until: Until) -> None:
+    with widget:
+        wire = wire_to(widget)
+        for tick in range(20):
+            wire.send(universe(tick), 0.0)
+            until(lambda tick=tick: widget.levels == universe(tick))
+        assert (wire.sent, wire.dropped, wire.is_open, wire.trouble) == (20, 0, True, None)
+        wire.close(0.0)
+    assert {len(packet) for _, packet in widget.universes} == {513}
+    assert {packet[0] for _, packet in widget.universes} == {0}
+    assert (set(widget.labels), widget.broken) == ({6}, 0)
+
+
+def test_fewer_channels_make_a_shorter_message(widget: UsbProWidget, until: Until) -> None:
+    with widget:
+        wire = wire_to(widget, channels=24)
+        wire.send(universe(), 0.0)
+        until(lambda: widget.levels == universe()[:24])
+        wire.close(0.0)
+
+
+def test_what_was_sent_last_arrives_before_the_end(widget: UsbProWidget, until: Until) -> None:
+    with widget:
+        wire = wire_to(widget)
+        wire.send(universe(), 0.0)
+        wire.send(bytes(512), 0.0)
+        wire.close(0.0)
+        until(lambda: widget.levels == bytes(512))
+
+
+def test_a_device_that_is_not_there_is_told_and_found_when_it_comes(
+    widget: UsbProWidget, until: Until
+) -> None:
+    wire = wire_to(widget)
+    until(lambda: wire.trouble is not None)
+    assert wire.trouble == (
+        f"DMX USB Pro {widget.path}, universe 1: it is not plugged in. Its lights do not follow; the show "
+        "goes on. It is tried again every 2 seconds: plug it in, or check device and serial in the box file."
+    )
+    wire.send(universe(1), 0.0)
+    wire.send(universe(2), 0.0)
+    assert wire.dropped == 1
+    with widget:
+        until(lambda: widget.levels == universe(2))
+        assert wire.trouble is None
+        wire.close(0.0)
+
+
+def test_pulled_out_mid_universe_and_back(widget: UsbProWidget, until: Until) -> None:
+    widget.plug_in()
+    wire = wire_to(widget)
+    wire.send(universe(1), 0.0)
+    until(lambda: widget.levels == universe(1))
+    widget.pull_out()
+    wire.send(universe(2), 0.0)
+    until(lambda: not wire.is_open)
+    assert "unplugged" in wire.last_error
+    widget.plug_in()  # a new universe is not needed: it shows the last one by itself
+    until(lambda: widget.levels == universe(2))
+    assert wire.is_open
+    wire.close(0.0)
+    widget.pull_out()
+
+
+def test_garbage_from_the_widget_changes_nothing(widget: UsbProWidget, until: Until) -> None:
+    with widget:
+        wire = wire_to(widget)
+        for tick in range(40):
+            widget.say(bytes(range(256)) * 8 + b"\x7e\x05\xff\xff")
+            wire.send(universe(tick), 0.0)
+            until(lambda tick=tick: widget.levels == universe(tick))
+        assert wire.sent == 40
+        assert widget.broken == 0
+        wire.close(0.0)
+
+
+def test_a_widget_that_hangs_holds_up_nobody_and_comes_back(widget: UsbProWidget, until: Until) -> None:
+    with widget:
+        wire = wire_to(widget)
+        wire.send(universe(), 0.0)
+        until(lambda: wire.sent == 1)
+        widget.hang()
+        while not wire.last_error:
+            wire.send(universe(100), 0.0)
+            time.sleep(0.002)
+        assert wire.last_error == "it takes no more data"
+        assert wire.dropped > 10  # one write hung all the while: nobody else did
+        widget.hang(False)
+        wire.send(universe(200), 0.0)
+        until(lambda: widget.levels == universe(200))
+        wire.close(0.0)
+
+
+def test_a_wire_ends_while_its_widget_hangs(widget: UsbProWidget, until: Until) -> None:
+    with widget:
+        wire = wire_to(widget)
+        widget.hang()
+        while not wire.last_error:
+            wire.send(universe(), 0.0)
+            time.sleep(0.002)
+        wire.close(0.0)
+        until(lambda: not wire.is_open)
+
+
+def test_another_program_has_it(widget: UsbProWidget, until: Until) -> None:
+    with widget:
+        first = wire_to(widget)
+        first.send(universe(), 0.0)
+        until(lambda: first.sent == 1)
+        second = wire_to(widget)
+        until(lambda: bool(second.last_error))
+        assert second.last_error == "another program uses it"
+        second.close(0.0)
+        first.close(0.0)
+
+
+def test_a_driver_s_own_fault_does_not_end_the_thread(until: Until) -> None:
+    tries = []
+
+    def open_adapter() -> AdapterWire:
+        tries.append(1)
+        raise ZeroDivisionError("a bug")
+
+    wire = AdapterWire("faulty", open_adapter)  # type: ignore[arg-type]
+    until(lambda: len(tries) >= 2)
+    assert wire.last_error == "a bug"
+    wire.close(0.0)
+
+
+def port(device: str, product: str, serial_number: str) -> ListPortInfo:
+    info = ListPortInfo(device, skip_link_detection=True)
+    info.vid, info.pid, info.product, info.serial_number = 0x0403, 0x6001, product, serial_number
+    return info
+
+
+@pytest.fixture
+def plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bare cable, a widget, another widget."""
+    ports = [
+        port("/dev/ttyUSB0", "FT232R USB UART", "A5"),
+        port("/dev/ttyUSB1", "DMX USB PRO", "EN1"),
+        port("/dev/ttyUSB2", "DMX USB PRO Mk2", "EN2"),
+    ]
+    monkeypatch.setattr(list_ports, "comports", lambda: ports)
+
+
+@pytest.mark.usefixtures("plugged_in")
+def test_an_adapter_is_found_by_what_it_is() -> None:
+    assert find_device(None, None, is_usb_pro) == "/dev/ttyUSB1"
+    assert find_device(None, None, is_bare_ftdi) == "/dev/ttyUSB0"
+    assert find_device(None, "EN2", is_usb_pro) == "/dev/ttyUSB2"
+    assert find_device("/dev/dmx", "EN2", is_usb_pro) == "/dev/dmx"
+    with pytest.raises(AdapterError, match="no adapter with the USB serial number EN9 is plugged in"):
+        find_device(None, "EN9", is_usb_pro)
+
+
+def test_no_adapter_of_the_kind(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(list_ports, "comports", list)
+    with pytest.raises(AdapterError, match="no adapter of this kind is plugged in"):
+        find_device(None, None, is_usb_pro)
