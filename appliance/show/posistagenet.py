@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from appliance.show.config_error import did_you_mean
+from appliance.show.config_error import Problem, did_you_mean
 from appliance.show.section import Ipv4, Section, refusal
-from appliance.show.yaml_file import Location
+from appliance.show.yaml_file import Location, YamlFile, read_yaml
 
 LAST_TRACKER = 65535
 
@@ -77,16 +78,23 @@ class PosiStageNetConfig(Section):
 
 
 def misfits(
-    outputs: Sequence[PosiStageNetConfig], joints: Sequence[str]
-) -> Iterator[tuple[Location, str, str]]:
-    """What does not fit a skeleton with these joints: where in the box file, what is wrong, what to do."""
+    outputs: Sequence[PosiStageNetConfig], joints: Sequence[str], box_file: Path | None
+) -> list[Problem]:
+    """What does not fit a skeleton with these joints; `box_file`: where the outputs come from."""
+    file = YamlFile(Path("box.yaml")) if box_file is None else read_yaml(box_file)
+    problems = []
     for place, output in enumerate(outputs):
         here: Location = ("outputs", "posistagenet", place)
         for number, joint in enumerate(output.joints):
             if joint not in joints:
                 message = f"The show's skeleton has no joint '{joint}'."
-                yield (*here, "joints", number), message, did_you_mean(joint, joints)
+                line = file.line((*here, "joints", number))
+                problems.append(Problem(file.path, line, message, did_you_mean(joint, joints)))
         last = output.first_tracker + len(output.joints or joints) - 1
         if last > LAST_TRACKER:
             message = f"Trackers are numbered up to {LAST_TRACKER}, and these would end at {last}."
-            yield (*here, "first_tracker"), message, "Begin with a lower number, or name fewer joints."
+            line = file.line((*here, "first_tracker"))
+            problems.append(
+                Problem(file.path, line, message, "Begin with a lower number, or name fewer joints.")
+            )
+    return problems

@@ -20,7 +20,7 @@ from appliance.dancer.puppeteers import (
     TurningAxis,
     WornSensor,
 )
-from appliance.outputs.receivers import OscOutputs
+from appliance.outputs.outputs import Outputs
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
@@ -29,7 +29,9 @@ from appliance.sensor.link import SensorLink, SensorReading, open_link
 from appliance.sensor.neutral import Mounting, joint_from_reading
 from appliance.sensor.ways.udp import PortError
 from appliance.show.box import BoxConfig, out_of_reach
+from appliance.show.config_error import ConfigError
 from appliance.show.cues import CueConfig
+from appliance.show.posistagenet import misfits
 from appliance.show.show import HandConfig, Show
 from appliance.stage.budget import Admission, admit
 from appliance.stage.realtime import borrowed_priority
@@ -68,7 +70,7 @@ class Cast:
     mountings: dict[str, Mounting]
     primary: str | None
     link: SensorLink
-    outputs: OscOutputs
+    outputs: Outputs
     complaints: tuple[str, ...] = ()
     cue: str = ""
     newest_primary: SensorReading | None = field(default=None)
@@ -86,7 +88,12 @@ class Cast:
         self.outputs.close()
 
 
-def assemble(show: Show, box: BoxConfig, profiles: Mapping[bytes, bytes] = MappingProxyType({})) -> Cast:
+def assemble(
+    show: Show,
+    box: BoxConfig,
+    profiles: Mapping[bytes, bytes] = MappingProxyType({}),
+    box_file: Path | None = None,
+) -> Cast:
     """Open every port and file of a show; `profiles`: the sensors' calibrations that the box has kept.
 
     Raises StageError or ConfigError before anything dances. Keys that are missing are no reason not to dance:
@@ -119,7 +126,7 @@ def assemble(show: Show, box: BoxConfig, profiles: Mapping[bytes, bytes] = Mappi
         mountings=mountings,
         primary=show.config.primary_sensor,
         link=_link(box, keys, list(worn), profiles),
-        outputs=OscOutputs(box.outputs.osc, show.skeleton),
+        outputs=_outputs(show, box, box_file),
         complaints=complaints,
     )
 
@@ -197,6 +204,13 @@ def _phrase(show: Show, path: Path) -> tuple[Recording, Floor | None]:
         )
     phrase = phrase.resampled(FPS)
     return phrase, survey(phrase) if show.config.motion.grounded else None
+
+
+def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:
+    problems = misfits(box.outputs.posistagenet, show.skeleton.names, box_file)
+    if problems:
+        raise ConfigError(problems)
+    return Outputs(box.outputs, show.skeleton)
 
 
 def _link(

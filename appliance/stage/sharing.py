@@ -1,0 +1,105 @@
+"""What the stage shares with the box's other processes: facts once, each frame, once a second its health."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from appliance.outputs.runtime_folder import Claim, RuntimeFolderError, runtime_folder
+from appliance.outputs.shared_frame import Facts, FrameWriter
+from appliance.show.box import BoxConfig
+from appliance.show.show import Show
+from appliance.stage.cast import Cast, Iterations
+from appliance.stage.health import Health
+from appliance.stage.stage_error import StageError
+from appliance.stage.thermometer import Thermometer
+
+
+def facts_of(show: Show, box_file: Path | None, iterations: Iterations, now: float) -> Facts:
+    """What readers need to know about this stage; `now`: it is about to dance."""
+    config, names = show.config, show.config.names
+    return Facts(
+        show_directory=show.directory.resolve(),
+        box_file=None if box_file is None else box_file.resolve(),
+        show_name=config.name,
+        skeleton=show.skeleton,
+        held=tuple(show.skeleton.names.index(hand.joint) for hand in config.hands),
+        hands=tuple(hand.sensor or hand.kind for hand in config.hands),
+        phrases=names["phrase"],
+        cues=tuple(cue.model_dump(mode="json") for cue in config.cues),
+        looks=names["look"],
+        lights=names["lights"],
+        coding=iterations.coding,
+        interaction=iterations.interaction,
+        most_iterations=iterations.most,
+        pid=os.getpid(),
+        started=now,
+    )
+
+
+class Sharing:
+    """The stage's place in the runtime folder: one stage a folder. Raises StageError where it has none."""
+
+    def __init__(self, box: BoxConfig) -> None:
+        try:
+            self.folder = runtime_folder(box)
+            self._claim = Claim(self.folder, "stage")
+        except RuntimeFolderError as error:
+            raise StageError(str(error)) from error
+        self._thermometer = Thermometer()
+        self.complaint = ""
+
+    def begin(self, cast: Cast, facts: Facts, say: Callable[[str], None]) -> None:
+        """From now on frames are shared, if the folder has room for them; without it, the dance goes on."""
+        try:
+            cast.outputs.share(FrameWriter(self.folder, facts))
+        except OSError as error:
+            self.complaint = (
+                f"{self.folder}: the frames cannot be shared ({error.strerror}). The dance goes on to all "
+                "receivers in the network, but neither lights nor projector on this box see it. Free memory "
+                "there, or give another folder as `runtime:` in the box file, and start again."
+            )
+            say(self.complaint)
+
+    def tell(
+        self,
+        now: float,
+        health: Health,
+        cast: Cast,
+        iterations: Iterations,
+        sensor_age_s: float | None,
+        locked: bool,
+        sensors: Sequence[Sequence[Any]],
+    ) -> None:
+        """How the box is, after the frame has left; docs/outputs.md lists the keys.
+
+        `sensors`: a line of the roster for each. `sensor_age_s`: None without a sensor, infinite if unheard.
+        """
+        told = health.snapshot(now)
+        told |= {
+            "state": "dancing" if cast.motion.rate else "stopped",
+            "sensor_age_s": None if sensor_age_s in (None, float("inf")) else sensor_age_s,
+            "locked": locked,
+            "coding": iterations.coding,
+            "interaction": iterations.interaction,
+            "phrase": cast.motion.phrase,
+            "position_s": cast.motion.position_s,
+            "cue": cast.cue,
+            "let_go": [puppeteer.joint for puppeteer in cast.hands.puppeteers if not puppeteer.enabled],
+            "looked_at": now,
+            "sensors": sensors,
+            "temperature_c": self._thermometer.celsius(),
+            "receivers": [
+                {"name": one.name, "sent": one.sent, "dropped": one.dropped, "error": one.last_error}
+                for one in cast.outputs.receivers
+            ],
+            "complaints": cast.complaints,
+        }
+        cast.outputs.tell(told)
+
+    def close(self) -> None:
+        """Give the place back, after the outputs were closed."""
+        self._thermometer.close()
+        self._claim.close()
