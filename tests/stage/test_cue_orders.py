@@ -1,0 +1,181 @@
+"""Cues, phrases and hands by order: what show control asks of the dance, carried out between two ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from appliance.control.orders import Order
+from appliance.pose import quaternion
+from appliance.pose.bvh import write_bvh
+from appliance.sensor.memory import SensorMemory
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.show import load_show
+from appliance.stage.cast import Cast, Iterations, assemble
+from appliance.stage.clock import Slot
+from appliance.stage.obey import obey, resume
+from appliance.stage.tick import Tick
+from appliance.stage.wearing import Wearing
+from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+
+CUES = [
+    {"name": "start", "phrase": "main", "iterations": [4, 3], "hands": ["lShldr", "Chest"]},
+    {"name": "storm", "phrase": "slow", "iterations": [12, 11], "hands": ["Chest"], "fade_s": 0.2},
+    {"name": "alone", "hands": []},
+    {"name": "lights only", "master": 0.5},
+]
+HANDS: list[dict[str, object]] = [
+    {"fixed": {"orientation": [0, 1, 0, 0]}, "joint": "lShldr"},
+    {"osc": True, "joint": "Chest"},
+]
+
+
+@pytest.fixture
+def cast(tmp_path: Path) -> Iterator[Cast]:
+    folder = write_show(tmp_path / "show", HANDS)
+    write_bvh(folder / "slow.bvh", swaying_phrase(5.0))
+    values = yaml.safe_load((folder / "show.yaml").read_text())
+    values |= {"motion": {"phrases": {"slow": "slow.bvh"}}, "cues": CUES}
+    (folder / "show.yaml").write_text(yaml.safe_dump(values))
+    box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+    cast = assemble(load_show(folder), box)
+    yield cast
+    cast.close()
+
+
+@pytest.fixture
+def iterations() -> Iterations:
+    return Iterations(3, 2, most=8)
+
+
+@pytest.fixture
+def tick(cast: Cast, iterations: Iterations) -> Tick:
+    return Tick(cast, Wearing(cast, SensorMemory(None, print), print), iterations, 1.0)
+
+
+def danced(tick: Tick, ticks: int, begin: int = 0) -> np.ndarray:
+    """Poses (ticks, J, 4) of so many frames."""
+    poses = []
+    for number in range(begin, begin + ticks):
+        slot = Slot(number, 10 + 0.02 * number, 10 + 0.02 * number, 0)
+        tick.run(slot)
+        poses.append(tick.frame.pose.copy())
+        tick.after(slot)
+    return np.array(poses)
+
+
+def enabled(cast: Cast) -> dict[str, bool]:
+    return {puppeteer.joint: puppeteer.enabled for puppeteer in cast.hands.puppeteers}
+
+
+def test_a_cue_changes_phrase_iterations_and_hands(cast: Cast, iterations: Iterations) -> None:
+    done, words = obey(Order("cue", text="storm"), cast, iterations, 1.0)
+    assert done and "at most 8 fit" in words  # the cue asks for 12 and 11
+    assert (iterations.coding, iterations.interaction) == (8, 7)
+    assert enabled(cast) == {"lShldr": False, "Chest": True}
+    assert cast.cue == "storm"
+    for _ in range(20):
+        cast.motion.advance()
+    assert cast.motion.phrase == "slow"
+    assert obey(Order("cue", text="start"), cast, iterations, 1.0) == (True, "")
+    assert (iterations.coding, iterations.interaction) == (4, 3)
+    assert enabled(cast) == {"lShldr": True, "Chest": True}
+
+
+def test_what_a_cue_leaves_out_stays(cast: Cast, iterations: Iterations) -> None:
+    obey(Order("cue", text="storm"), cast, iterations, 1.0)
+    obey(Order("cue", text="lights only"), cast, iterations, 1.0)
+    assert (iterations.coding, iterations.interaction) == (8, 7)
+    assert enabled(cast) == {"lShldr": False, "Chest": True}
+    assert cast.cue == "lights only"
+    obey(Order("cue", text="alone"), cast, iterations, 1.0)
+    assert enabled(cast) == {"lShldr": False, "Chest": False}
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        (Order("cue", text="strom"), "Did you mean 'storm'?"),
+        (Order("cue", text=""), "Known: start, storm, alone, lights only."),
+        (Order("phrase", text="slwo"), "Did you mean 'slow'?"),
+        (Order("hand", (0.0,), "Chst"), "Did you mean 'Chest'?"),
+        (Order("hand", (0.0,), 99), "no joint 99"),
+        (Order("hand", (0.0,), "Hips"), "No hand of this show holds 'Hips'"),
+    ],
+)
+def test_an_unknown_name_changes_nothing(
+    cast: Cast, iterations: Iterations, order: Order, words: str
+) -> None:
+    done, said = obey(order, cast, iterations, 1.0)
+    assert not done and words in said
+    cast.motion.advance()
+    assert (cast.cue, cast.motion.jumped, enabled(cast)) == ("", False, {"lShldr": True, "Chest": True})
+
+
+def test_a_phrase_is_called_with_its_own_fade(cast: Cast, iterations: Iterations) -> None:
+    assert obey(Order("phrase", (1.0,), "slow"), cast, iterations, 1.0) == (True, "")
+    cast.motion.advance()
+    assert cast.motion.jumped
+    assert obey(Order("phrase", text="main"), cast, iterations, 1.0) == (True, "")
+
+
+def test_a_hand_lets_go_and_holds_by_name_or_number(cast: Cast, iterations: Iterations, tick: Tick) -> None:
+    place = cast.hand_places[0]
+    danced(tick, 50)
+    assert cast.hands.weights[place] == 1.0
+    done, words = obey(Order("hand", (0.0,), FIGURE.index("lShldr")), cast, iterations, 1.0)
+    assert done and words == "The hand of lShldr lets go."
+    danced(tick, 60, 50)
+    assert cast.hands.weights[place] == 0.0
+    obey(Order("hand", (1.0,), "lShldr"), cast, iterations, 1.0)
+    danced(tick, 60, 110)
+    assert cast.hands.weights[place] == 1.0
+
+
+def test_a_hand_by_osc_that_was_told_nothing_holds_its_joint_where_it_is(
+    cast: Cast, iterations: Iterations, tick: Tick
+) -> None:
+    chest = FIGURE.index("Chest")
+    before = danced(tick, 62)
+    assert quaternion.angle_between(before[-1, chest], before[-20, chest]) > 0.1  # it sways
+    obey(Order("hand", (1.0,), "Chest"), cast, iterations, 1.0)
+    held = cast.hands.puppeteers[1].pull(11.24).orientation.copy()
+    assert quaternion.angle_between(held, before[-1, chest]) < 1e-3
+    after = danced(tick, 100, 62)
+    assert quaternion.angle_between(after[-50:, chest], held).max() < 1e-3
+
+
+def test_a_cue_shows_no_jump(cast: Cast, iterations: Iterations, tick: Tick) -> None:
+    parts = [danced(tick, 70)]
+    for place, name in enumerate(("storm", "start", "alone", "storm")):
+        obey(Order("cue", text=name), cast, iterations, 1.0)
+        parts.append(danced(tick, 70, 70 * (place + 1)))
+    poses = np.concatenate(parts)
+    assert np.sum(poses[1:] * poses[:-1], axis=-1).min() > 0.9
+    still = FIGURE.index("lForeArm")
+    assert quaternion.angle_between(poses[1:, still], poses[:-1, still]).max() < 1e-3
+
+
+def test_a_show_that_is_started_again_comes_back_in_its_cue(cast: Cast, iterations: Iterations) -> None:
+    sentence = resume("storm", cast, iterations)
+    assert "goes on in the cue 'storm'" in sentence and "at most 8 fit" in sentence
+    assert (cast.cue, cast.motion.phrase, cast.motion.position_s) == ("storm", "slow", 0.0)
+    assert (iterations.coding, iterations.interaction) == (8, 7)
+    assert enabled(cast) == {"lShldr": False, "Chest": True}
+    cast.motion.advance()
+    assert not cast.motion.jumped
+    first = cast.motion.window()[0][FIGURE.index("Chest")]
+    held = cast.hands.puppeteers[1].pull(10.0).orientation
+    assert quaternion.angle_between(held, first) < 0.1
+
+
+@pytest.mark.parametrize("name", ["", "of another show"])
+def test_without_a_cue_of_this_show_it_begins_as_it_does(
+    cast: Cast, iterations: Iterations, name: str
+) -> None:
+    assert resume(name, cast, iterations) == ""
+    assert (cast.cue, cast.motion.phrase, iterations.coding) == ("", "main", 3)
