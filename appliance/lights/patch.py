@@ -14,6 +14,7 @@ from appliance.lights.head import Heads, heads_of
 from appliance.show.fixture_profile import (
     DIMMER,
     FINE,
+    LAMPS,
     PAN,
     TILT,
     AttributeConfig,
@@ -21,7 +22,7 @@ from appliance.show.fixture_profile import (
     base,
     load_profile,
 )
-from appliance.show.light_rules import AIM, COLOUR
+from appliance.show.light_rules import COLOUR
 from appliance.show.lights import UNIVERSE_CHANNELS, FixtureConfig
 
 Values = NDArray[np.float64]
@@ -42,6 +43,11 @@ class Slot:
     def base(self) -> str:
         """'red' for 'red 2'."""
         return base(self.name)
+
+    @property
+    def is_lamp(self) -> bool:
+        """Whether light comes from it: one colour of several."""
+        return self.component >= 0 or self.base in LAMPS
 
     @property
     def is_inverted(self) -> bool:
@@ -82,16 +88,6 @@ class Patch:
             found += exact or [place for place in own if self.slots[place].base == attribute]
         return np.array(found, np.intp)
 
-    def drivable(self, fixture: FixtureConfig) -> tuple[str, ...]:
-        """What rules can drive on a fixture."""
-        own = [self.slots[place] for place in self._own[fixture.name]]
-        names = [slot.name for slot in own]
-        if any(slot.component >= 0 for slot in own):
-            names.append(COLOUR)
-        if any(head.fixture is fixture for head in self.heads.heads):
-            names.append(AIM)
-        return tuple(names)
-
     def dimmed(self, values: Values, level: Values | float) -> Values:
         """The values with dimmers scaled by `level` (a number or (S,)); colours stand in where none is."""
         shown = np.where(self.dims, values * level, values)
@@ -123,7 +119,7 @@ class Patch:
             )
             for name in mode.attributes
         ]
-        if components and not any(slot.base == DIMMER for slot in slots):
+        if any(slot.is_lamp for slot in slots) and not any(slot.base == DIMMER for slot in slots):
             slots.append(Slot(fixture, DIMMER, AttributeConfig(name=DIMMER), -1, ()))
         return slots
 
@@ -134,6 +130,9 @@ class Patch:
             return float(mixed((1.0, 1.0, 1.0))[slot.component])
         if slot.base in (PAN, TILT):
             return 0.5
+        own = [self.slots[place] for place in self._own[slot.fixture.name]]
+        if slot.is_lamp:  # amber beside red, green and blue waits for a rule; warm and cold white alone shine
+            return float(all(other.component < 0 for other in own))
         return float(slot.base == DIMMER and slot.name != DIMMER and self._has_dimmer(slot.fixture))
 
     def _dims(self, slot: Slot) -> bool:
@@ -151,7 +150,7 @@ class Patch:
             for dimmer, missing in enumerate(self.slots)
             if not missing.channels
             for place in self._own[missing.fixture.name]
-            if self.slots[place].component >= 0
+            if self.slots[place].is_lamp
         ]
         scaled, scales = np.array(pairs, np.intp).reshape(-1, 2).T
         self._subtractive = np.isin(self.components[scaled], SUBTRACTIVE)

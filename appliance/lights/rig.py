@@ -27,8 +27,8 @@ class Rig:
         self.patch = patch
         self.dance = Dance(skeleton)
         self.safety = 1.0  # 0: the dance alone; 1: the safe look alone
-        self.values: Values = patch.defaults.copy()  # (S,) what the last pass showed
         self._safe, self._homes = _safe_look(config.safe, patch), config.safe.heads == "home"
+        self.values: Values = patch.dimmed(self._safe, 1.0)  # (S,) what the last pass showed
         self._is_dark = config.safe.dimmer == 0.0
         self._mappings = mappings_of(config.mappings, patch)
         self._layers: list[_Layer] = []
@@ -66,7 +66,9 @@ class Rig:
         """What is left on the wires at the end: the safe look where it has light in it, else zeros."""
         if self._is_dark:
             return {universe: bytes(512) for universe in self.patch.universes}
-        return self.patch.encode(self.values)
+        heads, values = self.patch.heads, self.patch.dimmed(self._safe, 1.0)
+        values[heads.axes.slots] = heads.axes.shares(heads.angles)
+        return self.patch.encode(values)
 
     def _secure(self, house: House, now: float, seconds: float) -> None:
         """How much of the safe look is there: at once on panic, faded else."""

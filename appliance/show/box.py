@@ -9,11 +9,11 @@ from pydantic import Field, field_validator
 
 from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
-from appliance.show.lights import VenueLightsConfig
 from appliance.show.posistagenet import PosiStageNetConfig
 from appliance.show.projector import ProjectorConfig
 from appliance.show.section import Ipv4, LocalFile, Section, refusal
 from appliance.show.validation import validated
+from appliance.show.venue_lights import VenueLightsConfig
 from appliance.show.yaml_file import read_yaml
 
 Dialect = Literal["ai-toolbox", "joint", "vmc"]

@@ -17,7 +17,8 @@ FOLDER = "profiles"  # inside a show bundle
 UNUSED = "-"  # a channel that nothing drives
 FINE = (" fine", " finer")  # the second and third byte of an attribute
 DIMMER, PAN, TILT = "dimmer", "pan", "tilt"
-COLOURS = ("red", "green", "blue", "white", "cyan", "magenta", "yellow")
+COLOURS = ("red", "green", "blue", "white", "cyan", "magenta", "yellow")  # `colour` sets them
+LAMPS = ("amber", "uv", "lime", "indigo", "warm white", "cold white")  # those only rules of their own
 MAX_CHANNELS = 512
 
 Byte = Annotated[int, Field(ge=0, le=255)]

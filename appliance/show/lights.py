@@ -1,21 +1,26 @@
-"""Lights of a show: fixtures, addresses, places, mappings, the safe look; and a venue's changes."""
+"""Lights of a show: fixtures with their addresses and places, mappings, the safe look."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
 from appliance.show.config_error import did_you_mean
-from appliance.show.fixture_profile import COLOURS, DIMMER, PAN, TILT, base, load_profile, profile_refusal
+from appliance.show.fixture_profile import (
+    COLOURS,
+    DIMMER,
+    LAMPS,
+    PAN,
+    TILT,
+    base,
+    load_profile,
+    profile_refusal,
+)
 from appliance.show.light_rules import AIM, COLOUR, Colour, MappingConfig, Metres, Pair, RuleConfig
 from appliance.show.section import Section, refusal
-
-if TYPE_CHECKING:
-    from appliance.show.box import BoxConfig
-    from appliance.show.show import Show
 
 MAX_FIXTURES = 512
 UNIVERSE_CHANNELS = 512
@@ -154,30 +159,6 @@ class LightsConfig(Section):
         return safe
 
 
-class VenuePlaceConfig(Section):
-    """What is different about one fixture in this venue; what is left out stays as in the show."""
-
-    fixture: str = Field(min_length=1, description="Its name in the show.")
-    universe: Universe | None = Field(default=None, description="Its universe here.")
-    address: Address | None = Field(default=None, description="Its first channel here.")
-    place: Metres | None = Field(default=None, description="Where it is here, metres (x, y, z).")
-    pose: Pose | None = Field(default=None, description="Hanging or standing here.")
-    turn: Metres | None = Field(
-        default=None, description="How it is turned here: yaw, pitch, roll in degrees."
-    )
-
-
-class VenueLightsConfig(Section):
-    """The rig as it hangs in this venue."""
-
-    rate_hz: float = Field(
-        default=40.0, ge=1, le=44, description="How often lights are reckoned; a full universe takes 22.7 ms."
-    )
-    places: list[VenuePlaceConfig] = Field(
-        default_factory=list, max_length=MAX_FIXTURES, description="Fixtures that differ from the show."
-    )
-
-
 def overlaps(fixtures: Sequence[FixtureConfig], directory: Path | None) -> Sequence[tuple[int, str, str]]:
     """(place in the list, message, cure) of each fixture that sits on another one's channels."""
     owners: dict[tuple[int, int], FixtureConfig] = {}
@@ -197,40 +178,6 @@ def overlaps(fixtures: Sequence[FixtureConfig], directory: Path | None) -> Seque
     return found
 
 
-def unwired(show: Show, box: BoxConfig) -> list[str]:
-    """A sentence for each universe that the show's fixtures are on and the box file has no wire for."""
-    wired = {wire.universe for wire in box.outputs.dmx}
-    fixtures = at_venue(show.config.lights, box.lights).fixtures
-    return [
-        f"Universe {universe} has no wire: {_names(fixtures, universe)} stay dark. "
-        f"Add {{universe: {universe}, wire: artnet}} (or another wire) under outputs: dmx: in the box file."
-        for universe in sorted({fixture.universe for fixture in fixtures} - wired)
-    ]
-
-
-def misplaced(show: Show, box: BoxConfig) -> list[str]:
-    """What is wrong with the box file's changes to the rig: unknown fixtures, channels used twice."""
-    names = [fixture.name for fixture in show.config.lights.fixtures]
-    unknown = [
-        f"The show has no fixture '{place.fixture}' to change (lights: places: in the box file). "
-        + did_you_mean(place.fixture, names)
-        for place in box.lights.places
-        if place.fixture not in names
-    ]
-    fixtures = at_venue(show.config.lights, box.lights).fixtures
-    return unknown + [f"{words} {cure}" for _, words, cure in overlaps(fixtures, show.directory)]
-
-
-def at_venue(lights: LightsConfig, venue: VenueLightsConfig) -> LightsConfig:
-    """The rig with the venue's changes."""
-    changes = {
-        place.fixture: {key: value for key, value in place if key != "fixture" and value is not None}
-        for place in venue.places
-    }
-    fixtures = [fixture.model_copy(update=changes.get(fixture.name, {})) for fixture in lights.fixtures]
-    return lights.model_copy(update={"fixtures": fixtures})
-
-
 def drivable(fixture: FixtureConfig, directory: Path | None) -> tuple[str, ...]:
     """What rules can drive on a fixture: its attributes, `red` for all of `red 1`, ..., aim and colour."""
     names = list(load_profile(fixture.profile, directory).mode(fixture.mode).attributes)
@@ -238,7 +185,9 @@ def drivable(fixture: FixtureConfig, directory: Path | None) -> tuple[str, ...]:
     if {PAN, TILT} <= bases:
         names.append(AIM)
     if bases & set(COLOURS):
-        names += [COLOUR, DIMMER]  # colours without a dimmer are scaled in its place
+        names.append(COLOUR)
+    if bases & {*COLOURS, *LAMPS}:
+        names.append(DIMMER)  # colours without a dimmer are scaled in its place
     return tuple(dict.fromkeys([*names, *sorted(bases)]))
 
 
@@ -259,10 +208,6 @@ def _misfit(
     if not rule.fixtures and rule.drives not in everything:
         return f"No fixture has '{rule.drives}'.", did_you_mean(rule.drives, everything)
     return None
-
-
-def _names(fixtures: Sequence[FixtureConfig], universe: int) -> str:
-    return ", ".join(fixture.name for fixture in fixtures if fixture.universe == universe)
 
 
 def _directory(info: ValidationInfo) -> Path | None:

@@ -1,0 +1,192 @@
+"""The lights' process: the shared frame and the house in, levels of all universes out, 40 times a second."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from appliance.control.house import HouseReader
+from appliance.lights.patch import Patch
+from appliance.lights.rig import LOST_S, Rig
+from appliance.outputs.dmx.open_wire import open_universes
+from appliance.outputs.dmx.pace import Universe
+from appliance.outputs.frame_reader import FrameReader, SeenFrame
+from appliance.outputs.runtime_folder import Claim, runtime_folder
+from appliance.show.box import BoxConfig
+from appliance.show.config_error import ConfigError, Problem
+from appliance.show.lights import LightsConfig
+from appliance.show.show import Show
+from appliance.show.venue_lights import at_venue, misplaced, unwired
+
+Say = Callable[[str], None]
+_REPORT_S = 1.0
+_GIVE_UP_S = 1.2  # at the end: a machine too busy to fade within this time goes dark at once
+
+
+class Lights:
+    """The rig of one show on the wires of one box. Raises ConfigError or RuntimeFolderError before light."""
+
+    def __init__(self, show: Show, box: BoxConfig, box_file: Path | None, say: Say) -> None:
+        self.show, self.box, self.say = show, box, say
+        config = rig_here(show, box, box_file)
+        patch = Patch(config.fixtures, show.directory)
+        self.rig = Rig(config, patch, show.skeleton)
+        with ExitStack() as opened:
+            folder = runtime_folder(box)
+            opened.callback(Claim(folder, "lights").close)
+            self._reader = FrameReader(folder)
+            opened.callback(self._reader.close)
+            self._house = HouseReader(folder)
+            opened.callback(self._house.close)
+            self.universes = wired(patch, box)
+            self._closing = opened.pop_all()
+        self._stranger: int | None = None
+        self._was_lost = True
+        self._troubles: dict[str, str] = {}
+
+    def introduce(self) -> None:
+        """Say what is lit by which wires, and what stays dark."""
+        mappings = [mapping.name for mapping in self.show.config.lights.mappings]
+        wires = ", ".join(universe.wire.name for universe in self.universes)
+        rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: they rest at their defaults"
+        self.say(f"Lights: {len(self.rig.patch.fixtures)} fixtures by {wires}; {rules}.")
+        for sentence in unwired(self.show, self.box):
+            self.say(sentence)
+
+    def shine(self, stopped: Callable[[], bool]) -> None:
+        """Pass after pass on a grid of absolute deadlines until `stopped`; then fade to the safe look."""
+        period_s = 1.0 / self.box.lights.rate_hz
+        deadline = time.monotonic()
+        report_at = deadline + _REPORT_S
+        while not stopped():
+            now = self._next_pass()
+            if now >= report_at:
+                report_at = now + _REPORT_S
+                self._report(now)
+            deadline = _wait_for(deadline, period_s)
+        self.rig.leave()
+        give_up = time.monotonic() + _GIVE_UP_S
+        while self._next_pass() < give_up and self.rig.safety < 1.0:
+            deadline = _wait_for(deadline, period_s)
+
+    def close(self) -> None:
+        """Leave the safe look, or zeros, on all wires, say goodbye on them and free everything."""
+        levels, now = self.rig.last_levels(), time.monotonic()
+        for universe in self.universes:
+            universe.offer(levels[universe.number], now)
+            universe.close(now)
+        self._closing.close()
+
+    def _next_pass(self) -> float:
+        now = time.monotonic()
+        levels = self.rig.pass_(self._frame(now), self._reader.generation, self._house.read(), now)
+        for universe in self.universes:
+            universe.offer(levels[universe.number], now)
+        return now
+
+    def _frame(self, now: float) -> SeenFrame | None:
+        """The newest frame, if it is of the skeleton that these lights know."""
+        frame, facts = self._reader.newest(now), self._reader.facts
+        if frame is None or facts is None:
+            return None
+        if facts.skeleton.same_joints(self.show.skeleton):
+            return frame
+        if self._stranger != self._reader.generation:
+            self._stranger = self._reader.generation
+            self.say(
+                f"The stage dances '{facts.show_name}' with another skeleton. The lights stay in their safe "
+                f"look. Start them with --show {facts.show_directory}."
+            )
+        return None
+
+    def _report(self, now: float) -> None:
+        """Once a second: what has changed with the stage and the wires."""
+        lost = self.rig.is_lost(now)
+        if lost and not self._was_lost:
+            self.say(
+                f"No frame from the stage for {LOST_S:g} s. The lights fade to their safe look; they dance "
+                "again as soon as the stage does. Look what `bunraku play` says."
+            )
+        elif self._was_lost and not lost:
+            self.say("The stage dances, and the lights with it.")
+        self._was_lost = lost
+        for universe in self.universes:
+            name, trouble = universe.wire.name, universe.wire.trouble or ""
+            if trouble != self._troubles.get(name, ""):
+                self.say(trouble or f"{name} is well again.")
+            self._troubles[name] = trouble
+
+
+def rig_here(show: Show, box: BoxConfig, box_file: Path | None) -> LightsConfig:
+    """The show's lights as they hang in this venue; raises ConfigError when there is nothing to light."""
+    problems = [Problem(box_file or Path("box.yaml"), 0, sentence) for sentence in misplaced(show, box)]
+    if not show.config.lights.fixtures:
+        problems.append(
+            Problem(
+                show.file.path,
+                0,
+                "The show has no fixtures.",
+                "Add them under lights: (docs/lights.md tells how).",
+            )
+        )
+    elif not box.outputs.dmx:
+        problems.append(
+            Problem(
+                box_file or Path("box.yaml"),
+                0,
+                "No wire leads to the lights.",
+                "Add one under outputs: dmx: in the box file, for instance {universe: 1, wire: artnet}.",
+            )
+        )
+    if problems:
+        raise ConfigError(problems)
+    return at_venue(show.config.lights, box.lights)
+
+
+def wired(patch: Patch, box: BoxConfig) -> tuple[Universe, ...]:
+    """The universes of this rig on open wires; nothing is sent to universes without a fixture."""
+    used = [config for config in box.outputs.dmx if config.universe in patch.universes]
+    return open_universes(used, box.state_folder)
+
+
+def light_up(show: Show, box: BoxConfig, box_file: Path | None) -> None:
+    """Light the rig until a signal comes."""
+    with stop_signals() as stopped:
+        lights = Lights(show, box, box_file, say)
+        try:
+            lights.introduce()
+            lights.shine(stopped)
+        finally:
+            lights.close()
+
+
+def say(words: str) -> None:
+    """A line on standard output; light matters more than a terminal that is gone."""
+    with contextlib.suppress(OSError, ValueError):
+        print(words, flush=True)
+
+
+@contextmanager
+def stop_signals() -> Iterator[Callable[[], bool]]:
+    """While inside, SIGTERM, Ctrl-C and a closed terminal are only noted."""
+    caught: list[int] = []
+    signals = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+    before = [signal.signal(number, lambda came, _: caught.append(came)) for number in signals]
+    try:
+        yield lambda: bool(caught)
+    finally:
+        for number, handler in zip(signals, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _wait_for(deadline: float, period_s: float) -> float:
+    """Sleep until the deadline's successor on its grid; passes that were missed are left out."""
+    now = time.monotonic()
+    deadline += period_s * max(1, math.ceil((now - deadline) / period_s))
+    time.sleep(max(deadline - now, 0.0))
+    return deadline
