@@ -60,6 +60,15 @@ class Anatomy:
             if child not in self.trunk and not self._leads_to_head(child)
         ]
 
+    def part_of(self, joint: int) -> int:
+        """The hand or foot that a finger or toe belongs to; any other joint is a part of its own."""
+        while self.reach[joint] < 0.10 * self.height and self.skeleton.parents[joint] >= 0:
+            lengths = [float(np.linalg.norm(end - start)) for _, start, end in self.bones([joint])]
+            if max(lengths, default=0.0) > 0.05 * self.height:
+                break
+            joint = self.skeleton.parents[joint]
+        return joint
+
     def chain(self, joint: int) -> list[int]:
         """From a joint down the branch that reaches furthest until it ends or falls apart into fingers."""
         chain = [joint]
@@ -119,7 +128,7 @@ class Anatomy:
         return front
 
     def bones(self, joints: Sequence[int]) -> list[tuple[int, Array, Array]]:
-        """(joint that moves it, where it begins, where it ends) of the bones of some joints, tips included."""
+        """(joint that moves it, where it begins, where it ends) of some joints' bones, tips included."""
         found = [
             (joint, self.positions[joint], self.positions[child])
             for joint in joints

@@ -19,7 +19,7 @@ def body_mesh(skeleton: Skeleton) -> BodyMesh:
     field, grid = sampled(trunk, limbs, SPACING * anatomy.height)
     vertices, normals, faces = surface_of(field, grid)
     movers = [mover for group in (trunk, *limbs) for mover in group.movers]
-    joints, weights = weights_of(vertices, faces, movers)
+    joints, weights = weights_of(vertices, faces, movers, anatomy.part_of)
     return BodyMesh(
         vertices,
         normals,

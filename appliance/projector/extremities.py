@@ -68,10 +68,10 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:
     row, end = knuckles.mean(axis=0), tips.mean(axis=0)
     end = end + 0.020 * height * (end - row) / max(float(np.linalg.norm(end - row)), 1e-9)
     base = wrist + 0.35 * (anatomy.positions[thumb] - wrist)
-    thick = 0.0125 * height
+    thick = 0.0115 * height
     steps: list[Slab | Cut] = [
-        Slab(joint, wrist, row, 0.0165 * height, thick, 0.0, aside, 0.25 * half, half),
-        Slab(joint, row, end, thick, 0.0075 * height, 0.0, aside, half, 0.62 * half),
+        Slab(joint, wrist, row, 0.0160 * height, thick, 0.0, aside, 0.2 * half, half),
+        Slab(joint, row, end, thick, 0.0085 * height, 0.0, aside, half, 0.75 * half),
         Slab(joint, base, anatomy.positions[thumb], 0.014 * height, 0.011 * height, 0.012 * height, aside),
     ]
     steps += [

@@ -15,9 +15,9 @@ from appliance.projector.volumes import Group, Slab
 # Along the spine from the pelvis (0) to the neck (1): half the width as a share of the hips' and of the
 # shoulders' half width; flesh beside it, half the depth, and how far before the bones, in heights.
 _SPINE = np.array([0.0, 0.18, 0.42, 0.64, 0.82, 1.0])
-_OF_HIPS = np.array([0.90, 0.86, 0.50, 0.10, 0.0, 0.0])
+_OF_HIPS = np.array([0.92, 0.90, 0.52, 0.10, 0.0, 0.0])
 _OF_SHOULDERS = np.array([0.0, 0.0, 0.35, 0.80, 0.85, 0.20])
-_FLESH = np.array([0.036, 0.036, 0.018, 0.023, 0.027, 0.018])
+_FLESH = np.array([0.039, 0.038, 0.019, 0.023, 0.027, 0.018])
 _DEPTH = np.array([0.050, 0.052, 0.047, 0.057, 0.052, 0.034])
 _AHEAD = np.array([-0.004, -0.002, 0.004, 0.010, 0.009, 0.0])
 
@@ -58,7 +58,7 @@ def _trunk(anatomy: Anatomy) -> list[Slab]:
     hips, shoulders = _half_width(anatomy, spine[0]), _half_width(anatomy, spine[-2])
     slabs, before = [], 0.0
     for owner, start, end, length in zip(spine, ends, ends[1:], lengths, strict=False):
-        pieces = max(1, round(length / (0.025 * height)))
+        pieces = max(1, round(length / (0.012 * height)))
         for piece in range(pieces):
             shares = np.array([piece, piece + 1]) / pieces
             along = (before + shares * length) / whole
@@ -68,10 +68,9 @@ def _trunk(anatomy: Anatomy) -> list[Slab]:
                 start + share * (end - start) + shift * anatomy.forward
                 for share, shift in zip(shares, ahead, strict=True)
             )
-            side = _perpendicular(anatomy.across, high - low)
             slabs.append(
                 Slab(
-                    owner, low, high, float(depth[0]), float(depth[1]), 0.0, side,
+                    owner, low, high, float(depth[0]), float(depth[1]), 0.0, anatomy.across,
                     max(float(half[0]), 0.0), max(float(half[1]), 0.0),
                 )
             )  # fmt: skip
@@ -126,6 +125,7 @@ def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
     belly = start + 0.32 * (end - start)
     if is_leg and anatomy.reach[child] < 0.5 * anatomy.reach[joint]:
         belly = belly - 0.010 * anatomy.height * anatomy.forward  # the calf lies behind the bone
+    first = 0.9 * first if is_leg else first
     full = (first + 0.32 * (last - first)) * (1.18 if is_leg else 1.12)
     return [
         cone(anatomy, joint, belly, end, (full, last), 0.0),
@@ -143,8 +143,8 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
     if is_leg:
         seat = start - 0.022 * height * anatomy.forward + 0.4 * (inner - start)
         return [
-            cone(anatomy, trunk, seat, start, (1.05 * thick, thick), 0.02),
-            cone(anatomy, trunk, inner, start, (thick, thick), 0.02),
+            cone(anatomy, trunk, seat, start, (thick, 0.85 * thick), 0.02),
+            cone(anatomy, trunk, inner, start, (0.9 * thick, 0.9 * thick), 0.02),
         ]
     middle = inner + 0.45 * (places[trunk] - inner)
     middle = middle - anatomy.across * float((middle - inner) @ anatomy.across)
@@ -196,14 +196,3 @@ def _is_leg(anatomy: Anatomy, chain: Sequence[int], last: int) -> bool:
         return True
     drop = anatomy.positions[chain[0]] - anatomy.positions[chain[last]]
     return not anatomy.skeleton.feet and float(drop[1]) > 0.8 * float(np.linalg.norm(drop))
-
-
-def _perpendicular(side: Array, direction: Array) -> Array:
-    """The side, made perpendicular to a direction, unit length; any perpendicular where they are parallel."""
-    length2 = float(direction @ direction)
-    for candidate in (side, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])):
-        rest = candidate - direction * float(candidate @ direction) / max(length2, 1e-12)
-        if float(rest @ rest) > 0.05:
-            unit: Array = rest / np.linalg.norm(rest)
-            return unit
-    return side

@@ -9,7 +9,7 @@ p + 2 * cross(r.xyz, cross(r.xyz, p) + r.w * p) + 2 * (r.w * d.xyz - d.w * r.xyz
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,44 +61,71 @@ def skin(mesh: BodyMesh, positions: Array, world: Array) -> tuple[NDArray[np.flo
 
 
 MOVERS = 4  # joints that move a vertex
-SPREAD_STEPS = 40  # how often weights flow to the neighbours on the surface
+FAR_STEPS, NEAR_STEPS = 40, 8  # how often weights flow to the neighbours: between limbs, between fingers
 
 
 def weights_of(
-    vertices: NDArray[np.float32], faces: NDArray[np.int32], volumes: Sequence[Slab]
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    volumes: Sequence[Slab],
+    part_of: Callable[[int], int],
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Which joints move each vertex, (V, 4), and how much, (V, 4), strongest first.
 
     The owner of the nearest volume, softened along the surface alone: what the hand of a hanging arm comes
-    near to is not moved by it. faces: as `surface_of` gives them.
+    near to is not moved by it. Far between the parts of the body, little within a part (hand and fingers).
+    faces: as `surface_of` gives them.
     """
     owners = sorted({volume.owner for volume in volumes})
     place = {owner: number for number, owner in enumerate(owners)}
-    away = np.full((len(vertices), max(len(owners), MOVERS)), np.inf, dtype=np.float32)
+    away = np.full((len(vertices), len(owners)), np.inf, dtype=np.float32)
     x, y, z = vertices.T
     for volume in volumes:
         column = away[:, place[volume.owner]]
         np.minimum(column, volume.distance(x, y, z), out=column)
-    weights = np.zeros_like(away)
-    weights[np.arange(len(away)), away.argmin(axis=1)] = 1.0
-    weights = _spread_along(faces, weights)
+    nearest = away.argmin(axis=1)
+    around = _neighbours(faces, len(vertices))
+    parts = np.array([part_of(owner) for owner in owners])
+    names, part = np.unique(parts, return_inverse=True)
+    share = _spread(np.eye(len(names), dtype=np.float32)[part[nearest]], around, FAR_STEPS)
+    within = _spread(np.eye(len(owners), dtype=np.float32)[nearest], around, NEAR_STEPS)
+    weights = _divided(share, within, part)
+    weights = np.pad(weights, ((0, 0), (0, max(0, MOVERS - len(owners)))))
     strongest = np.argsort(-weights, axis=1, kind="stable")[:, :MOVERS]
     kept = np.take_along_axis(weights, strongest, axis=1)
     joints = np.array([*owners, *owners[:1] * MOVERS])[strongest]
     return joints.astype(np.uint8), (kept / kept.sum(axis=1, keepdims=True)).astype(np.float32)
 
 
-def _spread_along(faces: NDArray[np.int32], weights: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Weights (V, C) after they flowed to the neighbours on the surface, some times over."""
+def _divided(
+    share: NDArray[np.float32], within: NDArray[np.float32], part: NDArray[np.intp]
+) -> NDArray[np.float32]:
+    """The parts' shares (V, P) for their joints (V, C) as `within` says; where it says nothing, the first's."""
+    weights = np.zeros_like(within)
+    for number in range(share.shape[1]):
+        columns = np.flatnonzero(part == number)
+        own = within[:, columns]
+        total = own.sum(axis=1, keepdims=True)
+        first = np.eye(1, len(columns), dtype=np.float32)
+        weights[:, columns] = share[:, [number]] * np.where(
+            total > 1e-6, own / np.maximum(total, 1e-6), first
+        )
+    return weights
+
+
+def _neighbours(faces: NDArray[np.int32], count: int) -> NDArray[np.int64]:
+    """(most, V): each vertex's neighbours in the quads that the triangles are halves of, then itself."""
     quads = faces.reshape(-1, 6)[:, [0, 1, 2, 5]]
     edges = np.unique(np.concatenate([quads[:, [a, (a + 1) % 4]] for a in range(4)]), axis=0)
-    first = np.searchsorted(edges[:, 0], np.arange(len(weights) + 1))
-    most = int(np.diff(first).max())
-    around = np.tile(np.arange(len(weights))[:, None], (1, most))
-    around[edges[:, 0], np.arange(len(edges)) - first[edges[:, 0]]] = edges[:, 1]
-    for _ in range(SPREAD_STEPS):
-        flow = weights[around[:, 0]]
-        for neighbour in around.T[1:]:
-            flow += weights[neighbour]
-        weights = 0.5 * weights + (0.5 / most) * flow
+    first = np.searchsorted(edges[:, 0], np.arange(count + 1))
+    around = np.tile(np.arange(count), (int(np.diff(first).max()), 1))
+    around[np.arange(len(edges)) - first[edges[:, 0]], edges[:, 0]] = edges[:, 1]
+    return around
+
+
+def _spread(weights: NDArray[np.float32], around: NDArray[np.int64], steps: int) -> NDArray[np.float32]:
+    """Weights (V, C) after they flowed to the neighbours `steps` times, half of them each time."""
+    for _ in range(steps):
+        flow = sum(weights[neighbours] for neighbours in around)
+        weights = 0.5 * weights + np.float32(0.5 / len(around)) * flow
     return weights

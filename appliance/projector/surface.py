@@ -14,6 +14,9 @@ _CORNERS = np.array(list(product((0, 1), repeat=3)))  # corner number = 4x + 2y 
 _EDGES = np.array([(a, b) for a in range(8) for b in range(8) if a < b and (a ^ b) in (1, 2, 4)])
 
 
+_FILLED = -1e-5  # metres: a sample that is put inside lies just below the surface
+
+
 @dataclass(frozen=True)
 class Grid:
     """Cubes of `spacing` metres from `origin` (3,) on; shape counts the sample points along x, y, z."""
@@ -50,16 +53,18 @@ def surface_of(
 
 
 def _without_ambiguity(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """The field and each cell's corners inside, as bits; cells that two sheets would share are filled."""
+    """The field and each cell's corners inside, as bits; where two sheets would share a cell, its sample
+    outside that is nearest to the surface is put inside, until there is no such cell."""
     while True:
         codes = _codes(field < 0)
         doubtful = np.argwhere(_DOUBTFUL[codes])
         if not len(doubtful):
             return field, codes
         field = field.copy()
-        corners = (doubtful[:, None] + _CORNERS).reshape(-1, 3)
-        at = tuple(corners.T)
-        field[at] = np.minimum(field[at], -1e-4)
+        corners = doubtful[:, None] + _CORNERS
+        values = field[tuple(corners.transpose(2, 0, 1))]
+        nearest = np.where(values >= 0, values, np.inf).argmin(axis=1)
+        field[tuple(corners[np.arange(len(doubtful)), nearest].T)] = _FILLED
 
 
 def _codes(inside: NDArray[np.bool_]) -> NDArray[np.uint8]:

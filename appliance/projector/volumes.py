@@ -18,8 +18,8 @@ SMOOTHINGS = 2  # how often the field is smoothed over its neighbours: 2 mm off 
 
 @dataclass(frozen=True)
 class Slab:
-    """A rounded board: from `start` to `end` (3,), to both sides along the unit vector `across` by
-    `start_half` and `end_half`, as thick as the radii; a rounded cone when the halves are zero. Metres.
+    """A rounded board: from `start` to `end` (3,), to both sides towards `across` by `start_half` and
+    `end_half`, as thick as the radii; a rounded cone when the halves are zero. Metres.
 
     owner: the joint that moves it; softness: over how many metres it melts into what was made before it.
     """
@@ -53,7 +53,7 @@ class Slab:
         part = np.clip(along, 0.0, 1.0)
         squared = dx * dx + dy * dy + dz * dz + np.float32(length2) * part * (part - 2 * along)
         if self.start_half or self.end_half:
-            aside = _dot(dx, dy, dz, self.across)
+            aside = _dot(dx, dy, dz, perpendicular(self.across, bone))
             half = np.float32(self.start_half) + np.float32(self.end_half - self.start_half) * part
             held = aside * half / np.sqrt(half * half + aside * aside + np.float32(1e-12))  # no flat front
             squared = squared + held * (held - 2 * aside)
@@ -124,6 +124,14 @@ def smooth_minimum(a: Array, b: Array, softness: float) -> Array:
     near = np.maximum(np.float32(softness) - np.abs(a - b), 0.0)
     joined: Array = np.minimum(a, b) - near * near * np.float32(0.25 / softness)
     return joined
+
+
+def perpendicular(side: Array, direction: Array) -> Array:
+    """The side, turned perpendicular to a direction, unit length (3,); zero where the two are parallel."""
+    rest = side - direction * float(side @ direction) / max(float(direction @ direction), 1e-12)
+    length = float(np.linalg.norm(rest))
+    unit: Array = rest / length if length > 1e-3 else np.zeros(3)
+    return unit
 
 
 def _sample(group: Group, grid: Grid, field: NDArray[np.float32]) -> NDArray[np.float32]:
