@@ -64,14 +64,16 @@ def hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:
     knuckles = anatomy.positions[fingers]
     tips = np.array([_furthest(anatomy, finger, wrist) for finger in fingers])
     aside = np.linalg.svd(knuckles - knuckles.mean(axis=0))[2][0]
-    half = float(np.abs((knuckles - knuckles.mean(axis=0)) @ aside).max())
+    half, end_half = (
+        float(np.abs((places - places.mean(axis=0)) @ aside).max()) for places in (knuckles, tips)
+    )
     row, end = knuckles.mean(axis=0), tips.mean(axis=0)
     end = end + 0.020 * height * (end - row) / max(float(np.linalg.norm(end - row)), 1e-9)
     base = wrist + 0.35 * (anatomy.positions[thumb] - wrist)
     thick = 0.0115 * height
     steps: list[Slab | Cut] = [
         Slab(joint, wrist, row, 0.0160 * height, thick, 0.0, aside, 0.2 * half, half),
-        Slab(joint, row, end, thick, 0.0085 * height, 0.0, aside, half, 0.75 * half),
+        Slab(joint, row, end, thick, 0.0085 * height, 0.0, aside, half, 0.66 * end_half),
         Slab(joint, base, anatomy.positions[thumb], 0.014 * height, 0.011 * height, 0.012 * height, aside),
     ]
     steps += [

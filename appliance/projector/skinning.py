@@ -100,7 +100,7 @@ def weights_of(
 def _divided(
     share: NDArray[np.float32], within: NDArray[np.float32], part: NDArray[np.intp]
 ) -> NDArray[np.float32]:
-    """The parts' shares (V, P) for their joints (V, C) as `within` says; where it says nothing, the first's."""
+    """The parts' shares (V, P) for their joints (V, C) as `within` says; else for their first joint."""
     weights = np.zeros_like(within)
     for number in range(share.shape[1]):
         columns = np.flatnonzero(part == number)
