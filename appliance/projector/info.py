@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_REMEMBERED = 3600  # pictures: a minute on most displays
+_REMEMBERED = 3600  # pictures whose age counts: a minute on most displays
+_COUNTED = 120  # pictures by which the rate is counted: two seconds
 
 # Five rows of three pixels a letter, one octal digit a row.
 _SIGNS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ.,:-%/()_+"
@@ -62,7 +63,7 @@ class Meter:
     def __init__(self) -> None:
         self.pictures = 0
         self._ages_s: deque[float] = deque(maxlen=_REMEMBERED)
-        self._swaps: deque[float] = deque(maxlen=_REMEMBERED)
+        self._swaps: deque[float] = deque(maxlen=_COUNTED)
 
     def shown(self, swapped: float, left_stage: float | None) -> None:
         """A picture is on the wall since `swapped`; `left_stage` None: it does not show a dance."""
@@ -72,7 +73,7 @@ class Meter:
             self._ages_s.append(swapped - left_stage)
 
     def figures(self) -> Figures:
-        """Over the last minute or so."""
+        """Ages over the last minute or so, the rate over the last two seconds."""
         span_s = self._swaps[-1] - self._swaps[0] if len(self._swaps) > 1 else 0.0
         rate = (len(self._swaps) - 1) / span_s if span_s > 0 else 0.0
         if not self._ages_s:

@@ -38,7 +38,7 @@ class Window:
             self.handle = _create(kind, display, size or config.size)
             self.display_rate = _rate(display)
         except BaseException:
-            sdl2.SDL_Quit()
+            sdl2.SDL_QuitSubSystem(sdl2.SDL_INIT_VIDEO)
             raise
         sdl2.SDL_ShowCursor(sdl2.SDL_DISABLE)
         sdl2.SDL_DisableScreenSaver()
@@ -79,7 +79,7 @@ class Window:
     def close(self) -> None:
         """Give the display back."""
         sdl2.SDL_DestroyWindow(self.handle)
-        sdl2.SDL_Quit()
+        sdl2.SDL_QuitSubSystem(sdl2.SDL_INIT_VIDEO)
 
 
 def last_error() -> str:
@@ -94,7 +94,7 @@ def _start(kind: Kind) -> str:
     complaints = []
     for driver in _drivers(kind):
         sdl2.SDL_SetHintWithPriority(sdl2.SDL_HINT_VIDEODRIVER, driver.encode(), sdl2.SDL_HINT_OVERRIDE)
-        if sdl2.SDL_Init(sdl2.SDL_INIT_VIDEO) == 0:
+        if sdl2.SDL_InitSubSystem(sdl2.SDL_INIT_VIDEO) == 0:
             return driver
         complaints.append(f"{driver}: {last_error()}")
     raise ProjectorError(

@@ -1,0 +1,75 @@
+"""A stage of one's own: writes real shared frames into a runtime folder; and a painter whose pictures tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import moderngl
+import numpy as np
+
+from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.shared_frame import Facts, FrameWriter
+from appliance.pose.skeleton import Skeleton
+from appliance.projector.loop import Looks
+from appliance.projector.moment import Moment
+
+SIZE = (64, 36)
+
+
+def chain(joints: int) -> Skeleton:
+    """Joints one above the other."""
+    offsets = np.tile([0.0, 0.1, 0.0], (joints, 1))
+    offsets[0] = 0.0
+    return Skeleton(tuple(f"joint{k}" for k in range(joints)), tuple(range(-1, joints - 1)), offsets)
+
+
+class StageDouble:
+    """Writes frames of a skeleton with so many joints, for the show in a folder."""
+
+    def __init__(self, folder: Path, show: Path, joints: int = 3) -> None:
+        skeleton = chain(joints)
+        facts = Facts(
+            *(show, None, "A test", skeleton, (1,), ("left-wrist",), ("main",), (), ("plaster",), ()),
+            *(10, 9, 12, 1, 0.0),
+        )
+        self._writer = FrameWriter(folder, facts)
+        self._frame = JointFrame(joints)
+        self._frame.tick = -1
+
+    def write(self, frame_time: float, height: float = 1.0) -> None:
+        """The next frame, all joints at one height."""
+        self._frame.tick += 1
+        self._frame.frame_time = frame_time
+        self._frame.positions[:, 1] = height
+        self._writer.write(self._frame)
+
+    def close(self) -> None:
+        self._writer.close()
+
+
+class TellingPainter:
+    """Fills the picture: red says how high the dancer is, green how many joints, blue how far a look is there."""
+
+    made = 0
+    released = 0
+
+    def __init__(self, gl: moderngl.Context, size: tuple[int, int], skeleton: Skeleton, looks: Looks) -> None:
+        type(self).made += 1
+        self.looks, self.size, self._joints = looks, size, len(skeleton)
+
+    def draw(
+        self, moment: Moment, look: str, look_before: str, mix: float, target: moderngl.Framebuffer
+    ) -> None:
+        target.clear(float(moment.positions[0, 1]), 0.1 * self._joints, mix, 1.0)
+
+    def resize(self, size: tuple[int, int]) -> None:
+        self.size = size
+
+    def release(self) -> None:
+        type(self).released += 1
+
+
+def pixels(screen: moderngl.Framebuffer, size: tuple[int, int] = SIZE) -> np.ndarray:
+    """What is on the display, (height, width, 3), top row first."""
+    raw = np.frombuffer(screen.read(viewport=(0, 0, *size), components=4), np.uint8)
+    return raw.reshape(size[1], size[0], 4)[::-1, :, :3]

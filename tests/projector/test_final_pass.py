@@ -1,0 +1,175 @@
+"""The picture onto the wall, pixel by pixel: corner-pin, mirror, levels, edge blend, grid and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import moderngl
+import numpy as np
+import pytest
+
+from appliance.projector.alignment import Alignment
+from appliance.projector.context import offscreen
+from appliance.projector.controls import Controls
+from appliance.projector.corners import Corners
+from appliance.projector.final_pass import FinalPass, part_of, picture_size
+from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
+from tests.projector.stage_double import pixels
+
+SIZE = (160, 90)
+Show = Callable[..., np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def gl() -> Iterator[moderngl.Context]:
+    with offscreen(SIZE) as context:
+        yield context
+
+
+@pytest.fixture
+def show(gl: moderngl.Context) -> Show:
+    """Show a picture (h, w, 3) of bytes, top row first, and read the display."""
+
+    def shown(
+        picture: np.ndarray,
+        alignment: Alignment | None = None,
+        level: float = 1.0,
+        controls: Controls | None = None,
+        lines: tuple[str, ...] = (),
+        **config: Any,
+    ) -> np.ndarray:
+        final = FinalPass(gl, ProjectorConfig(**config))
+        height, width = picture.shape[:2]
+        final.resize((width, height))
+        opaque = np.dstack([picture, np.full((height, width), 255, np.uint8)])
+        final.picture.color_attachments[0].write(np.ascontiguousarray(opaque[::-1]).tobytes())
+        controls = controls or Controls(alignment or Alignment(), lambda _: None)
+        final.draw(gl.screen, SIZE, controls, level, lines)
+        found = pixels(gl.screen, SIZE)
+        final.release()
+        return found
+
+    return shown
+
+
+def noise(seed: int = 1) -> np.ndarray:
+    return np.random.default_rng(seed).integers(0, 256, (SIZE[1], SIZE[0], 3), np.uint8)
+
+
+def flat(value: int, width: int = SIZE[0]) -> np.ndarray:
+    return np.full((SIZE[1], width, 3), value, np.uint8)
+
+
+def test_without_corner_pin_each_byte_passes_unchanged(show: Show) -> None:
+    assert np.array_equal(show(noise()), noise())
+
+
+def test_mirror_and_upside_down(show: Show) -> None:
+    mirrored = Alignment(mirror=True)
+    assert np.array_equal(show(noise(), mirrored), noise()[:, ::-1])
+    assert np.array_equal(show(noise(), upside_down=True), noise()[::-1, ::-1])
+    assert np.array_equal(show(noise(), mirrored, upside_down=True), noise()[::-1])
+
+
+@pytest.mark.parametrize(
+    "corners", [((20, 10), (150, 4), (140, 80), (8, 70)), ((40, 30), (120, 20), (130, 60), (30, 85))]
+)
+def test_the_pictures_corners_land_on_the_wished_pixels(show: Show, corners: Corners) -> None:
+    pinned: Any = tuple((x / SIZE[0], y / SIZE[1]) for x, y in corners)
+    lit = show(flat(255), Alignment(pinned))[..., 0] > 127
+    depth = depth_inside(corners)
+    clear = np.abs(depth) > 0.01  # pixels: whose centre does not lie on the very edge
+    assert clear.sum() > 0.99 * clear.size
+    assert np.array_equal(lit[clear], depth[clear] > 0)
+
+
+def depth_inside(corners: Corners) -> np.ndarray:
+    """How far within the straight lines between four points each pixel's centre lies, pixels: the oracle."""
+    x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
+    depth = np.full(x.shape, np.inf)
+    for k in range(4):
+        (ax, ay), (bx, by) = corners[k], corners[(k + 1) % 4]
+        across = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+        depth = np.minimum(depth, across / np.hypot(bx - ax, by - ay))
+    return depth
+
+
+def test_straight_lines_stay_straight_on_the_wall(show: Show) -> None:
+    picture = flat(0)
+    picture[:, 100:103] = 255
+    pinned = Alignment(((0.1, 0.1), (0.95, 0.02), (0.9, 0.95), (0.05, 0.8)))
+    light = show(picture, pinned)[..., 0].astype(float)
+    rows = np.flatnonzero(light.sum(axis=1) > 200)
+    middles = (light[rows] @ np.arange(SIZE[0])) / light[rows].sum(axis=1)
+    slope, start = np.polyfit(rows, middles, 1)
+    assert len(rows) > 50 and abs(slope) > 0.005
+    assert np.abs(middles - (start + slope * rows)).max() < 0.35
+
+
+def test_level_and_brightness_multiply(show: Show) -> None:
+    found = show(flat(200), Alignment(brightness=0.5), level=0.5).astype(float)
+    assert abs(found.mean() - 50) < 0.6 and np.ptp(found) <= 1
+    assert (show(flat(200), Alignment(brightness=2.0)) == 255).all()
+
+
+def test_dark_steps_are_broken_up_and_black_stays_black(show: Show) -> None:
+    dim = show(flat(200), level=0.1525)
+    assert set(np.unique(dim)) == {30, 31}
+    assert not show(flat(0), level=0.3).any()
+    assert not show(noise(), level=0.0).any()
+
+
+def test_gamma_lifts_the_dark_tones_and_keeps_black_and_white(show: Show) -> None:
+    assert abs(show(flat(64), gamma=2.0).mean() - 255 * (64 / 255) ** 0.5) < 0.6
+    assert (show(flat(255), gamma=2.0) == 255).all() and not show(flat(0), gamma=2.0).any()
+
+
+@pytest.mark.parametrize("overlap", [0.1, 0.25, 0.5])
+def test_two_blended_projectors_light_the_wall_evenly(show: Show, overlap: float) -> None:
+    sides = []
+    for part in ("left", "right"):
+        blend = EdgeBlendConfig(part=part, overlap=overlap, gamma=2.2)
+        width, _ = picture_size(ProjectorConfig(edge_blend=blend), SIZE)
+        sides.append(show(flat(220, width), edge_blend=blend)[45, :, 0] / 255)
+    shared = round(overlap * SIZE[0])
+    left, right = (side**2.2 for side in sides)
+    wall = np.concatenate([left[:-shared], left[-shared:] + right[:shared], right[shared:]])
+    assert wall == pytest.approx((220 / 255) ** 2.2, abs=0.02)
+
+
+def test_each_blended_projector_shows_its_part(show: Show) -> None:
+    blends = [EdgeBlendConfig(part=part, overlap=0.25) for part in ("left", "right")]
+    width, height = picture_size(ProjectorConfig(edge_blend=blends[0]), SIZE)
+    assert (width, height) == (280, 90)
+    ramp = np.repeat(np.linspace(0, 250, width)[None, :, None], 3, axis=2).repeat(height, 0).astype(np.uint8)
+    left, right = (show(ramp, edge_blend=blend)[45, :, 0] for blend in blends)
+    assert np.abs(left[:110].astype(int) - ramp[0, :110, 0]).max() <= 2
+    assert np.abs(right[50:].astype(int) - ramp[0, 170:, 0]).max() <= 2
+    assert part_of(None).width == 1.0
+
+
+def test_grid_corner_mark_and_figures_only_on_demand(show: Show) -> None:
+    assert not show(flat(0)).any()
+    controls = Controls(Alignment(), lambda _: None)
+    controls.set_grid(True)
+    grid = show(flat(0), controls=controls)
+    assert 0.05 < (grid[..., 0] > 100).mean() < 0.6
+    controls.set_grid(False)
+    controls.choose(2)
+    marked = show(flat(0), controls=controls)
+    assert (marked != grid).any(axis=-1)[-40:, -40:].any()
+    assert not (marked != grid).any(axis=-1)[:40, :40].any()
+    figures = show(flat(0), lines=("60.0 pictures/s",))
+    assert figures[:12].any() and not figures[12:].any()
+
+
+def test_the_grid_of_two_projectors_meets(show: Show) -> None:
+    """Where both light the wall they show the same line."""
+    controls = Controls(Alignment(), lambda _: None)
+    controls.set_grid(True)
+    columns = []
+    for part in ("left", "right"):
+        blend = EdgeBlendConfig(part=part, overlap=0.5)
+        columns.append(show(flat(0, 240), controls=controls, edge_blend=blend)[..., 0])
+    assert np.abs(columns[0][:, 80:].astype(int) - columns[1][:, :80]).max() <= 2
