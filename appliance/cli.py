@@ -9,6 +9,7 @@ from importlib.metadata import version as distribution_version
 from pathlib import Path
 from typing import Annotated
 
+from appliance.control.lifeline import hold_lifeline
 from appliance.stage.realtime import prepare_environment
 
 prepare_environment()
@@ -50,11 +51,28 @@ def play(
     filmstrip: Annotated[
         Path | None, typer.Option(help="At the end draw what was danced into this PNG.")
     ] = None,
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Start neither show control nor lights: they run by themselves.")
+    ] = False,
+    window: Annotated[bool, typer.Option("--window", help="Show the projection in a window.")] = False,
 ) -> None:
     """Dance: sensors in, joints out, 50 times a second, until Ctrl-C."""
     from appliance.commands.play import play_show
 
-    raise typer.Exit(play_show(show, box, seconds, emulate, journal, filmstrip))
+    raise typer.Exit(play_show(show, box, seconds, emulate, journal, filmstrip, alone, window))
+
+
+@app.command()
+def control(
+    box: BoxFile = None,
+    socket_fd: Annotated[
+        int | None, typer.Option(min=3, help="The control port's socket, where it was opened already.")
+    ] = None,
+) -> None:
+    """Take commands by OSC (go, stop, panic, cues ...), also while the stage hangs or is not there."""
+    from appliance.commands.control import control_box
+
+    control_box(box, socket_fd)
 
 
 @app.command()
@@ -122,6 +140,7 @@ def version() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command; errors that people can mend are one clear line and exit status 2."""
+    hold_lifeline()
     given = list(sys.argv[1:] if arguments is None else arguments)
     if not given or given[0] not in _own_commands():
         plug_in(app, entry_points(group=PLUG_INS), lambda words: print(words, file=sys.stderr))

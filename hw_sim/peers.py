@@ -70,6 +70,7 @@ def write_box_file(setting: Setting, folder: Path, ports: tuple[int, int, int], 
         "outputs": {"osc": [{"host": HOST, "port": frames, "dialect": "ai-toolbox", "frame_message": True}]},
         "control": {"host": HOST, "port": control},
         "journal": {},
+        "runtime": str(folder / "runtime"),
         **own,
     }
     path = folder / "box.yaml"

@@ -13,9 +13,11 @@ from typing import Any, get_type_hints
 
 from pythonosc.osc_message import OscMessage
 
+from appliance.control.desk import SENSORS_REPLY as REPLY
+from appliance.control.packet import Message, datagram, readable
+from appliance.control.port import Address
+from appliance.control.roster import END, SENSOR, RosterLine
 from appliance.show.box import BoxConfig
-from appliance.stage.control import REPLY, Address, datagram, readable
-from appliance.stage.roster import END, SENSOR, Message, RosterLine
 
 PATIENCE_S = 2.0  # a tick takes the command, a thread answers: 0.2 s, and more while a box starts
 _LARGEST_DATAGRAM = 4096

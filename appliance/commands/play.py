@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import shutil
+import socket
+import sys
 import tempfile
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 
+from appliance.commands.companions import Companion, Companions
+from appliance.commands.control import control_command, open_control_port
 from appliance.commands.emulation import Emulation
+from appliance.control.house import forget_house
+from appliance.control.speaker import Speaker
+from appliance.outputs.runtime_folder import runtime_folder
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
-from appliance.show.show import load_show
+from appliance.show.show import Show, load_show
 from appliance.stage.cast import reach
 from appliance.stage.run import Stage, stop_signals
-from appliance.control.speaker import Speaker
 
 _PICTURED_S = 10.0
 _NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
@@ -36,8 +43,13 @@ def play_show(
     emulate: bool,
     journal: Path | None,
     filmstrip: Path | None,
+    alone: bool = False,
+    window: bool = False,
 ) -> int:
-    """Dance until the seconds are over or a signal comes; the exit status."""
+    """Dance until the seconds are over or a signal comes; the exit status.
+
+    alone: start no companions. window: show the projection in a window.
+    """
     show, box = load_show(directory or default_show_path()), load_box(box_file)
     with ExitStack() as opened:
         stopped = opened.enter_context(stop_signals())
@@ -52,13 +64,18 @@ def play_show(
             box = _with_short_journal(box)
         speaker = Speaker()
         opened.callback(speaker.close)
-        stage = Stage(show, box, journal, speaker.say)
-        try:
-            for line in _introduction(stage, emulate):
+        control = None if alone or box.control is None else open_control_port(box.control)
+        if control is not None:
+            opened.callback(control.close)
+        stage = Stage(show, box, journal, speaker.say, box_file)
+        with closing(stage):
+            for line in _introduction(stage, emulate, control):
                 speaker.say(line)
-            stage.dance(seconds, stopped)
-        finally:
-            stage.close()
+            company = () if alone else tuple(_company(show, box, box_file, control, window))
+            with Companions(company, speaker.say, lambda: stage.health.ticks > 0):
+                stage.dance(seconds, stopped)
+        if not alone:
+            forget_house(runtime_folder(box))
         for line in _conclusion(stage):
             speaker.say(line)
         if filmstrip is not None and journal is not None:
@@ -69,14 +86,42 @@ def play_show(
     return 0
 
 
-def _introduction(stage: Stage, emulate: bool) -> list[str]:
+def _company(
+    show: Show, box: BoxConfig, box_file: Path | None, control: socket.socket | None, window: bool
+) -> Iterator[Companion]:
+    """Who accompanies the stage."""
+    if control is not None:
+        yield Companion(
+            "Show control",
+            control_command(box, control.fileno()),
+            "What is in force stays in force; commands wait for a moment.",
+            descriptors=(control.fileno(),),
+        )
+    named = () if box_file is None else ("--box", str(box_file))
+    bunraku = (sys.executable, "-m", "appliance.cli")
+    if box.outputs.dmx and show.config.lights.fixtures:
+        yield Companion(
+            "The process for the lights",
+            (*bunraku, "lights", *named),
+            "The lights stay as they are for a moment.",
+        )
+    if window:
+        yield Companion(
+            "The projector",
+            (*bunraku, "project", *named, "--window"),
+            "The picture is black for a moment.",
+            may_close=True,
+        )
+
+
+def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) -> list[str]:
     show = stage.show
     hands = ", ".join(f"{hand.sensor or hand.kind} holds {hand.joint}" for hand in show.config.hands)
     receivers = ", ".join(receiver.name for receiver in stage.cast.outputs.receivers) or "nobody"
     lines = [
         f"{show.config.name}: {hands or 'no hands, the dancer moves freely'}.",
         f"The dance goes to {receivers}.",
-        _ears(stage),
+        _ears(stage, control),
         stage.admission.sentence(),
     ]
     lines += stage.cast.complaints
@@ -85,11 +130,10 @@ def _introduction(stage: Stage, emulate: bool) -> list[str]:
     return lines
 
 
-def _ears(stage: Stage) -> str:
+def _ears(stage: Stage, control: socket.socket | None) -> str:
     """Where sensors and commands are heard."""
     sensors = ", ".join(intake.name for intake in stage.cast.link.intakes) or "no port"
-    control = stage.box.control
-    commands = f"{control.host}:{stage.control.port}" if control is not None and stage.control else "no port"
+    commands = ":".join(map(str, control.getsockname())) if control is not None else "no port"
     return f"Sensors are heard on {sensors}, commands on {commands}."
 
 
@@ -101,8 +145,6 @@ def _conclusion(stage: Stage) -> list[str]:
     ]
     if stage.cast.worn:
         lines.append(_readings(stage.cast.link.counts))
-    if stage.control is not None and stage.control.refused:
-        lines.append(f"Commands: {stage.control.refused} refused, the last one: {stage.control.reason}")
     return lines
 
 

@@ -147,7 +147,7 @@ class Desk:
         def then(done: bool, words: str) -> None:
             if done:
                 self._set(in_cue(self.house, cue, now))
-            self._end(asker, "/cue", done, words or f"Cue {name}.")
+            self._end(asker, "/cue", done, f"Cue {name}. {words}".rstrip() if done else words)
 
         self._errands.begin("stage", Order("cue", text=name), now, then)
 
@@ -185,7 +185,7 @@ class Desk:
         if not done:
             self._refuse(words)
         reply = SENSORS_REPLY if address.startswith("/sensors/") else REPLY
-        self._tell(asker, (reply, address, int(done), words))
+        self._tell(asker, (reply, address, int(done), words or "Done."))
 
     def _refuse(self, reason: str) -> None:
         self.refused += 1

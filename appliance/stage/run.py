@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from appliance.control.orders import Order
+from appliance.control.house import HouseReader
+from appliance.control.orders import Order, OrderInbox
 from appliance.sensor.link import SensorState
 from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig
@@ -15,19 +16,19 @@ from appliance.show.show import Show
 from appliance.stage.budget import Admission
 from appliance.stage.cast import Cast, Iterations, admission, assemble
 from appliance.stage.clock import Slot, TickClock
-from appliance.stage.control import Control
 from appliance.stage.health import Health
 from appliance.stage.journal import JUMPED, LATE, NOT_FINITE, Journal, JournalError
-from appliance.stage.obey import SENSOR_ORDERS, obey, obey_for_sensors
+from appliance.stage.obey import SENSOR_ORDERS, obey, obey_for_sensors, resume
 from appliance.stage.phase_lock import PhaseLock
 from appliance.stage.realtime import enter_realtime, leave_realtime
-from appliance.stage.roster import Roster
+from appliance.stage.roster import roster_lines
+from appliance.stage.sharing import Sharing, facts_of
 from appliance.stage.stage_error import StageError
 from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
 from appliance.stage.wearing import Wearing
 
-_COMMANDS_A_TICK = 4
+_ORDERS_A_TICK = 4  # show control sends no more in that time
 _WARM_UP_MARGIN_MS = 0.5
 _LONGEST_WARM_UP_MS = 3.0  # a network this heavy comes from memory each time: warming it up gains nothing
 _FORGET_PHASE_S = 5.0  # a sensor silent for longer may come back anywhere: the phase is learnt anew
@@ -36,18 +37,25 @@ _FORGET_PHASE_S = 5.0  # a sensor silent for longer may come back anywhere: the 
 class Stage:
     """A show ready to dance, all ports open. Raises StageError or ConfigError before anything dances."""
 
-    def __init__(self, show: Show, box: BoxConfig, journal: Path | None, say: Callable[[str], None]) -> None:
-        self.show, self.box, self.say = show, box, say
+    def __init__(
+        self,
+        show: Show,
+        box: BoxConfig,
+        journal: Path | None,
+        say: Callable[[str], None],
+        box_file: Path | None = None,
+    ) -> None:
+        self.show, self.box, self.say, self.box_file = show, box, say, box_file
         self.health = Health()
         with ExitStack() as opened:
+            self.sharing = Sharing(box)
+            opened.callback(self.sharing.close)
             self.memory = SensorMemory(box.state_folder, say)
             opened.callback(self.memory.close)
-            self.cast: Cast = assemble(show, box, self.memory.profiles)
+            self.cast: Cast = assemble(show, box, self.memory.profiles, box_file)
             opened.callback(self.cast.close)
-            self.roster = Roster(str(box.sensors.keys or ""))
-            self.control = _open_control(box, self.roster)
-            if self.control is not None:
-                opened.callback(self.control.close)
+            self.inbox = _open_inbox(self.sharing.folder)
+            opened.callback(self.inbox.close)
             self.journal = self._open_journal(journal)
             if self.journal is not None:
                 opened.callback(self.journal.close)
@@ -64,6 +72,7 @@ class Stage:
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         self.lock = PhaseLock() if box.phase_lock and self.cast.primary else None
         self.watch = Watch(self.cast)
+        self._resume()
 
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
         """Tick until `stopped` says so or the seconds are over; this thread is the real-time one."""
@@ -88,7 +97,9 @@ class Stage:
         shift_s = 0.0
         begun = clock.now()
         self.health.begin(begun)
-        self._look_at_sensors(begun)
+        facts = facts_of(self.show, self.box_file, self.iterations, begun)
+        self.sharing.begin(self.cast, facts, self.say)
+        self._tell(begun)
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self.tick.run(slot)
@@ -142,38 +153,53 @@ class Stage:
         return self.lock.shift_s(slot.deadline)
 
     def _obey(self, now: float) -> None:
-        if self.control is None:
-            return
-        for _ in range(_COMMANDS_A_TICK):
-            command = self.control.take()
-            if command is None:
-                return
-            order = Order(command.name, command.values, command.sensor or command.joint, command.keys)
-            if order.name in SENSOR_ORDERS:
-                done, words = obey_for_sensors(order, self.cast, self.wearing, now)
-                self._look_at_sensors(now)
-                self.control.answer(command, done, words)
-            else:
-                done, words = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
-            if words:
-                self.say(words)
+        """Carry out what show control has asked for meanwhile, and tell it what came of that."""
+        done: list[tuple[Order, bool, str]] = []
+        while len(done) < _ORDERS_A_TICK and (order := self.inbox.take(now)) is not None:
+            done.append((order, *self._carry_out(order, now)))
+        if any(not order.quiet for order, _, _ in done):
+            self._tell(now)  # whoever asks next hears of it
+        for answer in done:
+            self.inbox.answer(*answer)
 
-    def _look_at_sensors(self, now: float) -> list[SensorState]:
-        """How the sensors are, also for whoever asks over the control port."""
+    def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
+        if order.name in SENSOR_ORDERS:
+            return obey_for_sensors(order, self.cast, self.wearing, now)
+        done, words = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
+        if words:
+            self.say(words)
+        return done, words
+
+    def _resume(self) -> None:
+        """After a crash: go on in the cue that is in force."""
+        with closing(HouseReader(self.sharing.folder)) as house:
+            words = resume(house.read().cue, self.cast, self.iterations)
+        if words:
+            self.say(words)
+
+    def _tell(self, now: float) -> list[SensorState]:
+        """How the box is, for whoever reads the shared frame; gives how the sensors are."""
         states = self.cast.link.states(now)
-        self.roster.refresh(states, self.wearing.neutral_of, now)
+        roster = roster_lines(states, self.wearing.neutral_of)
+        age_s, locked = self._sensor_age_s(now), self._is_locked
+        self.sharing.tell(now, self.health, self.cast, self.iterations, age_s, locked, roster)
         return states
+
+    def _sensor_age_s(self, now: float) -> float | None:
+        """None: the show has no sensor."""
+        primary = self.cast.primary
+        return None if primary is None else self.cast.worn[primary][0].silent_s(now)
+
+    @property
+    def _is_locked(self) -> bool:
+        return self.lock is not None and self.lock.locked
 
     def _report(self, now: float) -> None:
         """Once a second, after the frame has left."""
-        age_s = None
-        if self.cast.primary is not None:
-            age_s = self.cast.worn[self.cast.primary][0].silent_s(now)
-        locked = self.lock is not None and self.lock.locked
         times = self.iterations
-        self.say(self.health.line(now, times.coding, times.interaction, age_s, locked))
-        sensors = self._look_at_sensors(now)
-        for sentence in self.watch.news(now, sensors):
+        self.health.look(now)
+        self.say(self.health.line(times.coding, times.interaction, self._sensor_age_s(now), self._is_locked))
+        for sentence in self.watch.news(now, self._tell(now)):
             self.say(sentence)
         for imu_id, offsets in self.cast.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)
@@ -205,15 +231,11 @@ def stop_signals() -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
 
 
-def _open_control(box: BoxConfig, roster: Roster) -> Control | None:
-    control = box.control
-    if control is None:
-        return None
+def _open_inbox(folder: Path) -> OrderInbox:
     try:
-        return Control(control.host, control.port, roster, box.sensors.keys)
+        return OrderInbox(folder, "stage")
     except OSError as error:
         raise StageError(
-            f"UDP port {control.port} on {control.host} cannot be opened for commands ({error.strerror}). "
-            "Nothing dances. Is a second bunraku running? Stop it, or give another port under control: "
-            "in the box file, or `control: null` for none."
+            f"{folder}: no socket for show control's orders can be made ({error.strerror}). Nothing dances. "
+            "Give another folder as `runtime:` in the box file."
         ) from error

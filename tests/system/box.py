@@ -103,6 +103,8 @@ def playing(
             "sensors": {"udp": {"host": HOST, "port": sensors}, "keys": "sensors.keys"},
             "outputs": {"osc": [*more_receivers, frames]},
             "control": {"host": HOST, "port": control},
+            "runtime": "runtime",
+            "runtime": "runtime",
         }
         for section, values in (settings or {}).items():
             box[section] = {**box.get(section, {}), **values} if section == "sensors" else values

@@ -1,0 +1,78 @@
+"""`bunraku control`: opens the control port as the box file says, and becomes show control."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+from pathlib import Path
+
+from appliance.control.port import open_port
+from appliance.control.settings import Settings
+from appliance.outputs.runtime_folder import RuntimeFolderError, runtime_folder
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.control import ControlConfig
+from appliance.stage.stage_error import StageError
+
+_FIRST_OF_SYSTEMD = 3  # sd_listen_fds(3)
+
+
+def control_box(box_file: Path | None, descriptor: int | None) -> None:
+    """Never returns: this process becomes one that has loaded nothing that show control does not need.
+
+    `descriptor`: the port's socket where somebody has opened it already. Raises StageError, ConfigError.
+    """
+    box = load_box(box_file)
+    if box.control is None:
+        raise StageError(
+            "This box file says `control: null`, so nobody commands this box. Write `control: {port: 9002}`."
+        )
+    if descriptor is None:
+        descriptor = _from_systemd()
+    if descriptor is None:
+        descriptor = open_control_port(box.control).detach()
+    os.set_inheritable(descriptor, True)
+    command = control_command(box, descriptor)
+    os.execv(command[0], command)
+
+
+def open_control_port(control: ControlConfig) -> socket.socket:
+    """The port's socket, bound. Raises StageError with what to do when it is taken."""
+    try:
+        return open_port(control.host, control.port)
+    except OSError as error:
+        raise StageError(
+            f"UDP port {control.port} on {control.host} cannot be opened for commands ({error.strerror}). "
+            "Nothing dances. Is a second bunraku running? Stop it, or give another port under control: "
+            "in the box file, or `control: null` for none."
+        ) from error
+
+
+def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
+    """How to start show control for a box whose port is open; `box.control` is there. Raises StageError."""
+    control = box.control or ControlConfig()
+    try:
+        folder = runtime_folder(box)
+    except RuntimeFolderError as error:
+        raise StageError(str(error)) from error
+    settings = Settings(
+        folder=str(folder),
+        descriptor=descriptor,
+        senders=tuple(control.senders),
+        heartbeat=tuple((one.host, one.port) for one in control.heartbeat),
+        key_file=str(box.sensors.keys or ""),
+    )
+    return sys.executable, "-m", "appliance.control", settings.packed()
+
+
+def _from_systemd() -> int | None:
+    """The socket that a socket unit has opened for this process."""
+    ours = os.environ.get("LISTEN_PID") == str(os.getpid()) and os.environ.get("LISTEN_FDS", "0") != "0"
+    if not ours:
+        return None
+    one = socket.socket(fileno=_FIRST_OF_SYSTEMD)
+    kind = one.family, one.type
+    one.detach()
+    if kind != (socket.AF_INET, socket.SOCK_DGRAM):
+        raise StageError("The socket unit's first socket is not UDP over IPv4. Write ListenDatagram= in it.")
+    return _FIRST_OF_SYSTEMD
