@@ -66,8 +66,8 @@ class MotionConfig(Section):
     phrases: dict[str, BundleFile] = Field(
         default_factory=dict,
         max_length=32,
-        description="Further phrases, each with the name that cues and `/phrase` call it by, like "
-        "`quiet: quiet.bvh`. They are played from their start to their end.",
+        description="Further phrases of the same skeleton, each with the name that cues and `/phrase` call "
+        "it by, like `quiet: quiet.bvh`. They are played from their start to their end.",
     )
     start_s: float = Field(
         default=0.0, ge=0, le=86400, description="Where in `phrase` the excerpt starts, in seconds."

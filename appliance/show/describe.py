@@ -75,7 +75,9 @@ def _one_kind(annotation: Any) -> str:
         words = ["true" if word is True else str(word) for word in get_args(annotation)]
         return words[0] if len(words) == 1 else f"one of {', '.join(words)}"
     if get_origin(annotation) is tuple:
-        return f"{len(get_args(annotation))} numbers in brackets"
+        parts = get_args(annotation)
+        what = "words" if get_origin(parts[0]) is Literal else "numbers"
+        return f"{len(parts)} {what} in brackets"
     if get_origin(annotation) is list:
         return "a list"
     if get_origin(annotation) is dict:

@@ -143,10 +143,11 @@ class LightsConfig(Section):
         for place, mapping in enumerate(mappings):
             if mapping.name in names[:place]:
                 raise refusal(f"Two mappings are called '{mapping.name}'.", "Give one another name.", place)
-            for rule in mapping.rules:
+            for number, rule in enumerate(mapping.rules):
                 fault = _misfit(rule, info.data.get("fixtures"), _directory(info))
                 if fault is not None:
-                    raise refusal(f"In the mapping '{mapping.name}': {fault[0]}", fault[1], at=place)
+                    words = f"In the mapping '{mapping.name}': {fault[0]}"
+                    raise refusal(words, fault[1], at=(place, "rules", number))
         return mappings
 
     @field_validator("safe")

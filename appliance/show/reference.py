@@ -34,13 +34,39 @@ dancer:
   coding_iterations: 10       # more: away from the phrase, towards the dancer's habits
   interaction_iterations: 9   # the last pass is free, so nothing mirrors the hand
 motion:
-  crossfade_s: 0.5
+  phrase: phrase.bvh          # the show starts with it; cues call it main
+  phrases:
+    quiet: quiet.bvh
 hands:
   - sensor: left-wrist
     joint: lShldr
   - turning: {axis: [0, 1, 0], seconds_per_turn: 5}
     joint: head
     weight: 0.5
+looks:                        # the first one is shown at the start
+  - name: marble
+    style: plaster
+    figure: '#f2e6d8'
+    camera: {move: orbit, period_s: 120}
+  - {name: wires, style: lines}
+lights:
+  fixtures:
+    - {name: spot left, profile: moving-spot, universe: 1, address: 1, place: [2, 4, 3]}
+    - {name: wash, profile: led-par, universe: 1, address: 101, place: [0, 4, 2]}
+  mappings:                   # the first set is in force at the start
+    - name: warm
+      rules:
+        - {reads: place, joint: lShldr, drives: aim, fixtures: [spot left]}
+        - {reads: speed, drives: dimmer, attack_s: 0.1, release_s: 1.5}
+cues:                         # /cue storm, or /cue alone for the next one
+  - name: storm
+    phrase: main
+    iterations: [10, 9]
+    hands: [lShldr]           # its hand holds; the other one lets go
+    look: wires
+    lights: warm
+    fade_s: 4
+  - {name: end, phrase: quiet, hands: [], master: 0.2, fade_s: 10}
 ```
 """
 
@@ -53,6 +79,17 @@ outputs:
   osc:
     - {host: 192.168.0.20, port: 9004, dialect: ai-toolbox}
     - {host: 192.168.0.21, port: 39539, dialect: vmc}
+  posistagenet:
+    - {interface: 192.168.0.10, joints: [head, lHand, rHand]}
+  dmx:
+    - {universe: 1, wire: sacn, interface: 192.168.0.10}
+    - {universe: 2, wire: usb-pro, device: /dev/ttyUSB0}
+control:
+  host: 0.0.0.0
+  senders: [192.168.0.30]     # the lighting desk; beside it, only this machine is heard
+  heartbeat: [{host: 192.168.0.30}]
+projector:
+  mirror: true                # it stands behind the screen
 ```
 """
 

@@ -19,8 +19,10 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
-def refusal(message: str, cure: str, at: str | int | None = None) -> PydanticCustomError:
-    """An error for validators to raise; `at` names the key below the validated one where it stands."""
+def refusal(
+    message: str, cure: str, at: str | int | tuple[str | int, ...] | None = None
+) -> PydanticCustomError:
+    """An error for validators to raise; `at`: the key (or keys) below the validated one where it stands."""
     return PydanticCustomError("refused", "{message}", {"message": message, "cure": cure, "at": at})
 
 

@@ -130,7 +130,7 @@ class ShowConfig(Section):
         default_factory=list,
         max_length=32,
         description="How the projection looks; the first one is shown at the start. "
-        "[]: the four built-in looks, under the names of their styles.",
+        "[]: the built-in looks, under the names of their styles.",
     )
     lights: LightsConfig = Field(default_factory=LightsConfig, description=str(LightsConfig.__doc__))
     cues: list[CueConfig] = Field(

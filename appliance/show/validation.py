@@ -28,9 +28,9 @@ def _problem(model: type[Section], file: YamlFile, error: ErrorDetails) -> Probl
     location: Location = tuple(error["loc"])
     context: dict[str, Any] = error.get("ctx", {})
     if error["type"] == "refused":
-        at = context["at"]
-        below = location if at is None else (*location, at)
-        return Problem(file.path, file.line(below), context["message"], context["cure"])
+        at = context["at"] if context["at"] is not None else ()
+        below = at if isinstance(at, tuple) else (at,)
+        return Problem(file.path, file.line((*location, *below)), context["message"], context["cure"])
     message, cure = _words(model, location, error)
     return Problem(file.path, file.line(location), message, cure)
 
