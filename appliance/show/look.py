@@ -46,7 +46,7 @@ class CameraConfig(Section):
         default=24.0,
         ge=-180,
         le=180,
-        description="From where it looks: 0 from the front of the stage (+z), 90 from the figure's left (+x).",
+        description="From where it looks: 0 from the front (+z), 90 from the left of the figure (+x).",
     )
     elevation_deg: float = Field(
         default=7.0, ge=-3, le=70, description="How steeply it looks down: 0 from the height of the chest."
@@ -117,6 +117,6 @@ class LookConfig(Section):
 
 
 def looks_by_name(looks: Sequence[LookConfig]) -> dict[str, LookConfig]:
-    """The show's looks in their order, by name; without any the built-in ones by the names of their styles."""
+    """The looks in their order, by name; without any the built-in ones by the names of their styles."""
     chosen = looks or [LookConfig(name=style, style=style) for style in STYLES]
     return {look.name: look for look in chosen}

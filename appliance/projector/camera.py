@@ -1,0 +1,119 @@
+"""The camera: slow moves as a function of time, that go along with the dancer and never lose a hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from appliance.pose.quaternion import Array
+from appliance.projector.poses import ROWS, Poses
+from appliance.show.look import CameraConfig
+
+AIM = 0.5  # height that the camera looks at, in figure heights
+ROOM = 0.86  # of the half picture that joints may use; the rest is for the flesh around them
+KNEE = 8  # how suddenly the camera draws back when a joint comes near the edge: higher is later
+NEAR, FAR = 0.2, 30.0  # figure heights
+
+_AGES = (np.arange(ROWS) + 0.5) / ROWS
+_SMOOTH = np.sin(np.pi * _AGES) ** 2 / np.sum(np.sin(np.pi * _AGES) ** 2)  # 0.6 s behind, without a jolt
+_RECENT = np.cos(0.5 * np.pi * np.arange(ROWS) / ROWS) ** 2
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the camera stands, in figure heights; right, up and back are its axes; slopes: half the picture's
+    width and height at distance 1; ground (2,): x and z of where the dancer has lately been."""
+
+    eye: Array
+    right: Array
+    up: Array
+    back: Array
+    slopes: tuple[float, float]
+    ground: Array
+    azimuth: float
+
+    @property
+    def projection(self) -> Array:
+        """(4, 4) from figure heights to clip space, for column vectors."""
+        axes = np.stack([self.right, self.up, self.back])
+        look = np.eye(4)
+        look[:3, :3], look[:3, 3] = axes, -axes @ self.eye
+        lens = np.zeros((4, 4))
+        lens[0, 0], lens[1, 1] = 1 / self.slopes[0], 1 / self.slopes[1]
+        lens[2, 2], lens[2, 3] = (FAR + NEAR) / (NEAR - FAR), 2 * FAR * NEAR / (NEAR - FAR)
+        lens[3, 2] = -1.0
+        return np.asarray(lens @ look)
+
+
+@dataclass(frozen=True)
+class _Stand:
+    """What a CameraConfig says at one time."""
+
+    azimuth: float
+    elevation: float
+    lens: float
+    figure: float
+    follow: float
+
+
+def view(
+    config: CameraConfig, before: CameraConfig, mix: float, time_s: float, poses: Poses, aspect: float
+) -> View:
+    """The camera at time_s for a picture of width / height `aspect`; mix 0: as in `before`, 1: as in `config`."""
+    stand = _between(_stand(before, time_s), _stand(config, time_s), mix * mix * (3 - 2 * mix))
+    slope = float(np.tan(stand.lens / 2))
+    slopes = (slope * aspect, slope) if aspect >= 1 else (slope, slope / aspect)
+    distance = 0.5 / (stand.figure * slope)
+    across = np.array([np.cos(stand.azimuth), 0.0, -np.sin(stand.azimuth)])
+    towards = np.array([np.sin(stand.azimuth), 0.0, np.cos(stand.azimuth)])
+    centre = (_SMOOTH[:, None] * poses.positions[:, 0]).sum(axis=0) * [1.0, 0.0, 1.0]
+    left_behind = (1 - stand.follow) * centre
+    side, depth = float(left_behind @ across), float(left_behind @ towards)
+    aim = centre - across * _limited(side, max(0.1, distance * slopes[0] - 0.55))
+    aim = aim - towards * _limited(depth, 0.3 * distance) + [0.0, AIM, 0.0]
+    back = towards * np.cos(stand.elevation) + np.array([0.0, np.sin(stand.elevation), 0.0])
+    up = np.cross(back, across)
+    seen = (poses.positions.astype(float) - aim) @ np.stack([across, up, back]).T
+    distance *= _drawn_back(seen, distance, slopes)
+    return View(aim + distance * back, across, up, back, slopes, centre[[0, 2]], stand.azimuth)
+
+
+def _stand(config: CameraConfig, time_s: float) -> _Stand:
+    turn = 2 * np.pi * time_s / config.period_s
+    azimuth, elevation = np.radians(config.angle_deg), np.radians(config.elevation_deg)
+    if config.move == "orbit":
+        azimuth += turn
+    elif config.move == "drift":
+        azimuth += np.radians(config.sweep_deg) * np.sin(turn)
+        elevation += np.radians(0.12 * config.sweep_deg) * np.sin(0.618 * turn)
+    return _Stand(float(azimuth), float(elevation), np.radians(config.lens_deg), config.figure, config.follow)
+
+
+def _between(a: _Stand, b: _Stand, share: float) -> _Stand:
+    """From one stand to another, the short way round."""
+    way = (b.azimuth - a.azimuth + np.pi) % (2 * np.pi) - np.pi
+
+    def mixed(first: float, second: float) -> float:
+        return first + share * (second - first)
+
+    return _Stand(
+        a.azimuth + share * way,
+        mixed(a.elevation, b.elevation),
+        mixed(a.lens, b.lens),
+        mixed(a.figure, b.figure),
+        mixed(a.follow, b.follow),
+    )
+
+
+def _limited(value: float, limit: float) -> float:
+    return limit * float(np.tanh(value / limit))
+
+
+def _drawn_back(seen: Array, distance: float, slopes: tuple[float, float]) -> float:
+    """By how much the distance must grow; seen: (ROWS, J, 3) right, up, towards the camera from the aim."""
+    ahead = np.maximum(distance - seen[..., 2], 0.2 * distance)
+    wide = np.abs(seen[..., 0]) / (ahead * slopes[0] * ROOM)
+    high = np.abs(seen[..., 1]) / (ahead * slopes[1] * ROOM)
+    need = float(np.max(_RECENT * np.maximum(wide, high).max(axis=1)))
+    return float((1.0 + need**KNEE) ** (1.0 / KNEE))

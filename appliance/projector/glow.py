@@ -1,0 +1,77 @@
+"""Glow: light that spills around what is bright, reckoned in small pictures; and the dark room around it."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from appliance.projector.drawing import Drawing
+from appliance.projector.looks.palette import Palette
+from appliance.projector.scene import Easel, Scene
+from appliance.projector.targets import Target
+from appliance.show.look import LookConfig
+
+NEAR, FAR = 180, 48  # lines of the glow's pictures
+
+
+class Glow:
+    """The last step of the looks that are light in the dark."""
+
+    def __init__(self, easel: Easel) -> None:
+        self._easel = easel
+        self._shrink = Drawing(easel.ctx, "screen", "glow_shrink")
+        self._blur = Drawing(easel.ctx, "screen", "glow_blur")
+        self._finish = Drawing(easel.ctx, "air", "light_finish")
+
+    def spread(self, picture: Target, name: str, lines: int) -> Target:
+        """A small, soft copy of a picture."""
+        easel = self._easel
+        easel.ctx.enable_only(moderngl.NOTHING)
+        size = (max(2, round(picture.size[0] * lines / picture.size[1])), lines)
+        first, second = easel.canvas(name, size), easel.canvas(name + " half", size)
+        first.start()
+        texel = (0.25 / size[0], 0.25 / size[1])
+        self._shrink.draw(easel.tally, vertices=3, source=picture.texture, texel=texel)
+        for source, into, step in ((first, second, (1 / size[0], 0.0)), (second, first, (0.0, 1 / size[1]))):
+            into.start()
+            self._blur.draw(easel.tally, vertices=3, source=source.texture, step_uv=step)
+        return first
+
+    def finish(
+        self,
+        scene: Scene,
+        look: LookConfig,
+        colours: Palette,
+        picture: Target,
+        opacity: float,
+        target: moderngl.Framebuffer,
+    ) -> None:
+        """Lay the picture with its glow over what is in the target."""
+        near = self.spread(picture, "near glow", NEAR)
+        far = self.spread(near, "far glow", FAR)
+        easel, view = self._easel, scene.view
+        easel.finish(target)
+        self._finish.draw(
+            easel.tally,
+            vertices=3,
+            picture=picture.texture,
+            near_glow=near.texture,
+            far_glow=far.texture,
+            noise=easel.noise,
+            axes=np.stack([view.right, view.up, view.back], axis=1),
+            slopes=view.slopes,
+            eye=view.eye,
+            ground=view.ground,
+            air_colour=colours.background,
+            aspect=scene.aspect,
+            fog=look.fog,
+            glow=look.glow,
+            vignette=look.vignette,
+            exposure=look.exposure,
+            time=scene.time_s % 4096.0,
+            opacity=opacity,
+        )
+
+    def release(self) -> None:
+        for drawing in (self._shrink, self._blur, self._finish):
+            drawing.release()

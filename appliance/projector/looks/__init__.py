@@ -1,0 +1,1 @@
+"""Looks: ways of drawing the dancer, one module each."""

@@ -1,0 +1,39 @@
+"""Palette: the colours of each style, where the show does not say its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from appliance.pose.quaternion import Array
+from appliance.show.look import LookConfig
+
+_OWN = {  # figure, light, accent, background
+    "plaster": ("#efe6da", "#ffd9ad", "#8fb4ea", "#6b6259"),
+    "lines": ("#ffd7a1", "#fff4e0", "#3d7bff", "#10141f"),
+    "ink": ("#14110f", "#2a2320", "#8c2f1f", "#e9dfcb"),
+    "cloud": ("#cfe0ff", "#ffe3c2", "#3b63d8", "#0d1220"),
+    "veil": ("#bfe6e0", "#ffffff", "#c04a7a", "#0c1016"),
+}
+
+
+@dataclass(frozen=True)
+class Palette:
+    """Linear light, red, green, blue from 0 to 1."""
+
+    figure: Array
+    light: Array
+    accent: Array
+    background: Array
+
+
+def palette(look: LookConfig) -> Palette:
+    """A look's colours, its style's own where it says none."""
+    chosen = (look.figure, look.light, look.accent, look.background)
+    return Palette(*(linear(own or given) for own, given in zip(chosen, _OWN[look.style], strict=True)))
+
+
+def linear(colour: str) -> Array:
+    """'#rrggbb' as linear light; the projector's gamma is taken for 2.2."""
+    return np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]) ** 2.2

@@ -1,0 +1,83 @@
+"""The poses of the last second as a texture, from which vertex shaders read where the body was at any age."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pose import quaternion
+from appliance.projector.moment import Moment
+from appliance.projector.skinning import BodyMesh
+
+ROWS = 48
+ROW_S = 0.025  # from one row to the next; 48 of them reach 1.175 s back
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Where the joints were: row 0 now, row i ROW_S * i seconds ago; lengths in figure heights, floor at y = 0.
+
+    positions: (ROWS, J, 3); world: (ROWS, J, 4).
+    """
+
+    positions: Floats
+    world: Floats
+
+
+def poses_of(moment: Moment, height: float, sole: float) -> Poses:
+    """A moment's trail at even ages; height: the figure's, metres; sole: lowest skin below lowest joint, metres.
+
+    Ages that the trail does not reach show its oldest pose.
+    """
+    times = np.array([*moment.trail_times, moment.time_s])
+    positions = np.stack([*(at for at, _ in moment.trail), moment.positions])
+    world = np.stack([*(turn for _, turn in moment.trail), moment.world])
+    at = np.clip(moment.time_s - ROW_S * np.arange(ROWS), times[0], times[-1])
+    after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+    step = np.maximum(times[after] - times[after - 1], 1e-9)
+    share = np.clip((at - times[after - 1]) / step, 0.0, 1.0)[:, None, None].astype(np.float32)
+    between = positions[after - 1] * (1 - share) + positions[after] * share
+    earlier, later = world[after - 1], world[after]
+    agrees = np.sum(earlier * later, axis=-1, keepdims=True) >= 0
+    turned = earlier * (1 - share) + np.where(agrees, later, -later) * share
+    turned /= np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-9)
+    between[..., 1] -= _floor(positions, height, sole)
+    return Poses((between / height).astype(np.float32), turned.astype(np.float32))
+
+
+def _floor(positions: Floats, height: float, sole: float) -> float:
+    """Height of the floor, metres: the stage's, 0, unless a recording has plainly put it elsewhere."""
+    lowest = float(positions[..., 1].min()) - sole
+    return lowest * float(np.clip((abs(lowest) / height - 0.12) / 0.12, 0.0, 1.0))
+
+
+class PoseTexture:
+    """Dual quaternions of all joints in all rows: joint j in the texels 2j (rotation) and 2j + 1 (dual part)."""
+
+    def __init__(self, ctx: moderngl.Context, mesh: BodyMesh, joints: int) -> None:
+        self._back = quaternion.inverse(mesh.bind_world)
+        self._bind = mesh.bind_positions / mesh.height
+        self.texture = ctx.texture((2 * joints, ROWS), 4, dtype="f4")
+        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+
+    def write(self, poses: Poses) -> None:
+        """Bring the poses onto the GPU."""
+        turn = quaternion.multiply(poses.world, self._back)
+        shift = np.zeros_like(turn)
+        shift[..., 1:] = poses.positions - quaternion.rotate(turn, self._bind)
+        dual = 0.5 * quaternion.multiply(shift, turn)
+        texels = np.stack([turn, dual], axis=2).astype(np.float32)
+        self.texture.write(np.ascontiguousarray(texels))
+
+    @property
+    def bytes(self) -> int:
+        """What it takes on the GPU."""
+        return self.texture.width * self.texture.height * 16
+
+    def release(self) -> None:
+        self.texture.release()

@@ -1,0 +1,90 @@
+"""Scene: one moment seen by the camera, in figure heights, and what all looks draw it with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from appliance.pose.quaternion import Array
+from appliance.pose.skeleton import Skeleton
+from appliance.projector.body_buffers import BodyBuffers
+from appliance.projector.body_mesh import body_mesh
+from appliance.projector.camera import View
+from appliance.projector.drawing import Drawing, Tally
+from appliance.projector.noise import SIDE, noise_pixels
+from appliance.projector.poses import Poses, PoseTexture
+from appliance.projector.targets import Target
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A moment of the dance as the camera sees it; time_s drives haze and dust."""
+
+    time_s: float
+    view: View
+    poses: Poses
+    aspect: float
+    held: tuple[int, ...] = ()
+
+
+class Easel:
+    """The body, its poses, the noise and the canvases: once on the GPU, for all looks."""
+
+    def __init__(self, ctx: moderngl.Context, skeleton: Skeleton) -> None:
+        self.ctx, self.skeleton = ctx, skeleton
+        self.tally = Tally()
+        mesh = body_mesh(skeleton)
+        self.height = mesh.height
+        self.sole = float(mesh.bind_positions[:, 1].min() - mesh.vertices[:, 1].min())
+        self.bind_positions = mesh.bind_positions / mesh.height
+        self.body = BodyBuffers(ctx, mesh)
+        self.poses = PoseTexture(ctx, mesh, len(skeleton))
+        self.noise = ctx.texture((SIDE, SIDE), 4, noise_pixels())
+        self.noise.build_mipmaps()
+        self.noise.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self._canvases: dict[str, Target] = {}
+
+    def canvas(self, name: str, size: tuple[int, int], depth: bool = False) -> Target:
+        """The canvas of that name, made anew when its size has changed."""
+        known = self._canvases.get(name)
+        if known is None or known.size != size:
+            if known:
+                known.release()
+            known = self._canvases[name] = Target(self.ctx, size, depth)
+        return known
+
+    def picture(self, size: tuple[int, int], scale: float) -> Target:
+        """The canvas for the figure, with depth, at a share of the target's resolution."""
+        return self.canvas(
+            "picture", (max(1, round(size[0] * scale)), max(1, round(size[1] * scale))), depth=True
+        )
+
+    def finish(self, target: moderngl.Framebuffer) -> None:
+        """What is drawn next covers the target as far as its alpha says."""
+        target.use()
+        target.viewport = (0, 0, *target.size)
+        self.ctx.enable_only(moderngl.BLEND)
+        self.ctx.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+
+    def surface(self, vertex: str, fragment: str, coarse: bool = False) -> Drawing:
+        """The body's surface, drawn by these shaders."""
+        return Drawing(self.ctx, vertex, fragment, *self.body.content(coarse))
+
+    @property
+    def bytes(self) -> int:
+        """What all this takes on the GPU."""
+        canvases = sum(canvas.bytes for canvas in self._canvases.values())
+        return canvases + self.body.bytes + self.poses.bytes + SIDE * SIDE * 16 // 3
+
+    def release(self) -> None:
+        for part in (self.body, self.poses, self.noise, *self._canvases.values()):
+            part.release()
+
+
+def direction(azimuth: float, elevation_deg: float) -> Array:
+    """A unit vector towards where a lamp hangs: azimuth in radians from +z to +x, elevation in degrees."""
+    elevation = np.radians(elevation_deg)
+    flat = np.cos(elevation)
+    return np.array([flat * np.sin(azimuth), np.sin(elevation), flat * np.cos(azimuth)])

@@ -1,0 +1,57 @@
+// A grain of the cloud: on the body, or on its way off it since it was left behind by a movement.
+#include skin
+in vec3 in_position;
+in vec3 in_normal;
+in vec4 in_chance;
+in uvec4 in_joints;
+in vec4 in_weights;
+uniform mat4 projection;
+uniform vec3 eye;
+uniform vec3 lamp;
+uniform float pixels;
+uniform float rows;
+uniform float row_s;
+uniform float time;
+uniform float loose_share;
+uniform float fog;
+uniform float focus;
+uniform sampler2D noise;
+uniform vec3 figure_colour;
+uniform vec3 light_colour;
+uniform vec3 accent_colour;
+out vec4 grain_colour;
+
+vec3 place_at(float back) {
+    int row = int(back);
+    vec3 newer = moved(blended(in_joints, in_weights, row), in_position);
+    vec3 older = moved(joint_at(in_joints.x, row + 1), in_position);
+    vec3 same = moved(joint_at(in_joints.x, row), in_position);
+    return newer + (older - same) * fract(back);
+}
+
+void main() {
+    bool loose = in_chance.x < loose_share;
+    float life = (rows - 3.0) * (0.35 + 0.65 * in_chance.y);
+    float back = loose ? fract(time / (life * row_s) + in_chance.z) * life : 0.0;
+    int row = int(back);
+    vec3 place = place_at(back), before = place_at(back + 1.5);
+    vec3 velocity = (place - before) / (1.5 * row_s);
+    float age = back / life, age_s = back * row_s, speed = length(velocity);
+    vec3 normal = turned(joint_at(in_joints.x, row), in_normal);
+    vec3 drift = textureLod(noise, place.xy * 0.9 + in_chance.zw * 0.15 + time * 0.01, 0.0).rgb
+               + textureLod(noise, place.zy * 1.7 - time * 0.013, 0.0).gbr - 1.0;
+    place += age_s * (0.22 * velocity * (1.0 - 0.45 * age) + (0.10 + 0.16 * speed) * drift + 0.03 * normal);
+    place += normal * 0.006 * (in_chance.w - 0.3);
+    vec3 way = eye - place;
+    float distance = length(way), facing = dot(normal, way) / distance;
+    float key = clamp(dot(normal, lamp) * 0.8 + 0.2, 0.0, 1.0);
+    float rim = pow(1.0 - clamp(abs(facing), 0.0, 1.0), 2.0);
+    float deep = exp(-fog * 1.6 * max(distance - focus, 0.0));
+    vec3 on_body = figure_colour * (0.10 + 1.0 * key) + accent_colour * 1.5 * rim;
+    vec3 in_air = mix(light_colour, accent_colour, smoothstep(0.0, 0.7, age));
+    float shown = loose ? smoothstep(0.5, 2.2, speed) * (1.0 - age) : smoothstep(-0.25, 0.35, facing);
+    grain_colour = vec4((loose ? in_air * 1.1 : on_body) * shown * deep, 1.0);
+    gl_Position = projection * vec4(place, 1.0);
+    gl_PointSize = clamp(pixels * (0.6 + 0.8 * in_chance.w) / gl_Position.w, 1.5, 12.0);
+    if (shown < 0.01) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
+}

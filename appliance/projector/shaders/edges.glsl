@@ -1,0 +1,8 @@
+// A projector's picture has no frame: it is black where it ends.
+uniform float vignette;
+
+float edge(vec2 uv, float aspect) {
+    vec2 from_edge = min(uv, 1.0 - uv) * vec2(max(aspect, 1.0), max(1.0 / aspect, 1.0));
+    vec2 near = smoothstep(vec2(0.0), vec2(0.06 + 0.30 * vignette), from_edge);
+    return near.x * near.y;
+}

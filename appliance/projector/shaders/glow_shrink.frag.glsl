@@ -1,0 +1,11 @@
+// A quarter of the size in each direction.
+in vec2 uv;
+uniform sampler2D source;
+uniform vec2 texel;
+out vec4 colour;
+
+void main() {
+    vec4 sum = texture(source, uv + texel * vec2(-1.0, -1.0)) + texture(source, uv + texel * vec2(1.0, -1.0))
+             + texture(source, uv + texel * vec2(-1.0, 1.0)) + texture(source, uv + texel * vec2(1.0, 1.0));
+    colour = 0.25 * sum;
+}

@@ -1,0 +1,18 @@
+// How much ink lies where the body is: little where it turns to the eye, more along its outline.
+in vec3 place;
+in vec3 normal;
+in vec3 skin;
+in float open;
+uniform vec3 eye;
+uniform float level;
+uniform float hollow;
+uniform sampler2D noise;
+out vec4 colour;
+
+void main() {
+    float facing = clamp(dot(normalize(normal), normalize(eye - place)), 0.0, 1.0);
+    float wash = texture(noise, skin.xy * 1.3 + skin.z).r;
+    float outline = pow(1.0 - facing, 1.6);
+    float full = mix(1.0, 0.50 + 0.5 * outline + 0.30 * (wash - 0.5) + 0.2 * (1.0 - open), hollow);
+    colour = vec4(level * full);
+}

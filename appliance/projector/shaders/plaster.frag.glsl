@@ -1,0 +1,50 @@
+// Plaster in stage light: a warm key with a soft shadow, a cool rim, light that the floor gives back.
+in vec3 place;
+in vec3 normal;
+in vec3 skin;
+in float open;
+uniform vec3 eye;
+uniform vec3 lamp;
+uniform vec3 back_lamp;
+uniform vec3 figure_colour;
+uniform vec3 light_colour;
+uniform vec3 accent_colour;
+uniform float shadow;
+uniform float exposure;
+uniform mat4 lamp_projection;
+uniform sampler2D lamp_depth;
+uniform sampler2D noise;
+out vec4 colour;
+#include tone
+
+float lit(vec3 n) {
+    vec3 at = (lamp_projection * vec4(place + 0.010 * n, 1.0)).xyz * 0.5 + 0.5;
+    float turn = 6.2832 * grain(gl_FragCoord.xy), sum = 0.0;
+    for (int i = 0; i < 8; i++) {
+        float angle = turn + 2.399963 * float(i);
+        vec2 around = sqrt((float(i) + 0.5) / 8.0) * vec2(cos(angle), sin(angle));
+        vec3 bytes = texture(lamp_depth, at.xy + 0.011 * around).rgb;
+        sum += step(at.z - 0.004, dot(bytes, vec3(1.0, 1.0 / 255.0, 1.0 / 65025.0)));
+    }
+    return sum / 8.0;
+}
+
+void main() {
+    vec3 n = normalize(normal), to_eye = normalize(eye - place);
+    vec4 rough = texture(noise, skin.xy * 2.3 + skin.z * 1.7) + texture(noise, skin.zy * 5.1 - skin.x) - 1.0;
+    n = normalize(n + 0.16 * (rough.rgb * 0.6));
+    float facing = clamp(dot(n, to_eye), 0.0, 1.0);
+    vec3 albedo = figure_colour * (0.92 + 0.16 * rough.g);
+    float wrapped = clamp((dot(n, lamp) + 0.12) / 1.12, 0.0, 1.0);
+    float key = wrapped * mix(1.0, lit(normalize(normal)), shadow);
+    float sky = 0.5 + 0.5 * n.y;
+    float cavity = mix(1.0, open, 0.85);
+    vec3 bounce = light_colour * 0.10 * (1.0 - sky) * exp(-2.2 * place.y);
+    vec3 ambient = (mix(vec3(0.010), accent_colour * 0.045, sky) + bounce) * cavity;
+    float behind = clamp(dot(n, back_lamp) + 0.25, 0.0, 1.0);
+    vec3 rim = accent_colour * behind * pow(1.0 - facing, 2.5) * 2.4 * cavity;
+    vec3 halfway = normalize(lamp + to_eye);
+    float sheen = 0.10 * pow(clamp(dot(n, halfway), 0.0, 1.0), 18.0) * key;
+    vec3 light = albedo * (light_colour * key * 1.55 + ambient) + rim + light_colour * sheen;
+    colour = vec4(dithered(toned(exposure * light), gl_FragCoord.xy), 1.0);
+}

@@ -1,0 +1,15 @@
+// A thread of light: bright in its middle, fainter on the far side of the body.
+in float across;
+in float strength;
+in float facing;
+uniform vec3 near_colour;
+uniform vec3 far_colour;
+uniform float brightness;
+out vec4 colour;
+
+void main() {
+    float profile = exp(-3.5 * across * across) - 0.03;
+    float side = smoothstep(-0.35, 0.75, facing);
+    vec3 light = mix(far_colour * 0.16, near_colour, side);
+    colour = vec4(brightness * strength * max(profile, 0.0) * light, 1.0);
+}

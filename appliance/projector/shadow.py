@@ -1,0 +1,73 @@
+"""Shadows: what the lamp sees of the dancer, and what the dancer keeps off the floor."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from appliance.pose.quaternion import Array
+from appliance.projector.drawing import Drawing
+from appliance.projector.scene import Easel, Scene
+
+DEPTH_SIDE, CAST_SIDE = 512, 192  # pixels
+FIELD = 0.85  # figure heights around the dancer's middle that the lamp sees
+REACH = 1.7  # figure heights of floor around the dancer on which a shadow can fall
+SPREAD = 1.5  # pixels from one sample of the floor shadow's blur to the next
+
+
+class Shadow:
+    """The key lamp's shadow on the body (a picture of depths) and on the floor (soft with height)."""
+
+    def __init__(self, easel: Easel) -> None:
+        self._easel = easel
+        self._depth = easel.surface("body", "depth", coarse=True)
+        self._cast = easel.surface("cast", "cast", coarse=True)
+        self._blur = Drawing(easel.ctx, "screen", "cast_blur")
+
+    def draw(self, scene: Scene, lamp: Array) -> dict[str, object]:
+        """Draw both for a lamp in that direction; returns what shaders that receive shadows need."""
+        ctx, easel = self._easel.ctx, self._easel
+        root = scene.poses.positions[0, 0].astype(float)
+        lamp_projection = _orthographic(lamp, np.array([root[0], max(0.5, root[1]), root[2]]))
+        depth = easel.canvas("lamp depth", (DEPTH_SIDE, DEPTH_SIDE), depth=True)
+        depth.start((1.0, 1.0, 1.0, 1.0))
+        ctx.enable_only(moderngl.DEPTH_TEST)
+        self._depth.draw(easel.tally, poses=easel.poses.texture, projection=lamp_projection, row=0)
+        middle = root[[0, 2]] - 0.5 * lamp[[0, 2]] / lamp[1]
+        first, second = (easel.canvas(name, (CAST_SIDE, CAST_SIDE)) for name in ("cast", "cast blurred"))
+        first.start()
+        ctx.enable_only(moderngl.BLEND)
+        ctx.blend_equation = moderngl.MAX
+        self._cast.draw(
+            easel.tally, poses=easel.poses.texture, lamp=tuple(lamp), middle=tuple(middle), reach=REACH
+        )
+        ctx.blend_equation = moderngl.FUNC_ADD
+        ctx.enable_only(moderngl.NOTHING)
+        for source, into, step in ((first, second, (1.0, 0.0)), (second, first, (0.0, 1.0))):
+            into.start()
+            step_uv = (step[0] * SPREAD / CAST_SIDE, step[1] * SPREAD / CAST_SIDE)
+            self._blur.draw(easel.tally, vertices=3, source=source.texture, step_uv=step_uv)
+        return {
+            "lamp_depth": depth.texture,
+            "lamp_projection": lamp_projection,
+            "floor_shadow": first.texture,
+            "middle": tuple(middle),
+            "reach": REACH,
+        }
+
+    def release(self) -> None:
+        for drawing in (self._depth, self._cast, self._blur):
+            drawing.release()
+
+
+def _orthographic(lamp: Array, centre: Array) -> Array:
+    """(4, 4) from figure heights to the lamp's picture, that moves in whole pixels so that edges stay calm."""
+    right = np.cross([0.0, 1.0, 0.0], lamp)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(lamp, right), lamp])
+    pixel = 2 * FIELD / DEPTH_SIDE
+    middle = np.round(axes @ centre / pixel) * pixel
+    look = np.eye(4)
+    look[:3, :3], look[:3, 3] = axes / FIELD, -middle / FIELD
+    look[2] *= -0.5  # depth grows away from the lamp
+    return look

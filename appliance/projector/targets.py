@@ -1,0 +1,29 @@
+"""Targets: the textures that a picture passes through on its way, shared by all looks."""
+
+from __future__ import annotations
+
+import moderngl
+
+
+class Target:
+    """A texture of four bytes a pixel that can be drawn into, with depth where it is asked for."""
+
+    def __init__(self, ctx: moderngl.Context, size: tuple[int, int], depth: bool = False) -> None:
+        self.size = size
+        self.texture = ctx.texture(size, 4)
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self._depth = ctx.depth_renderbuffer(size) if depth else None
+        self.buffer = ctx.framebuffer([self.texture], self._depth)
+        self.bytes = size[0] * size[1] * (8 if depth else 4)
+
+    def start(self, colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)) -> None:
+        """What is drawn next goes here, over one colour."""
+        self.buffer.use()
+        self.buffer.viewport = (0, 0, *self.size)
+        self.buffer.clear(*colour)
+
+    def release(self) -> None:
+        self.buffer.release()
+        self.texture.release()
+        if self._depth:
+            self._depth.release()
