@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+_folders = itertools.count()
+
+
+@pytest.fixture(autouse=True)
+def own_runtime_folder(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the boxes of this test meet: never in the folder of a box that runs beside the tests."""
+    folder = tmp_path_factory.getbasetemp() / f"runtime-{next(_folders)}"
+    monkeypatch.setenv("RUNTIME_DIRECTORY", str(folder))
+    return folder
 
 
 @pytest.fixture(scope="session")

@@ -81,6 +81,7 @@ class RingFileWriter:
         with contextlib.suppress(OSError):
             if remove and os.path.samestat(os.fstat(self._descriptor), self._path.stat()):
                 self._path.unlink()
+        fcntl.flock(self._descriptor, fcntl.LOCK_UN)  # the mapping holds on to the file, and to its lock
         os.close(self._descriptor)
         self._descriptor = -1
 

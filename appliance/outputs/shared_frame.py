@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,8 @@ FACTS, HEALTH, FRAMES = range(3)  # the file's rings
 FRAME_SLOTS = 64  # 1.28 s: a reader has that long to copy the newest one
 HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
 LATE = 1  # flag
-FRAME_HEAD = struct.Struct(
-    "<qddqdII"
-)  # tick, time, when it left, sensor's sequence and arrival, flags, joints
+# Tick, frame time, when it left the stage, the sensor's sequence and its arrival, flags, joints.
+FRAME_HEAD = struct.Struct("<qddqdII")
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,8 @@ class FrameWriter:
     Raises OSError where the folder takes no file of its size.
     """
 
-    def __init__(self, folder: Path, facts: Facts) -> None:
+    def __init__(self, folder: Path, facts: Facts, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._monotonic = monotonic
         packed, layout = facts.packed(), FrameLayout(len(facts.skeleton))
         shapes = [(1, len(packed)), (HEALTH_SLOTS, HEALTH_BYTES), (FRAME_SLOTS, layout.bytes)]
         self._file = RingFileWriter.new(folder / FILE, KIND, FORMAT, shapes)
@@ -123,7 +123,7 @@ class FrameWriter:
             0,
             frame.tick,
             frame.frame_time,
-            time.monotonic(),  # after the tick's work: how long that took shifts what the projector shows
+            self._monotonic(),  # after the tick's work: how long that took shifts what the projector shows
             frame.sensor_sequence,
             frame.sensor_arrival,
             LATE if frame.late else 0,
