@@ -10,9 +10,10 @@ from appliance.show.section import Ipv4, Section, refusal
 
 WireKind = Literal["artnet", "sacn", "usb-pro", "open-dmx", "udmx"]
 
+LAST_UNIVERSE = 63999
 SLOTS = 512  # of a universe
 FASTEST_HZ = 44.0  # a full universe lasts 22.7 ms on the wire (ANSI E1.11)
-NUMBERS = {"artnet": (0, 32767), "sacn": (1, 63999)}  # 15 bits; E1.31 section 6.2.7
+NUMBERS = {"artnet": (0, 32767), "sacn": (1, LAST_UNIVERSE)}  # 15 bits; E1.31 section 6.2.7
 IN_WORDS = {
     "artnet": "Art-Net",
     "sacn": "sACN",
@@ -112,14 +113,11 @@ class DmxConfig(Section):
 
     @model_validator(mode="after")
     def _number_exists(self) -> DmxConfig:
-        low, high = NUMBERS.get(self.wire, (0, 63999))
-        if not low <= self.number_on_wire <= high:
-            raise refusal(
-                f"{IN_WORDS[self.wire]} has universes from {low} to {high}; "
-                f"{self.number_on_wire} is none of them.",
-                f"Write a number from {low} to {high}.",
-                at="universe" if self.number is None else "number",
-            )
+        if self.number is not None or self.wire not in NUMBERS:
+            _require("A box", 0, LAST_UNIVERSE, "universe", self.universe)
+        if self.wire in NUMBERS:
+            key = "universe" if self.number is None else "number"
+            _require(IN_WORDS[self.wire], *NUMBERS[self.wire], key, self.number_on_wire)
         if self.host == "255.255.255.255" and not self.broadcast:
             raise refusal(
                 "This address means every machine of the network.",
@@ -152,6 +150,15 @@ class DmxConfig(Section):
         if self.device or self.serial:
             return ("usb" if self.wire == "udmx" else "cable", self.device, self.serial)
         return (self.wire,)
+
+
+def _require(who: str, low: int, high: int, key: str, number: int) -> None:
+    if not low <= number <= high:
+        raise refusal(
+            f"{who} has universes from {low} to {high}; {number} is none of them.",
+            f"Write a number from {low} to {high}.",
+            at=key,
+        )
 
 
 def _each_destination_once(wires: list[DmxConfig]) -> list[DmxConfig]:

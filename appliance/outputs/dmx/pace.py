@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from appliance.outputs.dmx.wire import Wire
-from appliance.show.dmx import FASTEST_HZ, SLOTS, DmxConfig
+from appliance.show.dmx import SLOTS, DmxConfig
 
 KEEP_ALIVE_S = 0.85  # E1.31 section 6.6.2: 0.8 to 1.0 s; Art-Net 4 asks for 4 s at the latest
+EARLY = 0.75  # of a period
 REPEATS = 3  # E1.31 section 6.6.2: so often what does not change any more, before only keep-alives follow
 
 
 class Universe:
-    """One universe on one wire. Offer it as often as `next_due` says; what comes early waits for nothing.
+    """One universe on one wire. Offer it at the wire's rate or faster; the newest leaves, nothing waits.
 
-    The rate holds on average, however late a caller wakes, and two universes are never closer than a full
-    one lasts on a DMX cable (22.7 ms).
+    The rate is never exceeded by more than one universe. A caller that woke late, or that offers 50 a second
+    to a wire that takes 40, still gets the whole rate: a universe may leave three quarters of a period early.
     """
 
     def __init__(self, config: DmxConfig, wire: Wire) -> None:
@@ -21,7 +22,7 @@ class Universe:
         self.wire = wire
         self.number = config.universe  # as the show's fixtures name it
         self._period_s = 1.0 / config.rate
-        self._due = float("-inf")
+        self._due = float("-inf")  # when the next one would leave at an even rate
         self._newest = bytearray(SLOTS)
         self._changed = False  # since the last one that left
         self._same = 0  # how many alike have left
@@ -34,13 +35,13 @@ class Universe:
         if data != self._newest:
             self._newest[:] = data
             self._changed = True
-        if now < self._due or not (self._changed or self._is_repeated(now)):
+        if now < self._due - EARLY * self._period_s or not (self._changed or self._is_repeated(now)):
             return False
         self._leave(now)
         return True
 
     def next_due(self, now: float) -> float:
-        """When an offer leaves at the earliest, monotonic seconds; `now` if at once."""
+        """When to offer the next one for an even rate, monotonic seconds; `now` if at once."""
         return max(self._due, now)
 
     def close(self, now: float) -> None:
@@ -56,5 +57,5 @@ class Universe:
         self._same = 0 if self._changed else self._same + 1
         self._changed = False
         self._sent_at = now
-        self._due = max(self._due + self._period_s, now + 1.0 / FASTEST_HZ)
+        self._due = max(self._due, now) + self._period_s
         self.wire.send(self._newest, now)
