@@ -1,4 +1,4 @@
-"""A stage of one's own: writes real shared frames into a runtime folder; and a painter whose pictures tell."""
+"""A stage of one's own that writes real shared frames, and a painter whose pictures tell."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class StageDouble:
 
 
 class TellingPainter:
-    """Fills the picture: red says how high the dancer is, green how many joints, blue how far a look is there."""
+    """Fills the picture: red says how high the dancer is, green how many joints, blue how far a look is."""
 
     made = 0
     released = 0

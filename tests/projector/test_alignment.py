@@ -1,0 +1,101 @@
+"""The alignment outlives the box's power: kept as a whole or not at all, and never a reason not to show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from appliance.projector.alignment import FILE_NAME, Alignment, AlignmentFile, alignment_folder
+from appliance.show.box import BoxConfig
+from appliance.show.projector import ProjectorConfig
+
+PINNED = Alignment(((0.1, 0.05), (0.9, 0.1), (1.0, 1.0), (1 / 3, 0.9)), True, 0.8)
+
+
+@pytest.fixture
+def said() -> list[str]:
+    return []
+
+
+def opened(folder: Path, said: list[str], **config: object) -> AlignmentFile:
+    return AlignmentFile(folder, ProjectorConfig(**config), said.append)  # type: ignore[arg-type]
+
+
+def keep(folder: Path, said: list[str], alignment: Alignment) -> None:
+    file = opened(folder, said)
+    file.keep(alignment)
+    file.close()
+
+
+def test_it_is_the_same_after_a_restart(tmp_path: Path, said: list[str]) -> None:
+    folder = tmp_path / "state"
+    keep(folder, said, PINNED)
+    assert opened(folder, said).alignment == PINNED
+    assert yaml.safe_load((folder / FILE_NAME).read_text())["corners"][0] == [0.1, 0.05]
+    assert [path.name for path in folder.iterdir()] == [FILE_NAME] and not said
+
+
+def test_without_a_change_no_file_is_written(tmp_path: Path, said: list[str]) -> None:
+    file = opened(tmp_path, said, mirror=True, brightness=0.5)
+    assert file.alignment == Alignment(mirror=True, brightness=0.5)
+    file.close()
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_the_box_file_says_anew_goes_over_what_was_chosen_before(
+    tmp_path: Path, said: list[str]
+) -> None:
+    keep(tmp_path, said, PINNED)
+    found = opened(tmp_path, said, brightness=1.5).alignment
+    assert found == Alignment(PINNED.corners, True, 1.5)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "corners: [",
+        "corners: 3\n",
+        "[1, 2]",
+        "corners: [[0, 0], [1, 0], [1, 1]]\nmirror: {chosen: false, box_file: false}\n",
+        "corners: [[0, 0], [1, 1], [1, 0], [0, 1]]\nmirror: {chosen: false, box_file: false}\n"
+        "brightness: {chosen: 1.0, box_file: 1.0}\n",
+        "corners: [[0, 0], [1, 0], [1, 1], [0, 1]]\nmirror: {chosen: false, box_file: false}\n"
+        "brightness: {chosen: 100.0, box_file: 1.0}\n",
+        "x" * 5000,
+    ],
+)
+def test_a_damaged_file_is_set_aside(tmp_path: Path, said: list[str], text: str) -> None:
+    path = tmp_path / FILE_NAME
+    path.write_text(text)
+    assert opened(tmp_path, said).alignment == Alignment()
+    (sentence,) = said
+    assert "damaged" in sentence and "key c" in sentence
+    assert not path.exists() and path.with_name(FILE_NAME + ".broken").read_text() == text
+
+
+def test_bytes_that_are_no_text(tmp_path: Path, said: list[str]) -> None:
+    (tmp_path / FILE_NAME).write_bytes(b"\xff\xfe\x00")
+    assert opened(tmp_path, said).alignment == Alignment()
+    assert len(said) == 1
+
+
+def test_a_place_that_takes_no_file_is_said_once_and_the_alignment_holds(
+    tmp_path: Path, said: list[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    file = opened(tmp_path / "file", said)
+    file.keep(PINNED)
+    file.close()
+    (sentence,) = said
+    assert "cannot be kept" in sentence and file.alignment == PINNED
+
+
+def test_where_it_is_kept(tmp_path: Path) -> None:
+    own = BoxConfig(state=tmp_path / "state")
+    assert alignment_folder(own, tmp_path / "box.yaml") == tmp_path / "state"
+    assert alignment_folder(BoxConfig(), tmp_path / "box.yaml") == tmp_path
+    assert alignment_folder(BoxConfig(), None, {"XDG_STATE_HOME": "/kept"}) == Path("/kept/bunraku")
+    assert alignment_folder(BoxConfig(), None, {}) == Path.home() / ".local" / "state" / "bunraku"

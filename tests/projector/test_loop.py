@@ -1,0 +1,215 @@
+"""The projector beside a stage: before it, with it, after it, with another one; and what the house says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+
+from appliance.control.house import House, HouseReader, HouseWriter
+from appliance.outputs.frame_reader import FrameReader
+from appliance.projector.alignment import Alignment
+from appliance.projector.context import offscreen
+from appliance.projector.controls import Controls
+from appliance.projector.loop import Projector
+from appliance.show.projector import ProjectorConfig
+from tests.projector.stage_double import SIZE, StageDouble, TellingPainter, pixels
+from tests.stage.bundles import write_show
+
+PERIOD_S = 1 / 60
+TICK_S = 0.02
+
+
+@pytest.fixture(scope="module")
+def gl() -> Iterator[moderngl.Context]:
+    with offscreen(SIZE) as context:
+        yield context
+
+
+class Evening:
+    """A projector, and time that passes as the test wishes."""
+
+    def __init__(self, gl: moderngl.Context, folder: Path, show: Path) -> None:
+        TellingPainter.made = TellingPainter.released = 0
+        self._gl, self.folder, self.show = gl, folder, show
+        self.said: list[str] = []
+        self.controls = Controls(Alignment(), lambda _: None)
+        self.house = House()
+        self._house = HouseWriter(folder)
+        self._reader, self._seen_house = FrameReader(folder), HouseReader(folder)
+        self.projector = Projector(
+            *(gl, ProjectorConfig(), self._reader, self._seen_house, self.controls, self.said.append),
+            TellingPainter,
+        )
+        self.now = self._ticked = 1000.0
+        self.stage: StageDouble | None = None
+        self.left_stage: float | None = None
+
+    def begin(self, joints: int = 3, show: Path | None = None) -> None:
+        self.stage = StageDouble(self.folder, show or self.show, joints)
+
+    def picture(self, size: tuple[int, int] = SIZE, lines: tuple[str, ...] = ()) -> np.ndarray:
+        """One display frame later; the stage, if there is one, has ticked meanwhile."""
+        self.now += PERIOD_S
+        while self._ticked + TICK_S <= self.now:
+            self._ticked += TICK_S
+            if self.stage is not None:
+                self.stage.write(self._ticked)
+        self.left_stage = self.projector.draw(self.now, self._gl.screen, size, lines)
+        return pixels(self._gl.screen, size)
+
+    def colour(self, seconds: float = PERIOD_S) -> tuple[int, int, int]:
+        """What fills the display after so long."""
+        for _ in range(max(1, round(seconds / PERIOD_S))):
+            found = self.picture()
+        assert np.ptp(found, axis=(0, 1)).max() <= 1
+        red, green, blue = found.reshape(-1, 3).max(axis=0)
+        return int(red), int(green), int(blue)
+
+    def set_house(self, house: House) -> None:
+        self.house = house
+        self._house.write(house)
+
+    def close(self) -> None:
+        if self.stage is not None:
+            self.stage.close()
+        self.projector.release()
+        self._house.close()
+        self._seen_house.close()
+        self._reader.close()
+
+
+@pytest.fixture
+def evening(gl: moderngl.Context, tmp_path: Path) -> Iterator[Evening]:
+    (tmp_path / "run").mkdir()
+    evening = Evening(gl, tmp_path / "run", write_show(tmp_path / "show"))
+    yield evening
+    evening.close()
+
+
+def test_black_before_the_stage_then_the_dance_by_itself(evening: Evening) -> None:
+    assert evening.colour(1.0) == (0, 0, 0)
+    assert evening.left_stage is None
+    evening.begin()
+    assert evening.colour(0.2)[0] < 200
+    assert evening.colour(0.6)[:2] == (255, 76)
+    assert evening.left_stage == pytest.approx(evening.now - TICK_S, abs=0.002)
+    assert TellingPainter.made == 1
+
+
+def test_fades_to_black_when_the_stage_hangs_and_comes_back(evening: Evening) -> None:
+    evening.begin()
+    assert evening.colour(1.0)[0] == 255
+    stage, evening.stage = evening.stage, None
+    assert evening.colour(0.45)[0] == 255
+    assert 60 < evening.colour(0.3)[0] < 200
+    assert evening.colour(0.35) == (0, 0, 0)
+    assert evening.left_stage is None
+    evening.stage = stage
+    assert evening.colour(0.6)[0] == 255
+    assert TellingPainter.made == 1
+
+
+def test_a_stage_that_is_restarted_soon_is_hardly_seen(evening: Evening) -> None:
+    evening.begin()
+    evening.colour(1.0)
+    assert evening.stage is not None
+    evening.stage.close()
+    evening.stage = None
+    assert evening.colour(0.3)[0] == 255
+    evening.begin()
+    assert min(evening.colour()[0] for _ in range(30)) == 255
+    assert (TellingPainter.made, TellingPainter.released) == (1, 0)
+
+
+def test_another_show_with_another_skeleton_begins_in_the_dark(evening: Evening, tmp_path: Path) -> None:
+    evening.begin(joints=3)
+    assert evening.colour(1.0)[1] == 76
+    evening.begin(joints=7, show=write_show(tmp_path / "another"))
+    seen = [evening.colour() for _ in range(45)]
+    assert (0, 0, 0) in seen[:10]
+    assert seen[-1][:2] == (255, 178)
+    assert (TellingPainter.made, TellingPainter.released) == (2, 1)
+
+
+def test_looks_that_were_changed_are_taken_by_the_next_stage(evening: Evening) -> None:
+    evening.begin()
+    evening.colour(0.5)
+    with (evening.show / "show.yaml").open("a") as file:
+        file.write("looks: [{name: cold, style: lines}]\n")
+    evening.begin()
+    evening.colour(0.5)
+    assert TellingPainter.made == 2 and not evening.said
+
+
+def test_a_show_that_is_broken_meanwhile_is_said_and_shown_in_built_in_looks(evening: Evening) -> None:
+    with (evening.show / "show.yaml").open("a") as file:
+        file.write("looks: [{name: cold, style: lnes}]\n")
+    evening.begin()
+    assert evening.colour(1.0)[0] == 255
+    (sentence,) = evening.said
+    assert "Did you mean 'lines'?" in sentence and "built-in looks" in sentence
+
+
+def test_panic_is_black_in_the_very_next_picture(evening: Evening) -> None:
+    evening.begin()
+    evening.controls.set_grid(True)
+    for _ in range(60):
+        assert evening.picture().any() or evening.now < 1000.5
+    evening.set_house(replace(evening.house, panic=True))
+    assert not evening.picture(lines=("60 pictures/s",)).any()
+    assert evening.left_stage is None
+    evening.set_house(replace(evening.house, panic=False))
+    assert evening.picture().any()
+
+
+def test_panic_that_comes_while_a_picture_is_drawn_is_in_that_picture(
+    evening: Evening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    evening.begin()
+    assert evening.colour(1.0)[0] == 255
+    draw = TellingPainter.draw
+
+    def panics(*arguments: object) -> None:
+        draw(*arguments)  # type: ignore[arg-type]
+        evening.set_house(replace(evening.house, panic=True))
+
+    monkeypatch.setattr(TellingPainter, "draw", panics)
+    assert evening.colour() == (0, 0, 0)
+
+
+def test_blackout_and_master_and_stop(evening: Evening) -> None:
+    evening.begin()
+    evening.colour(1.0)
+    evening.set_house(replace(evening.house, blackout=True))
+    assert evening.colour() == (0, 0, 0)
+    evening.set_house(House().with_master(0.5, evening.now, 1.0))
+    assert 180 < evening.colour(0.5)[0] < 200
+    assert abs(evening.colour(0.7)[0] - 128) <= 1
+    evening.set_house(House().with_going(False, evening.now, 2.0))
+    assert 120 < evening.colour(1.0)[0] < 135
+    assert evening.colour(1.1) == (0, 0, 0)
+
+
+def test_looks_fade_as_the_house_says(evening: Evening) -> None:
+    evening.begin()
+    evening.colour(1.0)
+    evening.set_house(House().with_look("lines", evening.now, 1.0))
+    assert 120 < evening.colour(0.5)[2] < 135
+    assert evening.colour(0.6)[2] == 255
+
+
+def test_the_window_may_change_its_size(evening: Evening) -> None:
+    evening.begin()
+    evening.colour(1.0)
+    assert (evening.picture((40, 20))[..., 0] == 255).all()
+    assert (evening.picture()[..., 0] == 255).all()
+
+
+def test_no_text_unless_it_is_asked_for(evening: Evening) -> None:
+    assert not evening.picture().any()
+    assert evening.picture(lines=("60 pictures/s",)).any()
