@@ -122,20 +122,21 @@ class Playback:
         self._excerpt = self._asked.cut(start_s, end_s)
         self._request = self._excerpt, 0.0, self._fade
 
-    def play(self, name: str, fade_s: float | None = None) -> None:
-        """Go over to another phrase, as long as the show was made for it or `fade_s` says. Raises ValueError.
+    def play(self, name: str, fade_s: float | None = None) -> bool:
+        """Go over to another phrase within fade_s (None: the show's crossfade). Raises ValueError.
 
-        It begins at its start (backwards: at its end); one that plays already goes on where it is. An excerpt
-        that was chosen meanwhile is forgotten: the phrase is what it was at the show's start.
+        It begins at its start (backwards: at its end); one that plays already goes on where it is, told by
+        False. An excerpt that was chosen meanwhile is forgotten: the phrase is what it was at the beginning.
         """
         if name not in self._phrases:
             raise ValueError(f"This show has no phrase '{name}'. {did_you_mean(name, self.phrases)}")
         phrase, loop = self._phrases[name]
         if loop is self._excerpt:
-            return
+            return False
         self._asked, self._excerpt = phrase, loop
         begin = loop.length - 1.0 if self._wanted_rate < 0 else 0.0
         self._request = loop, begin, self._fade if fade_s is None else max(0, round(fade_s * FPS))
+        return True
 
     def start_with(self, name: str) -> None:
         """Before the first tick: begin with this phrase instead, without a crossfade. Raises ValueError."""

@@ -27,6 +27,10 @@ def obey(order: Order, cast: Cast, iterations: Iterations, usual_rate: float) ->
         elif order.name == "iterations":
             coding, interaction = (int(value) for value in order.values)
             return True, _iterate(coding, interaction, iterations)
+        elif order.name == "phrase":
+            name = str(order.text)
+            goes_over = cast.motion.play(name, *order.values)
+            return True, "" if goes_over else f"The phrase '{name}' plays already, and goes on."
         elif order.name == "cue":
             return True, _fire(_cue(str(order.text), cast), cast, iterations)
         else:
@@ -87,9 +91,7 @@ def _require_heard(names: list[str], link: SensorLink, now: float) -> None:
 
 def _play(order: Order, cast: Cast, usual_rate: float) -> None:
     motion = cast.motion
-    if order.name == "phrase":
-        motion.play(str(order.text), *order.values)
-    elif order.name == "start":
+    if order.name == "start":
         motion.rate = usual_rate or 1.0
     elif order.name == "stop":
         motion.rate = 0.0

@@ -120,6 +120,7 @@ def test_a_phrase_is_called_with_its_own_fade(cast: Cast, iterations: Iterations
     assert obey(Order("phrase", (1.0,), "slow"), cast, iterations, 1.0) == (True, "")
     cast.motion.advance()
     assert cast.motion.jumped
+    assert "plays already" in obey(Order("phrase", (1.0,), "slow"), cast, iterations, 1.0)[1]
     assert obey(Order("phrase", text="main"), cast, iterations, 1.0) == (True, "")
 
 
