@@ -15,10 +15,10 @@ from appliance.projector.volumes import Group, Slab
 # Along the spine from the pelvis (0) to the neck (1): half the width as a share of the hips' and of the
 # shoulders' half width; flesh beside it, half the depth, and how far before the bones, in heights.
 _SPINE = np.array([0.0, 0.18, 0.42, 0.64, 0.82, 1.0])
-_OF_HIPS = np.array([0.92, 0.90, 0.52, 0.10, 0.0, 0.0])
+_OF_HIPS = np.array([0.80, 0.80, 0.52, 0.10, 0.0, 0.0])
 _OF_SHOULDERS = np.array([0.0, 0.0, 0.35, 0.80, 0.85, 0.20])
-_FLESH = np.array([0.039, 0.038, 0.019, 0.023, 0.027, 0.018])
-_DEPTH = np.array([0.050, 0.052, 0.047, 0.057, 0.052, 0.034])
+_FLESH = np.array([0.032, 0.032, 0.020, 0.023, 0.027, 0.018])
+_DEPTH = np.array([0.045, 0.048, 0.047, 0.057, 0.052, 0.034])
 _AHEAD = np.array([-0.004, -0.002, 0.004, 0.010, 0.009, 0.0])
 
 
@@ -27,9 +27,10 @@ def sculpture(anatomy: Anatomy) -> tuple[Group, list[Group]]:
     limbs = [_limb(anatomy, trunk, first) for trunk, first in anatomy.limbs()]
     if anatomy.head is not None:
         limbs.append(Group((*_neck(anatomy), *head(anatomy)), 0.022 * anatomy.height))
-    covered = {slab.owner for group in limbs for slab in group.movers} | set(anatomy.trunk)
-    limbs += _twigs(anatomy, covered)
-    return Group(tuple(_trunk(anatomy)), 0.0), limbs
+    trunk = Group(tuple(_trunk(anatomy)), 0.0)
+    covered = {slab.owner for group in limbs for slab in group.movers}
+    covered |= {slab.owner for slab in trunk.slabs if slab.start is not slab.end}
+    return trunk, [*limbs, *_twigs(anatomy, covered)]
 
 
 def thickness(anatomy: Anatomy, joint: int) -> float:
@@ -115,7 +116,7 @@ def _limb(anatomy: Anatomy, trunk: int, first: int) -> Group:
     for place in reversed(range(begin, last)):
         steps += _bone(anatomy, chain[place], chain[place + 1], is_leg)
     steps += _root_of_limb(anatomy, trunk, chain[: begin + 1], is_leg)
-    return Group(tuple(steps), (0.030 if is_leg else 0.026) * anatomy.height, tuple(bones))
+    return Group(tuple(steps), (0.050 if is_leg else 0.026) * anatomy.height, tuple(bones))
 
 
 def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
@@ -143,13 +144,18 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
     if is_leg:
         seat = start - 0.022 * height * anatomy.forward + 0.4 * (inner - start)
         return [
-            cone(anatomy, trunk, seat, start, (thick, 0.85 * thick), 0.02),
-            cone(anatomy, trunk, inner, start, (0.9 * thick, 0.9 * thick), 0.02),
+            cone(anatomy, trunk, seat, start, (0.92 * thick, 0.85 * thick), 0.02),
+            cone(anatomy, trunk, inner, start, (0.8 * thick, 0.85 * thick), 0.02),
         ]
     middle = inner + 0.45 * (places[trunk] - inner)
     middle = middle - anatomy.across * float((middle - inner) @ anatomy.across)
+    girdle = [
+        cone(anatomy, a, places[a], places[b], (0.030 * height, 0.030 * height), 0.01)
+        for a, b in pairwise([trunk, *chain])
+    ]
     return [
-        cone(anatomy, owner, inner, start, (0.030 * height, 1.0 * thick), 0.015),
+        *girdle,
+        cone(anatomy, owner, inner, start, (0.030 * height, thick), 0.015),
         cone(anatomy, trunk, middle, start, (0.034 * height, 0.8 * thick), 0.02),
     ]
 
