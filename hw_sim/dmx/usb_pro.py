@@ -16,8 +16,7 @@ from typing import Self
 from hw_sim.dmx.widget_message import Deframer, framed
 
 GET_PARAMETERS, SEND_DMX, GET_SERIAL = 3, 6, 10  # labels of the DMX USB Pro API 1.44
-FIRMWARE = 0x0144  # 1.44, low octet first
-PARAMETERS = FIRMWARE.to_bytes(2, "little") + bytes((9, 1, 40))  # break 96 us, mark 10.67 us, 40 Hz
+PARAMETERS = bytes((44, 1, 9, 1, 40))  # firmware 1.44, break 96 us, mark 10.67 us, 40 Hz
 LOOKS_EACH_S = 0.02
 
 

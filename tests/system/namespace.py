@@ -1,0 +1,85 @@
+"""Networks of a test's own: Linux network namespaces, and a cable between two of them."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import itertools
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+_CLONE_NEWNET = 0x40000000
+_numbers = itertools.count()
+
+
+def why_not() -> str | None:
+    """Why this test run has no networks of its own; None when it has."""
+    if shutil.which("ip") is None:
+        return "the command ip (Debian package iproute2) is missing"
+    name = _name("try")
+    if _ip("netns", "add", name, check=False).returncode != 0:
+        return "making a network namespace needs the right to administer networks (run the tests as root)"
+    _ip("netns", "delete", name)
+    return None
+
+
+class Namespace:
+    """A network with a loopback interface of its own; no port in it is taken."""
+
+    def __init__(self, what: str) -> None:
+        self.name = _name(what)
+
+    def __enter__(self) -> Self:
+        _ip("netns", "add", self.name)
+        _ip("-n", self.name, "link", "set", "lo", "up")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        _ip("netns", "delete", self.name)
+
+    def command(self, *words: str) -> list[str]:
+        """A command line that runs inside."""
+        return ["ip", "netns", "exec", self.name, *words]
+
+    @contextlib.contextmanager
+    def entered(self) -> Iterator[None]:
+        """Inside, sockets that this thread opens are in this network, and stay there."""
+        with Path("/proc/thread-self/ns/net").open() as outside:
+            with Path("/run/netns", self.name).open() as inside:
+                _set_namespace(inside.fileno())
+            try:
+                yield
+            finally:
+                _set_namespace(outside.fileno())
+
+
+def join(one: Namespace, one_address: str, two: Namespace, two_address: str) -> None:
+    """A cable between two networks; it is gone with either. Addresses like 10.77.0.1/24."""
+    ends = (_name("a"), _name("b"))
+    _ip("link", "add", ends[0], "type", "veth", "peer", "name", ends[1])
+    for network, address, end in zip((one, two), (one_address, two_address), ends, strict=True):
+        _ip("link", "set", end, "netns", network.name)
+        _ip("-n", network.name, "address", "add", address, "dev", end)
+        _ip("-n", network.name, "link", "set", end, "up")
+
+
+def _name(what: str) -> str:
+    """At most 15 letters, as interfaces want it; two test runs do not meet."""
+    return f"bk{os.getpid() % 100000}{what[:6]}{next(_numbers)}"
+
+
+def _ip(*words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["ip", *words], capture_output=True, text=True, check=check)
+
+
+def _set_namespace(descriptor: int) -> None:
+    library = ctypes.CDLL(None, use_errno=True)
+    if library.setns(descriptor, _CLONE_NEWNET) != 0:
+        raise OSError(ctypes.get_errno(), "setns")

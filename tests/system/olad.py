@@ -1,0 +1,185 @@
+"""The real Open Lighting Architecture daemon as the lights' other end: configured, started, read back."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pwd
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+import urllib.parse
+import urllib.request
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from tests.system.namespace import Namespace
+
+STARTS_WITHIN_S = 30.0
+FOLLOWS_WITHIN_S = 20.0
+# Everything that it can do and that no test asks for: each would open ports or devices of its own.
+PLUGINS = (
+    *("artnet", "dummy", "e131", "espnet", "ftdidmx", "gpio", "karate", "kinet", "milinst", "opendmx"),
+    *("openpixelcontrol", "osc", "pathport", "renard", "sandnet", "shownet", "spi", "stageprofi", "uartdmx"),
+    *("usbdmx", "usbserial"),
+)
+NOBODY = "nobody"  # olad refuses to run as root
+
+Settings = Mapping[str, str | int | Sequence[str]]
+
+
+def why_not() -> str | None:
+    """Why it cannot be asked here; None when it can."""
+    return None if shutil.which("olad") else "olad (Debian package ola) is missing"
+
+
+class Olad:
+    """One daemon with a configuration of its own, in a network of its own where one is given.
+
+    plugins: those that are on, with their settings. patched: universe of each port; a port is named
+    plugin-device-direction-number, like 2-1-I-0 for the first Art-Net input.
+    """
+
+    def __init__(
+        self, plugins: Mapping[str, Settings], patched: Mapping[str, int], network: Namespace | None = None
+    ) -> None:
+        self._plugins = plugins
+        self._patched = patched
+        self._network = network
+        self._folder = Path(tempfile.mkdtemp(prefix="olad-"))
+        self._process: subprocess.Popen[bytes] | None = None
+        self.port = 0
+
+    def start(self) -> None:
+        """Returns when it answers."""
+        if not any(self._folder.iterdir()):
+            self._configure()
+        with self._inside():
+            self.port, rpc = _free_tcp_ports(2)
+        words = ["olad", "-c", str(self._folder), "-p", str(self.port), "-r", str(rpc), "-l", "3"]
+        words += ["--no-register-with-dns-sd", *(("-i", "lo") if self._network else ())]
+        with self._log.open("ab") as log:
+            self._process = subprocess.Popen(
+                self._network.command(*self._as_nobody(words)) if self._network else self._as_nobody(words),
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+        give_up = time.monotonic() + STARTS_WITHIN_S
+        while True:
+            with contextlib.suppress(OSError):
+                self.ask("json/server_stats")
+                return
+            assert self._process.poll() is None, f"olad ended:\n{self.log}"
+            assert time.monotonic() < give_up, f"olad does not answer:\n{self.log}"
+            time.sleep(0.05)
+
+    def stop(self) -> None:
+        """Ends it; what was patched stays for the next start."""
+        if self._process is not None:
+            self._process.terminate()
+            self._process.wait(10)
+        self._process = None
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    @property
+    def log(self) -> str:
+        """What it said."""
+        return self._log.read_text(errors="replace") if self._log.exists() else ""
+
+    def levels(self, universe: int) -> bytes:
+        """512 levels as it has them now."""
+        answer = self.ask(f"get_dmx?u={universe}")
+        digits = answer.partition("[")[2].partition("]")[0]
+        return bytes(int(level) for level in digits.split(",") if level.strip()).ljust(512, b"\0")
+
+    def follow(self, universe: int, levels: bytes) -> float:
+        """Wait until it has exactly these; when that was seen, monotonic seconds."""
+        give_up = time.monotonic() + FOLLOWS_WITHIN_S
+        while True:
+            found, now = self.levels(universe), time.monotonic()
+            if found == levels:
+                return now
+            assert now < give_up, f"it has {found[:8].hex()}..., not {levels[:8].hex()}...\n{self.log}"
+            time.sleep(0.01)
+
+    def shine(self, universe: int, levels: bytes) -> None:
+        """Set levels by itself, as from its own console."""
+        shown = ",".join(str(level) for level in levels)
+        self.ask("set_dmx", urllib.parse.urlencode({"u": universe, "d": shown}).encode())
+
+    def ask(self, path: str, form: bytes | None = None) -> str:
+        """One page of its web server. Raises OSError."""
+        with (
+            self._inside(),
+            urllib.request.urlopen(f"http://127.0.0.1:{self.port}/{path}", form, timeout=5) as answer,
+        ):
+            return str(answer.read().decode())
+
+    @property
+    def _log(self) -> Path:
+        return self._folder / "olad.log"
+
+    def _inside(self) -> contextlib.AbstractContextManager[None]:
+        return self._network.entered() if self._network else contextlib.nullcontext()
+
+    def _configure(self) -> None:
+        for plugin in PLUGINS:
+            settings: Settings = self._plugins.get(plugin, {})
+            lines = [f"enabled = {'true' if plugin in self._plugins else 'false'}"]
+            for key, value in settings.items():
+                values = [value] if isinstance(value, str | int) else value
+                lines += [f"{key} = {one}" for one in values]
+            (self._folder / f"ola-{plugin}.conf").write_text("\n".join(lines) + "\n")
+        ports = "".join(f"{port} = {universe}\n" for port, universe in self._patched.items())
+        (self._folder / "ola-port.conf").write_text(ports)
+        if os.geteuid() == 0:
+            owner = pwd.getpwnam(NOBODY)
+            for path in (self._folder, *self._folder.iterdir()):
+                os.chown(path, owner.pw_uid, owner.pw_gid)
+
+    @staticmethod
+    def _as_nobody(words: list[str]) -> list[str]:
+        if os.geteuid() != 0:
+            return words
+        owner = pwd.getpwnam(NOBODY)
+        return ["setpriv", f"--reuid={owner.pw_uid}", f"--regid={owner.pw_gid}", "--clear-groups", *words]
+
+
+def art_net_node(**settings: str | int) -> dict[str, Settings]:
+    """Plugin settings of a node on loopback."""
+    return {"artnet": {"ip": "127.0.0.1", "use_loopback": "true", "net": 0, "subnet": 0, **settings}}
+
+
+def sacn_node(address: str) -> dict[str, Settings]:
+    """Plugin settings of a node with this address."""
+    return {"e131": {"ip": address, "input_ports": 2, "output_ports": 1, "ignore_preview": "true"}}
+
+
+@contextlib.contextmanager
+def shared_folder() -> Iterator[Path]:
+    """A folder that the daemon's user can look into; a test's own cannot."""
+    with tempfile.TemporaryDirectory(prefix="widgets-") as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+def _free_tcp_ports(count: int) -> list[int]:
+    with contextlib.ExitStack() as opened:
+        sockets = [opened.enter_context(socket.socket()) for _ in range(count)]
+        for one in sockets:
+            one.bind(("127.0.0.1", 0))
+        return [one.getsockname()[1] for one in sockets]
