@@ -180,15 +180,16 @@ def _twigs(anatomy: Anatomy, covered: set[int]) -> list[Group]:
     """Everything else that has bones: tails, ears, wings."""
     face = set(anatomy.below(anatomy.head)) if anatomy.head is not None else set()
     left = [joint for joint in range(len(anatomy.skeleton)) if joint not in covered | face]
+    bones = [(*bone, thickness(anatomy, bone[0])) for bone in anatomy.bones(left)]
+    for joint in sorted({bone[0] for bone in bones}):
+        parent = anatomy.skeleton.parents[joint]
+        if parent in covered:
+            start, end = anatomy.positions[parent], anatomy.positions[joint]
+            bones.append((parent, start, end, thickness(anatomy, joint)))
     return [
-        Group((_twig(anatomy, owner, start, end),), 0.015 * anatomy.height)
-        for owner, start, end in anatomy.bones(left)
+        Group((cone(anatomy, owner, start, end, (thick, 0.8 * thick), 0.0),), 0.015 * anatomy.height)
+        for owner, start, end, thick in bones
     ]
-
-
-def _twig(anatomy: Anatomy, joint: int, start: Array, end: Array) -> Slab:
-    thick = thickness(anatomy, joint)
-    return cone(anatomy, joint, start, end, (thick, 0.8 * thick), 0.0)
 
 
 def _extremity(anatomy: Anatomy, chain: Sequence[int]) -> int:

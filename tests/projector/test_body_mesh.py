@@ -1,0 +1,200 @@
+"""The body around any skeleton: closed, whole, symmetrical where the skeleton is, and moved by its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from appliance.pose import quaternion
+from appliance.pose.skeleton import Skeleton
+from appliance.projector.body_mesh import body_mesh
+from appliance.projector.skinning import BodyMesh, skin
+from appliance.projector.surface import Grid, surface_of
+from tests.projector import skeletons
+
+Faces = NDArray[np.int32]
+FIGURES = ("dancer", "mixamo", "quadruped")
+
+
+@cache
+def skeleton_of(name: str) -> Skeleton:
+    make: Callable[[], Skeleton] = skeletons.ALL[name]
+    return make()
+
+
+@cache
+def mesh_of(name: str) -> BodyMesh:
+    return body_mesh(skeleton_of(name))
+
+
+def volume(vertices: NDArray[np.float32], faces: Faces) -> float:
+    """Cubic metres inside, positive where the faces look outwards."""
+    a, b, c = vertices[faces].astype(float).transpose(1, 0, 2)
+    return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6)
+
+
+def edges_of(faces: Faces) -> NDArray[np.int32]:
+    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def turned(skeleton: Skeleton, turns: dict[int, NDArray[np.float64]]) -> tuple[NDArray[np.float64], ...]:
+    """Positions and world rotations after some joints turned about themselves."""
+    pose = np.tile(quaternion.IDENTITY.astype(float), (len(skeleton), 1))
+    for joint, turn in turns.items():
+        pose[joint] = turn
+    return skeleton.forward_kinematics(pose, np.zeros(3))
+
+
+@pytest.mark.parametrize("name", skeletons.ALL)
+def test_the_surface_is_closed_and_looks_outwards(name: str) -> None:
+    mesh = mesh_of(name)
+    edges = edges_of(mesh.faces)
+    once, counts = np.unique(edges, axis=0, return_counts=True)
+    assert (counts == 1).all(), "an edge that more than two triangles share, or two in the same sense"
+    assert np.array_equal(once, np.unique(edges[:, ::-1], axis=0)), "an edge that has one triangle alone"
+    assert volume(mesh.vertices, mesh.faces) > 0
+    assert np.isfinite(mesh.vertices).all()
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", skeletons.ALL)
+def test_the_surface_is_in_one_piece(name: str) -> None:
+    mesh = mesh_of(name)
+    label = np.arange(len(mesh.vertices))
+    edges = edges_of(mesh.faces)
+    while True:
+        before = label.copy()
+        np.minimum.at(label, edges[:, 0], label[edges[:, 1]])
+        label = label[label]
+        if np.array_equal(label, before):
+            break
+    assert len(np.unique(label)) == 1
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_has_the_size_of_a_body(name: str) -> None:
+    mesh = mesh_of(name)
+    assert 8_000 <= len(mesh.vertices) <= 25_000
+    share = volume(mesh.vertices, mesh.faces) / mesh.height**3
+    assert 0.008 < share < 0.025  # a dancer of 1.53 m: 28 to 90 litres
+    facing = np.cross(
+        mesh.vertices[mesh.faces[:, 1]] - mesh.vertices[mesh.faces[:, 0]],
+        mesh.vertices[mesh.faces[:, 2]] - mesh.vertices[mesh.faces[:, 0]],
+    )
+    agree = np.einsum("fi,fi->f", facing, mesh.normals[mesh.faces[:, 0]]) > 0
+    assert agree.mean() > 0.995
+
+
+@pytest.mark.parametrize("name", ["mixamo", "quadruped", "toy"])
+def test_a_symmetrical_skeleton_gives_a_symmetrical_body(name: str) -> None:
+    vertices = mesh_of(name).vertices
+    mirrored = vertices * np.array([-1, 1, 1], np.float32)
+    spacing = 1e-3 * mesh_of(name).height
+    seen = {tuple(cell) for cell in np.round(vertices / spacing).astype(int)}
+    near = [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)]
+    alone = [
+        cell
+        for cell in np.round(mirrored / spacing).astype(int)
+        if not any((cell[0] + x, cell[1] + y, cell[2] + z) in seen for x, y, z in near)
+    ]
+    assert len(alone) < 0.002 * len(vertices)
+
+
+@pytest.mark.parametrize("name", skeletons.ALL)
+def test_weights_are_shares_of_real_joints(name: str) -> None:
+    mesh = mesh_of(name)
+    assert mesh.joints.max() < len(skeleton_of(name))
+    assert (mesh.weights >= 0).all()
+    np.testing.assert_allclose(mesh.weights.sum(axis=1), 1, atol=1e-5)
+    assert (np.diff(mesh.weights, axis=1) <= 0).all(), "the strongest does not come first"
+
+
+@pytest.mark.parametrize("name", skeletons.ALL)
+def test_without_a_turn_the_body_is_as_it_was_modelled(name: str) -> None:
+    mesh, skeleton = mesh_of(name), skeleton_of(name)
+    vertices, normals = skin(mesh, *turned(skeleton, {}))
+    np.testing.assert_allclose(vertices, mesh.vertices, atol=1e-5)
+    np.testing.assert_allclose(normals, mesh.normals, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", skeletons.ALL)
+def test_every_joint_with_a_bone_moves_something(name: str) -> None:
+    mesh, skeleton = mesh_of(name), skeleton_of(name)
+    face = {j for j, p in enumerate(skeleton.parents) if p >= 0 and "head" in skeleton.names[p].casefold()}
+    bones = {parent for joint, parent in enumerate(skeleton.parents) if skeleton.offsets[joint].any()}
+    bones |= {joint for joint, _ in skeleton.ends}
+    turn = quaternion.from_axis_angle([1, 1, 1], 0.5)
+    for joint in sorted(bones - face - {-1}):
+        vertices, _ = skin(mesh, *turned(skeleton, {joint: turn}))
+        moved = np.linalg.norm(vertices - mesh.vertices, axis=1)
+        assert moved.max() > 1e-3 * mesh.height, f"{skeleton.names[joint]} moves nothing"
+
+
+def test_a_rigid_turn_of_all_keeps_the_shape() -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    turn = quaternion.from_axis_angle([0.3, 1, -0.2], 2.0)
+    vertices, _ = skin(mesh, *turned(skeleton, {0: turn}))
+    np.testing.assert_allclose(vertices, quaternion.rotate(turn, mesh.vertices.astype(float)), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("joint", "child"), [("lForeArm", "lHand"), ("lShin", "lFoot"), ("rShldr", "rForeArm")]
+)
+def test_a_bent_or_twisted_limb_keeps_its_volume_and_length(joint: str, child: str) -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    whole = volume(mesh.vertices, mesh.faces)
+    bone = skeleton.offsets[skeleton.index(child)]
+    for axis, degrees in ((bone, 120.0), (np.cross(bone, [0.3, 0.2, 1.0]), 90.0)):
+        turn = quaternion.from_axis_angle(axis, np.radians(degrees))
+        vertices, _ = skin(mesh, *turned(skeleton, {skeleton.index(joint): turn}))
+        assert volume(vertices, mesh.faces) == pytest.approx(whole, rel=0.04)
+        moved = mesh.joints[:, 0] == skeleton.index(child)
+        before, after = mesh.vertices[moved].mean(axis=0), vertices[moved].mean(axis=0)
+        elbow = mesh.bind_positions[skeleton.index(joint)]
+        assert np.linalg.norm(after - elbow) == pytest.approx(np.linalg.norm(before - elbow), rel=0.02)
+
+
+def test_an_arm_at_the_hip_is_not_tied_to_the_hip() -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    legs = [skeleton.index(name) for name in ("hip", "lThigh", "rThigh", "abdomen")]
+    hand = np.isin(mesh.joints[:, 0], [skeleton.index(name) for name in ("lHand", "rHand", "lForeArm")])
+    assert hand.sum() > 100
+    assert not (np.isin(mesh.joints[hand], legs) & (mesh.weights[hand] > 1e-6)).any()
+
+
+def test_neighbours_on_the_surface_move_alike() -> None:
+    mesh, skeleton = mesh_of("dancer"), skeleton_of("dancer")
+    weights = np.zeros((len(mesh.vertices), len(skeleton)), np.float32)
+    np.put_along_axis(weights, mesh.joints.astype(int), 0, axis=1)
+    for place in range(4):
+        np.add.at(weights, (np.arange(len(weights)), mesh.joints[:, place]), mesh.weights[:, place])
+    fingers = [j for j in range(len(skeleton)) if any(w in skeleton.names[j] for w in ("Thumb", "1", "2"))]
+    edges = edges_of(mesh.faces)
+    jump = np.abs(weights[edges[:, 0]] - weights[edges[:, 1]])
+    jump[:, fingers] = 0.0
+    hands = np.isin(mesh.joints[:, 0], [*fingers, skeleton.index("lHand"), skeleton.index("rHand")])
+    assert jump[~hands[edges[:, 0]]].max() < 0.25
+
+
+def test_a_ball_is_a_ball() -> None:
+    grid = Grid(np.full(3, -1.0), 0.05, (41, 41, 41))
+    x, y, z = np.meshgrid(*(grid.axis(number) for number in range(3)), indexing="ij")
+    vertices, normals, faces = surface_of(np.sqrt(x * x + y * y + z * z) - np.float32(0.7), grid)
+    assert volume(vertices, faces) == pytest.approx(4 / 3 * np.pi * 0.7**3, rel=0.01)
+    radii = np.linalg.norm(vertices, axis=1)
+    np.testing.assert_allclose(radii, 0.7, atol=0.005)
+    np.testing.assert_allclose(normals, vertices / radii[:, None], atol=0.02)
+
+
+def test_sheets_that_would_share_a_cell_are_joined_instead() -> None:
+    field = np.full((6, 6, 6), 1.0, np.float32)
+    field[2, 2, 2] = field[3, 3, 3] = field[2, 4, 2] = field[3, 3, 1] = -0.4
+    _, _, faces = surface_of(field, Grid(np.zeros(3), 0.1, (6, 6, 6)))
+    edges = edges_of(faces)
+    once, counts = np.unique(edges, axis=0, return_counts=True)
+    assert (counts == 1).all()
+    assert np.array_equal(once, np.unique(edges[:, ::-1], axis=0))
