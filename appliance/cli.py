@@ -170,12 +170,13 @@ def _own_commands() -> set[str]:
 
 
 def _is_for_people(error: Exception) -> bool:
+    from appliance.outputs.runtime_folder import RuntimeFolderError
     from appliance.pose.bvh import BvhError
     from appliance.show.config_error import ConfigError
     from appliance.stage.journal import JournalError
     from appliance.stage.stage_error import StageError
 
-    return isinstance(error, BvhError | ConfigError | JournalError | StageError)
+    return isinstance(error, BvhError | ConfigError | JournalError | RuntimeFolderError | StageError)
 
 
 if __name__ == "__main__":

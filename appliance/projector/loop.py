@@ -64,6 +64,7 @@ class Projector:
         self._painter: Painter | None = None
         self._drawn: tuple[Skeleton, Looks] | None = None  # what the painter was made for
         self._to_draw: tuple[Skeleton, Looks] | None = None  # a show that waits for its painter
+        self._is_black = False  # since that show waits
 
     def draw(
         self, now: float, screen: moderngl.Framebuffer, display: Size, lines: tuple[str, ...] = ()
@@ -72,8 +73,12 @@ class Projector:
 
         lines: figures to show. Gives when what is shown left the stage; None while no dance is seen.
         """
-        self._follow_stage(now, display)
-        presence, moment = self._present(now)
+        self._follow_stage(now)
+        moment = self._moment(now)
+        if self._to_draw is not None and moment is not None:
+            self._prepare(self._to_draw, moment, display)
+        newest = self._poses.newest if self._poses is not None and self._drawn is not None else None
+        presence = self._presence.step(newest, now)
         house = self._house.read()
         level = house.level(now) * presence
         is_drawn = self._painter is not None and moment is not None and level > 0.0
@@ -96,24 +101,35 @@ class Projector:
             self._painter.release()
         self._final.release()
 
-    def _present(self, now: float) -> tuple[float, Moment | None]:
-        """How far the dance is there, 0..1, and where the dancer is."""
-        newest = moment = None
-        if self._poses is not None:
+    def _moment(self, now: float) -> Moment | None:
+        """Where the dancer is; None before a stage's first frame."""
+        if self._poses is None:
+            return None
+        if self._reader.generation == self._generation:
             self._poses.take(now)
-            newest, moment = self._poses.newest, self._poses.moment(now)
-        return self._presence.step(newest if self._painter is not None else None, now), moment
+        return self._poses.moment(now)
 
-    def _follow_stage(self, now: float, display: Size) -> None:
-        """Another stage may bring another show. Its painter takes a moment to make, so it is black before."""
-        self._reader.is_alive(now)  # looks for another stage
-        if self._reader.generation != self._generation and self._reader.facts is not None:
+    def _follow_stage(self, now: float) -> None:
+        """With the first frame of another stage; it may bring another show, which is prepared in the dark."""
+        self._reader.is_alive(now)  # looks for another one
+        first = self._reader.newest(now) if self._reader.generation != self._generation else None
+        if first is not None and self._reader.facts is not None:
             self._generation = self._reader.generation
             self._meet(self._reader.facts)
-        elif self._to_draw is not None:
-            self._final.resize(picture_size(self._config, display))
-            self._painter = self._make_painter(self._gl, self._final.picture.size, *self._to_draw)
-            self._drawn, self._to_draw = self._to_draw, None
+
+    def _prepare(self, show: tuple[Skeleton, Looks], moment: Moment, display: Size) -> None:
+        """Draw each look once, unseen: what a driver puts off until then would halt the dance."""
+        if not self._is_black:
+            self._is_black = True
+            return
+        if self._painter is not None:  # that took time, which is not to count for the fade
+            self._drawn, self._to_draw = show, None
+            return
+        self._final.resize(picture_size(self._config, display))
+        self._painter = self._make_painter(self._gl, self._final.picture.size, *show)
+        for look in show[1]:
+            self._painter.draw(moment, look, look, 1.0, self._final.picture)
+        self._gl.finish()
 
     def _meet(self, facts: Facts) -> None:
         self._poses = Interpolation(self._reader, facts.held)
@@ -124,7 +140,7 @@ class Projector:
             self._painter.release()
         self._painter = self._drawn = None
         self._presence.hide()
-        self._to_draw = show
+        self._to_draw, self._is_black = show, False
 
     def _looks(self, facts: Facts) -> Looks:
         try:

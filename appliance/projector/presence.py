@@ -4,6 +4,7 @@ from __future__ import annotations
 
 STALE_S = 0.5
 FADE_S = 0.5
+_LONGEST_S = 0.25  # between two pictures: who stood still for longer still fades in, in two steps
 
 
 class Presence:
@@ -18,8 +19,10 @@ class Presence:
         elapsed_s = 0.0 if self._before is None else max(0.0, now - self._before)
         self._before = now
         is_fresh = newest is not None and now - newest < STALE_S
-        change = elapsed_s / FADE_S
-        self.level = min(1.0, self.level + change) if is_fresh else max(0.0, self.level - change)
+        if is_fresh:
+            self.level = min(1.0, self.level + min(elapsed_s, _LONGEST_S) / FADE_S)
+        else:
+            self.level = max(0.0, self.level - elapsed_s / FADE_S)
         return self.level
 
     def hide(self) -> None:

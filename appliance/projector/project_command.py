@@ -8,6 +8,7 @@ from pathlib import Path
 
 import typer
 
+from appliance.control.speaker import Speaker
 from appliance.projector.projector_error import ProjectorError
 from appliance.projector.run import Run, Wish
 from appliance.projector.window import Kind, Size
@@ -40,17 +41,20 @@ def project_show(box_file: Path | None, wish: Wish) -> int:
         signal.signal(number, lambda came, _: stopped.append(came))
     if wish.frames is not None:
         wish.frames.mkdir(parents=True, exist_ok=True)
+    speaker = Speaker()
     try:
-        run = Run(load_box(box_file), box_file, wish, _say)
+        run = Run(load_box(box_file), box_file, wish, speaker.say)
         try:
             for line in run.introduction():
-                _say(line)
-            _say(f"Shown: {run.project(lambda: bool(stopped)).sentence()}.")
+                speaker.say(line)
+            speaker.say(f"Shown: {run.project(lambda: bool(stopped)).sentence()}.")
         finally:
             run.close()
     except ProjectorError as error:
         print(f"bunraku: {error}", file=sys.stderr)
         return error.status
+    finally:
+        speaker.close()
     return 0
 
 
@@ -61,11 +65,3 @@ def _size(text: str) -> Size:
     if not all(1 <= int(part) <= _LARGEST for part in (width, height)):
         raise typer.BadParameter(f"Width and height are from 1 to {_LARGEST} pixels.")
     return int(width), int(height)
-
-
-def _say(words: str) -> None:
-    """A terminal that is gone does not end the show."""
-    try:
-        print(words, flush=True)
-    except OSError:
-        sys.stdout = None

@@ -16,6 +16,7 @@ from appliance.projector.alignment import Alignment
 from appliance.projector.context import offscreen
 from appliance.projector.controls import Controls
 from appliance.projector.loop import Projector
+from appliance.show.look import STYLES
 from appliance.show.projector import ProjectorConfig
 from tests.projector.stage_double import SIZE, StageDouble, TellingPainter, pixels
 from tests.stage.bundles import write_show
@@ -122,8 +123,22 @@ def test_a_stage_that_is_restarted_soon_is_hardly_seen(evening: Evening) -> None
     evening.stage = None
     assert evening.colour(0.3)[0] == 255
     evening.begin()
-    assert min(evening.colour()[0] for _ in range(30)) == 255
+    assert {evening.colour()[0] for _ in range(30)} == {255}
     assert (TellingPainter.made, TellingPainter.released) == (1, 0)
+
+
+def test_a_new_stage_that_has_not_begun_to_dance_takes_no_picture_away(evening: Evening) -> None:
+    evening.begin()
+    evening.colour(1.0)
+    assert evening.stage is not None
+    evening.stage.close()
+    evening.stage = None
+    evening.colour(0.1)
+    coming = StageDouble(evening.folder, evening.show, joints=5)
+    assert evening.colour(0.3)[:2] == (255, 76)
+    assert evening.colour(1.0) == (0, 0, 0)
+    evening.stage = coming
+    assert evening.colour(0.8)[:2] == (255, 127)
 
 
 def test_another_show_with_another_skeleton_begins_in_the_dark(evening: Evening, tmp_path: Path) -> None:
@@ -201,6 +216,27 @@ def test_looks_fade_as_the_house_says(evening: Evening) -> None:
     evening.set_house(House().with_look("lines", evening.now, 1.0))
     assert 120 < evening.colour(0.5)[2] < 135
     assert evening.colour(0.6)[2] == 255
+
+
+def test_each_look_is_drawn_unseen_before_the_first_is_seen(
+    evening: Evening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a driver puts off until the first use of a shader would halt the dance in mid-show."""
+    drawn: list[tuple[str, int]] = []
+    draw = TellingPainter.draw
+
+    def noted(painter: TellingPainter, *arguments: object) -> None:
+        drawn.append((str(arguments[1]), len(seen)))
+        draw(painter, *arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(TellingPainter, "draw", noted)
+    seen: list[tuple[int, int, int]] = []
+    evening.begin()
+    while not seen or seen[-1] == (0, 0, 0):
+        seen.append(evening.colour())
+    first = drawn[0][1]
+    assert [look for look, picture in drawn if picture == first] == [*STYLES]
+    assert set(seen[: first + 1]) == {(0, 0, 0)}
 
 
 def test_the_window_may_change_its_size(evening: Evening) -> None:

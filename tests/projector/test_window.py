@@ -56,13 +56,12 @@ window.close()
 def virtual_display() -> Iterator[str]:
     """A real X server on no screen."""
     reading, writing = os.pipe()
-    with open(os.devnull, "wb") as nowhere:
-        server = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(writing), "-screen", "0", "640x480x24", "-nolisten", "tcp"],
-            pass_fds=[writing],
-            stdout=nowhere,
-            stderr=nowhere,
-        )
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "640x480x24", "-nolisten", "tcp"],
+        pass_fds=[writing],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     os.close(writing)
     try:
         with os.fdopen(reading) as told:
@@ -101,14 +100,16 @@ def no_display(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_no_display_at_all(no_display: None) -> None:
-    with pytest.raises(ProjectorError, match="There is no display .*kmsdrm.*Plug the projector in") as caught:
+    with pytest.raises(
+        ProjectorError, match=r"There is no display .*kmsdrm.*Plug the projector in"
+    ) as caught:
         Window(ProjectorConfig(), "fullscreen")
     assert caught.value.status == NO_DISPLAY
 
 
 def test_a_desktop_that_does_not_answer(no_display: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DISPLAY", ":987")
-    with pytest.raises(ProjectorError, match="x11: .*kmsdrm: "):
+    with pytest.raises(ProjectorError, match=r"x11: .*kmsdrm: "):
         Window(ProjectorConfig(), "window")
 
 
@@ -127,11 +128,13 @@ def test_no_opengl(monkeypatch: pytest.MonkeyPatch) -> None:
     try:
         with monkeypatch.context() as patched:
             patched.setattr(sdl2, "SDL_GL_CreateContext", lambda _: None)
-            with pytest.raises(ProjectorError, match="no OpenGL ES 3.0 .*Install the graphics card's driver"):
+            with pytest.raises(
+                ProjectorError, match=r"no OpenGL ES 3.0 .*Install the graphics card's driver"
+            ):
                 GlContext(window)
         with monkeypatch.context() as patched:
             patched.setattr(context_module, "_ES_3_0", 990)
-            with pytest.raises(ProjectorError, match="no OpenGL ES 3.0"):
+            with pytest.raises(ProjectorError, match=r"no OpenGL ES 3.0"):
                 GlContext(window)
         GlContext(window).close()
     finally:
@@ -162,7 +165,7 @@ def test_a_lost_context_ends_the_projector_with_a_sentence(
     run = Run(box, None, Wish("offscreen", (64, 36), seconds=20), print)
     try:
         with pytest.raises(
-            ProjectorError, match="was reset.*sees black.*Start the projector again"
+            ProjectorError, match=r"was reset.*sees black.*Start the projector again"
         ) as caught:
             run.project(lambda: False)
     finally:
