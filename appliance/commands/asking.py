@@ -19,7 +19,7 @@ from appliance.control.port import Address
 from appliance.control.roster import END, SENSOR, RosterLine
 from appliance.show.box import BoxConfig
 
-PATIENCE_S = 2.0  # a tick takes the command, a thread answers: 0.2 s, and more while a box starts
+PATIENCE_S = 2.0  # show control answers within 0.5 s, and later while it starts
 _LARGEST_DATAGRAM = 4096
 _LINE = tuple(get_type_hints(RosterLine).values())
 _ENDING = (int, float, str)
@@ -84,6 +84,8 @@ class RunningBox:
             ):
                 _, age_s, key_file = reply.params
                 return Roll(lines, float(age_s), Path(_shown(key_file)) if key_file else None)
+            elif reply.address == REPLY and reply.params[:2] == ["/sensors/list", 0]:
+                raise NoBoxError(readable(str(reply.params[-1])))
         raise self._nobody()
 
     def _replies(self, message: Message) -> Iterator[OscMessage]:

@@ -52,7 +52,7 @@ class House:
     def master_level(self, now: float) -> float:
         """0..1: the master's fader on its way."""
         part = _part(now, self.master_since, self.master_fade_s)
-        return self.master_before + (self.master - self.master_before) * part
+        return self.master_before * (1.0 - part) + self.master * part
 
     def going_level(self, now: float) -> float:
         """0..1: 1 while the show goes, on its way to 0 after /stop and back to 1 after /go."""

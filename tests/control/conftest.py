@@ -1,0 +1,44 @@
+"""A runtime folder with a stage, show control, and somebody who asks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from appliance.sensor.keys import create_keys
+from tests.control.doubles import Asker, ControlInThread, StageDouble
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "runtime"
+    folder.mkdir(mode=0o700)
+    return folder
+
+
+@pytest.fixture
+def key_file(tmp_path: Path) -> Path:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist", "spare-1"])
+    return tmp_path / "sensors.keys"
+
+
+@pytest.fixture
+def stage(folder: Path) -> Iterator[StageDouble]:
+    with StageDouble(folder) as stage:
+        yield stage
+
+
+@pytest.fixture
+def control(folder: Path, key_file: Path) -> Iterator[ControlInThread]:
+    control = ControlInThread(folder, key_file)
+    yield control
+    control.close()
+
+
+@pytest.fixture
+def asker(control: ControlInThread) -> Iterator[Asker]:
+    asker = Asker(control.port)
+    yield asker
+    asker.close()
