@@ -7,8 +7,11 @@ from pathlib import Path
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
 from appliance.show.bundle import CHECKSUMS, bundle_bytes, bundle_files, default_show_path, write_checksums
 from appliance.show.check import verify_bundle
+from appliance.show.config_error import ConfigError
 from appliance.show.cues import too_much
-from appliance.show.show import load_show
+from appliance.show.posistagenet import misfits
+from appliance.show.show import Show, load_show
+from appliance.show.venue_lights import misplaced, unwired
 from appliance.stage.cast import admission, assemble, reach
 from appliance.stage.stage_error import StageError
 
@@ -19,6 +22,7 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
     box = load_box(box_file)
     _refuse_damage(directory)
     show = load_show(directory)
+    _refuse_misfits(show, box, box_file)
     cast = assemble(show, _without_ports(box))
     verdict = admission(cast, show, box)
     cast.close()
@@ -28,7 +32,8 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
         raise StageError(verdict.sentence())
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
-    for warning in (*reach(cast, box), *too_much(show.config.cues, verdict.most_coding, show.file)):
+    too_many = too_much(show.config.cues, verdict.most_coding, show.file)
+    for warning in (*reach(cast, box), *unwired(show, box), *too_many):
         print(warning)
 
 
@@ -54,6 +59,16 @@ def _refuse_damage(directory: Path) -> None:
     errors = [str(finding) for finding in findings if finding.level == "error"]
     if errors:
         raise StageError("\n".join(["This show cannot be danced.", *errors]))
+
+
+def _refuse_misfits(show: Show, box: BoxConfig, box_file: Path | None) -> None:
+    """Whether what the box file says about joints and fixtures fits this show; raises ConfigError."""
+    problems = [
+        *misfits(box.outputs.posistagenet, show.skeleton.names, box_file),
+        *misplaced(show, box, box_file),
+    ]
+    if problems:
+        raise ConfigError(problems)
 
 
 def _without_ports(box: BoxConfig) -> BoxConfig:

@@ -124,7 +124,7 @@ class Lights:
 
 def rig_here(show: Show, box: BoxConfig, box_file: Path | None) -> LightsConfig:
     """The show's lights as they hang in this venue; raises ConfigError when there is nothing to light."""
-    problems = [Problem(box_file or Path("box.yaml"), 0, sentence) for sentence in misplaced(show, box)]
+    problems = misplaced(show, box, box_file)
     if not show.config.lights.fixtures:
         problems.append(
             Problem(

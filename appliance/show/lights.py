@@ -165,7 +165,7 @@ def overlaps(fixtures: Sequence[FixtureConfig], directory: Path | None) -> Seque
     owners: dict[tuple[int, int], FixtureConfig] = {}
     found = []
     for place, fixture in enumerate(fixtures):
-        count = len(load_profile(fixture.profile, directory).mode(fixture.mode).channels)
+        count = channel_count(fixture, directory)
         channels = [(fixture.universe, fixture.address + offset) for offset in range(count)]
         taken = next((channel for channel in channels if channel in owners), None)
         if taken is not None:
@@ -173,10 +173,15 @@ def overlaps(fixtures: Sequence[FixtureConfig], directory: Path | None) -> Seque
             message = (
                 f"'{other.name}' and '{fixture.name}' are both on channel {taken[1]} of universe {taken[0]}."
             )
-            end = other.address + len(load_profile(other.profile, directory).mode(other.mode).channels)
+            end = other.address + channel_count(other, directory)
             found.append((place, message, f"'{other.name}' ends on {end - 1}: write another address."))
         owners.update(dict.fromkeys(channels, fixture))
     return found
+
+
+def channel_count(fixture: FixtureConfig, directory: Path | None) -> int:
+    """How many channels a fixture takes in its mode."""
+    return len(load_profile(fixture.profile, directory).mode(fixture.mode).channels)
 
 
 def drivable(fixture: FixtureConfig, directory: Path | None) -> tuple[str, ...]:

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import Field
 
-from appliance.show.config_error import did_you_mean
+from appliance.show.config_error import Problem, did_you_mean
 from appliance.show.light_rules import Metres
-from appliance.show.lights import MAX_FIXTURES, Address, FixtureConfig, LightsConfig, Pose, Universe, overlaps
+from appliance.show.lights import (
+    MAX_FIXTURES,
+    UNIVERSE_CHANNELS,
+    Address,
+    FixtureConfig,
+    LightsConfig,
+    Pose,
+    Universe,
+    channel_count,
+    overlaps,
+)
 from appliance.show.section import Section
+from appliance.show.yaml_file import YamlFile, read_yaml
 
 if TYPE_CHECKING:
     from appliance.show.box import BoxConfig
@@ -52,17 +64,32 @@ def unwired(show: Show, box: BoxConfig) -> list[str]:
     ]
 
 
-def misplaced(show: Show, box: BoxConfig) -> list[str]:
-    """What is wrong with the box file's changes to the rig: unknown fixtures, channels used twice."""
+def misplaced(show: Show, box: BoxConfig, box_file: Path | None) -> list[Problem]:
+    """What is wrong with the box file's changes to the rig, each with its line: fixtures that the show has
+    not, channels that are used twice or that a universe has not.
+    """
+    file = YamlFile(Path("box.yaml")) if box_file is None else read_yaml(box_file)
     names = [fixture.name for fixture in show.config.lights.fixtures]
-    unknown = [
-        f"The show has no fixture '{place.fixture}' to change (lights: places: in the box file). "
-        + did_you_mean(place.fixture, names)
-        for place in box.lights.places
-        if place.fixture not in names
+    changed = [place.fixture for place in box.lights.places]
+
+    def problem(fixture: str, words: str, cure: str) -> Problem:
+        number = (changed.index(fixture),) if fixture in changed else ()
+        return Problem(file.path, file.line(("lights", "places", *number)), words, cure)
+
+    problems = [
+        problem(name, f"The show has no fixture '{name}'.", did_you_mean(name, names))
+        for name in changed
+        if name not in names
     ]
     fixtures = at_venue(show.config.lights, box.lights).fixtures
-    return unknown + [f"{words} {cure}" for _, words, cure in overlaps(fixtures, show.directory)]
+    for place, words, cure in overlaps(fixtures, show.directory):
+        problems.append(problem(fixtures[place].name, words, cure))
+    for fixture in fixtures:
+        end = fixture.address + channel_count(fixture, show.directory) - 1
+        if end > UNIVERSE_CHANNELS:
+            words = f"'{fixture.name}' would end on channel {end}; a universe has {UNIVERSE_CHANNELS}."
+            problems.append(problem(fixture.name, words, "Write a lower address, or another universe."))
+    return problems
 
 
 def at_venue(lights: LightsConfig, venue: VenueLightsConfig) -> LightsConfig:

@@ -9,6 +9,7 @@ import pytest
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
+from appliance.show.venue_lights import misplaced, unwired
 
 SHOW = """\
 name: Rig
@@ -142,4 +143,35 @@ def test_faults_of_the_rig_and_of_the_rest_are_said_together(bundle: Path) -> No
     assert [problem.line for problem in caught.value.problems] == [
         line_of(text, "plastre"),
         line_of(text, "513"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("places", "line", "words"),
+    [
+        ("{fixture: wahs, address: 7}", 3, ["no fixture 'wahs'", "Did you mean 'wash'?"]),
+        ("{fixture: wash, address: 3}", 3, ["are both on channel 3 of universe 1"]),
+        ("{fixture: wash, address: 512}", 3, ["'wash' would end on channel", "a universe has 512"]),
+        ("{fixture: wash, address: 7}\n    - {fixture: spot left, address: 5}", 3, ["are both on channel"]),
+    ],
+)
+def test_a_venue_that_hangs_fixtures_where_they_do_not_fit_is_refused(
+    bundle: Path, places: str, line: int, words: list[str]
+) -> None:
+    (bundle / "show.yaml").write_text(SHOW)
+    (bundle / "box.yaml").write_text(f"lights:\n  places:\n    - {places}\n")
+    (problem,) = misplaced(load_show(bundle), load_box(bundle / "box.yaml"), bundle / "box.yaml")
+    assert (problem.file, problem.line) == (bundle / "box.yaml", line)
+    for word in words:
+        assert word in str(problem)
+
+
+def test_a_venue_may_hang_the_rig_otherwise(bundle: Path) -> None:
+    (bundle / "show.yaml").write_text(SHOW)
+    (bundle / "box.yaml").write_text("lights: {places: [{fixture: wash, universe: 7, address: 1}]}\n")
+    show, box = load_show(bundle), load_box(bundle / "box.yaml")
+    assert misplaced(show, box, bundle / "box.yaml") == []
+    assert [sentence[:23] for sentence in unwired(show, box)] == [
+        "Universe 1 has no wire:",
+        "Universe 7 has no wire:",
     ]
