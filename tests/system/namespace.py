@@ -60,14 +60,25 @@ class Namespace:
                 _set_namespace(outside.fileno())
 
 
-def join(one: Namespace, one_address: str, two: Namespace, two_address: str) -> None:
-    """A cable between two networks; it is gone with either. Addresses like 10.77.0.1/24."""
-    ends = (_name("a"), _name("b"))
-    _ip("link", "add", ends[0], "type", "veth", "peer", "name", ends[1])
-    for network, address, end in zip((one, two), (one_address, two_address), ends, strict=True):
-        _ip("link", "set", end, "netns", network.name)
-        _ip("-n", network.name, "address", "add", address, "dev", end)
-        _ip("-n", network.name, "link", "set", end, "up")
+class Cable:
+    """Between two networks, plugged in; it is gone with either. Addresses like 10.77.0.1/24."""
+
+    def __init__(self, one: Namespace, one_address: str, two: Namespace, two_address: str) -> None:
+        self._near, self._end = one, _name("a")
+        far_end = _name("b")
+        _ip("link", "add", self._end, "type", "veth", "peer", "name", far_end)
+        for network, address, end in ((one, one_address, self._end), (two, two_address, far_end)):
+            _ip("link", "set", end, "netns", network.name)
+            _ip("-n", network.name, "address", "add", address, "dev", end)
+            _ip("-n", network.name, "link", "set", end, "up")
+
+    def pull_out(self) -> None:
+        """At the first one's end."""
+        _ip("-n", self._near.name, "link", "set", self._end, "down")
+
+    def plug_in(self) -> None:
+        """Again."""
+        _ip("-n", self._near.name, "link", "set", self._end, "up")
 
 
 def _name(what: str) -> str:

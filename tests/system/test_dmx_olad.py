@@ -17,7 +17,7 @@ from appliance.show.dmx import DmxConfig
 from hw_sim.dmx.usb_pro import GET_PARAMETERS, GET_SERIAL, UsbProWidget
 from tests.outputs.dmx.conftest import config, universe
 from tests.system import namespace, olad
-from tests.system.namespace import Namespace
+from tests.system.namespace import Cable, Namespace
 from tests.system.olad import Olad
 
 pytestmark = pytest.mark.skipif(olad.why_not() is not None, reason=str(olad.why_not()))
@@ -25,6 +25,8 @@ pytestmark = pytest.mark.skipif(olad.why_not() is not None, reason=str(olad.why_
 ART_NET_IN, SACN_IN = "2-1-I-0", "11-1-I-0"
 LOST_AFTER_S = 2.5
 BOX, NODE = "10.77.0.1", "10.77.0.2"
+
+Venue = tuple[Namespace, Namespace, Cable]
 
 
 class Sender:
@@ -133,13 +135,12 @@ def test_an_art_net_node_that_was_away_follows_again(art_net: Namespace | None) 
 
 
 @pytest.fixture
-def venue() -> Iterator[tuple[Namespace, Namespace]]:
-    """The box's network and the node's, with a cable between them."""
+def venue() -> Iterator[Venue]:
+    """The box's network and the node's, and the cable between them."""
     if namespace.why_not() is not None:
         pytest.skip(f"sACN needs a network of its own: {namespace.why_not()}")
     with Namespace("box") as box, Namespace("node") as node:
-        namespace.join(box, f"{BOX}/24", node, f"{NODE}/24")
-        yield box, node
+        yield box, node, Cable(box, f"{BOX}/24", node, f"{NODE}/24")
 
 
 def by_multicast(priority: int) -> DmxConfig:
@@ -147,9 +148,9 @@ def by_multicast(priority: int) -> DmxConfig:
 
 
 def test_of_two_boxes_the_higher_priority_is_seen_and_the_other_takes_over(
-    venue: tuple[Namespace, Namespace], tmp_path: Path
+    venue: Venue, tmp_path: Path
 ) -> None:
-    network, node = venue
+    network, node, _ = venue
     with (
         Olad(olad.sacn_node(NODE), {SACN_IN: 1}, node) as daemon,
         Sender([by_multicast(100)], tmp_path / "second", network) as second,
@@ -173,8 +174,8 @@ def test_of_two_boxes_the_higher_priority_is_seen_and_the_other_takes_over(
             assert daemon.follow(1, universe(101)) - ended > LOST_AFTER_S - 1.0
 
 
-def test_sacn_unicast_survives_a_still_picture(venue: tuple[Namespace, Namespace], tmp_path: Path) -> None:
-    network, node = venue
+def test_sacn_unicast_survives_a_still_picture(venue: Venue, tmp_path: Path) -> None:
+    network, node, _ = venue
     with (
         Olad(olad.sacn_node(NODE), {SACN_IN: 1}, node) as daemon,
         Sender([config("sacn", host=NODE, priority=150)], tmp_path / "still", network) as still,
@@ -188,8 +189,24 @@ def test_sacn_unicast_survives_a_still_picture(venue: tuple[Namespace, Namespace
             time.sleep(0.1)
 
 
-def test_preview_is_for_visualisers_alone(venue: tuple[Namespace, Namespace], tmp_path: Path) -> None:
-    network, node = venue
+def test_a_cable_pulled_out_and_back(venue: Venue, tmp_path: Path) -> None:
+    network, node, cable = venue
+    with (
+        Olad(olad.sacn_node(NODE), {SACN_IN: 1}, node) as daemon,
+        Sender([by_multicast(100)], tmp_path, network) as box,
+    ):
+        box.levels = universe(1)
+        daemon.follow(1, universe(1))
+        cable.pull_out()
+        box.levels = universe(2)
+        time.sleep(0.3)
+        assert daemon.levels(1) == universe(1)
+        cable.plug_in()
+        daemon.follow(1, universe(2))
+
+
+def test_preview_is_for_visualisers_alone(venue: Venue, tmp_path: Path) -> None:
+    network, node, _ = venue
     with (
         Olad(olad.sacn_node(NODE), {SACN_IN: 1}, node) as daemon,
         Sender(

@@ -47,5 +47,5 @@ def open_dmx_wire(config: DmxConfig) -> AdapterWire:
         return OpenDmx(find_device(config.device, config.serial, is_bare_ftdi), config.channels)
 
     which = config.device or config.serial
-    name = f"Open DMX{f' {which}' if which else ''}, universe {config.universe}"
+    name = f"Open DMX{f' {which}' if which else ''} (not recommended for shows), universe {config.universe}"
     return AdapterWire(name, open_adapter, period_s=1.0 / config.rate)

@@ -40,10 +40,6 @@ class Universe:
         self._leave(now)
         return True
 
-    def next_due(self, now: float) -> float:
-        """When to offer the next one for an even rate, monotonic seconds; `now` if at once."""
-        return max(self._due, now)
-
     def close(self, now: float) -> None:
         """What was offered last leaves, then the wire is closed."""
         if self._changed:

@@ -48,8 +48,9 @@ class SacnWire(NetworkWire):
         number = config.number_on_wire
         interface = config.interface or (None if config.host else LOOPBACK)
         host = config.host or sacn_packet.group(number)
+        inside = "inside this machine" if interface == LOOPBACK else f"multicast from {interface}"
         super().__init__(
-            f"sACN {config.host or 'multicast'}, universe {number}",
+            f"sACN {config.host or inside}, universe {number}",
             DatagramPath(host, config.udp_port, interface, hops=config.ttl),
             "Check the network cable, and host and interface in the box file.",
         )

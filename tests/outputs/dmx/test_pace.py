@@ -56,16 +56,6 @@ def test_a_caller_that_wakes_late_now_and_then_gets_every_universe_away() -> Non
     assert len(listener.heard) == 600
 
 
-def test_who_offers_when_told_keeps_an_even_rate() -> None:
-    one, listener = paced()
-    now = 0.0
-    for tick in range(400):
-        assert one.offer(universe(tick), now)
-        now = one.next_due(now)
-    times = [now for now, _ in listener.heard]
-    assert [late - early for early, late in pairwise(times)] == pytest.approx([0.025] * 399)
-
-
 def test_the_newest_leaves() -> None:
     one, listener = paced()
     one.offer(universe(1), 0.0)
