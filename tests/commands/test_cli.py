@@ -98,6 +98,20 @@ def test_check_passes_a_whole_show_and_says_what_it_costs(
     assert "3 coding iterations cost" in words
 
 
+def test_check_reads_a_box_file_against_the_show(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    show = write_show(tmp_path / "show")
+    with (show / "show.yaml").open("a") as file:
+        file.write("lights: {fixtures: [{name: wash, profile: led-par, address: 1}]}\n")
+    write_checksums(show)
+    box = tmp_path / "box.yaml"
+    box.write_text("sensors: {udp: null}\n")
+    assert "Universe 1 has no wire: wash" in succeeded(capsys, "check", str(show), "--box", str(box))
+    box.write_text("outputs:\n  posistagenet: [{joints: [Chset]}]\nlights:\n  places: [{fixture: wahs}]\n")
+    words = refused(capsys, "check", str(show), "--box", str(box))
+    assert "box.yaml:2: The show's skeleton has no joint 'Chset'. Did you mean 'Chest'?" in words
+    assert "box.yaml:4: The show has no fixture 'wahs'. Did you mean 'wash'?" in words
+
+
 def test_check_refuses_a_changed_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     show = write_show(tmp_path / "show")
     write_checksums(show)
