@@ -1,0 +1,100 @@
+"""All outputs behind one call: each gets the frame, and one that is missing costs the others nothing."""
+
+from __future__ import annotations
+
+import gc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.outputs.frame_reader import FrameReader
+from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.outputs import Outputs
+from appliance.outputs.shared_frame import FrameWriter
+from appliance.pose.skeleton import Skeleton
+from appliance.show.box import OutputsConfig
+from hw_sim.osc_receiver import OscReceiver
+from hw_sim.peers import free_ports
+from hw_sim.posistagenet import PsnReceiver
+from tests.outputs.conftest import fill
+from tests.outputs.test_shared_frame import facts_of
+
+LOOPBACK = "127.0.0.1"
+
+
+def configured(osc: int, psn: int) -> OutputsConfig:
+    return OutputsConfig.model_validate(
+        {
+            "osc": [{"port": osc}],
+            "posistagenet": [{"port": psn}, {"host": LOOPBACK, "port": osc, "every": 50}],
+        }
+    )
+
+
+def test_everybody_gets_the_frame(tmp_path: Path, skeleton: Skeleton, frame: JointFrame) -> None:
+    (port,) = free_ports(1)
+    with OscReceiver(LOOPBACK) as osc, PsnReceiver(LOOPBACK, port=port) as psn:
+        outputs = Outputs(configured(osc.port, port), skeleton)
+        outputs.share(FrameWriter(tmp_path, facts_of(skeleton)))
+        outputs.send(frame)
+        outputs.tell({"state": "dancing"})
+        reader = FrameReader(tmp_path)
+        seen = reader.newest(frame.frame_time)
+        assert seen is not None
+        np.testing.assert_array_equal(seen.positions, frame.positions)
+        assert reader.health() == {"state": "dancing"}
+        assert [one.is_data for one in psn.poll(5.0)] == [False, True]
+        assert osc.poll(5.0)[0][1] == "/mocap/0/joint/rot_local"
+        assert [receiver.sent for receiver in outputs.receivers] == [3, 2, 2]
+        assert [receiver.dropped for receiver in outputs.receivers] == [0, 0, 0]
+        outputs.close()
+        assert reader.state(frame.frame_time + 1.0) == "absent"
+
+
+def test_without_a_shared_frame_the_others_go_on(skeleton: Skeleton, frame: JointFrame) -> None:
+    (port,) = free_ports(1)
+    with OscReceiver(LOOPBACK) as osc:
+        outputs = Outputs(configured(osc.port, port), skeleton)
+        outputs.send(frame)
+        outputs.tell({"state": "dancing"})
+        assert len(osc.poll(5.0)) == 3
+        outputs.close()
+
+
+def test_receivers_that_are_not_there_are_named_and_counted(skeleton: Skeleton, frame: JointFrame) -> None:
+    port, nobody = free_ports(2)
+    settings = {"osc": [{"port": nobody}], "posistagenet": [{"port": port, "interface": "192.0.2.1"}]}
+    outputs = Outputs(OutputsConfig.model_validate(settings), skeleton)
+    for tick in range(20):
+        outputs.send(fill(frame, skeleton, tick))
+    assert [receiver.name for receiver in outputs.receivers] == [
+        f"127.0.0.1:{nobody} (ai-toolbox)",
+        f"236.10.10.10:{port} (posistagenet)",
+    ]
+    assert all(receiver.dropped and receiver.last_error for receiver in outputs.receivers)
+    outputs.close()
+
+
+@pytest.mark.parametrize("receivers", [True, False], ids=["heard", "unheard"])
+def test_sending_leaves_nothing_for_the_collector(
+    tmp_path: Path, skeleton: Skeleton, frame: JointFrame, receivers: bool
+) -> None:
+    (port, nobody) = free_ports(2)
+    with OscReceiver(LOOPBACK) as osc:
+        outputs = Outputs(configured(osc.port if receivers else nobody, port), skeleton)
+        outputs.share(FrameWriter(tmp_path, facts_of(skeleton)))
+        for tick in range(200):
+            outputs.send(fill(frame, skeleton, tick))
+        gc.collect()
+        gc.disable()
+        try:
+            before = gc.get_count()[0]
+            for _ in range(300):
+                frame.frame_time += 0.02
+                outputs.send(frame)
+            left = gc.get_count()[0] - before
+        finally:
+            gc.enable()
+        outputs.close()
+    assert left < 20
