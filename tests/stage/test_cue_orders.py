@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
+from appliance.control.house import House, HouseWriter
 from appliance.control.orders import Order
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.sensor.memory import SensorMemory
-from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
-from appliance.show.show import load_show
+from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
+from appliance.show.show import Show, load_show
 from appliance.stage.cast import Cast, Iterations, assemble
 from appliance.stage.clock import Slot
 from appliance.stage.obey import obey, resume
+from appliance.stage.run import Stage
 from appliance.stage.tick import Tick
 from appliance.stage.wearing import Wearing
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show
@@ -34,15 +37,22 @@ HANDS: list[dict[str, object]] = [
 ]
 
 
+BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+
+
 @pytest.fixture
-def cast(tmp_path: Path) -> Iterator[Cast]:
+def show(tmp_path: Path) -> Show:
     folder = write_show(tmp_path / "show", HANDS)
     write_bvh(folder / "slow.bvh", swaying_phrase(5.0))
     values = yaml.safe_load((folder / "show.yaml").read_text())
     values |= {"motion": {"phrases": {"slow": "slow.bvh"}}, "cues": CUES}
     (folder / "show.yaml").write_text(yaml.safe_dump(values))
-    box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
-    cast = assemble(load_show(folder), box)
+    return load_show(folder)
+
+
+@pytest.fixture
+def cast(show: Show) -> Iterator[Cast]:
+    cast = assemble(show, BOX)
     yield cast
     cast.close()
 
@@ -180,3 +190,18 @@ def test_without_a_cue_of_this_show_it_begins_as_it_does(
 ) -> None:
     assert resume(name, cast, iterations) == ""
     assert (cast.cue, cast.motion.phrase, iterations.coding) == ("", "main", 3)
+
+
+def test_the_stage_asks_the_house_in_which_cue_it_was(show: Show, tmp_path: Path) -> None:
+    runtime = tmp_path / "runtime"
+    runtime.mkdir(mode=0o700)
+    box = BOX.model_copy(update={"runtime": runtime, "realtime": RealtimeConfig(enabled=False)})
+    for cue, phrase in (("storm", "slow"), ("", "main")):
+        with closing(HouseWriter(runtime)) as house:
+            house.write(House(cue=cue))
+        said: list[str] = []
+        stage = Stage(show, box, None, said.append)
+        with closing(stage):
+            stage.dance(0.1, lambda: False)
+            assert (stage.cast.cue, stage.cast.motion.phrase) == (cue, phrase)
+        assert any("goes on in the cue 'storm'" in words for words in said) == (cue == "storm")
