@@ -105,7 +105,7 @@ class ProfileConfig(Section):
 
     name: str = Field(min_length=1, max_length=200, description="Manufacturer and model.")
     modes: list[ModeConfig] = Field(
-        min_length=1, max_length=64, description="Layouts; the first one is taken unless the patch says."
+        min_length=1, max_length=256, description="Layouts; the first one is taken unless the patch says."
     )
     attributes: list[AttributeConfig] = Field(
         default_factory=list, max_length=MAX_CHANNELS, description="What is special about some of them."
