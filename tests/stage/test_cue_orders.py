@@ -43,7 +43,7 @@ BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
 @pytest.fixture
 def show(tmp_path: Path) -> Show:
     folder = write_show(tmp_path / "show", HANDS)
-    write_bvh(folder / "slow.bvh", swaying_phrase(5.0))
+    write_bvh(folder / "slow.bvh", swaying_phrase(5.0).resampled(60.0))  # brought to 50 at the start
     values = yaml.safe_load((folder / "show.yaml").read_text())
     values |= {"motion": {"phrases": {"slow": "slow.bvh"}}, "cues": CUES}
     (folder / "show.yaml").write_text(yaml.safe_dump(values))
