@@ -33,6 +33,7 @@ class PosiStageNet:
         self._turn = _turn(config.axes) * np.float32(config.scale)
         self._offset = np.array(config.offset, np.float32)
         self._taken, self._positions, self._before, self._speeds = np.zeros((4, len(names), 3), np.float32)
+        self._with_speed = config.speed
         self._every, self._frames = config.every, 0
         self._started: float | None = None
         self._time_before = self._next_info = 0.0
@@ -68,7 +69,8 @@ class PosiStageNet:
             self._started = self._next_info = self._time_before = frame.frame_time
             self._place(frame, self._before)
         self._place(frame, self._positions)
-        self._note_speeds(frame)
+        if self._with_speed:
+            self._note_speeds(frame)
         self._data.fill(self._positions, self._speeds)
         time_us = round(1e6 * (frame.frame_time - self._started))
         if frame.frame_time < self._next_info:

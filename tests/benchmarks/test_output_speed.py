@@ -1,24 +1,42 @@
-"""What follows the puppet: forward kinematics of the figure and packing it into OSC."""
+"""What follows the puppet: the figure's kinematics, packing it, and sending it to everybody in one tick."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pypsn
 import pytest
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 from appliance.dancer.figure import Figure
+from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.osc.dialects import DIALECTS
+from appliance.outputs.outputs import Outputs
+from appliance.outputs.posistagenet import PosiStageNet
+from appliance.outputs.shared_frame import FrameWriter
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
+from appliance.show.box import OutputsConfig
+from appliance.show.bundle import default_show_path
+from appliance.show.posistagenet import PosiStageNetConfig
+from appliance.show.show import load_show
+from hw_sim.osc_receiver import OscReceiver
+from hw_sim.peers import HOST
+from hw_sim.posistagenet import PsnReceiver
+from tests.outputs.test_shared_frame import facts_of
 from tests.studio.tiny import skeleton, swaying
 
 FIGURE_GROUP = "forward kinematics of one pose"
 OSC_GROUP = "one frame packed into OSC, dialect ai-toolbox"
 DIALECTS_GROUP = "one frame packed into OSC, the other dialects"
+PSN_GROUP = "one frame packed into PosiStageNet, the default show's figure"
+SHARED_GROUP = "shared frame, the default show's figure"
+OUTPUTS_GROUP = "all outputs of one tick, the default show's figure"
 
 
 @pytest.fixture
@@ -96,3 +114,98 @@ def test_forward_kinematics_in_the_tick(measured: Callable[..., Any], frame: Joi
     figure = Figure(skeleton())
     measured("figure, in the tick", FIGURE_GROUP)(figure.stand, frame.pose, frame.positions[0])
     np.testing.assert_allclose(figure.positions, frame.positions, atol=1e-5)
+
+
+def chunk(number: int, data: bytes, parent: bool = False) -> bytes:
+    return struct.pack("<I", number | len(data) << 16 | parent << 31) + data
+
+
+def pack_one_by_one(positions: list[Any]) -> bytes:
+    """The same data packet, built up from its chunks as the description of the protocol lists them."""
+    trackers = b"".join(
+        chunk(number, chunk(0, struct.pack("<fff", *position)) + chunk(3, struct.pack("<f", 1.0)), True)
+        for number, position in enumerate(positions)
+    )
+    header = chunk(0, struct.pack("<QBBBB", 0, 2, 0, 1, 1))
+    return chunk(0x6755, header + chunk(1, trackers, True), True)
+
+
+@pytest.fixture(scope="module")
+def dancer() -> Skeleton:
+    return load_show(default_show_path()).skeleton
+
+
+@pytest.fixture
+def full_frame(dancer: Skeleton) -> JointFrame:
+    made = JointFrame(len(dancer))
+    made.positions[:], made.world[:] = dancer.forward_kinematics(made.pose, np.zeros(3, np.float32))
+    return made
+
+
+def test_posistagenet_chunk_by_chunk(
+    measured: Callable[..., Any], dancer: Skeleton, full_frame: JointFrame
+) -> None:
+    benchmark = measured("struct, chunk by chunk", PSN_GROUP, reference=True)
+    packed = benchmark(lambda: pack_one_by_one(full_frame.positions.tolist()))
+    psn = PosiStageNet(PosiStageNetConfig(), dancer)
+    psn.encode(full_frame)
+    assert packed == bytes(psn.encode(full_frame)[0])
+    assert len(pypsn.parse_psn_packet(packed).trackers) == len(dancer)
+
+
+@pytest.mark.parametrize("speed", [False, True], ids=["positions", "positions and speeds"])
+def test_posistagenet(
+    measured: Callable[..., Any],
+    dancer: Skeleton,
+    full_frame: JointFrame,
+    speed: bool,
+    request: pytest.FixtureRequest,
+) -> None:
+    psn = PosiStageNet(PosiStageNetConfig(speed=speed), dancer)
+    psn.encode(full_frame)
+    label = f"ours, {request.node.callspec.id}"
+    assert measured(label, PSN_GROUP)(psn.encode, full_frame)
+
+
+def test_shared_frame_written(
+    measured: Callable[..., Any], dancer: Skeleton, full_frame: JointFrame, tmp_path: Path
+) -> None:
+    writer = FrameWriter(tmp_path, facts_of(dancer))
+    measured("write, in the tick", SHARED_GROUP)(writer.write, full_frame)
+    assert FrameReader(tmp_path).newest(0.0) is not None
+
+
+def test_shared_frame_read(
+    measured: Callable[..., Any], dancer: Skeleton, full_frame: JointFrame, tmp_path: Path
+) -> None:
+    writer = FrameWriter(tmp_path, facts_of(dancer))
+    writer.write(full_frame)
+    reader = FrameReader(tmp_path)
+    seen = measured("read the newest, in the reader", SHARED_GROUP)(reader.newest, 0.0)
+    np.testing.assert_array_equal(seen.positions, full_frame.positions)
+
+
+@pytest.fixture
+def everybody(dancer: Skeleton, tmp_path: Path) -> Iterator[Outputs]:
+    """Three OSC receivers with a dialect each, a multicast receiver, the shared frame: all really there."""
+    with (
+        OscReceiver(HOST) as one,
+        OscReceiver(HOST) as two,
+        OscReceiver(HOST) as three,
+        PsnReceiver(HOST, port=0) as followspot,
+    ):
+        receivers = zip((one, two, three), DIALECTS, strict=True)
+        osc = [{"port": peer.port, "dialect": dialect, "frame_message": True} for peer, dialect in receivers]
+        psn = {"port": followspot.port, "joints": list(dancer.names[:8]), "speed": True}
+        outputs = Outputs(OutputsConfig.model_validate({"osc": osc, "posistagenet": [psn]}), dancer)
+        outputs.share(FrameWriter(tmp_path, facts_of(dancer)))
+        yield outputs
+        outputs.close()
+
+
+def test_all_outputs_of_one_tick(
+    measured: Callable[..., Any], everybody: Outputs, full_frame: JointFrame
+) -> None:
+    """Three receivers by OSC, 8 trackers by PosiStageNet, the shared frame: 0.3 ms is the limit."""
+    measured("OSC to three, PosiStageNet, shared frame", OUTPUTS_GROUP)(everybody.send, full_frame)
+    assert all(receiver.sent and not receiver.dropped for receiver in everybody.receivers)
