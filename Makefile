@@ -28,9 +28,9 @@ help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 	@echo "  make run ARGS='--seconds 10' passes options on; make run ARGS= dances until Ctrl-C"
 
-run: $(VENV)/.ready-to-run ## dance with an emulated sensor and draw a picture of it
+run: $(VENV)/.ready-to-run ## dance with an emulated sensor, in a window or into a picture
 	@mkdir -p $(dir $(PICTURE))
-	@$(BIN)/bunraku play --emulate --filmstrip $(PICTURE) $(ARGS)
+	@$(BIN)/bunraku play --emulate --rehearse $(PICTURE) $(ARGS)
 
 studio: $(VENV)/.ready-to-test ## add what training needs (PyTorch) to the environment
 

@@ -55,11 +55,17 @@ def play(
         bool, typer.Option("--alone", help="Start neither show control nor lights: they run by themselves.")
     ] = False,
     window: Annotated[bool, typer.Option("--window", help="Show the projection in a window.")] = False,
+    rehearse: Annotated[
+        Path | None,
+        typer.Option(
+            help="A window where there is a display; at the end render what was danced into this PNG."
+        ),
+    ] = None,
 ) -> None:
     """Dance: sensors in, joints out, 50 times a second, until Ctrl-C."""
     from appliance.commands.play import play_show
 
-    raise typer.Exit(play_show(show, box, seconds, emulate, journal, filmstrip, alone, window))
+    raise typer.Exit(play_show(show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse))
 
 
 @app.command()
@@ -122,14 +128,21 @@ def project(
 def filmstrip(
     recording: Annotated[Path, typer.Argument(help="A BVH recording, or the journal of a run.")],
     out: Annotated[Path | None, typer.Option(help="The PNG; left out: beside the recording.")] = None,
-    start: Annotated[float, typer.Option(min=0.0, help="Second at which the pictures begin.")] = 0.0,
+    start: Annotated[
+        float, typer.Option(help="Second at which the pictures begin; negative: counted from the end.")
+    ] = 0.0,
     seconds: Annotated[float, typer.Option(min=0.1, help="How many seconds they cover.")] = 10.0,
     metres_per_unit: Annotated[float, typer.Option(min=1e-6, help="Unit of a BVH file, in metres.")] = 0.01,
+    look: Annotated[
+        str | None, typer.Option(help="Render in this look, as the projector shows it: plaster, lines ...")
+    ] = None,
+    show: Annotated[Path | None, typer.Option(help="Show bundle whose look it is.")] = None,
 ) -> None:
     """Draw a recording or a journal as a row of poses; held joints are highlighted."""
-    from appliance.commands.pictures import picture_of_file
+    from appliance.commands.pictures import danced, drawn, rendered
 
-    typer.echo(picture_of_file(recording, out, start, seconds, metres_per_unit))
+    dance, out = danced(recording, metres_per_unit).part(start, seconds), out or recording.with_suffix(".png")
+    typer.echo(drawn(dance, out) if look is None else rendered(dance, out, look, show))
 
 
 @app.command()

@@ -1,57 +1,88 @@
-"""Filmstrips of journals and recordings: what was danced, with the held joints highlighted."""
+"""Pictures of journals and recordings: what was danced, drawn as a filmstrip or rendered in a look."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from appliance.pose.bvh import read_bvh
 from appliance.pose.filmstrip import MissingPicturesError, draw_filmstrip
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
+from appliance.projector.projector_error import ProjectorError
+from appliance.show.look import LookConfig, looks_by_name
+from appliance.show.show import load_show
 from appliance.stage.clock import TICK_S
 from appliance.stage.journal import read_journal
 from appliance.stage.stage_error import StageError
 
 
-def picture_of_file(
-    source: Path, out: Path | None, start_s: float, seconds: float, metres_per_unit: float
-) -> Path:
-    """A filmstrip of a BVH recording or a journal. Raises BvhError, JournalError or StageError."""
-    out = out or source.with_suffix(".png")
-    if source.suffix.lower() != ".bvh":
-        return picture_of_journal(source, out, start_s, seconds)
-    recording = read_bvh(source, metres_per_unit=metres_per_unit)
-    part = _part(source, len(recording.poses), recording.fps, start_s, seconds)
-    return _drawn(
-        out, recording.skeleton, recording.poses[part], recording.roots[part], recording.fps, (), source.stem
+@dataclass(frozen=True)
+class Danced:
+    """Poses (N, J, 4) and roots (N, 3) at `fps`; the joints that hands held; what it is called."""
+
+    skeleton: Skeleton
+    poses: Array
+    roots: Array
+    fps: float
+    held: tuple[int, ...]
+    title: str
+
+    def part(self, start_s: float, seconds: float) -> Danced:
+        """So many seconds from a start on; a negative start counts from the end. Raises StageError."""
+        count = len(self.poses)
+        first = round(start_s * self.fps) if start_s >= 0.0 else max(0, count + round(start_s * self.fps))
+        if first >= count:
+            raise StageError(
+                f"{self.title}: nothing was danced after second {start_s:g}. Choose an earlier start."
+            )
+        kept = slice(first, first + max(1, round(seconds * self.fps)))
+        return Danced(self.skeleton, self.poses[kept], self.roots[kept], self.fps, self.held, self.title)
+
+
+def danced(source: Path, metres_per_unit: float = 0.01) -> Danced:
+    """All of a BVH recording or of a journal. Raises BvhError or JournalError."""
+    if source.suffix.lower() == ".bvh":
+        recording = read_bvh(source, metres_per_unit=metres_per_unit)
+        return Danced(recording.skeleton, recording.poses, recording.roots, recording.fps, (), source.stem)
+    journal = read_journal(source)
+    held = tuple(journal.skeleton.index(hand["joint"]) for hand in journal.header["hands"])
+    return Danced(
+        journal.skeleton, journal.ticks["pose"], journal.ticks["root"], 1.0 / TICK_S, held, source.stem
     )
 
 
-def picture_of_journal(source: Path, out: Path, start_s: float, seconds: float) -> Path:
-    """A filmstrip of a journal, from `start_s` on; a negative start counts from its end."""
-    journal = read_journal(source)
-    skeleton, ticks = journal.skeleton, journal.ticks
-    if start_s < 0.0:
-        start_s = max(0.0, len(ticks) * TICK_S + start_s)
-    ticks = ticks[_part(source, len(ticks), 1.0 / TICK_S, start_s, seconds)]
-    held = [skeleton.index(hand["joint"]) for hand in journal.header["hands"]]
-    return _drawn(out, skeleton, ticks["pose"], ticks["root"], 1.0 / TICK_S, held, source.stem)
-
-
-def _part(source: Path, count: int, fps: float, start_s: float, seconds: float) -> slice:
-    first, last = round(start_s * fps), round((start_s + seconds) * fps)
-    if first >= count:
-        raise StageError(f"{source}: nothing was danced after second {start_s:g}. Choose an earlier start.")
-    return slice(first, last)
-
-
-def _drawn(
-    out: Path, skeleton: Skeleton, poses: Array, roots: Array, fps: float, held: Sequence[int], title: str
-) -> Path:
+def drawn(dance: Danced, out: Path) -> Path:
+    """A filmstrip of lit figures in rows, held joints highlighted. Raises StageError."""
     try:
-        return draw_filmstrip(out, skeleton, poses, roots, fps, held=held, title=title)
+        return draw_filmstrip(
+            out, dance.skeleton, dance.poses, dance.roots, dance.fps, held=dance.held, title=dance.title
+        )
     except MissingPicturesError as error:
         raise StageError(str(error)) from error
     except OSError as error:
-        raise StageError(f"{out}: the picture cannot be written ({error.strerror}).") from error
+        raise _unwritable(out, error) from error
+
+
+def rendered(dance: Danced, out: Path, look: str, show: Path | None) -> Path:
+    """A strip of pictures as the projector shows them, in a look of a show or, without a show, a built-in
+    one. Raises ConfigError, or StageError where the look is unknown or nothing can be rendered here."""
+    looks = looks_by_name(() if show is None else load_show(show).config.looks)
+    _refuse_unknown(look, looks)
+    try:
+        from appliance.projector.strip import strip
+
+        return strip(out, dance.skeleton, looks, look, dance.poses, dance.roots, dance.fps, dance.held)
+    except ProjectorError as error:
+        raise StageError(str(error)) from error
+    except OSError as error:
+        raise _unwritable(out, error) from error
+
+
+def _refuse_unknown(look: str, looks: dict[str, LookConfig]) -> None:
+    if look not in looks:
+        raise StageError(f"There is no look '{look}'. There are: {', '.join(looks)}.")
+
+
+def _unwritable(out: Path, error: OSError) -> StageError:
+    return StageError(f"{out}: the picture cannot be written ({error.strerror}).")

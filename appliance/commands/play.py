@@ -13,6 +13,7 @@ from pathlib import Path
 from appliance.commands.companions import Companion, Companions
 from appliance.commands.control import control_command, open_control_port
 from appliance.commands.emulation import Emulation
+from appliance.commands.rehearsal import PICTURED_S, has_display, rehearsal_picture
 from appliance.control.house import forget_house
 from appliance.control.speaker import Speaker
 from appliance.outputs.runtime_folder import runtime_folder
@@ -22,7 +23,6 @@ from appliance.show.show import Show, load_show
 from appliance.stage.cast import reach
 from appliance.stage.run import Stage, stop_signals
 
-_PICTURED_S = 10.0
 _NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
 # In a technician's words; what is not here goes by its name in docs/wire.md.
 _REFUSALS = {
@@ -45,10 +45,12 @@ def play_show(
     filmstrip: Path | None,
     alone: bool = False,
     window: bool = False,
+    rehearse: Path | None = None,
 ) -> int:
     """Dance until the seconds are over or a signal comes; the exit status.
 
-    alone: start no companions. window: show the projection in a window.
+    alone: start no companions. window: show the projection in a window. rehearse: the same where there is
+    a display, and a picture of the projection at the end.
     """
     show, box = load_show(directory or default_show_path()), load_box(box_file)
     with ExitStack() as opened:
@@ -59,11 +61,12 @@ def play_show(
             emulation = opened.enter_context(Emulation(show, box, scratch))
             box = emulation.box
         journal = journal or box.journal.file
-        if filmstrip is not None and journal is None:
+        if (filmstrip or rehearse) is not None and journal is None:
             journal = scratch / "dance.journal"
             box = _with_short_journal(box)
         speaker = Speaker()
         opened.callback(speaker.close)
+        shown = rehearse is not None and has_display()
         control = None if alone or box.control is None else open_control_port(box.control)
         if control is not None:
             opened.callback(control.close)
@@ -71,7 +74,7 @@ def play_show(
         with closing(stage):
             for line in _introduction(stage, emulate, control):
                 speaker.say(line)
-            company = () if alone else tuple(_company(show, box, box_file, control, window))
+            company = () if alone else tuple(_company(show, box, box_file, control, window or shown))
             with Companions(company, speaker.say, lambda: stage.health.ticks > 0):
                 stage.dance(seconds, stopped)
         if not alone:
@@ -79,10 +82,13 @@ def play_show(
         for line in _conclusion(stage):
             speaker.say(line)
         if filmstrip is not None and journal is not None:
-            from appliance.commands.pictures import picture_of_journal
+            from appliance.commands.pictures import danced, drawn
 
-            picture = picture_of_journal(journal, filmstrip, -_PICTURED_S, _PICTURED_S)
+            picture = drawn(danced(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
             speaker.say(f"What was just danced, held joints highlighted: {picture}")
+        if rehearse is not None and journal is not None:
+            for line in rehearsal_picture(journal, rehearse, show):
+                speaker.say(line)
     return 0
 
 
