@@ -9,6 +9,7 @@ import select
 import threading
 import time
 import tty
+from collections import deque
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -18,18 +19,19 @@ from hw_sim.dmx.widget_message import Deframer, framed
 GET_PARAMETERS, SEND_DMX, GET_SERIAL = 3, 6, 10  # labels of the DMX USB Pro API 1.44
 PARAMETERS = bytes((44, 1, 9, 1, 40))  # firmware 1.44, break 96 us, mark 10.67 us, 40 Hz
 LOOKS_EACH_S = 0.02
+REMEMBERED = 4096  # some 100 s
 
 
 class UsbProWidget:
     """`path` is the device; it is there only while the widget is plugged in.
 
-    universes: each universe that came in, with its arrival (monotonic seconds), start code included.
+    universes: the newest ones that came in, each with its arrival (monotonic seconds), start code included.
     """
 
     def __init__(self, path: Path, serial_number: int = 0x01234567) -> None:
         self.path = path
         self.serial_number = serial_number
-        self.universes: list[tuple[float, bytes]] = []
+        self.universes: deque[tuple[float, bytes]] = deque(maxlen=REMEMBERED)
         self.labels: list[int] = []  # of every whole message that came in
         self.broken = 0  # messages that did not end as they should
         self._master = self._slave = -1
