@@ -1,0 +1,176 @@
+"""The real box shares its frames: other processes see them, and what becomes of the stage, by themselves."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from appliance.outputs.frame_reader import FrameReader
+from hw_sim.osc_receiver import OscReceiver
+from hw_sim.peers import HOST, free_ports
+from hw_sim.posistagenet import PsnReceiver
+from tests.stage.bundles import FIGURE, write_show
+from tests.system.box import PATIENCE_S, PLAY, playing
+
+pytestmark = pytest.mark.realtime
+
+ROOT = Path(__file__).resolve().parents[2]
+# A folder in memory with room for a few pages alone, in a mount namespace of its own; then the box.
+IN_A_FULL_FOLDER = """
+mkdir -m 700 "$1/runtime" && mount -t tmpfs -o size=16k,mode=700 none "$1/runtime" && shift && exec "$@"
+"""
+
+
+@pytest.fixture(scope="module")
+def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_show(tmp_path_factory.mktemp("bundle") / "show")
+
+
+def await_that(is_so: Callable[[float], Any]) -> Any:
+    """What `is_so(now)` gives once it gives something; fails after a long time."""
+    until = time.monotonic() + PATIENCE_S
+    while not (found := is_so(now := time.monotonic())):
+        assert now < until, "it never came to that"
+        time.sleep(0.01)
+    return found
+
+
+def test_frames_facts_and_health_are_there_for_whoever_reads(show: Path, tmp_path: Path) -> None:
+    reader = FrameReader(tmp_path / "runtime")
+    assert reader.state(time.monotonic()) == "absent"
+    with playing(show, tmp_path, "--alone", settings={"limits": {"late_ms": 20}}) as box:
+        await_that(lambda now: reader.state(now) == "fresh")
+        facts = reader.facts
+        assert facts is not None and facts.pid == box.process.pid and facts.skeleton.names == FIGURE.names
+        assert facts.show_directory == show and facts.box_file == tmp_path / "box.yaml"
+        assert facts.hands == ("left-wrist",)
+        assert [facts.skeleton.names[joint] for joint in facts.held] == ["lShldr"]
+
+        sent = {frame[0]: frame for frame in box.frames(100)}
+        seen = reader.frames(50, time.monotonic())
+        common = [frame for frame in seen if frame.tick in sent]
+        assert len(common) > 20
+        assert all(frame.frame_time == sent[frame.tick][1] for frame in common)
+        assert [frame.tick for frame in seen] == sorted({frame.tick for frame in seen})
+        assert all(0.0 < frame.left - frame.frame_time < PATIENCE_S for frame in seen)
+
+        health = await_that(lambda now: (reader.health() or {}).get("ticks", 0) > 100 and reader.health())
+        assert health["state"] == "dancing" and health["phrase"] == "main"
+        assert health["rate_hz"] > 0 and health["tick_p50_ms"] > 0
+        assert health["sensors"][0][:3] == ["left-wrist", f"{box.key.device_id:08x}", "absent"]
+        assert [one["dropped"] for one in health["receivers"]] == [0]
+        assert box.end() == 0
+    await_that(lambda now: reader.state(now) == "absent")
+
+
+def test_a_stage_that_hangs_is_stale_one_that_died_is_not_alive_and_the_next_is_found(
+    show: Path, tmp_path: Path
+) -> None:
+    reader = FrameReader(tmp_path / "runtime")
+    with playing(show, tmp_path, "--alone") as box:
+        await_that(lambda now: reader.state(now) == "fresh")
+        box.process.send_signal(signal.SIGSTOP)
+        await_that(lambda now: reader.state(now) == "stale")
+        assert reader.is_alive(time.monotonic())
+        box.process.send_signal(signal.SIGCONT)
+        await_that(lambda now: reader.state(now) == "fresh")
+        assert reader.generation == 1
+
+        box.end(signal.SIGKILL)
+        await_that(lambda now: not reader.is_alive(now))
+        assert reader.state(time.monotonic()) == "stale"
+        last = reader.newest(time.monotonic())
+        assert last is not None
+
+        box.kill_and_restart()
+        await_that(lambda now: reader.state(now) == "fresh")
+        assert reader.generation == 2
+        assert box.end() == 0
+
+
+def test_a_second_stage_in_the_same_folder_is_refused_and_the_first_dances_on(
+    show: Path, tmp_path: Path
+) -> None:
+    with playing(show, tmp_path, "--alone") as box:
+        box.frames(1)
+        (tmp_path / "second.yaml").write_text(
+            yaml.safe_dump({"runtime": "runtime", "control": None, "sensors": {"udp": None}})
+        )
+        command = [*PLAY, "--alone", "--show", str(show), "--box", str(tmp_path / "second.yaml")]
+        second = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
+        assert second.returncode == 2, second.stderr
+        assert "Another stage runs in" in second.stderr and "`runtime:` in the box file" in second.stderr
+        before = box.frames(1)[0][0]
+        assert box.frames(20)[-1][0] > before
+        assert box.end() == 0
+
+
+def test_without_room_for_the_frames_the_dance_goes_on_and_says_so(show: Path, tmp_path: Path) -> None:
+    namespace = ["unshare", "--mount", "--map-root-user"]
+    if subprocess.run([*namespace, "mount", "-t", "tmpfs", "none", "/mnt"], capture_output=True).returncode:
+        pytest.skip("this machine does not allow mount namespaces")
+    command = [*namespace, "sh", "-c", IN_A_FULL_FOLDER, "sh", str(tmp_path), *PLAY]
+    with playing(show, tmp_path, "--alone", command=command) as box:
+        frames = box.frames(60)
+        assert [frame[3] for frame in frames].count(0) > 0
+        box.await_words("the frames cannot be shared (No space left on device). The dance goes on")
+        assert box.end() == 0
+
+
+def test_positions_reach_a_media_server(show: Path, tmp_path: Path) -> None:
+    (port,) = free_ports(1)
+    joints = ["lShldr", FIGURE.names[0]]
+    with PsnReceiver(HOST, port=port) as server, OscReceiver(HOST) as osc:
+        outputs = {
+            "osc": [{"port": osc.port}],
+            "posistagenet": [{"port": port, "joints": joints, "system_name": "Evening"}],
+        }
+        (tmp_path / "box.yaml").write_text(
+            yaml.safe_dump(
+                {"outputs": outputs, "control": None, "sensors": {"udp": None}, "runtime": "runtime"}
+            )
+        )
+        command = [
+            *PLAY,
+            "--alone",
+            "--show",
+            str(show),
+            "--box",
+            str(tmp_path / "box.yaml"),
+            "--seconds",
+            "2",
+        ]
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
+        assert ran.returncode == 0, ran.stderr
+        assert f"236.10.10.10:{port} (posistagenet)" in ran.stdout
+        packets = server.poll(1.0)
+    assert server.malformed == 0
+    names = [one for one in packets if not one.is_data]
+    data = [one for one in packets if one.is_data]
+    assert {tuple(one.names.values()) for one in names} == {tuple(joints)}
+    assert {one.system for one in names} == {"Evening"} and len(names) in (2, 3)
+    numbers = [one.frame for one in data]
+    assert len(data) > 50 and numbers == [number % 256 for number in range(len(data))]
+    hips = np.array([one.trackers[1].position for one in data])
+    assert np.isfinite(hips).all() and np.ptp(hips, axis=0).max() > 0.0
+
+
+def test_a_tracker_that_the_skeleton_has_not_is_refused_with_its_line(show: Path, tmp_path: Path) -> None:
+    path = tmp_path / "box.yaml"
+    path.write_text("runtime: runtime\noutputs:\n  posistagenet:\n    - joints:\n        - lShouldr\n")
+    command = [sys.executable, "-m", "appliance.cli", "play", "--show", str(show), "--box", str(path)]
+    ran = subprocess.run(
+        command, capture_output=True, text=True, timeout=PATIENCE_S, cwd=ROOT, env=os.environ
+    )
+    assert ran.returncode == 2
+    assert f"{path}:5: The show's skeleton has no joint 'lShouldr'. Did you mean 'lShldr'?" in ran.stderr
