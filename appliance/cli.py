@@ -17,6 +17,7 @@ prepare_environment()
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
 
 from appliance.commands import sensor_commands  # noqa: E402
+from appliance.lights import lights_commands  # noqa: E402
 
 PLUG_INS = "bunraku.commands"
 REFUSED = 2
@@ -104,6 +105,7 @@ def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you cha
 
 app.command()(sensor_commands.provision)
 app.add_typer(sensor_commands.sensors, name="sensors")
+app.add_typer(lights_commands.lights, name="lights")
 
 
 @app.command()

@@ -1,0 +1,56 @@
+"""`bunraku lights convert`: a fixture's JSON in, a profile's YAML out, and what was left out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import yaml
+
+from appliance.lights.open_fixture_library import LibraryError, profile_values
+from appliance.show.config_error import ConfigError, Problem
+from appliance.show.fixture_profile import FOLDER, ProfileConfig
+from appliance.show.validation import validated
+from appliance.show.yaml_file import read_yaml
+
+_HEAD = """\
+# Made by `bunraku lights convert` from {name}, a fixture of the Open Fixture Library.
+# Prove it with `bunraku lights test` before the show.
+"""
+
+
+def convert_file(source: Path, out: Path | None) -> None:
+    """Write the profile and print what to do with it. Raises ConfigError; then nothing was written."""
+    out = out or source.with_suffix(".yaml")
+    values, notes = _values(source)
+    text = _HEAD.format(name=source.name) + yaml.safe_dump(
+        values, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
+    )
+    out.parent.mkdir(parents=True, exist_ok=True)
+    written = out.with_name(f".{out.name}.new")
+    written.write_text(text, encoding="utf-8")
+    try:
+        profile = validated(ProfileConfig, read_yaml(written), {})
+    except ConfigError:
+        written.unlink()
+        raise
+    written.replace(out)
+    for note in notes:
+        print(note)
+    modes = ", ".join(f"{mode.name} ({len(mode.channels)})" for mode in profile.modes)
+    print(f"{profile.name}: {out}. Modes and their channels: {modes}.")
+    print(f"Put it into the folder {FOLDER} of a show and write `profile: {out.stem}` in its lights.")
+
+
+def _values(source: Path) -> tuple[dict[str, object], list[str]]:
+    try:
+        return profile_values(json.loads(source.read_text(encoding="utf-8")))
+    except OSError as error:
+        message, line = f"The file cannot be read ({error.strerror}).", 0
+    except UnicodeDecodeError:
+        message, line = "This is not text. Download the fixture as JSON.", 1
+    except json.JSONDecodeError as error:
+        message, line = f"This is not JSON: {error.msg}. Download the fixture again.", error.lineno
+    except LibraryError as error:
+        message, line = str(error), 0
+    raise ConfigError([Problem(source, line, message)])

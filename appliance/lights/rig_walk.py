@@ -1,0 +1,69 @@
+"""`bunraku lights test`: the walk through the rig on the wires of a box, while no show runs."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+from appliance.lights.patch import Patch
+from appliance.lights.run import rig_here, say, stop_signals, wired
+from appliance.lights.walk import steps, walk
+from appliance.outputs.runtime_folder import Claim, runtime_folder
+from appliance.show.box import load_box
+from appliance.show.bundle import default_show_path
+from appliance.show.config_error import ConfigError, Problem, did_you_mean
+from appliance.show.lights import drivable
+from appliance.show.show import Show, load_show
+from appliance.show.venue_lights import unwired
+
+
+def walk_rig(
+    directory: Path | None, box_file: Path | None, fixtures: list[str], attribute: str | None, step_s: float
+) -> None:
+    """Take every step; zeros at the end. Raises ConfigError, or AlreadyHereError while the lights run."""
+    show, box = load_show(directory or default_show_path()), load_box(box_file)
+    config = rig_here(show, box, box_file)
+    _require_known(show, fixtures, attribute)
+    patch = Patch(config.fixtures, show.directory)
+    to_see = list(steps(patch, fixtures, attribute))
+    with ExitStack() as opened:
+        stopped = opened.enter_context(stop_signals())
+        opened.callback(Claim(runtime_folder(box), "lights").close)
+        universes = wired(patch, box)
+        for universe in universes:
+            opened.callback(lambda one: one.close(time.monotonic()), universe)
+
+        def send(levels: dict[int, bytes]) -> float:
+            for universe in universes:
+                universe.offer(levels[universe.number], time.monotonic())
+            time.sleep(1.0 / box.lights.rate_hz)
+            return time.monotonic()
+
+        for sentence in unwired(show, box):
+            say(sentence)
+        say(f"{len(to_see)} steps of {step_s:g} s; Ctrl-C ends the walk, and all goes dark.")
+        walk(patch, to_see, step_s, send, say, stopped)
+        for universe in universes:
+            if universe.wire.trouble:
+                say(universe.wire.trouble)
+
+
+def _require_known(show: Show, fixtures: list[str], attribute: str | None) -> None:
+    """Refuse names that the rig does not have."""
+    rig = show.config.lights.fixtures
+    names = [fixture.name for fixture in rig]
+    problems = [
+        Problem(
+            show.file.path, show.file.line(("lights", "fixtures")), f"There is no fixture '{name}'.", cure
+        )
+        for name in fixtures
+        if name not in names and (cure := did_you_mean(name, names))
+    ]
+    words = sorted({word for fixture in rig for word in drivable(fixture, show.directory)})
+    if attribute is not None and attribute not in words:
+        problems.append(
+            Problem(show.file.path, 0, f"No fixture has '{attribute}'.", did_you_mean(attribute, words))
+        )
+    if problems:
+        raise ConfigError(problems)

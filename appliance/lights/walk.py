@@ -1,0 +1,130 @@
+"""A walk through the rig: fixture by fixture, attribute by attribute, each with words to look for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.lights.patch import Patch, Slot, Values
+from appliance.show.fixture_profile import DIMMER, PAN, TILT
+from appliance.show.light_rules import AIM
+from appliance.show.lights import UNIVERSE_CHANNELS
+
+CHEST_M = 1.2  # where heads are told to point at the end: over the stage's origin, as high as a chest
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing to look at. `place` is the slot that moves, -1: all of the fixture's heads aim."""
+
+    fixture: str
+    attribute: str
+    words: str
+    place: int
+
+
+def steps(patch: Patch, fixtures: Sequence[str] = (), attribute: str | None = None) -> Iterator[Step]:
+    """What to look at, in the order of the patch; `fixtures` empty: all of them, `attribute` None: all."""
+    for fixture in patch.fixtures:
+        if fixtures and fixture.name not in fixtures:
+            continue
+        for place, slot in enumerate(patch.slots):
+            if slot.fixture is fixture and attribute in (None, slot.name, slot.base):
+                yield Step(fixture.name, slot.name, _words(slot), place)
+        if any(head.fixture is fixture for head in patch.heads.heads) and attribute in (None, AIM):
+            words = f"points at the origin of the stage, {CHEST_M:g} m above the floor"
+            yield Step(fixture.name, AIM, words, -1)
+
+
+def introduction(patch: Patch, fixture: str) -> str:
+    """A fixture in a line: what it is and where it listens."""
+    own = next(one for one in patch.fixtures if one.name == fixture)
+    channels = [channel for slot in patch.slots if slot.fixture is own for channel in slot.channels]
+    first, last = min(channels) % UNIVERSE_CHANNELS + 1, max(channels) % UNIVERSE_CHANNELS + 1
+    return f"{fixture} ({own.profile}): universe {own.universe}, channels {first} to {last}"
+
+
+class Walk:
+    """Levels while a step is looked at: its fixture alone is lit, and what the step names moves."""
+
+    def __init__(self, patch: Patch) -> None:
+        self._patch = patch
+        self._aims: NDArray[np.float64] = np.tile([0.0, CHEST_M, 0.0], (len(patch.heads.heads), 1))
+
+    def levels(self, step: Step, part: float, seconds: float) -> dict[int, bytes]:
+        """512 levels for each universe, `part` 0..1 of the step and `seconds` after the levels before."""
+        patch, heads = self._patch, self._patch.heads
+        values = self._lit(step.fixture)
+        if step.place >= 0:
+            values[step.place] = self._moved(step, part)
+            self._alone(step, values)
+        aimed = np.array([step.place < 0 and head.fixture.name == step.fixture for head in heads.heads], bool)
+        heads.follow(heads.axes.angles(values), self._aims, aimed, seconds)
+        shown = patch.dimmed(values, 1.0)
+        shown[heads.axes.slots] = heads.axes.shares(heads.angles)
+        return patch.encode(shown)
+
+    def dark(self) -> dict[int, bytes]:
+        """Zeros."""
+        return {universe: bytes(UNIVERSE_CHANNELS) for universe in self._patch.universes}
+
+    def _lit(self, fixture: str) -> Values:
+        """Everything at its default, the dimmers of this fixture open, all others shut."""
+        patch = self._patch
+        values = patch.defaults.copy()
+        values[patch.dims] = 0.0
+        own = np.array([slot.fixture.name == fixture and slot.base == DIMMER for slot in patch.slots], bool)
+        values[own] = 1.0
+        return values
+
+    def _moved(self, step: Step, part: float) -> float:
+        rest = 0.0 if step.attribute == DIMMER else float(self._patch.defaults[step.place])
+        if self._patch.slots[step.place].base in (PAN, TILT):
+            return 0.5 - 0.5 * math.sin(2 * math.pi * part)
+        return float(np.interp(part, (0.0, 0.25, 0.75, 1.0), (rest, 0.0, 1.0, rest)))
+
+    def _alone(self, step: Step, values: Values) -> None:
+        """A colour is shown without the others."""
+        patch, moved = self._patch, self._patch.slots[step.place]
+        if not moved.is_lamp:
+            return
+        for place, slot in enumerate(patch.slots):
+            if slot.fixture is moved.fixture and slot.is_lamp and place != step.place:
+                values[place] = 0.0
+
+
+def _words(slot: Slot) -> str:
+    channels = [f"{channel % UNIVERSE_CHANNELS + 1}" for channel in slot.channels]
+    where = f"channel {' and '.join(channels)}" if channels else "by its colours"
+    if slot.base in (PAN, TILT):
+        return f"{where}: from the middle to one end, to the other end, and back"
+    if slot.is_lamp:
+        return f"{where}: this colour alone, up and down"
+    return f"{where}: dark, full, back" if slot.base == DIMMER else f"{where}: from 0 to full, and back"
+
+
+def walk(
+    patch: Patch,
+    to_see: Sequence[Step],
+    step_s: float,
+    show: Callable[[dict[int, bytes]], float],
+    say: Callable[[str], None],
+    stopped: Callable[[], bool],
+) -> None:
+    """Take the steps, `step_s` each. `show` sends levels, waits for the next pass and gives the time then."""
+    moving, fixture = Walk(patch), ""
+    now = show(moving.dark())
+    for step in to_see:
+        if step.fixture != fixture:
+            fixture = step.fixture
+            say(introduction(patch, fixture))
+        say(f"  {step.attribute}, {step.words}")
+        begun = before = now
+        while not stopped() and now - begun < step_s:
+            levels = moving.levels(step, (now - begun) / step_s, now - before)
+            before, now = now, show(levels)
+    show(moving.dark())
