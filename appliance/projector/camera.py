@@ -45,6 +45,11 @@ class View:
         lens[3, 2] = -1.0
         return np.asarray(lens @ look)
 
+    def on_picture(self, place: Array) -> tuple[float, float]:
+        """Where a place appears, in picture heights from the lower left corner."""
+        x, y, _, w = self.projection @ np.append(place, 1.0)
+        return float((0.5 + 0.5 * x / w) * self.slopes[0] / self.slopes[1]), float(0.5 + 0.5 * y / w)
+
 
 @dataclass(frozen=True)
 class _Stand:

@@ -11,7 +11,8 @@ from appliance.projector.scene import Easel, Scene
 from appliance.projector.targets import Target
 from appliance.show.look import LookConfig
 
-NEAR, FAR = 180, 48  # lines of the glow's pictures
+NEAR, FAR = 180, 60  # lines of the glow's pictures
+FAR_GAIN = 2.0  # the far glow is faint
 
 
 class Glow:
@@ -21,17 +22,18 @@ class Glow:
         self._easel = easel
         self._shrink = Drawing(easel.ctx, "screen", "glow_shrink")
         self._blur = Drawing(easel.ctx, "screen", "glow_blur")
-        self._finish = Drawing(easel.ctx, "air", "light_finish")
+        self._air = Drawing(easel.ctx, "air", "light_air")
+        self._finish = Drawing(easel.ctx, "screen", "light_finish")
 
-    def spread(self, picture: Target, name: str, lines: int) -> Target:
-        """A small, soft copy of a picture."""
+    def spread(self, picture: Target, name: str, lines: int, gain: float = 1.0) -> Target:
+        """A small, soft copy of a picture, `gain` times as bright."""
         easel = self._easel
         easel.ctx.enable_only(moderngl.NOTHING)
         size = (max(2, round(picture.size[0] * lines / picture.size[1])), lines)
         first, second = easel.canvas(name, size), easel.canvas(name + " half", size)
         first.start()
         texel = (0.25 / size[0], 0.25 / size[1])
-        self._shrink.draw(easel.tally, vertices=3, source=picture.texture, texel=texel)
+        self._shrink.draw(easel.tally, vertices=3, source=picture.texture, texel=texel, gain=gain)
         for source, into, step in ((first, second, (1 / size[0], 0.0)), (second, first, (0.0, 1 / size[1]))):
             into.start()
             self._blur.draw(easel.tally, vertices=3, source=source.texture, step_uv=step)
@@ -48,13 +50,13 @@ class Glow:
     ) -> None:
         """Lay the picture with its glow over what is in the target."""
         near = self.spread(picture, "near glow", NEAR)
-        far = self.spread(near, "far glow", FAR)
+        far = self.spread(near, "far glow", FAR, FAR_GAIN)
         easel, view = self._easel, scene.view
-        easel.finish(target)
-        self._finish.draw(
+        air = easel.canvas("air", near.size)
+        air.start()
+        self._air.draw(
             easel.tally,
             vertices=3,
-            picture=picture.texture,
             near_glow=near.texture,
             far_glow=far.texture,
             noise=easel.noise,
@@ -62,16 +64,25 @@ class Glow:
             slopes=view.slopes,
             eye=view.eye,
             ground=view.ground,
+            heart=view.on_picture(np.array([view.ground[0], 0.5, view.ground[1]])),
             air_colour=colours.background,
             aspect=scene.aspect,
             fog=look.fog,
             glow=look.glow,
+            time=scene.time_s % 4096.0,
+        )
+        easel.finish(target)
+        self._finish.draw(
+            easel.tally,
+            vertices=3,
+            picture=picture.texture,
+            air=air.texture,
+            aspect=scene.aspect,
             vignette=look.vignette,
             exposure=look.exposure,
-            time=scene.time_s % 4096.0,
             opacity=opacity,
         )
 
     def release(self) -> None:
-        for drawing in (self._shrink, self._blur, self._finish):
+        for drawing in (self._shrink, self._blur, self._air, self._finish):
             drawing.release()

@@ -18,6 +18,9 @@ from appliance.projector.poses import Poses, PoseTexture
 from appliance.projector.targets import Target
 
 
+FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most
+
+
 @dataclass(frozen=True)
 class Scene:
     """A moment of the dance as the camera sees it; time_s drives haze and dust."""
@@ -27,6 +30,16 @@ class Scene:
     poses: Poses
     aspect: float
     held: tuple[int, ...] = ()
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """Where the figure is in the picture: left, lower, right and upper edge, 0..1."""
+        places = self.poses.positions[0].astype(float)
+        x, y, _, w = self.view.projection @ np.concatenate([places, np.ones((len(places), 1))], axis=1).T
+        flesh = 0.5 * FLESH / (np.abs(w) * np.array(self.view.slopes)[:, None])
+        across, up = 0.5 + 0.5 * x / w, 0.5 + 0.5 * y / w
+        low, high = np.stack([across, up]) - flesh, np.stack([across, up]) + flesh
+        return (*low.min(axis=1).tolist(), *high.max(axis=1).tolist())
 
 
 class Easel:
@@ -43,7 +56,7 @@ class Easel:
         self.poses = PoseTexture(ctx, mesh, len(skeleton))
         self.noise = ctx.texture((SIDE, SIDE), 4, noise_pixels())
         self.noise.build_mipmaps()
-        self.noise.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self.noise.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
         self._canvases: dict[str, Target] = {}
 
     def canvas(self, name: str, size: tuple[int, int], depth: bool = False) -> Target:

@@ -12,8 +12,8 @@ from appliance.pose.skeleton import Skeleton
 from appliance.projector.body_buffers import BodyBuffers, merged
 
 STEP = 0.014  # figure heights from one point of a strand to the next
-POINTS = 34  # of a strand
-SPACING = 0.06  # figure heights between where strands start
+POINTS = 40  # steps of a strand
+SPACING = 0.045  # figure heights between where strands start
 TURN = 0.35  # how far a strand turns around its limb, per length that it runs along it
 
 Floats = NDArray[np.float32]
@@ -21,12 +21,13 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Strands:
-    """(S, POINTS, ..): places and the directions at them, in figure heights, rest pose; normals; what moves
-    them."""
+    """(S, POINTS + 1, ..): places and the directions at them, in figure heights, rest pose; normals; strengths
+    from 0 to 1; what moves them."""
 
     positions: Floats
     tangents: Floats
     normals: Floats
+    strengths: Floats
     joints: NDArray[np.uint8]
     weights: Floats
 
@@ -41,18 +42,15 @@ def strands_of(body: BodyBuffers, skeleton: Skeleton, bind_positions: Array) -> 
     ways -= normals * np.sum(ways * normals, axis=1, keepdims=True)
     ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-6)
     starts, _ = merged(body.positions, body.faces, SPACING)
-    halves = []
-    for sign in (-1.0, 1.0):
-        at, half = body.positions[starts].copy(), []
-        for _ in range(POINTS // 2):
-            near = _nearest(places, at)
-            half.append((at, near))
-            at = at + sign * STEP * ways[near]
-            at = at - normals[near] * np.sum((at - places[near]) * normals[near], axis=1, keepdims=True)
-        halves.append(half)
-    run = halves[0][::-1] + halves[1]
+    run = [(body.positions[starts], _nearest(places, body.positions[starts]))]
+    backwards = _walk(run[0], -ways[run[0][1]], places, normals, ways)
+    run = backwards[::-1] + run + _walk(run[0], ways[run[0][1]], places, normals, ways)
     positions = np.stack([at for at, _ in run], axis=1)
     near = np.stack([index for _, index in run], axis=1)
+    runs_on = np.linalg.norm(np.diff(positions, axis=1, prepend=positions[:, :1]), axis=-1) > 0.5 * STEP
+    runs_on[:, POINTS // 2] = True
+    for _ in range(3):
+        positions[:, 1:-1] = 0.25 * (positions[:, :-2] + 2 * positions[:, 1:-1] + positions[:, 2:])
     tangents = np.gradient(positions, axis=1)
     tangents /= np.maximum(np.linalg.norm(tangents, axis=-1, keepdims=True), 1e-6)
     chosen = first[near]
@@ -60,9 +58,46 @@ def strands_of(body: BodyBuffers, skeleton: Skeleton, bind_positions: Array) -> 
         positions.astype(np.float32),
         tangents.astype(np.float32),
         body.normals[chosen],
+        _tapered(runs_on),
         body.joints[chosen],
         body.weights[chosen],
     )
+
+
+_Run = list[tuple[Array, NDArray[np.int64]]]
+
+
+def _walk(
+    start: tuple[Array, NDArray[np.int64]], heading: Array, places: Floats, normals: Floats, ways: Array
+) -> _Run:
+    """POINTS // 2 steps from the start on the surface, along its ways in the direction that changes least."""
+    at, near = start
+    run: _Run = []
+    for _ in range(POINTS // 2):
+        way = ways[near]
+        way = np.where(np.sum(way * heading, axis=1, keepdims=True) < 0, -way, way)
+        stepped = at + STEP * way
+        next_near = _nearest(places, stepped)
+        out = np.sum((stepped - places[next_near]) * normals[next_near], axis=1, keepdims=True)
+        stepped = stepped - normals[next_near] * out
+        goes_on = np.sum((stepped - at) * heading, axis=1) > 0.3 * STEP
+        at = np.where(goes_on[:, None], stepped, at)
+        near = np.where(goes_on, next_near, near)
+        heading = np.where(goes_on[:, None], way, 0.0)
+        run.append((at, near))
+    return run
+
+
+def _tapered(runs_on: NDArray[np.bool_]) -> Floats:
+    """(S, POINTS) how strong a strand is at each of its points: nothing where it has ended."""
+    middle = POINTS // 2
+    ahead = np.cumprod(runs_on[:, middle:], axis=1)
+    behind = np.cumprod(np.roll(runs_on, -1, axis=1)[:, middle - 1 :: -1], axis=1)[:, ::-1]
+    whole = np.concatenate([behind, ahead], axis=1)
+    last, first = whole.shape[1] - 1 - np.argmax(whole[:, ::-1], axis=1), np.argmax(whole, axis=1)
+    place = np.arange(POINTS + 1)[None]
+    from_end = np.minimum(place - first[:, None], last[:, None] - place) / 9.0
+    return np.asarray(np.clip(from_end, 0, 1), np.float32)
 
 
 def reach_of(skeleton: Skeleton, bind_positions: Array) -> Array:
@@ -75,17 +110,25 @@ def reach_of(skeleton: Skeleton, bind_positions: Array) -> Array:
 
 
 def _along(skeleton: Skeleton, bind_positions: Array) -> Array:
-    """(J, 3) the direction in which the body goes on beyond each joint: to its children, away from the root."""
-    along = np.zeros((len(skeleton), 3))
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            along[parent] += bind_positions[joint] - bind_positions[parent]
+    """(J, 3) along the body beyond each joint, to its longest branch; turned so that it runs on from its parent."""
+    length, along = np.zeros(len(skeleton)), np.zeros((len(skeleton), 3))
     for joint, offset in skeleton.ends:
-        along[joint] += offset
+        along[joint] = offset
+    for joint in reversed(range(1, len(skeleton))):
+        parent = skeleton.parents[joint]
+        bone = bind_positions[joint] - bind_positions[parent]
+        if length[joint] + np.linalg.norm(bone) > length[parent]:
+            length[parent] = length[joint] + np.linalg.norm(bone)
+            along[parent] = bone
     for joint, parent in enumerate(skeleton.parents):
-        if np.linalg.norm(along[joint]) < 1e-6 and parent >= 0:
-            along[joint] = bind_positions[joint] - bind_positions[parent]
-    return np.asarray(along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-6))
+        size = np.linalg.norm(along[joint])
+        if size < 1e-6:
+            along[joint] = along[parent] if parent >= 0 else (0.0, 1.0, 0.0)
+        else:
+            along[joint] /= size
+        if parent >= 0 and along[joint] @ along[parent] < 0:
+            along[joint] *= -1
+    return along
 
 
 def _nearest(places: Floats, at: Array) -> NDArray[np.int64]:

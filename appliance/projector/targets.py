@@ -22,6 +22,12 @@ class Target:
         self.buffer.viewport = (0, 0, *self.size)
         self.buffer.clear(*colour)
 
+    def keep(self, channels: str, depth: bool = True) -> None:
+        """What is drawn next changes these channels ('r' to 'a') alone, and depth only if wanted."""
+        self.buffer.color_mask = tuple(channel in channels for channel in "rgba")
+        self.buffer.depth_mask = depth
+        self.buffer.use()
+
     def release(self) -> None:
         self.buffer.release()
         self.texture.release()

@@ -58,7 +58,7 @@ class CameraConfig(Section):
         description="Angle of view across the picture's shorter side: small is calm and flat, wide is close.",
     )
     figure: float = Field(
-        default=0.62,
+        default=0.7,
         ge=0.1,
         le=0.9,
         description="Share of the picture's shorter side that the standing figure takes.",

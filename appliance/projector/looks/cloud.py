@@ -13,8 +13,8 @@ from appliance.projector.poses import ROW_S, ROWS
 from appliance.projector.scene import Easel, Scene, direction
 from appliance.show.look import LookConfig
 
-GRAINS = 24000  # at density 1
-LOOSE = 0.45  # share of the grains that may leave the body
+GRAINS = 50000  # at density 1
+LOOSE = 0.4  # share of the grains that may leave the body
 
 
 class Cloud:
@@ -24,6 +24,7 @@ class Cloud:
         self._easel = easel
         self._buffer = easel.ctx.buffer(particles_of(easel.body, GRAINS).packed())
         self._grains = Drawing(easel.ctx, "cloud", "cloud", [(self._buffer, LAYOUT, *NAMES)])
+        self._body = easel.surface("body", "depth", coarse=True)
         self._glow = Glow(easel)
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
@@ -31,7 +32,11 @@ class Cloud:
         easel, view, colours = self._easel, scene.view, palette(look)
         picture = easel.picture(target.size, look.render_scale)
         picture.start()
-        easel.ctx.enable_only(moderngl.BLEND)
+        picture.keep("")
+        easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._body.draw(easel.tally, poses=easel.poses.texture, projection=view.projection, row=0)
+        picture.keep("rgba", depth=False)
+        easel.ctx.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
         self._grains.draw(
             easel.tally,
@@ -42,7 +47,7 @@ class Cloud:
             projection=view.projection,
             eye=view.eye,
             lamp=direction(view.azimuth - 0.9, 40.0),
-            pixels=0.006 * picture.size[1] / view.slopes[1],
+            pixels=0.0045 * picture.size[1] / view.slopes[1],
             rows=float(min(ROWS, max(6, round(look.trail_s / ROW_S)))),
             row_s=ROW_S,
             time=scene.time_s % 4096.0,
@@ -53,8 +58,9 @@ class Cloud:
             light_colour=np.sqrt(colours.light) * 0.5,
             accent_colour=np.sqrt(colours.accent) * 0.5,
         )
+        picture.keep("rgba")
         self._glow.finish(scene, look, colours, picture, opacity, target)
 
     def release(self) -> None:
-        for part in (self._buffer, self._grains, self._glow):
+        for part in (self._buffer, self._grains, self._body, self._glow):
             part.release()

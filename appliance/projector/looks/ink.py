@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import moderngl
+import numpy as np
 
 from appliance.projector.drawing import Drawing
 from appliance.projector.glow import Glow
@@ -17,7 +18,7 @@ from appliance.projector.trails import traced
 from appliance.show.look import LookConfig
 
 ECHOES = 5
-STROKES = 10
+STROKES = 12
 WET = 180  # lines of the picture in which ink spreads
 
 
@@ -45,26 +46,26 @@ class Ink:
             "projection": view.projection,
             "eye": view.eye,
         }
-        picture.buffer.color_mask = (True, False, False, False)
+        picture.keep("r")
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._figure.draw(easel.tally, **common, row=0, level=1.0, hollow=1.0)
         easel.ctx.enable_only(moderngl.BLEND)
         easel.ctx.blend_equation = moderngl.MAX
         if look.trail_s > 0:
             rows = min(ROWS, max(6, round(look.trail_s / ROW_S)))
-            picture.buffer.color_mask = (False, True, False, False)
+            picture.keep("g")
             for echo in range(1, ECHOES + 1):
                 level = 0.85 * (1 - echo / (ECHOES + 1)) ** 1.2
                 self._echo.draw(
                     easel.tally, **common, row=round((rows - 1) * echo / ECHOES), level=level, hollow=0.0
                 )
-            picture.buffer.color_mask = (False, False, True, False)
+            picture.keep("b")
             self._strokes.draw(
                 easel.tally, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES, **common,
-                pixel=(2 / picture.size[0], 2 / picture.size[1]), width=0.016 * picture.size[1], rows=rows, row_s=ROW_S, floor_side=1.0, brightness=0.9,
+                pixel=(2 / picture.size[0], 2 / picture.size[1]), width=0.013 * picture.size[1], rows=rows, row_s=ROW_S, floor_side=1.0, brightness=0.9,
             )  # fmt: skip
         easel.ctx.blend_equation = moderngl.FUNC_ADD
-        picture.buffer.color_mask = (True, True, True, True)
+        picture.keep("rgba")
         wet = self._glow.spread(picture, "near glow", WET)
         x, y, _, w = view.projection @ [view.ground[0], 0.0, view.ground[1], 1.0]
         easel.finish(target)
@@ -74,10 +75,10 @@ class Ink:
             picture=picture.texture,
             near_glow=wet.texture,
             noise=easel.noise,
-            figure_colour=colours.figure,
-            light_colour=colours.light,
-            accent_colour=colours.accent,
-            air_colour=colours.background,
+            figure_colour=np.sqrt(colours.figure),
+            light_colour=np.sqrt(colours.light),
+            accent_colour=np.sqrt(colours.accent),
+            air_colour=np.sqrt(colours.background),
             foot=(scene.aspect * (0.5 + 0.5 * x / w), 0.5 + 0.5 * y / w),
             foot_size=0.28 / (view.slopes[1] * w),
             aspect=scene.aspect,

@@ -103,7 +103,7 @@ def _ribbons(strands: Strands) -> tuple[bytes, bytes]:
     """Vertices, two a point, and indices of the triangles between them."""
     count = len(strands.positions)
     kinds = [("p", "f4", 3), ("t", "f4", 3), ("n", "f4", 3), ("a", "f4", 3), ("j", "u1", 4), ("w", "f4", 4)]
-    records = np.zeros((count, POINTS, 2), kinds)
+    records = np.zeros((count, POINTS + 1, 2), kinds)
     for name, values in zip(
         "ptnjw",
         (strands.positions, strands.tangents, strands.normals, strands.joints, strands.weights),
@@ -112,8 +112,8 @@ def _ribbons(strands: Strands) -> tuple[bytes, bytes]:
         records[name] = values[:, :, None]
     chances = np.random.RandomState(5).random_sample((count, 1))
     records["a"][..., 0] = [-1.0, 1.0]
-    records["a"][..., 1] = np.linspace(0, 1, POINTS)[None, :, None]
+    records["a"][..., 1] = strands.strengths[..., None]
     records["a"][..., 2] = chances[..., None]
-    first = (2 * np.arange(count * POINTS).reshape(count, POINTS)[:, :-1]).reshape(-1, 1)
+    first = (2 * np.arange(count * (POINTS + 1)).reshape(count, POINTS + 1)[:, :-1]).reshape(-1, 1)
     indices = first + np.array([[0, 1, 2, 1, 3, 2]])
     return records.tobytes(), indices.astype(np.int32).tobytes()

@@ -10,7 +10,7 @@ from appliance.pose.quaternion import Array
 from appliance.show.look import LookConfig
 
 _OWN = {  # figure, light, accent, background
-    "plaster": ("#efe6da", "#ffd9ad", "#8fb4ea", "#6b6259"),
+    "plaster": ("#f3ede4", "#ffe4c4", "#86b2f2", "#6f675f"),
     "lines": ("#ffd7a1", "#fff4e0", "#3d7bff", "#10141f"),
     "ink": ("#14110f", "#2a2320", "#8c2f1f", "#e9dfcb"),
     "cloud": ("#cfe0ff", "#ffe3c2", "#3b63d8", "#0d1220"),
@@ -35,5 +35,5 @@ def palette(look: LookConfig) -> Palette:
 
 
 def linear(colour: str) -> Array:
-    """'#rrggbb' as linear light; the projector's gamma is taken for 2.2."""
-    return np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]) ** 2.2
+    """'#rrggbb' as linear light."""
+    return np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]) ** 2

@@ -5,17 +5,16 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from appliance.pose.quaternion import Array
-from appliance.projector.camera import View
 from appliance.projector.drawing import Drawing
 from appliance.projector.looks.palette import palette
 from appliance.projector.scene import Easel, Scene, direction
 from appliance.projector.shadow import Shadow
 from appliance.show.look import LookConfig
 
-KEY_FROM, KEY_ABOVE = -0.95, 42.0  # radians beside the camera, degrees above the floor
-RIM_FROM, RIM_ABOVE = 2.5, 30.0
-BEAM = 2.6  # figure heights from the pool of light to the lamp
+KEY_FROM, KEY_ABOVE = -1.0, 54.0  # radians beside the camera, degrees above the floor
+RIM_FROM, RIM_ABOVE = 2.25, 24.0
+AIR_LINES = 360  # of the picture of the empty stage: all that is in it is soft
+BEAM = 2.4  # figure heights from the pool of light to the lamp
 
 
 class Plaster:
@@ -25,7 +24,8 @@ class Plaster:
         self._easel = easel
         self._shadow = Shadow(easel)
         self._figure = easel.surface("body", "plaster")
-        self._finish = Drawing(easel.ctx, "air", "plaster_finish")
+        self._air = Drawing(easel.ctx, "air", "plaster_air")
+        self._finish = Drawing(easel.ctx, "screen", "plaster_finish")
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
         """Lay the look over what is in the target."""
@@ -53,41 +53,38 @@ class Plaster:
             back_lamp=direction(view.azimuth + RIM_FROM, RIM_ABOVE),
             figure_colour=colours.figure,
         )
-        beam_to, beam_from = (
-            _on_picture(view, place, scene.aspect)
-            for place in (np.array([view.ground[0], 0.1, view.ground[1]]), _lamp_place(view, lamp))
+        pool = np.array([view.ground[0], 0.0, view.ground[1]])
+        air = easel.canvas("air", (round(AIR_LINES * scene.aspect), AIR_LINES))
+        air.start()
+        easel.ctx.enable_only(moderngl.NOTHING)
+        self._air.draw(
+            easel.tally,
+            vertices=3,
+            **common,
+            axes=np.stack([view.right, view.up, view.back], axis=1),
+            slopes=view.slopes,
+            ground=view.ground,
+            air_colour=colours.background,
+            beam_from=view.on_picture(pool + BEAM * lamp),
+            beam_to=view.on_picture(pool),
+            beam_width=0.42 / (view.slopes[1] * 2 * np.linalg.norm(view.eye - pool)),
+            aspect=scene.aspect,
+            fog=look.fog,
+            time=scene.time_s % 4096.0,
         )
         easel.finish(target)
         self._finish.draw(
             easel.tally,
             vertices=3,
-            **common,
             picture=picture.texture,
+            air=air.texture,
             texel=(1 / picture.size[0], 1 / picture.size[1]),
-            axes=np.stack([view.right, view.up, view.back], axis=1),
-            slopes=view.slopes,
-            ground=view.ground,
-            air_colour=colours.background,
-            beam_from=beam_from,
-            beam_to=beam_to,
-            beam_width=0.55 / (view.slopes[1] * 2 * np.linalg.norm(view.eye)),
+            box=scene.box,
             aspect=scene.aspect,
-            fog=look.fog,
             vignette=look.vignette,
-            time=scene.time_s % 4096.0,
             opacity=opacity,
         )
 
     def release(self) -> None:
-        for part in (self._shadow, self._figure, self._finish):
+        for part in (self._shadow, self._figure, self._air, self._finish):
             part.release()
-
-
-def _lamp_place(view: View, lamp: Array) -> Array:
-    return np.array([view.ground[0], 0.0, view.ground[1]]) + BEAM * lamp
-
-
-def _on_picture(view: View, place: Array, aspect: float) -> Array:
-    """Where a place appears, in picture heights from the lower left corner."""
-    x, y, _, w = view.projection @ [*place, 1.0]
-    return np.array([aspect * (0.5 + 0.5 * x / w), 0.5 + 0.5 * y / w])

@@ -40,18 +40,19 @@ void main() {
     vec3 normal = turned(joint_at(in_joints.x, row), in_normal);
     vec3 drift = textureLod(noise, place.xy * 0.9 + in_chance.zw * 0.15 + time * 0.01, 0.0).rgb
                + textureLod(noise, place.zy * 1.7 - time * 0.013, 0.0).gbr - 1.0;
-    place += age_s * (0.22 * velocity * (1.0 - 0.45 * age) + (0.10 + 0.16 * speed) * drift + 0.03 * normal);
+    place += age_s * (0.30 * velocity * (1.0 - 0.45 * age) + (0.12 + 0.20 * speed) * drift + 0.03 * normal);
     place += normal * 0.006 * (in_chance.w - 0.3);
     vec3 way = eye - place;
     float distance = length(way), facing = dot(normal, way) / distance;
-    float key = clamp(dot(normal, lamp) * 0.8 + 0.2, 0.0, 1.0);
-    float rim = pow(1.0 - clamp(abs(facing), 0.0, 1.0), 2.0);
-    float deep = exp(-fog * 1.6 * max(distance - focus, 0.0));
-    vec3 on_body = figure_colour * (0.10 + 1.0 * key) + accent_colour * 1.5 * rim;
-    vec3 in_air = mix(light_colour, accent_colour, smoothstep(0.0, 0.7, age));
-    float shown = loose ? smoothstep(0.5, 2.2, speed) * (1.0 - age) : smoothstep(-0.25, 0.35, facing);
-    grain_colour = vec4((loose ? in_air * 1.1 : on_body) * shown * deep, 1.0);
-    gl_Position = projection * vec4(place, 1.0);
-    gl_PointSize = clamp(pixels * (0.6 + 0.8 * in_chance.w) / gl_Position.w, 1.5, 12.0);
+    float key = clamp(dot(normal, lamp) * 0.85 + 0.15, 0.0, 1.0);
+    float rim = pow(1.0 - clamp(abs(facing), 0.0, 1.0), 2.5);
+    float deep = exp(-fog * 1.6 * max(distance - focus, -0.3));
+    float spark = 0.35 + 0.5 * in_chance.w + 1.4 * pow(in_chance.y, 12.0);
+    vec3 on_body = figure_colour * (0.06 + 1.25 * key * key) + accent_colour * (0.16 + 1.2 * rim);
+    vec3 in_air = mix(light_colour, accent_colour, smoothstep(0.1, 0.8, age));
+    float shown = loose ? smoothstep(0.30, 1.5, speed) * pow(1.0 - age, 1.5) : smoothstep(-0.1, 0.3, facing);
+    grain_colour = vec4((loose ? in_air * 1.3 : on_body) * spark * shown * deep, 1.0);
+    gl_Position = projection * vec4(place + 0.012 * way / distance, 1.0);
+    gl_PointSize = clamp(pixels * (0.55 + 0.5 * in_chance.w + 0.6 * pow(in_chance.y, 12.0)) / gl_Position.w, 1.6, 12.0);
     if (shown < 0.01) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
 }

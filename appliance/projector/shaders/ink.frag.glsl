@@ -13,6 +13,6 @@ void main() {
     float facing = clamp(dot(normalize(normal), normalize(eye - place)), 0.0, 1.0);
     float wash = texture(noise, skin.xy * 1.3 + skin.z).r;
     float outline = pow(1.0 - facing, 1.6);
-    float full = mix(1.0, 0.50 + 0.5 * outline + 0.30 * (wash - 0.5) + 0.2 * (1.0 - open), hollow);
+    float full = mix(1.0, 0.66 + 0.45 * outline + 0.35 * (wash - 0.5) + 0.25 * (1.0 - open), hollow);
     colour = vec4(level * full);
 }

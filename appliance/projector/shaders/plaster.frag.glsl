@@ -31,20 +31,21 @@ float lit(vec3 n) {
 
 void main() {
     vec3 n = normalize(normal), to_eye = normalize(eye - place);
-    vec4 rough = texture(noise, skin.xy * 2.3 + skin.z * 1.7) + texture(noise, skin.zy * 5.1 - skin.x) - 1.0;
-    n = normalize(n + 0.16 * (rough.rgb * 0.6));
+    vec4 rough = texture(noise, skin.xy * 1.9 + skin.z * 1.3) + texture(noise, skin.zy * 4.3 - skin.x) - 1.0;
+    float shaded = clamp((dot(n, lamp) + 0.10) / 1.10, 0.0, 1.0) * mix(1.0, lit(n), shadow);
+    n = normalize(n + 0.10 * rough.rgr);
     float facing = clamp(dot(n, to_eye), 0.0, 1.0);
-    vec3 albedo = figure_colour * (0.92 + 0.16 * rough.g);
-    float wrapped = clamp((dot(n, lamp) + 0.12) / 1.12, 0.0, 1.0);
-    float key = wrapped * mix(1.0, lit(normalize(normal)), shadow);
+    vec3 albedo = figure_colour * (0.94 + 0.12 * rough.g);
+    float key = min(shaded, 1.0) * clamp(0.35 + 0.65 * dot(n, lamp) / max(dot(normalize(normal), lamp), 0.2), 0.4, 1.3);
+    float cavity = mix(1.0, open * open, 0.9);
     float sky = 0.5 + 0.5 * n.y;
-    float cavity = mix(1.0, open, 0.85);
-    vec3 bounce = light_colour * 0.10 * (1.0 - sky) * exp(-2.2 * place.y);
-    vec3 ambient = (mix(vec3(0.010), accent_colour * 0.045, sky) + bounce) * cavity;
-    float behind = clamp(dot(n, back_lamp) + 0.25, 0.0, 1.0);
-    vec3 rim = accent_colour * behind * pow(1.0 - facing, 2.5) * 2.4 * cavity;
-    vec3 halfway = normalize(lamp + to_eye);
-    float sheen = 0.10 * pow(clamp(dot(n, halfway), 0.0, 1.0), 18.0) * key;
-    vec3 light = albedo * (light_colour * key * 1.55 + ambient) + rim + light_colour * sheen;
+    vec3 bounce = light_colour * 0.16 * (1.0 - sky) * exp(-2.5 * place.y);
+    vec3 ambient = (mix(vec3(0.006), accent_colour * 0.028, sky) + bounce) * cavity;
+    float behind = clamp(dot(n, back_lamp) * 0.9 + 0.1, 0.0, 1.0);
+    vec3 rim = accent_colour * (0.10 * behind + 3.4 * behind * pow(1.0 - facing, 3.0)) * cavity;
+    float warm = shaded * (1.0 - shaded);
+    vec3 glance = vec3(0.10, 0.03, 0.0) * warm;
+    float sheen = 0.07 * pow(clamp(dot(n, normalize(lamp + to_eye)), 0.0, 1.0), 14.0) * shaded;
+    vec3 light = albedo * (light_colour * (key * 1.7 * mix(1.0, open, 0.35)) + glance + ambient + rim) + light_colour * sheen;
     colour = vec4(dithered(toned(exposure * light), gl_FragCoord.xy), 1.0);
 }

@@ -3,7 +3,7 @@
 in vec3 in_position;
 in vec3 in_tangent;
 in vec3 in_normal;
-in vec3 in_along;  // side -1 or 1, place along the strand 0..1, a chance
+in vec3 in_along;  // side -1 or 1, strength 0..1, a chance
 in uvec4 in_joints;
 in vec4 in_weights;
 uniform mat4 projection;
@@ -22,8 +22,7 @@ void main() {
     vec3 place = moved(by, in_position), tangent = turned(by, in_tangent);
     vec3 way = normalize(eye - place);
     facing = dot(turned(by, in_normal), way);
-    float ends = smoothstep(0.0, 0.3, in_along.y) * smoothstep(1.0, 0.7, in_along.y);
-    strength = ends * (floor_side < 0.0 ? exp(-5.0 * max(place.y, 0.0)) : 1.0);
+    strength = in_along.y * (floor_side < 0.0 ? exp(-5.0 * max(place.y, 0.0)) : 1.0);
     place.y *= floor_side;
     tangent.y *= floor_side;
     vec4 here = projection * vec4(place, 1.0), there = projection * vec4(place + 0.01 * tangent, 1.0);

@@ -8,10 +8,11 @@ uniform sampler2D noise;
 out vec4 colour;
 
 void main() {
-    float bristle = texture(noise, vec2(age * 0.35 + chance, 0.11 * across + chance * 3.0)).b;
-    float dry = 0.25 + 0.5 * smoothstep(0.5, 3.0, speed) + 0.35 * age;
-    float round_off = 1.0 - across * across;
-    float ink = smoothstep(dry, dry + 0.25, bristle * 0.8 + 0.75 * round_off - 0.1);
-    float moving = smoothstep(0.45, 1.3, speed);
-    colour = vec4(brightness * ink * moving * (1.0 - age));
+    float side = across + 0.25 * (texture(noise, vec2(age * 1.7 + chance, chance)).r - 0.5);
+    float bristle = texture(noise, vec2(age * 0.22 + chance, 0.16 * side + chance * 3.0)).b;
+    float round_off = 1.0 - side * side * side * side;
+    float dry = 0.10 + 0.30 * smoothstep(0.8, 3.5, speed) + 0.55 * age;
+    float ink = smoothstep(dry - 0.06, dry + 0.16, bristle) * smoothstep(0.0, 0.35, round_off);
+    float moving = smoothstep(0.4, 1.0, speed);
+    colour = vec4(brightness * ink * moving * (1.0 - 0.75 * age));
 }

@@ -1,7 +1,7 @@
-// From linear light to the picture, and steps finer than 8 bits hold; exact black stays exact black.
+// From linear light to the picture (a gamma of 2), and finer steps than 8 bits hold; black stays exactly black.
 vec3 toned(vec3 light) {
     vec3 x = max(light, 0.0);
-    return pow(x * (1.0 + 0.11 * x) / (1.0 + 0.72 * x) , vec3(1.0 / 2.2));
+    return sqrt(x * (1.0 + 0.11 * x) / (1.0 + 0.72 * x));
 }
 
 float grain(vec2 pixel) {
