@@ -28,7 +28,8 @@ class CueConfig(Section):
         "It begins at its start; one that plays already goes on.",
     )
     iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = Field(
-        default=None, description="Coding and interaction iterations; more than fit the box are lowered."
+        default=None,
+        description="Coding and interaction iterations, reached in whole steps; more than fit are lowered.",
     )
     hands: list[Name] | None = Field(
         default=None,
@@ -44,7 +45,7 @@ class CueConfig(Section):
         default=FADE_S,
         ge=0,
         le=60,
-        description="How long phrase, look, lights and master take to change, in seconds. "
+        description="How long phrase, iterations, look, lights and master take to change, in seconds. "
         "Hands take 0.5 s to hold and 1 s to let go, whatever stands here.",
     )
 

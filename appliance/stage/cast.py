@@ -41,15 +41,6 @@ _MOVES_FREELY = "No sensor is let in, and the dancer moves freely."
 
 
 @dataclass(slots=True)
-class Iterations:
-    """How often the puppet goes over a window; commands may change it up to `most`, which fits the budget."""
-
-    coding: int
-    interaction: int
-    most: int
-
-
-@dataclass(slots=True)
 class Cast:
     """Everything that dances, hears and speaks.
 

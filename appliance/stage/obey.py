@@ -8,7 +8,8 @@ from appliance.pose import quaternion
 from appliance.sensor.link import SensorLink
 from appliance.show.config_error import did_you_mean
 from appliance.show.cues import CueConfig
-from appliance.stage.cast import Cast, Iterations
+from appliance.stage.cast import Cast
+from appliance.stage.iterations import Iterations
 from appliance.stage.wearing import Wearing
 
 SENSOR_ORDERS = frozenset(("neutral", "heading", "strobe", "reload"))
@@ -26,13 +27,14 @@ def obey(order: Order, cast: Cast, iterations: Iterations, usual_rate: float) ->
             return True, _hold(order, cast)
         elif order.name == "iterations":
             coding, interaction = (int(value) for value in order.values)
-            return True, _iterate(coding, interaction, iterations)
+            return True, iterations.ask(coding, interaction)
         elif order.name == "phrase":
             name = str(order.text)
             goes_over = cast.motion.play(name, *order.values)
             return True, "" if goes_over else f"The phrase '{name}' plays already, and goes on."
         elif order.name == "cue":
-            return True, _fire(_cue(str(order.text), cast), cast, iterations)
+            cue = _cue(str(order.text), cast)
+            return True, _fire(cue, cast, iterations, cue.fade_s)
         else:
             _play(order, cast, usual_rate)
     except ValueError as error:
@@ -47,7 +49,7 @@ def resume(name: str, cast: Cast, iterations: Iterations) -> str:
         return ""
     if cue.phrase is not None:
         cast.motion.start_with(cue.phrase)
-    return f"The show goes on in the cue '{name}'. {_fire(cue, cast, iterations)}".rstrip()
+    return f"The show goes on in the cue '{name}'. {_fire(cue, cast, iterations, 0.0)}".rstrip()
 
 
 def obey_for_sensors(order: Order, cast: Cast, wearing: Wearing, now: float) -> Outcome:
@@ -105,20 +107,6 @@ def _play(order: Order, cast: Cast, usual_rate: float) -> None:
         raise ValueError(f"The stage knows no order '{order.name}'.")
 
 
-def _iterate(coding: int, interaction: int, iterations: Iterations) -> str:
-    """Take as many as fit; a sentence when these are fewer than were asked for."""
-    allowed = min(max(coding, 1), iterations.most)
-    iterations.coding = allowed
-    iterations.interaction = max(0, min(interaction - max(coding - allowed, 0), allowed))
-    if (iterations.coding, iterations.interaction) == (coding, interaction):
-        return ""
-    return (
-        f"{coding} coding and {interaction} interaction iterations were asked for; "
-        f"the dancer runs with {iterations.coding} and {iterations.interaction}: "
-        f"at most {iterations.most} fit the tick's budget here."
-    )
-
-
 def _cue(name: str, cast: Cast) -> CueConfig:
     if name not in cast.cues:
         if not cast.cues:
@@ -127,13 +115,13 @@ def _cue(name: str, cast: Cast) -> CueConfig:
     return cast.cues[name]
 
 
-def _fire(cue: CueConfig, cast: Cast, iterations: Iterations) -> str:
+def _fire(cue: CueConfig, cast: Cast, iterations: Iterations, fade_s: float) -> str:
     """What of a cue concerns the dance; its names were checked when the show was read."""
     words = ""
     if cue.phrase is not None:
-        cast.motion.play(cue.phrase, cue.fade_s)
+        cast.motion.play(cue.phrase, fade_s)
     if cue.iterations is not None:
-        words = _iterate(*cue.iterations, iterations)
+        words = iterations.ask(*cue.iterations, fade_s)
     if cue.hands is not None:
         for puppeteer in cast.hands.puppeteers:
             _enable(puppeteer, puppeteer.joint in cue.hands, cast)

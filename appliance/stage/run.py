@@ -14,9 +14,10 @@ from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.budget import Admission
-from appliance.stage.cast import Cast, Iterations, admission, assemble
+from appliance.stage.cast import Cast, admission, assemble
 from appliance.stage.clock import Slot, TickClock
 from appliance.stage.health import Health
+from appliance.stage.iterations import Iterations
 from appliance.stage.journal import JUMPED, LATE, NOT_FINITE, Journal, JournalError
 from appliance.stage.obey import SENSOR_ORDERS, obey, obey_for_sensors, resume
 from appliance.stage.phase_lock import PhaseLock

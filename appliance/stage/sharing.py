@@ -11,8 +11,9 @@ from appliance.outputs.runtime_folder import Claim, RuntimeFolderError, runtime_
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
-from appliance.stage.cast import Cast, Iterations
+from appliance.stage.cast import Cast
 from appliance.stage.health import Health
+from appliance.stage.iterations import Iterations
 from appliance.stage.stage_error import StageError
 from appliance.stage.thermometer import Thermometer
 

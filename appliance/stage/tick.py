@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.outputs.joint_frame import JointFrame
-from appliance.stage.cast import Cast, Iterations
+from appliance.stage.cast import Cast
 from appliance.stage.clock import Slot
+from appliance.stage.iterations import Iterations
 from appliance.stage.journal import SECTIONS
 from appliance.stage.wearing import Wearing
 
@@ -91,6 +92,7 @@ class Tick:
         """
         if not self.frame.late:
             self.cast.motion.advance()
+            self.iterations.advance()
         self.cast.link.tend(self._monotonic())
         self.wearing.look(slot.started)
         begin = slot.started

@@ -15,8 +15,9 @@ from appliance.sensor.ways.udp import UdpIntake
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig, UdpConfig
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
-from appliance.stage.cast import Cast, Iterations, assemble
+from appliance.stage.cast import Cast, assemble
 from appliance.stage.clock import TICK_S, Slot
+from appliance.stage.iterations import Iterations
 from appliance.stage.tick import Tick
 from appliance.stage.wearing import Wearing
 from hw_sim.motions import turning

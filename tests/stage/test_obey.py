@@ -15,7 +15,8 @@ from appliance.sensor.link import SensorLink, SensorState
 from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.cast import Cast, Iterations, assemble
+from appliance.stage.cast import Cast, assemble
+from appliance.stage.iterations import Iterations
 from appliance.stage.obey import obey, obey_for_sensors
 from appliance.stage.wearing import Wearing
 from tests.stage.bundles import write_show

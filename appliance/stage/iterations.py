@@ -1,0 +1,47 @@
+"""How often the puppet goes over a window: within what fits the budget, changed at once or in steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from appliance.dancer.phrase import FPS
+
+
+@dataclass(slots=True)
+class Iterations:
+    """Coding and interaction iterations; orders may change them up to `most`, which fits the budget."""
+
+    coding: int
+    interaction: int
+    most: int
+    _before: tuple[int, int] = (0, 0)
+    _wanted: tuple[int, int] = (0, 0)
+    _tick: int = 0
+    _ticks: int = 0
+
+    def ask(self, coding: int, interaction: int, fade_s: float = 0.0) -> str:
+        """Take as many as fit, over fade_s; a sentence when these are fewer than were asked for."""
+        allowed = min(max(coding, 1), self.most)
+        self._before = self.coding, self.interaction
+        self._wanted = allowed, max(0, min(interaction - max(coding - allowed, 0), allowed))
+        self._tick, self._ticks = 0, max(1, round(fade_s * FPS))
+        if self._ticks == 1:
+            self.advance()
+        if self._wanted == (coding, interaction):
+            return ""
+        return (
+            f"{coding} coding and {interaction} interaction iterations were asked for; "
+            f"the dancer runs with {self._wanted[0]} and {self._wanted[1]}: "
+            f"at most {self.most} fit the tick's budget here."
+        )
+
+    def advance(self) -> None:
+        """One tick further on the way to what was asked for, in whole iterations: each is a small step."""
+        if self._tick == self._ticks:
+            return
+        self._tick += 1
+        share = self._tick / self._ticks
+        self.coding, self.interaction = (
+            int(before + share * (wanted - before) + 0.5)
+            for before, wanted in zip(self._before, self._wanted, strict=True)
+        )
