@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.outputs.dmx.datagram_sender import DatagramPath, DatagramSender
+from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.posistagenet_packets import DataPackets, InfoPackets
 from appliance.pose.skeleton import Skeleton

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import errno
 import socket
 from collections.abc import Sequence
 
+from appliance.outputs.datagram_sender import PASSING, DatagramPath, in_words
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.osc.dialects import DIALECTS, Encoder
 from appliance.outputs.osc.frame_message import FrameMessage
@@ -14,14 +14,6 @@ from appliance.show.box import OscConfig
 
 FIRST_PAUSE_FRAMES = 5  # 0.1 s
 LONGEST_PAUSE_FRAMES = 50  # 1 s: a receiver that comes back sees the dancer again within it
-_PASSING = (errno.EAGAIN, errno.ENOBUFS)  # a full buffer: the next frame may go through
-_IN_WORDS = {
-    errno.ECONNREFUSED: "nobody listens on that port",
-    errno.ENETUNREACH: "no network leads there",
-    errno.EHOSTUNREACH: "that machine does not answer",
-    errno.EAGAIN: "the network does not take more",
-    errno.EMSGSIZE: "the message is too long for a datagram",
-}
 
 
 class OscOutputs:
@@ -61,6 +53,7 @@ class OscReceiver:
 
     def __init__(self, config: OscConfig) -> None:
         self.config = config
+        self._path = DatagramPath(config.host, config.port, broadcast=True)
         self.sent = 0  # datagrams handed to the network
         self.dropped = 0  # datagrams that were not
         self.last_error = ""  # why the last one was dropped; stays after the receiver is back
@@ -87,7 +80,7 @@ class OscReceiver:
             return
         sent_before, due = self.sent, sum(map(len, groups))
         try:
-            connection = self._socket or self._connect()
+            connection = self._socket = self._socket or self._path.open()
             for datagrams in groups:
                 for datagram in datagrams:
                     connection.send(datagram)
@@ -95,8 +88,8 @@ class OscReceiver:
             self._count_well()
         except OSError as error:
             self.dropped += due - (self.sent - sent_before)
-            self.last_error = _IN_WORDS.get(error.errno or 0, str(error.strerror))
-            if error.errno not in _PASSING:
+            self.last_error = in_words(error)
+            if error.errno not in PASSING:
                 self._back_off()
 
     def close(self) -> None:
@@ -104,19 +97,6 @@ class OscReceiver:
         if self._socket:
             self._socket.close()
         self._socket = None
-
-    def _connect(self) -> socket.socket:
-        """A new socket; a fresh one for each try, so that it takes on the network as it now is."""
-        connection = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            connection.setblocking(False)
-            connection.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-            connection.connect((self.config.host, self.config.port))
-        except OSError:
-            connection.close()
-            raise
-        self._socket = connection
-        return connection
 
     def _count_well(self) -> None:
         """Only a good while makes up for a failure: a refusal comes back after the datagram that it means."""

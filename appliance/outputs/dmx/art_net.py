@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from appliance.outputs.dmx.datagram_sender import DatagramPath
+from appliance.outputs.datagram_sender import DatagramPath
 from appliance.outputs.dmx.network_wire import NetworkWire
 from appliance.show.dmx import DmxConfig
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from appliance.outputs.dmx.datagram_sender import DatagramPath, DatagramSender
+from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
 
 
 class NetworkWire:

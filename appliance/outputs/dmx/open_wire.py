@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from appliance.outputs.datagram_sender import DatagramPath
 from appliance.outputs.dmx import sacn_packet
 from appliance.outputs.dmx.art_net import ArtNetWire
-from appliance.outputs.dmx.datagram_sender import DatagramPath
 from appliance.outputs.dmx.identity import component_identifier
 from appliance.outputs.dmx.open_dmx import open_dmx_wire
 from appliance.outputs.dmx.pace import Universe

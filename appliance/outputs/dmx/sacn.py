@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from uuid import UUID
 
+from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
 from appliance.outputs.dmx import sacn_packet
-from appliance.outputs.dmx.datagram_sender import DatagramPath, DatagramSender
 from appliance.outputs.dmx.network_wire import NetworkWire
 from appliance.show.dmx import DmxConfig
 

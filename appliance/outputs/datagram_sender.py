@@ -10,9 +10,9 @@ from dataclasses import dataclass
 FIRST_PAUSE_S = 0.1
 LONGEST_PAUSE_S = 1.0
 WELL_AFTER_S = 2.0  # longer than the pause between two keep-alives: a refusal comes back with the next one
-_PASSING = (errno.EAGAIN, errno.ENOBUFS)  # a full buffer: the next universe may go through
+PASSING = (errno.EAGAIN, errno.ENOBUFS)  # a full buffer: the next datagram may go through
 _IN_WORDS = {
-    errno.ECONNREFUSED: "nobody listens there",
+    errno.ECONNREFUSED: "nobody listens on that port",
     errno.ENETUNREACH: "no network leads there",
     errno.EHOSTUNREACH: "that machine does not answer",
     errno.EADDRNOTAVAIL: "this machine does not have the interface's address",
@@ -20,7 +20,13 @@ _IN_WORDS = {
     errno.EACCES: "the network allows no broadcast to that address",
     errno.EPERM: "this machine's firewall refuses it",
     errno.EAGAIN: "the network does not take more",
+    errno.EMSGSIZE: "the message is too long for a datagram",
 }
+
+
+def in_words(error: OSError) -> str:
+    """Why a datagram did not leave, as a clause."""
+    return _IN_WORDS.get(error.errno or 0, str(error.strerror))
 
 
 @dataclass(frozen=True)
@@ -96,8 +102,8 @@ class DatagramSender:
 
     def _failed(self, error: OSError, now: float) -> None:
         self.dropped += 1
-        self.last_error = _IN_WORDS.get(error.errno or 0, str(error.strerror))
-        if error.errno in _PASSING:
+        self.last_error = in_words(error)
+        if error.errno in PASSING:
             return
         self.close()
         self._retry_at = now + self._pause_s
