@@ -12,7 +12,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,11 +23,15 @@ from rich.console import Console
 from appliance.cli import main
 from appliance.commands.asking import RunningBox as AskedBox
 from appliance.commands.sensor_table import SensorTable
+from appliance.control.orders import Order
+from appliance.control.packet import Message, datagram
+from appliance.control.port import Address
+from appliance.control.roster import RosterLine
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorState
 from appliance.sensor.wire import HAS_PROFILE, IS_NDOF
-from appliance.stage.control import Command, Control, datagram
-from appliance.stage.roster import Message, Roster, RosterLine
+from appliance.stage.roster import roster_lines
+from tests.control.doubles import ControlInThread, StageDouble, until
 
 LEFT = SensorState(
     *("left-wrist", 0x1A2B3C4D, "linked", "192.168.4.7:2390", 49.96, 0.0123, 0.0042, 0.013),
@@ -40,41 +44,42 @@ SPARE = SensorState(
 
 
 class RunningBox:
-    """A control port that answers as a stage would, without anyone dancing."""
+    """Show control, and a stage that answers without dancing."""
 
     def __init__(self, folder: Path, key_file: Path | None = None) -> None:
-        self.obeyed: list[Command] = []
+        runtime = folder / "runtime"
+        runtime.mkdir(mode=0o700)
+        self.stage = StageDouble(runtime)
+        self.stage.answer = lambda order: (self.done, f"{order.name} it is.")
         self.done = True
-        self.roster = Roster(str(key_file or folder / "sensors.keys"))
-        self.control = Control("127.0.0.1", 0, self.roster, folder / "sensors.keys")
+        self.control = ControlInThread(runtime, key_file or folder / "sensors.keys")
         self.box_file = folder / "box.yaml"
         settings = {
             "sensors": {"keys": "sensors.keys"},
-            "control": {"host": "0.0.0.0", "port": self.control.port},
+            "control": {"host": "0.0.0.0", "port": self.control.port, "senders": ["10.0.0.1"]},
         }
         self.box_file.write_text(yaml.safe_dump(settings))
-        self._is_over = threading.Event()
-        self._thread = threading.Thread(target=self._obey)
-        self._thread.start()
+        self.stage.__enter__()
+        until(lambda: self.control.process.desk.status(0, time.monotonic()).state == "dancing")
 
-    def _obey(self) -> None:
-        while not self._is_over.wait(0.005):
-            order = self.control.take()
-            if order is not None:
-                self.obeyed.append(order)
-                self.control.answer(order, self.done, f"{order.name} it is.")
+    @property
+    def obeyed(self) -> list[Order]:
+        return self.stage.orders
+
+    def look(self, states: list[SensorState], neutral_of: Callable[[str], str], now: float) -> None:
+        """The stage looks at its sensors."""
+        self.stage.tell(sensors=roster_lines(states, neutral_of), looked_at=now)
 
     def close(self) -> None:
-        self._is_over.set()
-        self._thread.join()
         self.control.close()
+        self.stage.__exit__(None, None, None)
 
 
 @pytest.fixture
 def box(tmp_path: Path) -> Iterator[RunningBox]:
     create_keys(tmp_path / "sensors.keys", ["left-wrist", "head", "spare-1"])
     box = RunningBox(tmp_path)
-    box.roster.refresh(
+    box.look(
         [LEFT, LOST, SPARE],
         lambda name: {"left-wrist": "wanted", "head": "kept"}.get(name, ""),
         time.monotonic(),
@@ -162,7 +167,7 @@ def test_a_box_that_is_still_starting_or_hangs_is_said(
         assert "still starting" in out
     with ends(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
         assert json.loads(out) == {"box": True, "age_s": None, "sensors": []}
-    box.roster.refresh([LEFT], lambda name: "", time.monotonic() - 60.0)
+    box.look([LEFT], lambda name: "", time.monotonic() - 60.0)
     with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
         assert "This is 60 s old: the box hangs" in out
     box.close()
@@ -198,7 +203,7 @@ def test_commands_reach_the_box_and_its_answer_is_printed(
 ) -> None:
     with ends(capsys, 0, *words, "--box", str(box.box_file)) as (out, _):
         assert out == f"{name} it is.\n"
-    assert box.obeyed == [Command(name, sensor=sensor)]
+    assert box.obeyed == [Order(name, text=sensor)]
     box.done = False
     with ends(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
         assert err == f"bunraku: {name} it is.\n"
@@ -255,7 +260,7 @@ def test_what_is_wrong_with_the_key_file_of_a_running_box_is_said(
         + f"head: {{device: {LOST.device_id + 1}, key: {7:032x}}}\n"
     )
     states = [LEFT, SPARE, LOST._replace(device_id=LOST.device_id + 1)]
-    box.roster.refresh(states, lambda _: "", time.monotonic())
+    box.look(states, lambda _: "", time.monotonic())
     keys.chmod(0o644)
     with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
         assert "has other sensors" not in out
@@ -359,17 +364,17 @@ def test_watching_goes_on_until_it_is_ended(box: RunningBox) -> None:
     command = [sys.executable, "-m", "appliance.cli", "sensors", "--watch", "--box", str(box.box_file)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     seen = 0
-    until = time.monotonic() + 60.0
-    lists = box.control._lay_down
+    ends_at = time.monotonic() + 60.0
+    tell = box.control.process.desk._tell
 
-    def counted(order: Command) -> None:
+    def counted(asker: Address, message: Message) -> None:
         nonlocal seen
-        seen += order.name == "list"
-        lists(order)
+        seen += message[0] == "/sensors/end"
+        tell(asker, message)
 
-    box.control._lay_down = counted  # type: ignore[method-assign]
+    box.control.process.desk._tell = counted
     while seen < 3:
-        assert time.monotonic() < until
+        assert time.monotonic() < ends_at
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
