@@ -20,18 +20,21 @@ lights = typer.Typer(
 
 
 @lights.callback(invoke_without_command=True)
-def light(context: typer.Context, show: ShowFolder = None, box: BoxFile = None) -> None:
+def light(
+    context: typer.Context,
+    show: Annotated[
+        Path | None, typer.Option(help="Show bundle; left out: the one that the stage dances.")
+    ] = None,
+    box: BoxFile = None,
+) -> None:
     """Light the rig by the dance that `bunraku play` dances, until Ctrl-C; `play` starts this by itself."""
     if context.invoked_subcommand is not None:
         if (show, box) != (None, None):
             raise typer.BadParameter(f"write options behind '{context.invoked_subcommand}'")
         return
     from appliance.lights.run import light_up
-    from appliance.show.box import load_box
-    from appliance.show.bundle import default_show_path
-    from appliance.show.show import load_show
 
-    light_up(load_show(show or default_show_path()), load_box(box), box)
+    light_up(show, box)
 
 
 @lights.command("test")

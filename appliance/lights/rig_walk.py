@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from appliance.lights.patch import Patch
-from appliance.lights.run import rig_here, say, stop_signals, wired
+from appliance.lights.run import require_wires, rig_here, say, stop_signals, wired
 from appliance.lights.walk import steps, walk
 from appliance.outputs.runtime_folder import Claim, runtime_folder
 from appliance.show.box import load_box
@@ -23,6 +23,7 @@ def walk_rig(
 ) -> None:
     """Take every step; zeros at the end. Raises ConfigError, or AlreadyHereError while the lights run."""
     show, box = load_show(directory or default_show_path()), load_box(box_file)
+    require_wires(box, box_file)
     config = rig_here(show, box, box_file)
     _require_known(show, fixtures, attribute)
     patch = Patch(config.fixtures, show.directory)

@@ -11,40 +11,36 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from appliance.control.house import HouseReader
+from appliance.lights.bill import Bill
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
 from appliance.outputs.dmx.open_wire import open_universes
 from appliance.outputs.dmx.pace import Universe
 from appliance.outputs.frame_reader import FrameReader, SeenFrame
 from appliance.outputs.runtime_folder import Claim, runtime_folder
-from appliance.show.box import BoxConfig
+from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError, Problem
 from appliance.show.lights import LightsConfig
-from appliance.show.show import Show
+from appliance.show.show import Show, load_show
 from appliance.show.venue_lights import at_venue, misplaced, unwired
 
-Say = Callable[[str], None]
 _REPORT_S = 1.0
+_LOOK_S = 0.1  # how often the stage is looked for
 _GIVE_UP_S = 1.2  # at the end: a machine too busy to fade within this time goes dark at once
 
 
 class Lights:
-    """The rig of one show on the wires of one box. Raises ConfigError or RuntimeFolderError before light."""
+    """The rig of one show on the wires of one box. Raises ConfigError before there is light."""
 
-    def __init__(self, show: Show, box: BoxConfig, box_file: Path | None, say: Say) -> None:
-        self.show, self.box, self.say = show, box, say
+    def __init__(
+        self, show: Show, box: BoxConfig, box_file: Path | None, stage: FrameReader, house: HouseReader
+    ) -> None:
         config = rig_here(show, box, box_file)
         patch = Patch(config.fixtures, show.directory)
+        self.show, self.box = show, box
         self.rig = Rig(config, patch, show.skeleton)
-        with ExitStack() as opened:
-            folder = runtime_folder(box)
-            opened.callback(Claim(folder, "lights").close)
-            self._reader = FrameReader(folder)
-            opened.callback(self._reader.close)
-            self._house = HouseReader(folder)
-            opened.callback(self._house.close)
-            self.universes = wired(patch, box)
-            self._closing = opened.pop_all()
+        self.universes = wired(patch, box)
+        self._stage, self._house = stage, house
         self._stranger: int | None = None
         self._was_lost = True
         self._troubles: dict[str, str] = {}
@@ -54,9 +50,9 @@ class Lights:
         mappings = [mapping.name for mapping in self.show.config.lights.mappings]
         wires = ", ".join(universe.wire.name for universe in self.universes)
         rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: they rest at their defaults"
-        self.say(f"Lights: {len(self.rig.patch.fixtures)} fixtures by {wires}; {rules}.")
+        say(f"Lights: {len(self.rig.patch.fixtures)} fixtures by {wires}; {rules}.")
         for sentence in unwired(self.show, self.box):
-            self.say(sentence)
+            say(sentence)
 
     def shine(self, stopped: Callable[[], bool]) -> None:
         """Pass after pass on a grid of absolute deadlines until `stopped`; then fade to the safe look."""
@@ -75,30 +71,29 @@ class Lights:
             deadline = _wait_for(deadline, period_s)
 
     def close(self) -> None:
-        """Leave the safe look, or zeros, on all wires, say goodbye on them and free everything."""
+        """Leave the safe look, or zeros, on all wires, and say goodbye on them."""
         levels, now = self.rig.last_levels(), time.monotonic()
         for universe in self.universes:
             universe.offer(levels[universe.number], now)
             universe.close(now)
-        self._closing.close()
 
     def _next_pass(self) -> float:
         now = time.monotonic()
-        levels = self.rig.pass_(self._frame(now), self._reader.generation, self._house.read(), now)
+        levels = self.rig.pass_(self._frame(now), self._stage.generation, self._house.read(), now)
         for universe in self.universes:
             universe.offer(levels[universe.number], now)
         return now
 
     def _frame(self, now: float) -> SeenFrame | None:
         """The newest frame, if it is of the skeleton that these lights know."""
-        frame, facts = self._reader.newest(now), self._reader.facts
+        frame, facts = self._stage.newest(now), self._stage.facts
         if frame is None or facts is None:
             return None
         if facts.skeleton.same_joints(self.show.skeleton):
             return frame
-        if self._stranger != self._reader.generation:
-            self._stranger = self._reader.generation
-            self.say(
+        if self._stranger != self._stage.generation:
+            self._stranger = self._stage.generation
+            say(
                 f"The stage dances '{facts.show_name}' with another skeleton. The lights stay in their safe "
                 f"look. Start them with --show {facts.show_directory}."
             )
@@ -108,22 +103,22 @@ class Lights:
         """Once a second: what has changed with the stage and the wires."""
         lost = self.rig.is_lost(now)
         if lost and not self._was_lost:
-            self.say(
+            say(
                 f"No frame from the stage for {LOST_S:g} s. The lights fade to their safe look; they dance "
                 "again as soon as the stage does. Look what `bunraku play` says."
             )
         elif self._was_lost and not lost:
-            self.say("The stage dances, and the lights with it.")
+            say("The stage dances, and the lights with it.")
         self._was_lost = lost
         for universe in self.universes:
             name, trouble = universe.wire.name, universe.wire.trouble or ""
             if trouble != self._troubles.get(name, ""):
-                self.say(trouble or f"{name} is well again.")
+                say(trouble or f"{name} is well again.")
             self._troubles[name] = trouble
 
 
 def rig_here(show: Show, box: BoxConfig, box_file: Path | None) -> LightsConfig:
-    """The show's lights as they hang in this venue; raises ConfigError when there is nothing to light."""
+    """A show's lights as they hang in this venue; raises ConfigError when there is nothing to light."""
     problems = misplaced(show, box, box_file)
     if not show.config.lights.fixtures:
         problems.append(
@@ -134,18 +129,16 @@ def rig_here(show: Show, box: BoxConfig, box_file: Path | None) -> LightsConfig:
                 "Add them under lights: (docs/lights.md tells how).",
             )
         )
-    elif not box.outputs.dmx:
-        problems.append(
-            Problem(
-                box_file or Path("box.yaml"),
-                0,
-                "No wire leads to the lights.",
-                "Add one under outputs: dmx: in the box file, for instance {universe: 1, wire: artnet}.",
-            )
-        )
     if problems:
         raise ConfigError(problems)
     return at_venue(show.config.lights, box.lights)
+
+
+def require_wires(box: BoxConfig, box_file: Path | None) -> None:
+    """Refuse a box file from which no wire leads to lights, with a ConfigError."""
+    if not box.outputs.dmx:
+        cure = "Add one under outputs: dmx:, for instance {universe: 1, wire: artnet, host: 192.168.0.30}."
+        raise ConfigError([Problem(box_file or Path("box.yaml"), 0, "No wire leads to the lights.", cure)])
 
 
 def wired(patch: Patch, box: BoxConfig) -> tuple[Universe, ...]:
@@ -154,15 +147,40 @@ def wired(patch: Patch, box: BoxConfig) -> tuple[Universe, ...]:
     return open_universes(used, box.state_folder)
 
 
-def light_up(show: Show, box: BoxConfig, box_file: Path | None) -> None:
-    """Light the rig until a signal comes."""
-    with stop_signals() as stopped:
-        lights = Lights(show, box, box_file, say)
-        try:
-            lights.introduce()
-            lights.shine(stopped)
-        finally:
-            lights.close()
+def light_up(directory: Path | None, box_file: Path | None) -> None:
+    """Light a show's rig until a signal comes; without a folder: that of the show which the stage dances.
+
+    Raises ConfigError for a show or box file that cannot be lit, RuntimeFolderError without a place to meet.
+    """
+    box = load_box(box_file)
+    require_wires(box, box_file)
+    with stop_signals() as stopped, ExitStack() as opened:
+        folder = runtime_folder(box)
+        opened.callback(Claim(folder, "lights").close)
+        stage, house = FrameReader(folder), HouseReader(folder)
+        opened.callback(stage.close)
+        opened.callback(house.close)
+        if directory is not None:
+            _light(Lights(load_show(directory), box, box_file, stage, house), stopped)
+            return
+        bill = Bill(stage)
+        while not stopped():
+            if bill.is_new(time.monotonic()):
+                try:
+                    lights = Lights(bill.take(), box, box_file, stage, house)
+                except ConfigError as error:
+                    say(f"{error}\nThe lights stay off until the stage dances another show.")
+                else:
+                    _light(lights, lambda: stopped() or bill.is_new(time.monotonic()))
+            time.sleep(_LOOK_S)
+
+
+def _light(lights: Lights, stopped: Callable[[], bool]) -> None:
+    try:
+        lights.introduce()
+        lights.shine(stopped)
+    finally:
+        lights.close()
 
 
 def say(words: str) -> None:
