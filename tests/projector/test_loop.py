@@ -138,7 +138,7 @@ def test_a_new_stage_that_has_not_begun_to_dance_takes_no_picture_away(evening: 
     assert evening.colour(0.3)[:2] == (255, 76)
     assert evening.colour(1.0) == (0, 0, 0)
     evening.stage = coming
-    assert evening.colour(0.8)[:2] == (255, 127)
+    assert evening.colour(0.8)[:2] == (255, 128)
 
 
 def test_another_show_with_another_skeleton_begins_in_the_dark(evening: Evening, tmp_path: Path) -> None:

@@ -1,0 +1,185 @@
+"""The real projector beside the real box: before it, with it, after it; whatever it does, frames go on."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from pythonosc.osc_message import OscMessage
+from pythonosc.osc_message_builder import OscMessageBuilder
+
+from appliance.projector.projector_error import NO_DISPLAY
+from appliance.show.bundle import default_show_path
+from hw_sim.peers import HOST
+from tests.stage.bundles import write_show
+from tests.system.box import PATIENCE_S, Box, playing
+
+PROJECT = (sys.executable, "-m", "appliance.cli", "project")
+SIZE = "128x72"
+
+
+class Projection:
+    """A running `bunraku project` without a display; what it shows lies in a folder of pictures."""
+
+    def __init__(self, box_file: Path, folder: Path) -> None:
+        self.pictures = Path(tempfile.mkdtemp(dir=folder))
+        self.words_file = self.pictures / "words.txt"
+        with self.words_file.open("wb") as words:
+            self.process = subprocess.Popen(
+                [*PROJECT, "--box", str(box_file), "--offscreen", SIZE, "--frames", str(self.pictures)],
+                stdin=subprocess.DEVNULL,
+                stdout=words,
+                stderr=subprocess.STDOUT,
+            )
+
+    @property
+    def words(self) -> str:
+        return self.words_file.read_text()
+
+    def newest(self) -> np.ndarray | None:
+        """What is on the wall: the newest picture that is whole."""
+        found = sorted(self.pictures.glob("*.png"))[:-1]
+        for path in found[:-1]:
+            path.unlink()
+        return np.asarray(Image.open(found[-1]).convert("RGB")) if found else None
+
+    def await_picture(self, is_wanted: Callable[[np.ndarray], bool]) -> None:
+        """Until such a picture is on the wall."""
+        until = time.monotonic() + PATIENCE_S
+        while True:
+            picture = self.newest()
+            if picture is not None and is_wanted(picture):
+                return
+            assert time.monotonic() < until and self.process.poll() is None, self.words
+            time.sleep(0.02)
+
+    def await_black(self) -> None:
+        self.await_picture(lambda picture: not picture.any())
+
+    def await_dance(self) -> None:
+        self.await_picture(lambda picture: picture.max() > 100)
+
+    def end(self, number: int = signal.SIGTERM) -> int:
+        self.process.send_signal(number)
+        return self.process.wait(PATIENCE_S)
+
+
+@contextlib.contextmanager
+def projecting(box_file: Path, folder: Path) -> Iterator[Projection]:
+    projection = Projection(box_file, folder)
+    try:
+        yield projection
+    finally:
+        projection.process.kill()
+        projection.process.wait()
+
+
+@pytest.fixture
+def box(tmp_path: Path) -> Iterator[Box]:
+    with playing(write_show(tmp_path / "show", hands=[]), tmp_path) as box:
+        yield box
+
+
+def ask(port: int, address: str, *values: Any) -> list[Any]:
+    """Send a command and wait for its reply: address, done, words."""
+    message = OscMessageBuilder(address)
+    for value in values:
+        message.add_arg(value)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.settimeout(PATIENCE_S)
+        one.sendto(message.build().dgram, (HOST, port))
+        while True:
+            reply = OscMessage(one.recv(65536))
+            if reply.address == "/reply":
+                return list(reply.params)
+
+
+def test_started_first_it_waits_in_the_dark_and_outlives_two_stages(tmp_path: Path) -> None:
+    box_file = tmp_path / "box.yaml"
+    box_file.write_text("runtime: runtime\n")  # as in the box file that the box gets
+    with projecting(box_file, tmp_path) as projection:
+        projection.await_black()
+        with playing(write_show(tmp_path / "show", hands=[]), tmp_path) as box:
+            projection.await_dance()
+            box.end(signal.SIGKILL)
+            projection.await_black()
+        (tmp_path / "another").mkdir()
+        same_place = {"runtime": str(tmp_path / "runtime")}
+        with playing(default_show_path(), tmp_path / "another", settings=same_place) as box:
+            projection.await_dance()
+            assert projection.end() == 0
+            box.frames(5)
+    assert re.search(r"Shown: [\d.]+ pictures/s, frame age at the swap \d+ ms p50", projection.words)
+    assert projection.words.count("No graphics card draws here") == 1  # however many stages there were
+
+
+def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path: Path) -> None:
+    with projecting(tmp_path / "box.yaml", tmp_path) as projection:
+        projection.await_dance()
+        projection.process.send_signal(signal.SIGSTOP)
+        hung = box.frames(100)
+        assert [frame[0] for frame in hung] == sorted({frame[0] for frame in hung})
+        projection.process.send_signal(signal.SIGCONT)
+        projection.await_dance()
+        assert projection.end(signal.SIGKILL) == -signal.SIGKILL
+        box.frames(25)
+    with projecting(tmp_path / "box.yaml", tmp_path) as projection:
+        projection.await_dance()
+        assert projection.end(signal.SIGINT) == 0
+    box.frames(5)
+    assert box.process.poll() is None
+
+
+def test_panic_and_alignment_by_osc(box: Box, tmp_path: Path) -> None:
+    with projecting(tmp_path / "box.yaml", tmp_path) as projection:
+        projection.await_dance()
+        assert ask(box.control, "/panic", 1)[1] == 1
+        projection.await_black()
+        assert ask(box.control, "/panic", 0)[1] == 1
+        projection.await_dance()
+
+        assert ask(box.control, "/projector/grid", 1)[1:] == [1, "The grid is on the wall."]
+        corners = (0.5, 0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0)
+        assert ask(box.control, "/projector/corners", *corners)[1] == 1
+        projection.await_picture(lambda seen: seen[40:].max() > 100 and not seen[:36].any())
+        done, words = ask(box.control, "/projector/corner", 1, 1.0, 1.0)[1:]
+        assert not done and "fold" in words
+        projection.end()
+    with projecting(tmp_path / "box.yaml", tmp_path) as projection:
+        projection.await_picture(lambda seen: seen[40:].max() > 100 and not seen[:36].any())
+
+
+def test_without_a_display_it_says_so(tmp_path: Path) -> None:
+    if Path("/dev/dri").exists():
+        pytest.skip("this machine has a display of its own")
+    without = {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}
+    environment = {name: value for name, value in os.environ.items() if name not in without}
+    done = subprocess.run(PROJECT, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == NO_DISPLAY
+    assert re.fullmatch(r"bunraku: There is no display .* Plug the projector in .*\n", done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--offscreen", "big"), "is no size"),
+        (("--offscreen", "0x10"), "from 1 to"),
+        (("--window", "--fullscreen"), "Give one of"),
+    ],
+)
+def test_options_that_make_no_sense(arguments: tuple[str, ...], words: str) -> None:
+    done = subprocess.run([*PROJECT, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and words in done.stderr.replace("\n", " ")
