@@ -1,0 +1,138 @@
+"""100,000 messages that nobody should send: nothing raises, nothing grows, and the port goes on answering."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from appliance.control.desk import Desk
+from appliance.control.errands import WAITING, Errands
+from appliance.control.house import House, HouseReader, HouseWriter
+from appliance.control.key_file import KeyFile
+from appliance.control.orders import OrderSender
+from appliance.control.packet import Message, datagram
+from appliance.control.port import LARGEST_DATAGRAM, Address
+from appliance.control.settings import Settings
+from appliance.control.sight import StageSight
+from tests.control.doubles import Asker, InboxDouble, StageDouble, until
+from tests.control.fuzz import datagrams
+
+COUNT, OVER_THE_SOCKET = 100_000, 10_000
+SOMEBODY = ("127.0.0.1", 5000)
+
+
+@pytest.fixture
+def quiet_library() -> Iterator[None]:
+    """As in the process: python-osc logs each type tag that it does not know."""
+    logging.disable(logging.CRITICAL)
+    yield
+    logging.disable(logging.NOTSET)
+
+
+@pytest.mark.usefixtures("quiet_library")
+def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
+    folder: Path, key_file: Path, stage: StageDouble
+) -> None:
+    writer, sender, projector = HouseWriter(folder), OrderSender(folder), InboxDouble(folder, "projector")
+    told: list[int] = []
+
+    def tell(to: Address, message: Message) -> None:
+        told.append(len(datagram(message)))
+
+    errands = Errands(sender)
+    desk = Desk(House(), StageSight(folder), errands, KeyFile(key_file), tell, writer.write)
+    reader = HouseReader(folder)
+    now = time.monotonic()
+    for number, received in enumerate(datagrams(3, COUNT)):
+        desk.hear(received[:LARGEST_DATAGRAM], SOMEBODY, now + number / 1000)
+        if number % 100 == 0:
+            now = time.monotonic() - number / 1000
+            errands.go_on(now + number / 1000)
+            desk.look(now + number / 1000)
+        assert 0.0 <= desk.house.level(now) <= 1.0
+    assert all(len(way.waiting) <= WAITING for way in errands._ways.values())
+    house = reader.read()
+    assert house == desk.house
+    assert all(math.isfinite(value) for value in (house.master, house.going_since, house.look_since))
+    assert 0.0 <= house.master <= 1.0
+    assert house.look in ("", "plaster", "lines", "ink", "cloud")
+    assert desk.refused > COUNT / 2
+    assert len(told) > COUNT / 2
+    assert max(told) < 1500  # an answer is no weapon
+    assert stage.orders  # some of them were commands
+    assert all(math.isfinite(value) for order in stage.orders for value in order.values)
+    projector.close()
+    sender.close()
+    writer.close()
+
+
+@contextlib.contextmanager
+def control_process(folder: Path, words: Path) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+    """Show control as the process that a box runs, and its port."""
+    from appliance.control.port import open_port
+
+    bound = open_port("127.0.0.1", 0)
+    os.set_inheritable(bound.fileno(), True)
+    settings = Settings(str(folder), bound.fileno())
+    with words.open("wb") as out:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "appliance.control", settings.packed()],
+            pass_fds=[bound.fileno()],
+            stdout=out,
+            stderr=subprocess.STDOUT,
+        )
+    try:
+        yield process, bound.getsockname()[1]
+    finally:
+        bound.close()
+        process.kill()
+        process.wait()
+
+
+def answers(asker: Asker) -> bool:
+    """Whether a ping is answered; in a flood the kernel may drop one."""
+    asker.tell("/ping")
+    return asker.hear(0.5) == ["/pong"]
+
+
+def resident_kb(pid: int) -> int:
+    line = next(one for one in Path(f"/proc/{pid}/status").read_text().splitlines() if "VmRSS" in one)
+    return int(line.split()[1])
+
+
+def test_the_process_answers_after_all_that_and_has_not_grown(folder: Path, tmp_path: Path) -> None:
+    words = tmp_path / "words.txt"
+    with control_process(folder, words) as (process, port):
+        flood, asker = Asker(port), Asker(port)
+        assert asker.ask("/ping") == ["/pong"]
+        before = 0
+        for number, sent in enumerate(datagrams(4, OVER_THE_SOCKET)):
+            flood.socket.send(sent[:65_000])
+            if number % 20 == 19:
+                until(lambda: answers(asker))
+                while flood.hear(0.0) is not None:
+                    pass
+            if number == OVER_THE_SOCKET // 5:
+                before = resident_kb(process.pid)
+        assert resident_kb(process.pid) < before + 2048
+        while asker.hear(0.1) is not None:
+            pass
+        assert asker.ask("/panic", 1)[:3] == ["/reply", "/panic", 1]
+        assert HouseReader(folder).read().panic
+        process.terminate()
+        assert process.wait(20) == 0
+        flood.close()
+        asker.close()
+    said = words.read_text()
+    assert said.startswith("Commands: ")
+    assert len(said.splitlines()) == 1, said  # nothing of what came in was said
+    assert said.strip().isprintable()
