@@ -104,7 +104,6 @@ def playing(
             "outputs": {"osc": [*more_receivers, frames]},
             "control": {"host": HOST, "port": control},
             "runtime": "runtime",
-            "runtime": "runtime",
         }
         for section, values in (settings or {}).items():
             box[section] = {**box.get(section, {}), **values} if section == "sensors" else values
