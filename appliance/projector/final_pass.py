@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 
@@ -9,7 +10,7 @@ import moderngl
 import numpy as np
 
 from appliance.projector.controls import Controls
-from appliance.projector.corners import homography
+from appliance.projector.corners import WHOLE, homography
 from appliance.projector.info import letters
 from appliance.projector.window import Size
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
@@ -43,16 +44,15 @@ def picture_size(config: ProjectorConfig, display: Size) -> Size:
 
 
 class FinalPass:
-    """Owns the picture's texture and the program that lays it onto the wall."""
+    """Owns the picture's texture and the programs that lay it onto the wall, one of them with marks."""
 
     def __init__(self, gl: moderngl.Context, config: ProjectorConfig) -> None:
         self._gl, self._config = gl, config
         self._part = part_of(config.edge_blend)
-        self._program = gl.program(
-            vertex_shader=(_SHADERS / "final.vert.glsl").read_text(),
-            fragment_shader=(_SHADERS / "final.frag.glsl").read_text(),
-        )
-        self._triangle = gl.vertex_array(self._program, [])
+        fixed = ["GAMMA"] * (config.gamma != 1.0) + ["BLEND"] * (config.edge_blend is not None)
+        self._leaves_unchanged = not fixed and not config.upside_down
+        self._through = _Program(gl, "through", [])
+        self._plain, self._marked = (_Program(gl, "final", [*fixed, *marks]) for marks in ((), ("MARKS",)))
         self._text = gl.texture((1, 1), 1)
         self._lines: tuple[str, ...] = ()
         self._pictures = 0
@@ -73,18 +73,25 @@ class FinalPass:
         lines: tuple[str, ...],
     ) -> None:
         """Lay the picture onto the display. level 0..1; `lines`: figures to show, maybe none."""
+        scale = level * controls.alignment.brightness
+        has_marks = bool(lines) or controls.shows_grid
+        if scale == 0.0 and not has_marks:
+            self.black(screen, display)
+            return
         screen.use()
         screen.viewport = (0, 0, *display)
+        is_whole = controls.alignment.corners == WHOLE and not controls.alignment.mirror
+        is_same = is_whole and scale == 1.0 and self._leaves_unchanged and self.picture.size == display
         self._gl.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._place(display, controls)
-        self._light(level * controls.alignment.brightness)
-        self._write(lines, display)
-        self._set("grid", float(controls.shows_grid))
-        self._texture.use(0)
-        self._text.use(1)
-        self._set("picture", 0)
-        self._set("text", 1)
-        self._triangle.render(vertices=3)
+        if is_same and not has_marks:
+            self._through.draw(self._texture)
+            return
+        program = self._marked if has_marks else self._plain
+        self._place(program, display, controls)
+        self._light(program, scale)
+        if has_marks:
+            self._mark(program, lines, display, controls)
+        program.draw(self._texture)
 
     def black(self, screen: moderngl.Framebuffer, display: Size) -> None:
         """Nothing at all, not even what was asked for."""
@@ -95,51 +102,49 @@ class FinalPass:
     def release(self) -> None:
         """Give the GPU's memory back."""
         self._forget_picture()
-        for owned in (self._text, self._triangle, self._program):
+        for owned in (self._text, self._through, self._plain, self._marked):
             owned.release()
 
-    def _place(self, display: Size, controls: Controls) -> None:
+    def _place(self, program: _Program, display: Size, controls: Controls) -> None:
         width, height = display
-        alignment, config = controls.alignment, self._config
+        alignment, upside_down = controls.alignment, self._config.upside_down
         wall_from_picture = np.diag([width, height, 1.0]) @ homography(alignment.corners)
         picture_from_wall = np.linalg.inv(wall_from_picture)
-        self._set("display", (float(width), float(height)))
-        self._set("flips", (float(alignment.mirror != config.upside_down), float(config.upside_down)))
-        self._set("picture_from_wall", tuple(picture_from_wall.T.ravel()))  # column by column
-        self._set("part", (self._part.begin, self._part.width))
-        marker = (0.0, 0.0, 0.0)
-        if controls.corner is not None:
-            x, y = alignment.corners[controls.corner]
-            marker = (x * width, y * height, _MARKER_RADIUS)
-        self._set("marker", marker)
+        program.set("display", (float(width), float(height)))
+        program.set("flips", (float(alignment.mirror != upside_down), float(upside_down)))
+        program.set("picture_from_wall", tuple(picture_from_wall.T.ravel()))  # column by column
+        program.set("part", (self._part.begin, self._part.width))
 
-    def _light(self, scale: float) -> None:
-        blend, gamma = self._config.edge_blend, self._config.gamma
-        side = 0.0 if blend is None else -1.0 if blend.part == "left" else 1.0
-        self._set("blend", (side, blend.overlap, 1.0 / blend.gamma) if blend else (0.0, 1.0, 1.0))
-        self._set("scale", scale)
-        self._set("inverse_gamma", 1.0 / gamma)
-        passes_unchanged = scale == 1.0 and gamma == 1.0 and blend is None
-        self._set("dither", 0.0 if passes_unchanged else 1.0)
+    def _light(self, program: _Program, scale: float) -> None:
+        blend = self._config.edge_blend
+        if blend is not None:
+            side = -1.0 if blend.part == "left" else 1.0
+            program.set("blend", (side, blend.overlap, 1.0 / blend.gamma))
+        if self._config.gamma != 1.0:
+            program.set("inverse_gamma", 1.0 / self._config.gamma)
+        program.set("scale", scale)
+        program.set("dither", 0.0 if scale == 1.0 and self._leaves_unchanged else 1.0)
         self._pictures += 1
-        self._set("seed", (self._pictures % 64 * _DITHER_STEP, self._pictures % 61 * _DITHER_STEP))
+        program.set("seed", (self._pictures % 64 * _DITHER_STEP, self._pictures % 61 * _DITHER_STEP))
 
-    def _write(self, lines: tuple[str, ...], display: Size) -> None:
+    def _mark(self, program: _Program, lines: tuple[str, ...], display: Size, controls: Controls) -> None:
+        """Grid, chosen corner and figures."""
         if lines != self._lines:
             image = letters(lines)
             self._text.release()
             self._text = self._gl.texture((image.shape[1], image.shape[0]), 1, image.tobytes(), alignment=1)
             self._text.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self._lines = lines
-        scale = float(max(1, display[1] // _TEXT_ROWS))
-        size = self._text.size if lines else (0, 0)
-        self._set("text_scale", scale)
-        self._set("text_size", (scale * size[0], scale * size[1]))
-
-    def _set(self, name: str, value: object) -> None:
-        uniform = self._program[name]
-        assert isinstance(uniform, moderngl.Uniform)
-        uniform.value = value
+        self._text.use(1)
+        text_scale = float(max(1, display[1] // _TEXT_ROWS))
+        columns, rows = self._text.size if lines else (0, 0)
+        x, y = controls.alignment.corners[controls.corner or 0]
+        radius = 0.0 if controls.corner is None else _MARKER_RADIUS
+        program.set("text", 1)
+        program.set("text_scale", text_scale)
+        program.set("text_size", (text_scale * columns, text_scale * rows))
+        program.set("grid", float(controls.shows_grid))
+        program.set("marker", (x * display[0], y * display[1], radius))
 
     def _target(self, size: Size) -> tuple[moderngl.Texture, moderngl.Framebuffer]:
         texture = self._gl.texture(size, 4)
@@ -150,3 +155,31 @@ class FinalPass:
     def _forget_picture(self) -> None:
         self.picture.release()
         self._texture.release()
+
+
+class _Program:
+    """A final shader with some of its parts: what is not asked for would cost time on a small computer."""
+
+    def __init__(self, gl: moderngl.Context, name: str, parts: Sequence[str]) -> None:
+        version, _, source = (_SHADERS / f"{name}.frag.glsl").read_text().partition("\n")
+        defines = "".join(f"#define {part}\n" for part in parts)
+        self._program = gl.program(
+            vertex_shader=(_SHADERS / "final.vert.glsl").read_text(),
+            fragment_shader=f"{version}\n{defines}{source}",
+        )
+        self._triangle = gl.vertex_array(self._program, [])
+
+    def set(self, name: str, value: object) -> None:
+        """The value of a uniform."""
+        uniform = self._program[name]
+        assert isinstance(uniform, moderngl.Uniform)
+        uniform.value = value
+
+    def draw(self, picture: moderngl.Texture) -> None:
+        """Cover the whole display."""
+        picture.use(0)
+        self._triangle.render(vertices=3)
+
+    def release(self) -> None:
+        self._triangle.release()
+        self._program.release()

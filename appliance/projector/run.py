@@ -28,6 +28,7 @@ from appliance.show.box import BoxConfig
 
 _ORDERS_A_PICTURE = 8
 _REPORT_S = 1.0
+_SMOOTH = 0.8  # of the display's pictures: fewer look jerky
 _JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
 
 
@@ -165,12 +166,7 @@ class Run:
             self._say(f"{figures.sentence()}, stage {state}")
         if not self._warned and figures.dances >= _JUDGED_AFTER:
             self._warned = True
-            self._say(
-                f"No graphics card draws here but the processor ({self._context.renderer}): about "
-                f"{figures.rate:.0f} pictures a second at {width}x{height}. The audience sees a jerky dance. "
-                "Use a machine with a graphics card and its driver, or a smaller `picture` in the "
-                "projector's part of the box file."
-            )
+            self._say(_about_software(figures.rate, 1.0 / self._pacing.period_s, self._context.renderer))
 
     def _check_context(self) -> None:
         if self._context.is_lost:
@@ -180,6 +176,16 @@ class Run:
                 "often, look at the card's cooling and power.",
                 GPU_LOST,
             )
+
+
+def _about_software(rate: float, wanted: float, renderer: str) -> str:
+    """What it means that no graphics card draws."""
+    seen = "The audience sees a jerky dance." if rate < _SMOOTH * wanted else "The audience sees the dance."
+    return (
+        f"No graphics card draws here but the processor ({renderer}): about {rate:.0f} of {wanted:.0f} pictures "
+        f"a second. {seen} Use a machine with a graphics card and its driver, or a smaller `picture` in the "
+        "projector's part of the box file."
+    )
 
 
 def _inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> OrderInbox | None:

@@ -1,45 +1,60 @@
 #version 300 es
-// The picture onto the wall: corner-pin, mirror, brightness and gamma, edge blend; grid and figures on demand.
+// The picture onto the wall: corner-pin, mirror, brightness; GAMMA, BLEND for edge blend, MARKS on demand.
 precision highp float;
 precision highp sampler2D;
 
 uniform sampler2D picture;         // what the looks have drawn; with edge blend wider than this display
-uniform sampler2D text;            // figures, one byte a pixel, top row first
 uniform vec2 display;              // width, height, pixels
 uniform vec2 flips;                // 1: exchange left and right; 1: exchange top and bottom
 uniform mat3 picture_from_wall;    // wall pixels (y down) to the unit square of this display's part
 uniform vec2 part;                 // where this part begins in the picture, and how wide it is
-uniform vec3 blend;                // -1 left, 1 right, 0 none; overlap, share of this part's width; 1 / gamma
 uniform float scale;               // brightness * level
 uniform float dither;              // steps of 1/255; 0 where the picture passes unchanged
+uniform vec2 seed;                 // another pattern of dither for each picture
+
+out vec4 colour;
+
+#ifdef GAMMA
 uniform float inverse_gamma;
+#endif
+
+#ifdef BLEND
+uniform vec3 blend;                // -1 left, 1 right; overlap, share of this part's width; 1 / gamma
+
+// Both ramps of an overlap add up to one in linear light.
+float blended(float u) {
+    float from_edge = clamp((blend.x < 0.0 ? 1.0 - u : u) / blend.y, 0.0, 1.0);
+    return pow(smoothstep(0.0, 1.0, from_edge), blend.z);
+}
+#endif
+
+#ifdef MARKS
+uniform sampler2D text;            // figures, one byte a pixel, top row first
 uniform float grid;                // 0 or 1
 uniform vec3 marker;               // the chosen corner, wall pixels; radius, 0: none
 uniform vec2 text_size;            // pixels on the wall; 0: none
 uniform float text_scale;          // wall pixels a text pixel
-uniform vec2 seed;                 // another pattern of dither for each picture
 
-out vec4 colour;
+float lines(vec2 place, vec2 pixel_size) {
+    vec2 nearest = abs(fract(place - 0.5) - 0.5) / pixel_size;
+    return 1.0 - clamp(min(nearest.x, nearest.y) - 0.5, 0.0, 1.0);
+}
+
+float grid_lines(vec2 place, vec2 pixel_size) {
+    vec2 cells = vec2(16.0, 9.0);
+    float upright = lines(place * cells, pixel_size * cells);
+    vec2 diagonals = vec2(place.x - place.y, place.x + place.y);
+    return max(upright, lines(diagonals, vec2(pixel_size.x + pixel_size.y)));
+}
+#endif
 
 float coverage(vec2 uv, vec2 pixel_size) {
     vec2 inside = min(uv, 1.0 - uv) / pixel_size;
     return clamp(min(inside.x, inside.y) + 0.5, 0.0, 1.0);
 }
 
-// Both ramps of an overlap add up to one in linear light.
-float blended(float u) {
-    if (blend.x == 0.0) return 1.0;
-    float from_edge = clamp((blend.x < 0.0 ? 1.0 - u : u) / blend.y, 0.0, 1.0);
-    return pow(smoothstep(0.0, 1.0, from_edge), blend.z);
-}
-
 float noise(vec2 place) {
     return fract(52.9829189 * fract(dot(place + seed, vec2(0.06711056, 0.00583715)))) - 0.5;
-}
-
-float lines(vec2 place, vec2 pixel_size) {
-    vec2 nearest = abs(fract(place - 0.5) - 0.5) / pixel_size;
-    return 1.0 - clamp(min(nearest.x, nearest.y) - 0.5, 0.0, 1.0);
 }
 
 void main() {
@@ -52,22 +67,22 @@ void main() {
     vec2 place = vec2(part.x + clamp(uv.x, 0.0, 1.0) * part.y, clamp(uv.y, 0.0, 1.0));
 
     vec3 light = textureLod(picture, vec2(place.x, 1.0 - place.y), 0.0).rgb;
-    if (inverse_gamma != 1.0) light = pow(light, vec3(inverse_gamma));
-    light *= scale * blended(uv.x) * seen;
+#ifdef GAMMA
+    light = pow(light, vec3(inverse_gamma));
+#endif
+#ifdef BLEND
+    light *= blended(uv.x);
+#endif
+    light *= scale * seen;
     light += dither * noise(gl_FragCoord.xy) / 255.0 * step(0.5 / 255.0, light);
-
-    if (grid > 0.0) {
-        vec2 cells = vec2(16.0, 9.0);
-        vec2 across = uv * vec2(part.y, 1.0) + vec2(part.x, 0.0);
-        vec2 cell = pixel_size * vec2(part.y, 1.0);
-        float ink = max(lines(across * cells, cell * cells), lines(vec2(across.x - across.y), vec2(cell.x + cell.y)));
-        ink = max(ink, lines(vec2(across.x + across.y), vec2(cell.x + cell.y)));
-        light = mix(light, vec3(0.9), ink * seen);
-    }
+#ifdef MARKS
+    vec2 across = vec2(part.x + uv.x * part.y, uv.y);
+    light = mix(light, vec3(0.9), grid * seen * grid_lines(across, pixel_size * vec2(part.y, 1.0)));
     float ring = abs(distance(wall, marker.xy) - marker.z);
     if (marker.z > 0.0) light = mix(light, vec3(1.0, 0.6, 0.1), 1.0 - clamp(ring - 2.0, 0.0, 1.0));
     if (wall.x < text_size.x && wall.y < text_size.y) {
         light = mix(0.3 * light, vec3(1.0), texelFetch(text, ivec2(wall / text_scale), 0).r);
     }
+#endif
     colour = vec4(light, 1.0);
 }
