@@ -1,0 +1,274 @@
+"""The long run: all outputs of a real box at once, each counted at its other end; memory and handles watched.
+
+`python -m tests.system.outputs_run --minutes 10 --report out/outputs` runs it and writes outputs.json; exit
+status 1 when something was missing, did not follow, grew or ended. A test runs it for some seconds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+import tempfile
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from appliance.pose.bvh import read_bvh
+from appliance.show.bundle import default_show_path
+from tests.system.venue import LAMPS, PATIENCE_S, Venue, venue
+
+SETTLED_SHARE = 0.2  # of the run: what a process takes until then is its start
+MOST_GROWTH_MB, MOST_HANDLES = 6.0, 2
+LOOK_S = 1.0
+HEARD_S = 1.0  # a lamp shows a height that the joint had at most so long ago
+OFF_BY = 3  # of 255: rounding, and the height between two frames
+LAST_FRAME_S = 5.0
+STALL_S, NAP_S = 0.02, 0.005
+
+
+@dataclass
+class Heard:
+    """What one receiver got: ticks as they came, and how many were marked late."""
+
+    ticks: list[int] = field(default_factory=list)
+    late: int = 0
+
+    @property
+    def missing(self) -> int:
+        """Ticks that never came between the first and the last."""
+        return max(self.ticks) - min(self.ticks) + 1 - len(set(self.ticks)) if self.ticks else 0
+
+
+class Stalls:
+    """How long this machine kept a thread waiting that only wanted to nap: its own part in what is late."""
+
+    def __init__(self) -> None:
+        self.count, self.worst_s = 0, 0.0
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._nap, daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def _nap(self) -> None:
+        while not self._ended.is_set():
+            before = time.monotonic()
+            time.sleep(NAP_S)
+            over_s = time.monotonic() - before - NAP_S
+            self.count += over_s > STALL_S
+            self.worst_s = max(self.worst_s, over_s)
+
+
+class Measurement:
+    """One run: hears, looks once a second, and has figures at the end."""
+
+    def __init__(self, running: Venue) -> None:
+        self._venue = running
+        self._heard = {name: Heard() for name in running.osc}
+        names = read_bvh(default_show_path() / "skeleton.bvh", metres_per_unit=0.01).skeleton.names
+        self._lamps = {universe: (names.index(joint), full) for universe, (joint, full) in LAMPS.items()}
+        self._heights: dict[int, deque[tuple[float, float]]] = {u: deque() for u in LAMPS}
+        self._frames: list[int] = []  # PosiStageNet's, each once
+        self.lamps = {universe: {"looks": 0, "followed": 0, "levels": set[int]()} for universe in LAMPS}
+        self.memory_mb: dict[str, list[float]] = {}
+        self.handles: dict[str, list[int]] = {}
+
+    def await_dance(self) -> None:
+        """Until all of it runs: frames at every receiver, the lamps lit, the projector and sensor at work."""
+        until = time.monotonic() + PATIENCE_S
+        while True:
+            self.hear(0.1)
+            ready = all(heard.ticks for heard in self._heard.values()) and self._frames
+            ready = ready and {"control", "lights"} <= self._venue.pids().keys()
+            ready = ready and all(self._follows(self._level(universe), universe) for universe in LAMPS)
+            if ready and "neutral pose taken" in self._venue.said("stage"):
+                return
+            ended = [name for name, process in self._venue.processes.items() if process.poll() is not None]
+            told = {name: self._venue.said(name) for name in ("stage", "sensor", "projector")}
+            assert not ended and time.monotonic() < until, f"{ended or 'slow'}: {told}"
+
+    def run(self, seconds: float) -> None:
+        """Hear and look for so long."""
+        end = time.monotonic() + seconds
+        look_at = 0.0
+        while (now := time.monotonic()) < end:
+            self.hear(0.02)
+            if now >= look_at:
+                look_at = now + LOOK_S
+                self._look_at_lamps()
+                self._look_at_processes()
+
+    def hear(self, wait_s: float) -> None:
+        """Take what has come to the receivers."""
+        for name, receiver in self._venue.osc.items():
+            for arrival, address, arguments in receiver.poll(wait_s):
+                if address == "/bunraku/frame":
+                    self._heard[name].ticks.append(int(str(arguments[0])))
+                    self._heard[name].late += bool(arguments[3])
+                elif address.endswith("/pos_world"):
+                    self._note_heights(arrival, arguments)
+            wait_s = 0.0
+        for packet in self._venue.positions.poll():
+            if packet.is_data and (not self._frames or packet.frame != self._frames[-1] % 256):
+                step = (packet.frame - self._frames[-1]) % 256 if self._frames else 0
+                self._frames.append(self._frames[-1] + step if self._frames else packet.frame)
+
+    def figures(self, seconds: float, statuses: dict[str, int], stalls: Stalls) -> dict[str, Any]:
+        """All of it, as JSON, once the stage has ended and every receiver had time for the last frame."""
+        until = time.monotonic() + LAST_FRAME_S
+        heard = {**self._heard, "oscdump": _dumped(self._venue.dump)}
+        while len({one.ticks[-1] for one in heard.values() if one.ticks}) > 1 and time.monotonic() < until:
+            self.hear(0.2)
+            heard["oscdump"] = _dumped(self._venue.dump)
+        positions = Heard(self._frames)
+        receivers = {
+            name: {"frames": len(one.ticks), "missing": one.missing, "late": one.late}
+            for name, one in heard.items()
+        }
+        receivers["PosiStageNet"] = {"frames": len(positions.ticks), "missing": positions.missing, "late": 0}
+        malformed = sum(one.malformed for one in (*self._venue.osc.values(), self._venue.positions))
+        return {
+            "seconds": round(seconds, 1),
+            "receivers": receivers,
+            "malformed": malformed,
+            "lamps": {
+                str(universe): {**lamp, "levels": len(lamp["levels"])}
+                for universe, lamp in self.lamps.items()
+            },
+            "memory_mb": {name: _ends(values) for name, values in self.memory_mb.items()},
+            "handles": {name: _ends(values) for name, values in self.handles.items()},
+            "projector": self._venue.said("projector").strip().splitlines()[-1],
+            "stage": [line for line in self._venue.said("stage").splitlines() if line.startswith("Danced")],
+            "statuses": statuses,
+            "stalls_over_20_ms": stalls.count,
+            "worst_stall_ms": round(1e3 * stalls.worst_s, 1),
+        }
+
+    def _note_heights(self, arrival: float, arguments: list[Any]) -> None:
+        for universe, (joint, full) in self._lamps.items():
+            heights = self._heights[universe]
+            heights.append((arrival, min(max(arguments[3 * joint + 1] / full, 0.0), 1.0)))
+            while heights[0][0] < arrival - HEARD_S:
+                heights.popleft()
+
+    def _look_at_lamps(self) -> None:
+        """Whether each lamp shows a height that its joint had in the last moments."""
+        for universe, lamp in self.lamps.items():
+            level = self._level(universe)
+            lamp["looks"] += 1
+            lamp["followed"] += self._follows(level, universe)
+            lamp["levels"].add(level)
+
+    def _level(self, universe: int) -> int:
+        return self._venue.daemon.levels(universe)[0]
+
+    def _follows(self, level: int, universe: int) -> bool:
+        self.hear(0.0)
+        shares = [255.0 * share for _, share in self._heights[universe]]
+        return bool(shares) and min(shares) - OFF_BY <= level <= max(shares) + OFF_BY
+
+    def _look_at_processes(self) -> None:
+        for name, pid in self._venue.pids().items():
+            try:
+                status = Path(f"/proc/{pid}/status").read_text()
+                open_files = sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir())
+            except OSError:
+                continue  # it has ended: the statuses at the end will say so
+            resident = re.search(r"VmRSS:\s+(\d+)", status)
+            self.memory_mb.setdefault(name, []).append(int(resident[1]) / 1024 if resident else 0.0)
+            self.handles.setdefault(name, []).append(open_files)
+
+
+def faults(figures: dict[str, Any], judge_growth: bool = True) -> list[str]:
+    """What is wrong; empty when all is well. Growth cannot be judged in a run of seconds."""
+    found = [
+        f"{name}: {one['missing']} of {one['frames']} frames missing"
+        for name, one in figures["receivers"].items()
+        if one["missing"] or not one["frames"]
+    ]
+    found += [
+        f"lamp {name}: followed in {lamp['followed']} of {lamp['looks']} looks, {lamp['levels']} levels"
+        for name, lamp in figures["lamps"].items()
+        if lamp["followed"] < lamp["looks"] or lamp["levels"] < 2
+    ]
+    found += [f"{name} ended with status {status}" for name, status in figures["statuses"].items() if status]
+    if figures["malformed"]:
+        found.append(f"{figures['malformed']} datagrams malformed")
+    for what, most in (("memory_mb", MOST_GROWTH_MB), ("handles", MOST_HANDLES)):
+        for name, (start, end) in figures[what].items():
+            if judge_growth and end - start > most:
+                found.append(f"{name}: {what} grew from {start:g} to {end:g}")
+    return found
+
+
+def measure(seconds: float, folder: Path) -> dict[str, Any]:
+    """Build the venue, run, end it; the figures."""
+    stalls = Stalls()
+    with venue(folder) as running:
+        measurement = Measurement(running)
+        measurement.await_dance()
+        begun = time.monotonic()
+        measurement.run(seconds)
+        lasted = time.monotonic() - begun
+        stalls.end()
+        return measurement.figures(lasted, running.end(), stalls)
+
+
+def table(figures: dict[str, Any]) -> list[str]:
+    """What a person reads."""
+    lines = [f"{figures['seconds']:g} s"]
+    lines += [f"  {name:<14} {one}" for name, one in figures["receivers"].items()]
+    lines += [f"  lamp {name:<9} {lamp}" for name, lamp in figures["lamps"].items()]
+    for name, (start, end) in figures["memory_mb"].items():
+        handles = figures["handles"][name]
+        lines.append(f"  {name:<14} {start:.1f} to {end:.1f} MB, {handles[0]:g} to {handles[1]:g} handles")
+    lines += [f"  {figures['projector']}", *(f"  {line}" for line in figures["stage"])]
+    stalls = f"{figures['stalls_over_20_ms']} stalls over 20 ms, the worst {figures['worst_stall_ms']:g} ms"
+    return [*lines, f"  the machine itself: {stalls}"]
+
+
+def _dumped(file: Path) -> Heard:
+    """What the real oscdump printed: address, type tags, tick, time, sequence, late."""
+    heard = Heard()
+    for line in file.read_text().splitlines():
+        found = re.search(r"/bunraku/frame \S+ (\d+) \S+ -?\d+ (\d)$", line.strip())
+        if found:
+            heard.ticks.append(int(found[1]))
+            heard.late += int(found[2])
+    return heard
+
+
+def _ends(values: list[float] | list[int]) -> tuple[float, float]:
+    """How much at first, once settled, and in the end: medians of a tenth of the run each."""
+    few = max(1, len(values) // 10)
+    settled = values[int(SETTLED_SHARE * len(values)) :]
+    return round(median(settled[:few]), 1), round(median(values[-few:]), 1)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--report", type=Path, help="folder for outputs.json")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        figures = measure(60.0 * options.minutes, Path(name))
+    wrong = faults(figures)
+    print("\n".join([*table(figures), *(f"FAIL  {words}" for words in wrong)] or ["ok"]))
+    if options.report is not None:
+        options.report.mkdir(parents=True, exist_ok=True)
+        (options.report / "outputs.json").write_text(
+            json.dumps({**figures, "faults": wrong}, indent=2) + "\n"
+        )
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,57 @@
+"""All outputs of one box at once, for some seconds: no frame misses a receiver, lamps follow the dance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.system import venue
+from tests.system.outputs_run import faults, measure, table
+
+SECONDS = 20.0
+
+pytestmark = pytest.mark.skipif(venue.why_not() is not None, reason=str(venue.why_not()))
+
+
+@pytest.fixture(scope="module")
+def figures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return measure(SECONDS, tmp_path_factory.mktemp("venue"))
+
+
+def test_nothing_is_missing_and_everything_follows(figures: dict[str, Any]) -> None:
+    assert faults(figures, judge_growth=False) == [], "\n".join(table(figures))
+
+
+def test_every_receiver_heard_the_same_dance(figures: dict[str, Any]) -> None:
+    counts = {name: one["frames"] for name, one in figures["receivers"].items()}
+    assert set(counts) == {"ai-toolbox", "vmc", "oscdump", "PosiStageNet"}
+    assert len(set(counts.values())) == 1, counts
+    assert min(counts.values()) > 5 * SECONDS
+
+
+def test_every_process_was_watched_and_leaks_no_handles(figures: dict[str, Any]) -> None:
+    watched = {"stage", "control", "lights", "projector", "sensor", "oscdump"}
+    assert watched <= figures["handles"].keys()
+    for name in watched:
+        start, end = figures["handles"][name]
+        assert end <= start + 2, f"{name}: {start} handles at first, {end} in the end"
+
+
+def test_the_projector_showed_the_dance(figures: dict[str, Any]) -> None:
+    assert "frame age" in figures["projector"]
+
+
+def test_what_goes_wrong_is_found(figures: dict[str, Any]) -> None:
+    assert figures["lamps"]["1"]["looks"] > 0
+    worse = {
+        **figures,
+        "malformed": 2,
+        "receivers": {**figures["receivers"], "vmc": {"frames": 900, "missing": 3, "late": 0}},
+        "lamps": {**figures["lamps"], "1": {"looks": 9, "followed": 8, "levels": 5}},
+        "memory_mb": {**figures["memory_mb"], "lights": (50.0, 90.0)},
+        "statuses": {**figures["statuses"], "stage": -9},
+    }
+    said = "\n".join(faults(worse))
+    for words in ("vmc: 3 of 900", "lamp 1: followed in 8 of 9", "stage ended", "2 datagrams", "50 to 90"):
+        assert words in said

@@ -1,0 +1,193 @@
+"""A whole venue in a network of its own: the box, a sensor, a projector, and real and own receivers."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+
+from appliance.sensor.keys import create_keys
+from appliance.show.bundle import default_show_path, write_checksums
+from hw_sim.osc_receiver import OscReceiver
+from hw_sim.peers import HOST, free_ports
+from hw_sim.posistagenet import PsnReceiver
+from tests.system import namespace, olad
+from tests.system.namespace import Namespace
+from tests.system.olad import Olad
+
+SENSOR = "left-wrist"
+LAMPS = {1: ("lHand", 2.0), 2: ("rFoot", 1.0)}  # universe: the joint whose height it shows, metres of full
+ART_NET_IN = {"2-1-I-0": 1, "2-1-I-1": 2}
+BUNRAKU = (sys.executable, "-m", "appliance.cli")
+PATIENCE_S = 60.0
+
+
+def why_not() -> str | None:
+    """Why a venue cannot be built here; None when it can."""
+    if shutil.which("oscdump") is None:
+        return "oscdump (Debian package liblo-tools) is missing"
+    return olad.why_not() or namespace.why_not()
+
+
+@dataclass
+class Venue:
+    """Everything that runs. `processes`: by name; `words`: the folder with what each of them said."""
+
+    folder: Path
+    daemon: Olad
+    osc: dict[str, OscReceiver]
+    positions: PsnReceiver
+    dump: Path
+    processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+
+    def said(self, name: str) -> str:
+        """What a process said so far."""
+        return (self.folder / f"{name}.txt").read_text(errors="replace")
+
+    def pids(self) -> dict[str, int]:
+        """All processes by name, the stage's companions among them."""
+        found = {name: process.pid for name, process in self.processes.items()}
+        for pid in _children(found["stage"]):
+            words = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b".", b"\0").split(b"\0")
+            found |= {name: pid for name in ("control", "lights") if name.encode() in words}
+        return found
+
+    def end(self) -> dict[str, int]:
+        """Ask the box's own processes to end; their exit statuses."""
+        own = {name: self.processes[name] for name in ("sensor", "projector", "stage")}
+        for process in own.values():
+            process.terminate()
+        return {name: process.wait(PATIENCE_S) for name, process in own.items()}
+
+
+@contextlib.contextmanager
+def venue(folder: Path, picture: str = "320x180") -> Iterator[Venue]:
+    """Start all of it; the receivers listen before the box begins. picture: the projector's size, pixels."""
+    show = lit_show(folder / "show")
+    create_keys(folder / "sensors.keys", [SENSOR])
+    with contextlib.ExitStack() as opened:
+        network = opened.enter_context(Namespace("venue"))
+        daemon = opened.enter_context(Olad(olad.art_net_node(), ART_NET_IN, network))
+        with network.entered():
+            osc = {
+                dialect: opened.enter_context(contextlib.closing(OscReceiver(HOST)))
+                for dialect in ("ai-toolbox", "vmc")
+            }
+            dump_port, psn_port, sensors, control = free_ports(4)
+            psn = opened.enter_context(PsnReceiver(HOST, HOST, psn_port))
+        receivers = [
+            {"host": HOST, "port": receiver.port, "dialect": dialect, "frame_message": True}
+            for dialect, receiver in osc.items()
+        ]
+        receivers.append({"host": HOST, "port": dump_port, "dialect": "joint", "frame_message": True})
+        box = folder / "box.yaml"
+        settings = {
+            "runtime": "runtime",
+            "sensors": {"udp": {"host": HOST, "port": sensors}, "keys": "sensors.keys"},
+            "control": {"host": HOST, "port": control},
+            "outputs": {
+                "osc": receivers,
+                "posistagenet": [{"host": HOST, "port": psn_port}],
+                "dmx": [{"universe": universe, "wire": "artnet"} for universe in LAMPS],
+            },
+        }
+        box.write_text(yaml.safe_dump(settings))
+        running = Venue(folder, daemon, osc, psn, folder / "oscdump.txt")
+        _dump(running, network, dump_port, opened)
+        stage = [*BUNRAKU, "play", "--show", str(show), "--box", str(box)]
+        emulator = [sys.executable, "-m", "hw_sim", "emulate", "--sensor", SENSOR, "--motion", "dance"]
+        emulator += ["--keys", str(folder / "sensors.keys"), "--port", str(sensors)]
+        projector = [*BUNRAKU, "project", "--box", str(box), "--offscreen", picture]
+        for name, words in (("stage", stage), ("sensor", emulator), ("projector", projector)):
+            running.processes[name] = _start(opened, network.command(*words), folder / f"{name}.txt")
+        yield running
+
+
+def lit_show(folder: Path) -> Path:
+    """The default show with a lamp in each of two universes that shows how high a joint is."""
+    shutil.copytree(default_show_path(), folder)
+    show = yaml.safe_load((folder / "show.yaml").read_text())
+    show["lights"] = {
+        "fixtures": [
+            {"name": f"lamp {universe}", "profile": "dimmer", "universe": universe, "address": 1}
+            for universe in LAMPS
+        ],
+        "mappings": [
+            {
+                "name": "heights",
+                "rules": [
+                    {
+                        "fixtures": [f"lamp {universe}"],
+                        "reads": "height",
+                        "joint": joint,
+                        "drives": "dimmer",
+                        "range": [0.0, full],
+                    }
+                    for universe, (joint, full) in LAMPS.items()
+                ],
+            }
+        ],
+    }
+    (folder / "show.yaml").write_text(yaml.safe_dump(show))
+    write_checksums(folder)
+    return folder
+
+
+def _dump(running: Venue, network: Namespace, port: int, opened: contextlib.ExitStack) -> None:
+    """The real oscdump, of which the lines about frames are kept."""
+    with running.dump.open("wb") as kept:
+        dump = subprocess.Popen(network.command("oscdump", str(port)), stdout=subprocess.PIPE)
+        opened.callback(_stop, dump)
+        keep = subprocess.Popen(["grep", "--line-buffered", "/bunraku/frame"], stdin=dump.stdout, stdout=kept)
+        opened.callback(_stop, keep)
+    running.processes["oscdump"] = dump
+    until = time.monotonic() + PATIENCE_S
+    with network.entered():
+        while port in _free(port):
+            assert dump.poll() is None and time.monotonic() < until, "oscdump does not listen"
+            time.sleep(0.02)
+
+
+def _free(port: int) -> list[int]:
+    """The port if nobody has bound it in this network."""
+    bound = Path("/proc/thread-self/net/udp").read_text() + Path("/proc/thread-self/net/udp6").read_text()
+    return [] if f":{port:04X} " in bound else [port]
+
+
+def _start(opened: contextlib.ExitStack, command: Sequence[str], words: Path) -> subprocess.Popen[bytes]:
+    with words.open("wb") as out:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+    opened.callback(_stop, process)
+    return process
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(10)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    if process.stdout is not None:
+        process.stdout.close()
+
+
+def _children(pid: int) -> list[int]:
+    found = []
+    for tasks in Path(f"/proc/{pid}/task").glob("*/children"):
+        found += [int(child) for child in tasks.read_text().split()]
+    return found
