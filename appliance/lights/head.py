@@ -90,7 +90,8 @@ class Heads:
         pans, tilts = self.pans[aimed], self.tilts[aimed]
         self._ways[aimed] = way[aimed]
         wanted[pans] = np.clip(pan[aimed], axes.low[pans], axes.high[pans])
-        reach[pans] *= np.minimum(1.0, sideways[aimed] / QUIET_CONE)
+        quiet = np.where(polar < 90.0, sideways / QUIET_CONE, 1.0)
+        reach[pans] *= np.minimum(1.0, quiet[aimed])
         self._step(pans, wanted, reach)
         off = np.radians(heading[aimed] - self.angles[pans])
         wanted[tilts] = np.clip(polar[aimed] * np.cos(off), axes.low[tilts], axes.high[tilts])

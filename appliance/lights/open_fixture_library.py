@@ -28,12 +28,15 @@ def profile_values(fixture: Json) -> tuple[dict[str, Any], list[str]]:
             f"This file only says that the fixture is now called {fixture['redirectTo']}. Convert that one."
         )
     try:
-        return _Conversion(fixture).result()
+        values, notes = _Conversion(fixture).result()
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         raise LibraryError(
             f"This is not a fixture of the Open Fixture Library ({type(error).__name__}: {error}). "
             "Download it again as JSON ('Open Fixture Library JSON')."
         ) from error
+    if not values["modes"]:
+        raise LibraryError(f"No mode of {values['name']} fits into one universe.")
+    return values, notes
 
 
 class _Conversion:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -14,6 +13,7 @@ from appliance.show.fixture_profile import DIMMER, PAN, TILT
 from appliance.show.light_rules import AIM
 from appliance.show.lights import UNIVERSE_CHANNELS
 
+_ROOM = 2.2  # ways from end to end that a head has time for, of which it goes two
 CHEST_M = 1.2  # where heads are told to point at the end: over the stage's origin, as high as a chest
 
 
@@ -81,10 +81,16 @@ class Walk:
         values[own] = 1.0
         return values
 
+    def duration_s(self, step: Step, at_least_s: float) -> float:
+        """How long a step takes: a head needs its time from one end of its range to the other and back."""
+        axes = self._patch.heads.axes
+        place = np.flatnonzero(axes.slots == step.place)
+        return max([at_least_s, *(_ROOM * axes.degrees[place] / axes.slew[place]).tolist()])
+
     def _moved(self, step: Step, part: float) -> float:
         rest = 0.0 if step.attribute == DIMMER else float(self._patch.defaults[step.place])
         if self._patch.slots[step.place].base in (PAN, TILT):
-            return 0.5 - 0.5 * math.sin(2 * math.pi * part)
+            return float(np.interp(part, (0.0, 0.25, 0.75, 1.0), (0.5, 0.0, 1.0, 0.5)))
         return float(np.interp(part, (0.0, 0.25, 0.75, 1.0), (rest, 0.0, 1.0, rest)))
 
     def _alone(self, step: Step, values: Values) -> None:
@@ -115,7 +121,10 @@ def walk(
     say: Callable[[str], None],
     stopped: Callable[[], bool],
 ) -> None:
-    """Take the steps, `step_s` each. `show` sends levels, waits for the next pass and gives the time then."""
+    """Take the steps, `step_s` each or as long as heads need.
+
+    `show` sends levels, waits for the next pass and gives the time then.
+    """
     moving, fixture = Walk(patch), ""
     now = show(moving.dark())
     for step in to_see:
@@ -124,7 +133,8 @@ def walk(
             say(introduction(patch, fixture))
         say(f"  {step.attribute}, {step.words}")
         begun = before = now
-        while not stopped() and now - begun < step_s:
-            levels = moving.levels(step, (now - begun) / step_s, now - before)
+        duration_s = moving.duration_s(step, step_s)
+        while not stopped() and now - begun < duration_s:
+            levels = moving.levels(step, (now - begun) / duration_s, now - before)
             before, now = now, show(levels)
     show(moving.dark())

@@ -22,7 +22,7 @@ from appliance.show.fixture_profile import (
 from appliance.show.light_rules import AIM, COLOUR, Colour, MappingConfig, Metres, Pair, RuleConfig
 from appliance.show.section import Section, refusal
 
-MAX_FIXTURES = 512
+MAX_FIXTURES = 2048
 UNIVERSE_CHANNELS = 512
 Universe = Annotated[int, Field(ge=0, le=63999)]
 Address = Annotated[int, Field(ge=1, le=UNIVERSE_CHANNELS)]

@@ -1,0 +1,185 @@
+"""The rig when things happen to the show: panic, stop, blackout, a lost stage, the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from appliance.control.house import House
+from appliance.lights.rig import LEAVING_FADE_S, LOST_S, SAFE_FADE_S, Rig
+from tests.lights.rigs import frame, lights, rig
+
+PERIOD_S = 0.025
+PAR = {"name": "par", "profile": "led-par", "address": 1}
+SHY = {"name": "shy", "profile": "led-par", "address": 11}
+HEAD = {"name": "head", "profile": "moving-wash", "address": 21, "place": [0, 4, 0]}
+FULL = {"reads": "steady", "drives": "dimmer"}
+AIM = {"reads": "place", "joint": "hand", "drives": "aim"}
+RED = {"reads": "steady", "drives": "colour", "colours": [[1, 0, 0]]}
+
+
+class Evening:
+    """A rig and its clock: passes 40 times a second, with frames or without."""
+
+    def __init__(self, made: Rig) -> None:
+        self.rig, self.now, self.house = made, 0.0, House()
+        self.frame = frame(1)
+        self.generation = 1
+
+    def dance(self, seconds: float = 0.0, hand: Any = (1.0, 1.0, 0.0)) -> list[bytes]:
+        """Universe 1 pass by pass while the stage dances."""
+        return self._passes(seconds, lambda: frame(round(self.now / 0.02) + 1, hand))
+
+    def hang(self, seconds: float) -> list[bytes]:
+        """While it does not."""
+        return self._passes(seconds, lambda: self.frame)
+
+    def _passes(self, seconds: float, newest: Callable[[], Any]) -> list[bytes]:
+        shown = []
+        for _ in range(max(1, round(seconds / PERIOD_S))):
+            self.now += PERIOD_S
+            self.frame = newest()
+            shown.append(self.rig.pass_(self.frame, self.generation, self.house, self.now)[1])
+        return shown
+
+
+def evening(*rules: dict[str, Any], safe: dict[str, Any] | None = None) -> Evening:
+    return Evening(rig(lights([PAR, SHY, HEAD], *(rules or (FULL,)), safe=safe)))
+
+
+def dimmers(levels: bytes) -> tuple[int, int, int]:
+    return levels[0], levels[10], levels[24]
+
+
+def test_panic_is_dark_in_the_very_next_pass_and_heads_stand_still() -> None:
+    night = evening(FULL, AIM)
+    night.dance(2.0)
+    assert dimmers(night.dance()[0]) == (255, 255, 255)
+    night.house = House(panic=True)
+    before = night.rig.patch.heads.angles.copy()
+    for levels in night.dance(0.5, hand=(-2, 1, 1)):
+        assert dimmers(levels) == (0, 0, 0)
+    np.testing.assert_array_equal(night.rig.patch.heads.angles, before)
+
+
+def test_the_safe_look_shines_on_panic_where_the_show_says_so() -> None:
+    night = evening(FULL, RED, safe={"dimmer": 0.4, "colour": [1, 1, 1], "fixtures": ["par"]})
+    assert night.dance(1.0)[-1][:4] == bytes([255, 255, 0, 0])
+    night.house = House(panic=True)
+    levels = night.dance()[0]
+    assert levels[:4] == bytes([102, 255, 255, 255])
+    assert dimmers(levels)[1:] == (0, 0)
+
+
+def test_heads_go_home_in_the_safe_look_where_the_show_says_so() -> None:
+    night = evening(FULL, AIM, safe={"heads": "home"})
+    night.dance(3.0)
+    assert abs(night.rig.patch.heads.angles).max() > 5
+    night.house = House(panic=True)
+    night.dance(3.0)
+    np.testing.assert_allclose(night.rig.patch.heads.angles, 0, atol=1e-6)
+
+
+def test_after_panic_the_dance_fades_in() -> None:
+    night = evening()
+    night.house = House(panic=True)
+    night.dance(1.0)
+    night.house = House()
+    shown = [dimmers(levels)[0] / 255 for levels in night.dance(1.5 * SAFE_FADE_S)]
+    assert np.diff(shown).max() < 0.05
+    assert shown[-1] == 1.0
+
+
+def test_stop_fades_as_show_control_says_and_then_comes_the_safe_look() -> None:
+    night = evening(safe={"dimmer": 0.2})
+    night.dance(1.0)
+    night.house = House().with_going(False, night.now, 2.0)
+    shown = [dimmers(levels)[0] / 255 for levels in night.dance(4.0)]
+    assert shown[39] == pytest.approx(0.5, abs=0.03)
+    assert shown[79] < 0.05
+    assert shown[-1] == pytest.approx(0.2, abs=0.01)
+
+
+def test_master_and_blackout_reach_dimmers_alone() -> None:
+    night = evening(FULL, RED)
+    night.house = House().with_master(0.5, night.now, 0.0)
+    assert night.dance(1.0)[-1][:3] == bytes([128, 255, 0])
+    night.house = House(blackout=True)
+    assert night.dance()[0][:3] == bytes([0, 255, 0])
+
+
+@pytest.mark.parametrize(("house", "shines"), [(House(), 51), (House(blackout=True), 0)])
+def test_blackout_also_darkens_the_safe_look_of_a_lost_stage(house: House, shines: int) -> None:
+    night = evening(safe={"dimmer": 0.2})
+    night.dance(0.5)
+    night.house = house
+    assert dimmers(night.hang(LOST_S + 2 * SAFE_FADE_S)[-1])[0] == shines
+
+
+def test_but_on_panic_the_safe_look_is_seen_whatever_else_is_in_force() -> None:
+    night = evening(safe={"dimmer": 0.2})
+    night.house = House(panic=True, blackout=True, master=0.0)
+    assert dimmers(night.dance()[0])[0] == 51
+
+
+def test_a_lost_stage_fades_to_the_safe_look_after_a_second_and_comes_back() -> None:
+    night = evening()
+    night.dance(1.0)
+    shown = [dimmers(levels)[0] / 255 for levels in night.hang(3.0)]
+    lost = round(LOST_S / PERIOD_S)
+    assert min(shown[: lost - 2]) == 1.0
+    assert shown[lost + 20] == pytest.approx(0.5, abs=0.1)
+    assert shown[lost + 44] == 0.0
+    night.generation = 2
+    back = [dimmers(levels)[0] / 255 for levels in night.dance(1.5)]
+    assert np.diff(back).max() < 0.05
+    assert back[-1] == 1.0
+
+
+def test_a_rig_begins_safe_and_stays_so_without_a_stage() -> None:
+    config = lights([PAR, SHY, HEAD], FULL, safe={"dimmer": 0.2})
+    made = rig(config)
+    made.safety = 1.0
+    for number in range(50):
+        levels = made.pass_(None, 0, House(), 100.0 + number * PERIOD_S)[1]
+        assert dimmers(levels)[0] == 51
+
+
+def test_the_old_frame_of_a_dead_stage_lights_nothing() -> None:
+    made = rig(lights([PAR, SHY, HEAD], FULL))
+    made.safety = 1.0
+    old = frame(50)
+    for number in range(50):
+        assert dimmers(made.pass_(old, 1, House(), 100.0 + number * PERIOD_S)[1]) == (0, 0, 0)
+
+
+@pytest.mark.parametrize(("safe", "left"), [({}, 0), ({"dimmer": 0.5}, 128)])
+def test_at_the_end_it_fades_and_leaves_zeros_or_the_safe_look(safe: dict[str, Any], left: int) -> None:
+    night = evening(safe=safe)
+    night.dance(1.0)
+    night.rig.leave()
+    shown = [dimmers(levels)[0] for levels in night.dance(LEAVING_FADE_S + PERIOD_S)]
+    assert shown[0] > 200 and shown == sorted(shown, reverse=True)
+    assert shown[-1] == left
+    assert night.rig.safety == 1.0
+    last = night.rig.last_levels()[1]
+    assert last[0] == left
+    assert any(last) == bool(left)
+
+
+def test_after_a_pause_of_the_whole_machine_nothing_jumps_but_time() -> None:
+    night = evening(FULL, AIM)
+    night.dance(1.0)
+    before = night.rig.patch.heads.angles.copy()
+    night.now += 30.0
+    night.dance(hand=(-3, 0, 2))
+    assert np.abs(night.rig.patch.heads.angles - before).max() <= 200 * 0.1 + 1e-6
+
+
+def test_unknown_mappings_leave_the_first_in_force() -> None:
+    night = evening()
+    night.house = House(lights="of another show", lights_before="nor this")
+    assert dimmers(night.dance(0.5)[-1])[0] == 255
