@@ -86,10 +86,20 @@ def checkout(page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return copy
 
 
+def environment_of(checkout: Path) -> dict[str, str]:
+    """A shell's environment without a display, and with a runtime folder of the page's own."""
+    left_out = ("DISPLAY", "WAYLAND_DISPLAY", "RUNTIME_DIRECTORY")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    environment = {name: value for name, value in environment.items() if name not in left_out}
+    environment["PATH"] = f"{checkout / '.venv' / 'bin'}:{environment['PATH']}"
+    environment["XDG_RUNTIME_DIR"] = str(checkout.parent / f"{checkout.name}-runtime")
+    Path(environment["XDG_RUNTIME_DIR"]).mkdir(exist_ok=True)
+    return environment
+
+
 def test_every_command_of_a_page_works(page: str, checkout: Path) -> None:
     assert BLOCKS[page], f"{page} shows no command"
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
-    environment["PATH"] = f"{checkout / '.venv' / 'bin'}:{environment['PATH']}"
+    environment = environment_of(checkout)
     for block in BLOCKS[page]:
         script = "\n".join(RECURSIVE.sub(r"make --dry-run \1", line) for line in block.text.splitlines())
         done = subprocess.run(

@@ -1,0 +1,123 @@
+"""Strips of rendered pictures, and the picture at the end of a rehearsal."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from appliance.commands.pictures import danced, rendered
+from appliance.commands.rehearsal import has_display, rehearsal_picture
+from appliance.projector.strip import COLUMNS, PICTURE, ROWS, strip
+from appliance.show.look import looks_by_name
+from appliance.show.show import load_show
+from appliance.stage.journal import Journal
+from appliance.stage.stage_error import StageError
+from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+
+WIDTH, HEIGHT = PICTURE
+LARGEST_BYTES = 600_000
+
+
+def pictures_of(path: Path) -> list[np.ndarray]:
+    """The single pictures of a strip, row by row."""
+    strip_ = np.asarray(Image.open(path).convert("RGB")).astype(int)
+    rows = np.split(strip_, len(strip_) // HEIGHT)
+    return [one for row in rows for one in np.split(row, COLUMNS, axis=1)]
+
+
+def write_journal(path: Path, ticks: int = 100) -> Path:
+    """A journal of a sway, as `play` writes it."""
+    phrase = swaying_phrase()
+    journal = Journal(path, FIGURE, [{"joint": "lShldr"}], minutes=0.2)
+    for tick in range(ticks):
+        journal.field["tick"][journal.row] = tick
+        journal.field["pose"][journal.row] = phrase.poses[tick % len(phrase.poses)]
+        journal.field["root"][journal.row] = phrase.roots[0]
+        journal.commit()
+    journal.close()
+    return path
+
+
+@pytest.mark.parametrize("look", ["plaster", "lines"])
+def test_ten_instants_side_by_side(tmp_path: Path, look: str) -> None:
+    dance = swaying_phrase()
+    out = strip(
+        tmp_path / "deep" / "strip.png", FIGURE, looks_by_name(()), look, dance.poses, dance.roots, 50.0, [2]
+    )
+    assert Image.open(out).size == (COLUMNS * WIDTH, ROWS * HEIGHT)
+    assert out.stat().st_size < LARGEST_BYTES
+    pictures = pictures_of(out)
+    assert len(pictures) == COLUMNS * ROWS
+    for before, picture in pairwise(pictures):
+        assert picture.max() > 150, "nobody is to be seen"
+        assert np.abs(picture - before).max() > 50, "nobody moves"
+
+
+def test_two_poses_give_two_pictures_and_black(tmp_path: Path) -> None:
+    dance = swaying_phrase(0.04)
+    out = strip(tmp_path / "two.png", FIGURE, looks_by_name(()), "plaster", dance.poses, dance.roots, 50.0)
+    pictures = pictures_of(out)
+    assert len(pictures) == COLUMNS
+    assert pictures[0].max() > 150
+    assert pictures[-1].max() == 0
+
+
+def test_looks_come_from_the_show(tmp_path: Path) -> None:
+    show = write_show(tmp_path / "show")
+    with (show / "show.yaml").open("a") as file:
+        file.write("looks: [{name: dusk, style: plaster, exposure: 0.3}]\n")
+    dance = danced(show / "phrase.bvh").part(0.0, 0.1)
+    dark = pictures_of(rendered(dance, tmp_path / "dark.png", "dusk", show))
+    bright = pictures_of(rendered(dance, tmp_path / "bright.png", "plaster", None))
+    assert 0 < dark[0].mean() < bright[0].mean()
+    with pytest.raises(StageError, match=r"There is no look 'plaster'\. There are: dusk"):
+        rendered(dance, tmp_path / "none.png", "plaster", show)
+
+
+@pytest.mark.parametrize(
+    ("environment", "is_there"),
+    [
+        ({}, False),
+        ({"DISPLAY": ""}, False),
+        ({"DISPLAY": ":0"}, True),
+        ({"WAYLAND_DISPLAY": "wayland-1"}, True),
+    ],
+)
+def test_a_display_is_known_by_the_environment(environment: dict[str, str], is_there: bool) -> None:
+    assert has_display(environment) == is_there
+
+
+def test_a_rehearsal_ends_with_a_rendered_picture(tmp_path: Path) -> None:
+    show = load_show(write_show(tmp_path / "show"))
+    out = tmp_path / "dance.png"
+    (said,) = rehearsal_picture(write_journal(tmp_path / "run.journal"), out, show)
+    assert said == f"What was just danced, as the projector shows it: {out}"
+    assert Image.open(out).size == (COLUMNS * WIDTH, ROWS * HEIGHT)
+
+
+def test_without_opengl_a_rehearsal_ends_with_a_filmstrip_and_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", str(tmp_path / "absent.json"))
+    show = load_show(write_show(tmp_path / "show"))
+    out = tmp_path / "dance.png"
+    why, said = rehearsal_picture(write_journal(tmp_path / "run.journal"), out, show)
+    assert "cannot be rendered here" in why
+    for package in ("libgl1-mesa-dri", "libegl1", "libgles2", "libgbm1"):
+        assert package in why
+    assert str(out) in said
+    assert out.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_part_of_a_dance_counts_from_either_end(tmp_path: Path) -> None:
+    dance = danced(write_journal(tmp_path / "run.journal"))
+    assert dance.held == (FIGURE.index("lShldr"),)
+    assert len(dance.part(-1.0, 10.0).poses) == 50
+    assert len(dance.part(-100.0, 10.0).poses) == 100
+    assert len(dance.part(0.5, 0.5).poses) == 25
+    with pytest.raises(StageError, match="nothing was danced after second 2"):
+        dance.part(2.0, 1.0)
