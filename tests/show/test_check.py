@@ -195,7 +195,7 @@ def test_a_folder_that_is_not_there_is_one_finding(tmp_path: Path) -> None:
 
 
 @given(st.text(max_size=200) | st.binary(max_size=200).map(lambda raw: raw.decode("latin-1")))
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_text_raises_anything_but_a_config_error(tmp_path: Path, text: str) -> None:
     path = tmp_path / "show.yaml"
     path.write_bytes(text.encode("utf-8", "replace"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from appliance.stage.iterations import Iterations
@@ -50,6 +50,7 @@ def test_a_change_during_a_fade_begins_where_it_has_come_to() -> None:
     assert (iterations.coding, iterations.interaction) == (10, 9)
 
 
+@settings(deadline=None)
 @given(begin=TIMES, asked=TIMES, most=st.integers(1, 64), fade_s=st.floats(0, 3))
 def test_they_are_never_more_than_fit_nor_interactions_more_than_codings(
     begin: tuple[int, int], asked: tuple[int, int], most: int, fade_s: float
