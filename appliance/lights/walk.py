@@ -85,7 +85,8 @@ class Walk:
         """How long a step takes: a head needs its time from one end of its range to the other and back."""
         axes = self._patch.heads.axes
         place = np.flatnonzero(axes.slots == step.place)
-        return max([at_least_s, *(_ROOM * axes.degrees[place] / axes.slew[place]).tolist()])
+        needed_s: list[float] = (_ROOM * axes.degrees[place] / axes.slew[place]).tolist()
+        return max([at_least_s, *needed_s])
 
     def _moved(self, step: Step, part: float) -> float:
         rest = 0.0 if step.attribute == DIMMER else float(self._patch.defaults[step.place])

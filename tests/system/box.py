@@ -106,7 +106,7 @@ def playing(
             "runtime": "runtime",
         }
         for section, values in (settings or {}).items():
-            box[section] = {**box.get(section, {}), **values} if section == "sensors" else values
+            box[section] = {**box.get(section, {}), **values} if section in ("sensors", "outputs") else values
         (folder / "box.yaml").write_text(yaml.safe_dump(box))
         full = [*command, "--show", str(show), "--box", str(folder / "box.yaml"), *arguments]
         process = _start(full, words)

@@ -1,0 +1,279 @@
+"""The real box and its lights: they move with the dance, obey show control, and are safe whatever dies."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from pythonosc.udp_client import SimpleUDPClient
+
+from hw_sim.dmx.artnet import ArtNetReceiver
+from hw_sim.dmx.usb_pro import UsbProWidget
+from hw_sim.peers import HOST
+from tests.stage.bundles import write_show
+from tests.system.box import PATIENCE_S, PLAY, playing
+
+pytestmark = pytest.mark.realtime
+
+LIGHTS = (sys.executable, "-m", "appliance.cli", "lights")
+ALONE = (*PLAY, "--alone")
+PAN, DIMMER, PAR, SAFE = 0, 4, 20, 0.2
+RIG = {
+    "fixtures": [
+        {"name": "head", "profile": "moving-wash", "address": 1, "place": [1.5, 3.5, 1.0]},
+        {"name": "par", "profile": "led-par", "address": 21, "place": [-2, 3.5, 0]},
+        {"name": "second", "profile": "led-par", "universe": 2, "address": 1},
+    ],
+    "mappings": [
+        {
+            "name": "warm",
+            "rules": [
+                {"reads": "place", "joint": "lForeArm", "drives": "aim"},
+                {"reads": "steady", "drives": "dimmer"},
+            ],
+        },
+        {"name": "dim", "rules": [{"reads": "steady", "drives": "dimmer", "value": 0.25}]},
+    ],
+    "safe": {"dimmer": SAFE, "fixtures": ["par"]},
+}
+DARK = {**RIG, "safe": {}}
+
+
+def show_with(folder: Path, rig: dict[str, Any]) -> Path:
+    show = write_show(folder / "show")
+    with (show / "show.yaml").open("a") as file:
+        file.write(yaml.safe_dump({"lights": rig}))
+    return show
+
+
+def artnet(port: int, *universes: int) -> dict[str, Any]:
+    wires = [{"universe": one, "wire": "artnet", "host": HOST, "port": port} for one in universes]
+    return {"outputs": {"dmx": wires}}
+
+
+class Node:
+    """An Art-Net node: the newest levels of a universe, and all that came."""
+
+    def __init__(self, receiver: ArtNetReceiver) -> None:
+        self._receiver = receiver
+        self.levels: dict[int, bytes] = {}
+        self.arrivals: list[tuple[float, int, bytes]] = []
+
+    def look(self) -> None:
+        for arrival, packet in self._receiver.poll(0.05):
+            self.levels[packet.port_address] = packet.levels
+            self.arrivals.append((arrival, packet.port_address, packet.levels))
+
+    def await_levels(self, is_wanted: Callable[[bytes], bool], universe: int = 1) -> None:
+        until = time.monotonic() + PATIENCE_S
+        while not (universe in self.levels and is_wanted(self.levels[universe])):
+            assert time.monotonic() < until, self.levels.get(universe, b"nothing")[:32]
+            self.look()
+
+    def await_dance(self) -> None:
+        """Fully lit, by a first mapping that says so."""
+        self.await_levels(lambda levels: levels[DIMMER] == 255 and levels[PAR] == 255)
+
+    def await_safe(self) -> None:
+        self.await_levels(lambda levels: levels[DIMMER] == 0 and levels[PAR] == round(255 * SAFE))
+
+
+@contextlib.contextmanager
+def node() -> Iterator[tuple[Node, int]]:
+    with ArtNetReceiver(HOST) as receiver:
+        yield Node(receiver), receiver.port
+
+
+class LightsProcess:
+    """`bunraku lights` by itself, as systemd runs it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.words_file = folder / "lights.txt"
+        with self.words_file.open("ab") as words:
+            self.process = subprocess.Popen(
+                [*LIGHTS, "--box", str(folder / "box.yaml")],
+                stdin=subprocess.DEVNULL,
+                stdout=words,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, "PYTHONUNBUFFERED": "1"},
+            )
+
+    def await_words(self, words: str) -> None:
+        until = time.monotonic() + PATIENCE_S
+        while words not in self.words_file.read_text():
+            assert time.monotonic() < until and self.process.poll() is None, self.words_file.read_text()
+            time.sleep(0.05)
+
+    def end(self, number: int = signal.SIGTERM) -> int:
+        self.process.send_signal(number)
+        return self.process.wait(PATIENCE_S)
+
+    def __enter__(self) -> LightsProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+
+
+def test_lights_move_with_the_dance_obey_show_control_and_end_in_zeros(tmp_path: Path) -> None:
+    show = show_with(tmp_path, DARK)
+    with node() as (lamp, port), playing(show, tmp_path, settings=artnet(port, 1, 2)) as box:
+        lamp.await_dance()
+        lamp.await_levels(lambda levels: levels[0] == 255, universe=2)
+        pans = set()
+        until = time.monotonic() + PATIENCE_S
+        while len(pans) < 20:  # the joint sways, and the head after it
+            assert time.monotonic() < until
+            lamp.look()
+            pans.add(lamp.levels[1][PAN : PAN + 2])
+
+        client = SimpleUDPClient(HOST, box.control)
+        client.send_message("/panic", [])
+        lamp.await_levels(lambda levels: levels[DIMMER] == 0 and levels[PAR] == 0)
+        lamp.await_levels(lambda levels: levels[0] == 0, universe=2)
+        client.send_message("/go", [])
+        lamp.await_dance()
+        client.send_message("/master", [0.5])
+        lamp.await_levels(lambda levels: levels[PAR] == 128)
+        client.send_message("/blackout", [1])
+        lamp.await_levels(lambda levels: levels[PAR] == 0)
+        client.send_message("/blackout", [0])
+        client.send_message("/master", [1.0])
+        client.send_message("/lights", ["dim", 0.2])
+        lamp.await_levels(lambda levels: levels[PAR] == 64)
+
+        assert box.end() == 0
+        lamp.look()
+        assert lamp.levels == {1: bytes(512), 2: bytes(512)}
+        assert "Lights: 3 fixtures by Art-Net" in box.words
+        assert "Traceback" not in box.words
+
+
+def test_a_killed_stage_leaves_the_safe_look_and_the_dance_returns_with_the_next(tmp_path: Path) -> None:
+    show = show_with(tmp_path, RIG)
+    with (
+        node() as (lamp, port),
+        playing(show, tmp_path, settings=artnet(port, 1, 2), command=ALONE) as box,
+        LightsProcess(tmp_path) as lights,
+    ):
+        lamp.await_dance()
+        box.end(signal.SIGKILL)
+        killed = time.monotonic()
+        lamp.await_safe()
+        assert time.monotonic() - killed > 1.0  # it waits for a second, and fades for another
+        lights.await_words("No frame from the stage")
+        box.kill_and_restart()
+        lamp.await_dance()
+        lights.await_words("The stage dances, and the lights with it.")
+        assert lights.end() == 0
+        lamp.look()
+        assert lamp.levels[1][PAR] == round(255 * SAFE)  # the light that the show leaves on
+        assert lamp.levels[2][0] == 0
+
+
+def test_a_stage_that_hangs_brings_the_safe_look_too(tmp_path: Path) -> None:
+    show = show_with(tmp_path, RIG)
+    with (
+        node() as (lamp, port),
+        playing(show, tmp_path, settings=artnet(port, 1, 2), command=ALONE) as box,
+        LightsProcess(tmp_path),
+    ):
+        lamp.await_dance()
+        box.process.send_signal(signal.SIGSTOP)
+        lamp.await_safe()
+        box.process.send_signal(signal.SIGCONT)
+        lamp.await_dance()
+
+
+def test_lights_that_start_first_wait_for_the_stage(tmp_path: Path) -> None:
+    show = show_with(tmp_path, RIG)
+    with node() as (lamp, port), playing(show, tmp_path, settings=artnet(port, 1, 2), command=ALONE) as box:
+        box.frames(1)
+        box.end()
+        with LightsProcess(tmp_path) as lights:
+            box.kill_and_restart()
+            lamp.await_dance()
+            assert lights.end(signal.SIGINT) == 0
+
+
+def test_killed_lights_are_started_again_by_the_box(tmp_path: Path) -> None:
+    show = show_with(tmp_path, DARK)
+    with node() as (lamp, port), playing(show, tmp_path, settings=artnet(port, 1, 2)) as box:
+        lamp.await_dance()
+        children = Path(f"/proc/{box.process.pid}/task")
+        running = [
+            int(child)
+            for task in children.iterdir()
+            for child in (task / "children").read_text().split()
+            if b"lights" in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
+        ]
+        assert len(running) == 1
+        os.kill(running[0], signal.SIGKILL)
+        lamp.levels.clear()
+        lamp.await_dance()
+        assert box.words.count("Lights: 3 fixtures") == 2
+
+
+def test_a_killed_box_takes_its_lights_with_it_and_they_end_in_zeros(tmp_path: Path) -> None:
+    show = show_with(tmp_path, DARK)
+    with node() as (lamp, port), playing(show, tmp_path, settings=artnet(port, 1, 2)) as box:
+        lamp.await_dance()
+        box.end(signal.SIGKILL)
+        lamp.await_levels(lambda levels: not any(levels))
+        lamp.await_levels(lambda levels: not any(levels), universe=2)
+
+
+def test_a_widget_that_is_not_there_costs_the_other_wires_nothing(tmp_path: Path) -> None:
+    show = show_with(tmp_path, DARK)
+    with node() as (lamp, port):
+        settings = artnet(port, 1)
+        missing = {"universe": 2, "wire": "usb-pro", "device": str(tmp_path / "ttyUSB9")}
+        settings["outputs"]["dmx"].append(missing)
+        with playing(show, tmp_path, settings=settings) as box:
+            lamp.await_dance()
+            box.await_words("ttyUSB9")
+            assert box.end() == 0
+            assert "Traceback" not in box.words
+
+
+def test_by_usb_the_same_levels_arrive(tmp_path: Path) -> None:
+    show = show_with(tmp_path, DARK)
+    with UsbProWidget(tmp_path / "ttyUSB0") as widget:
+        wires = [{"universe": 1, "wire": "usb-pro", "device": str(widget.path)}]
+        with playing(show, tmp_path, settings={"outputs": {"dmx": wires}}) as box:
+            until = time.monotonic() + PATIENCE_S
+            while not (widget.levels and widget.levels[DIMMER] == 255 and widget.levels[PAR] == 255):
+                assert time.monotonic() < until, box.words
+                time.sleep(0.05)
+            box.await_words("Universe 2 has no wire: second stay dark.")
+            assert box.end() == 0
+        assert widget.levels is not None and not any(widget.levels)
+
+
+def test_another_show_in_the_same_box_lights_its_own_rig(tmp_path: Path) -> None:
+    first = show_with(tmp_path / "first", DARK)
+    other = {
+        "fixtures": [{"name": "lamp", "profile": "dimmer", "address": 512}],
+        "mappings": [{"name": "on", "rules": [{"reads": "steady", "drives": "dimmer"}]}],
+    }
+    second = show_with(tmp_path / "second", other)
+    with (
+        node() as (lamp, port),
+        playing(first, tmp_path, settings=artnet(port, 1), command=ALONE) as box,
+        LightsProcess(tmp_path) as lights,
+    ):
+        lamp.await_dance()
+        box.command[box.command.index(str(first))] = str(second)
+        box.kill_and_restart()
+        lamp.await_levels(lambda levels: levels[511] == 255 and not any(levels[:511]))
+        assert lights.end() == 0
