@@ -17,7 +17,6 @@ from appliance.sensor.private_file import replace_private
 from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
 
-FILE_NAME = "projector.alignment"
 _HEADER = (
     "# How the picture lies on the wall; written by bunraku project, corners clockwise from the top left.\n"
 )
@@ -46,6 +45,12 @@ def alignment_folder(
     return Path(environment.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "bunraku"
 
 
+def file_name(config: ProjectorConfig) -> str:
+    """Two projectors side by side on one box lie each in its own way."""
+    side = "" if config.edge_blend is None else f"-{config.edge_blend.part}"
+    return f"projector{side}.alignment"
+
+
 class AlignmentFile:
     """Keeps an alignment in a file, which is replaced as a whole by a thread of its own: pictures never wait.
 
@@ -54,7 +59,7 @@ class AlignmentFile:
     """
 
     def __init__(self, folder: Path, config: ProjectorConfig, say: Callable[[str], None]) -> None:
-        self.path = folder / FILE_NAME
+        self.path = folder / file_name(config)
         self._from_box, self._say = Alignment(WHOLE, config.mirror, config.brightness), say
         self._kept = self._wanted = self._load()
         self._is_wanted = threading.Event()

@@ -183,8 +183,8 @@ def _about_software(rate: float, wanted: float, renderer: str) -> str:
     seen = "The audience sees a jerky dance." if rate < _SMOOTH * wanted else "The audience sees the dance."
     return (
         f"No graphics card draws here but the processor ({renderer}): about {rate:.0f} of {wanted:.0f} "
-        f"pictures a second. {seen} Use a machine with a graphics card and its driver, or a smaller `picture` "
-        "in the projector's part of the box file."
+        f"pictures a second. {seen} Use a machine with a graphics card and its driver, or a smaller "
+        "`picture` in the projector's part of the box file."
     )
 
 

@@ -14,9 +14,9 @@ Size = Annotated[
 
 
 class EdgeBlendConfig(Section):
-    """Two projectors side by side, each on a box of its own, whose pictures overlap and melt together."""
+    """Two projectors side by side, each with a box file of its own, whose pictures melt together."""
 
-    part: Literal["left", "right"] = Field(description="Which part of the wide picture this box shows.")
+    part: Literal["left", "right"] = Field(description="Which part of the wide picture this projector shows.")
     overlap: float = Field(
         default=0.15,
         ge=0.01,

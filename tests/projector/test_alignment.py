@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from appliance.projector.alignment import FILE_NAME, Alignment, AlignmentFile, alignment_folder
+from appliance.projector.alignment import Alignment, AlignmentFile, alignment_folder, file_name
 from appliance.show.box import BoxConfig
-from appliance.show.projector import ProjectorConfig
+from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 
+FILE_NAME = "projector.alignment"
 PINNED = Alignment(((0.1, 0.05), (0.9, 0.1), (1.0, 1.0), (1 / 3, 0.9)), True, 0.8)
 
 
@@ -99,3 +100,12 @@ def test_where_it_is_kept(tmp_path: Path) -> None:
     assert alignment_folder(BoxConfig(), tmp_path / "box.yaml") == tmp_path
     assert alignment_folder(BoxConfig(), None, {"XDG_STATE_HOME": "/kept"}) == Path("/kept/bunraku")
     assert alignment_folder(BoxConfig(), None, {}) == Path.home() / ".local" / "state" / "bunraku"
+
+
+def test_two_projectors_of_one_box_have_a_file_each() -> None:
+    names = {file_name(ProjectorConfig(edge_blend=EdgeBlendConfig(part=part))) for part in ("left", "right")}
+    assert names | {file_name(ProjectorConfig())} == {
+        "projector.alignment",
+        "projector-left.alignment",
+        "projector-right.alignment",
+    }
