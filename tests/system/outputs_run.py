@@ -261,7 +261,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         figures = measure(60.0 * options.minutes, Path(name))
     wrong = faults(figures)
-    print("\n".join([*table(figures), *(f"FAIL  {words}" for words in wrong)] or ["ok"]))
+    print("\n".join([*table(figures), *([f"FAIL  {words}" for words in wrong] or ["ok"])]))
     if options.report is not None:
         options.report.mkdir(parents=True, exist_ok=True)
         (options.report / "outputs.json").write_text(
