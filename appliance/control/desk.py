@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from appliance.control.command import Command, command
 from appliance.control.errands import Errands
 from appliance.control.house import House
-from appliance.control.house_commands import CHANGES, in_cue, known, next_cue, of_this_show
+from appliance.control.house_commands import CHANGES, PARTS, in_cue, known, next_cue, of_this_show
 from appliance.control.key_file import KeyFile
 from appliance.control.orders import Order, Place
 from appliance.control.packet import Message, messages_in, readable
@@ -78,6 +78,8 @@ class Desk:
         self._tell, self._publish = tell, publish
         self._standstill = Standstill(sight, errands)
         self._generation = -1
+        self._heard = 0
+        self._set_by = dict.fromkeys(PARTS, 0)  # the newest command that has set it
 
     def hear(self, received: bytes, asker: Address, now: float) -> None:
         """Carry out what one datagram asks for; never raises, whatever it is."""
@@ -115,6 +117,7 @@ class Desk:
 
     def _carry_out(self, order: Command, asker: Address, now: float) -> None:
         """Raises ValueError for what cannot be done."""
+        self._heard += 1
         address = order.address
         if address == "/ping":
             self._tell(asker, (PONG,))
@@ -135,18 +138,22 @@ class Desk:
         if order.address == "/go":
             self._standstill.go(self.house, now)
         self._set(house)
+        self._set_by |= {part: self._heard for part in PARTS if order.address == f"/{part}"}
         self._end(asker, order.address, True, words)
 
     def _cue(self, order: Command, asker: Address, now: float) -> None:
-        """The stage first; picture and lights follow when it has done its part."""
+        """The stage first; when it has done its part, picture and lights follow, if nothing newer was said."""
         facts = self._sight.facts
         names = None if facts is None else [cue["name"] for cue in facts.cues]
         name = known("cue", order.text, names) if order.text else next_cue(self.house, facts)
         cue = next(cue for cue in facts.cues if cue["name"] == name) if facts else {}
+        heard = self._heard
 
         def then(done: bool, words: str) -> None:
             if done:
-                self._set(in_cue(self.house, cue, now))
+                parts = [part for part in PARTS if self._set_by[part] <= heard]
+                self._set_by |= dict.fromkeys(parts, heard)
+                self._set(in_cue(self.house, cue, parts, now))
             self._end(asker, "/cue", done, f"Cue {name}. {words}".rstrip() if done else words)
 
         self._errands.begin("stage", Order("cue", text=name), now, then)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -80,15 +80,19 @@ CHANGES: dict[str, Change] = {
 }
 
 
-def in_cue(house: House, cue: Mapping[str, Any], now: float) -> House:
-    """The house in a cue that the stage has carried out; what the cue leaves out stays as it is."""
+PARTS = ("look", "lights", "master")  # of the house, that cues set
+
+
+def in_cue(house: House, cue: Mapping[str, Any], parts: Collection[str], now: float) -> House:
+    """The house in a cue that the stage has carried out; of PARTS, only `parts` and what the cue names."""
     fade_s = float(cue["fade_s"])
-    if cue.get("look"):
-        house = house.with_look(cue["look"], now, fade_s)
-    if cue.get("lights"):
-        house = house.with_lights(cue["lights"], now, fade_s)
-    if cue.get("master") is not None:
-        house = house.with_master(float(cue["master"]), now, fade_s)
+    wanted = {part: cue[part] for part in parts if cue.get(part) is not None}
+    if "look" in wanted:
+        house = house.with_look(wanted["look"], now, fade_s)
+    if "lights" in wanted:
+        house = house.with_lights(wanted["lights"], now, fade_s)
+    if "master" in wanted:
+        house = house.with_master(float(wanted["master"]), now, fade_s)
     return replace(house, cue=cue["name"])
 
 

@@ -178,6 +178,21 @@ def test_a_cue_that_the_stage_refuses_or_does_not_hear_changes_nothing(
     assert house(folder) == House()
 
 
+def test_what_is_said_after_a_cue_wins_over_it_however_long_the_stage_takes(
+    folder: Path, stage: StageDouble, asker: Asker
+) -> None:
+    stage.obeys = False
+    asker.tell("/look", "lines")
+    asker.tell("/cue", "storm")
+    asker.tell("/master", 0.25)
+    asker.tell("/cue", "1")
+    assert [asker.hear()[1] for _ in range(2)] == ["/look", "/master"]  # type: ignore[index]
+    stage.obeys = True
+    assert [asker.hear()[3] for _ in range(2)] == ["Cue storm. cue it is.", "Cue 1. cue it is."]  # type: ignore[index]
+    now = house(folder)
+    assert (now.cue, now.look, now.lights, now.master) == ("1", "lines", "cold", 0.25)
+
+
 def test_cues_follow_each_other(folder: Path, stage: StageDouble, asker: Asker) -> None:
     assert [asker.ask("/cue")[3] for _ in range(2)] == ["Cue 1. cue it is.", "Cue storm. cue it is."]
     _, _, done, words = asker.ask("/cue")

@@ -1,0 +1,391 @@
+"""Show control and the real box: real OSC tools, a stage that hangs, spins or is killed, floods, restarts."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from appliance.control.house import House, HouseReader
+from appliance.stage.journal import read_journal
+from hw_sim.peers import HOST, free_ports
+from tests.control.doubles import Asker, until
+from tests.stage.bundles import write_show
+from tests.system.box import PATIENCE_S, PLAY, Box, is_free, playing
+
+pytestmark = pytest.mark.realtime
+
+JOURNAL = {"journal": {"file": "run.journal", "minutes": 1}}
+CUES: list[dict[str, Any]] = [
+    {"name": "calm", "iterations": [2, 1], "look": "lines", "fade_s": 0.1},
+    {"name": "storm", "iterations": [4, 3], "hands": [], "look": "ink", "master": 0.5, "fade_s": 0.1},
+]
+# Becomes a box whose 100th tick never ends.
+SPINNING = (
+    sys.executable,
+    "-c",
+    "import sys\n"
+    "from appliance.cli import main\n"
+    "from appliance.stage.tick import Tick\n"
+    "run = Tick.run\n"
+    "def spin(self, slot):\n"
+    "    run(self, slot)\n"
+    "    while slot.tick >= 100: pass\n"
+    "Tick.run = spin\n"
+    "main(['play', *sys.argv[1:]])",
+)
+
+
+@pytest.fixture(scope="module")
+def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = write_show(tmp_path_factory.mktemp("bundle") / "show")
+    settings = yaml.safe_load((folder / "show.yaml").read_text())
+    (folder / "show.yaml").write_text(yaml.safe_dump(settings | {"cues": CUES}))
+    return folder
+
+
+def house(folder: Path) -> House:
+    with contextlib.closing(HouseReader(folder / "runtime")) as reader:
+        return reader.read()
+
+
+@contextlib.contextmanager
+def asking(box: Box) -> Iterator[Asker]:
+    """Once show control answers: it starts after the first tick."""
+    until(lambda: answers(box.control))
+    with contextlib.closing(Asker(box.control)) as asker:
+        yield asker
+
+
+def answers(port: int) -> bool:
+    """Whether a ping is answered: a flood may drop one, and before the start there is no port."""
+    with contextlib.closing(Asker(port)) as asker, contextlib.suppress(ConnectionRefusedError):
+        asker.tell("/ping")
+        return asker.hear(0.5) == ["/pong"]
+    return False
+
+
+def status(asker: Asker) -> dict[str, Any]:
+    """The first arguments of /bunraku/status by name, and the later ones that tests look at."""
+    message, _ = asker.ask_all("/status")
+    names = {1: "state", 9: "coding", 10: "interaction", 13: "cue", 14: "look", 16: "level", 17: "panic"}
+    return {name: message[place] for place, name in names.items()}
+
+
+def children_of(pid: int) -> list[int]:
+    done = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False
+    )
+    return [int(word) for word in done.stdout.split()]
+
+
+@pytest.mark.skipif(not shutil.which("oscsend"), reason="liblo-tools is not installed")
+def test_real_osc_tools_command_the_box_and_hear_its_heartbeat(show: Path, tmp_path: Path) -> None:
+    [heart] = free_ports(1)
+    heard = tmp_path / "heard.txt"
+    with heard.open("wb") as out:
+        listener = subprocess.Popen(["stdbuf", "-oL", "oscdump", str(heart)], stdout=out)
+    try:
+        [port] = free_ports(1)
+        control = {"host": HOST, "port": port, "heartbeat": [{"host": HOST, "port": heart}]}
+        with playing(show, tmp_path, settings={"control": control, **JOURNAL}) as box:
+            box.control = port
+            box.frames(1)
+
+            def send(*words: str) -> None:
+                subprocess.run(["oscsend", HOST, str(port), *words], check=True)
+
+            def says(*words: str) -> bool:
+                lines = [line for line in heard.read_text().splitlines() if "/bunraku/status" in line]
+                return any(all(word in line for word in words) for line in lines)
+
+            until(lambda: says('"dancing" "A test"'))
+            send("/iterations", "ii", "5", "4")
+            send("/cue", "s", "storm")
+            send("/master", "f", "0.25")
+            until(lambda: says('"dancing"', '"storm" "ink"', " 0.250000 0 0 "))
+            send("/blackout", "T")
+            until(lambda: says('"blackout"'))
+            send("/panic")
+            until(lambda: says('"panic"'))
+            send("/blackout", "F")
+            send("/go")
+            send("/stop", "f", "0.1")
+            until(lambda: says('"stopped"'))
+            box.frames(20)
+            assert box.end() == 0
+        beats = [
+            float.fromhex(f"0x{seconds}.{fraction}")
+            for seconds, fraction in re.findall(r"^(\w{8})\.(\w{8}) /bunraku/status", heard.read_text(), re.M)
+        ]
+        assert np.median(np.diff(beats)) == pytest.approx(1.0, abs=0.2)
+    finally:
+        listener.terminate()
+        listener.wait()
+    ticks = read_journal(tmp_path / "run.journal").ticks
+    assert (4, 3) in set(zip(ticks["coding_iterations"], ticks["interaction_iterations"], strict=True))
+    np.testing.assert_array_equal(ticks["pose"][-1], ticks["pose"][-2])  # the phrase stands still
+
+
+def test_cues_stop_and_go_reach_the_dance_and_are_answered(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, settings=JOURNAL) as box, asking(box) as asker:
+        assert asker.ask("/cue")[2:] == [1, "Cue calm."]
+        assert asker.ask("/cue")[2:] == [1, "Cue storm."]
+        assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0]
+        until(lambda: (status(asker)["coding"], status(asker)["interaction"]) == (4, 3))
+        now = status(asker)
+        assert (now["state"], now["cue"], now["look"], round(now["level"], 3)) == (
+            "dancing",
+            "storm",
+            "ink",
+            0.5,
+        )
+        assert "Did you mean 'storm'?" in asker.ask("/cue", "strom")[3]
+        assert "Did you mean 'lShldr'?" in asker.ask("/hold", "lSholder", 1)[3]
+        assert asker.ask("/hold", "lShldr", 1)[2] == 1
+        asker.ask("/stop", 0)
+        until(lambda: status(asker)["state"] == "stopped")
+        box.receiver.poll()
+        box.frames(30)
+        assert asker.ask("/go")[2] == 1
+        box.receiver.poll()
+        box.frames(60)
+        assert box.end() == 0
+    poses = read_journal(tmp_path / "run.journal").ticks["pose"]
+    moves = np.abs(np.diff(poses, axis=0)).max(axis=(1, 2)) > 0
+    still = np.flatnonzero(~moves)
+    assert len(still) >= 5  # it stood
+    assert moves[still[-1] + 1 :].sum() > 20  # and went on
+    assert "Traceback" not in box.words
+
+
+def hangs(box: Box) -> None:
+    box.process.send_signal(signal.SIGSTOP)
+
+
+def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path) as box, asking(box) as asker:
+        box.frames(20)
+        hangs(box)
+        assert asker.ask("/panic")[2] == 1
+        assert house(tmp_path).panic
+        until(lambda: status(asker)["state"] == "hung")
+        assert status(asker)["panic"] == 1
+        assert "The stage does not answer" in asker.ask("/cue", "storm")[3]
+        assert "The stage does not answer" in asker.ask("/iterations", 9, 9)[3]
+        box.process.send_signal(signal.SIGCONT)
+        box.frames(20)
+        until(lambda: status(asker)["state"] == "panic")
+        assert house(tmp_path).panic
+        now = status(asker)
+        assert (now["cue"], now["coding"]) == ("", 3)  # what was told not to be done is not done later
+        assert asker.ask("/go")[2] == 1
+        assert status(asker)["state"] == "dancing"
+        assert box.end() == 0
+
+
+def test_panic_works_while_the_stage_spins(show: Path, tmp_path: Path) -> None:
+    settings = {"realtime": {"enabled": False}}  # it would take a whole core of the tests' machine
+    with playing(show, tmp_path, command=SPINNING, settings=settings) as box, asking(box) as asker:
+        until(lambda: status(asker)["state"] == "hung")
+        assert asker.ask("/panic")[2] == 1
+        assert house(tmp_path).panic
+        box.process.kill()
+
+
+def test_a_killed_box_leaves_nobody_behind_and_panic_is_in_force_when_it_comes_back(
+    show: Path, tmp_path: Path
+) -> None:
+    with playing(show, tmp_path) as box:
+        with asking(box) as asker:
+            [control] = children_of(box.process.pid)
+            asker.ask("/cue", "storm")
+            asker.ask("/panic")
+        box.end(signal.SIGKILL)
+        until(lambda: is_free(box.control))
+        until(lambda: not Path(f"/proc/{control}").exists())
+        box.kill_and_restart()
+        with asking(box) as asker:
+            box.await_words("Panic is still in force")
+            box.await_words("The show goes on in the cue 'storm'.")
+            assert status(asker)["panic"] == 1
+            assert asker.ask("/panic", 0)[2] == 1
+            until(lambda: status(asker)["state"] == "dancing")
+            assert status(asker)["cue"] == "storm"
+            assert box.end() == 0
+    assert "Traceback" not in box.words
+
+
+def test_a_show_that_ends_as_usual_leaves_nothing_in_force(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path) as box:
+        with asking(box) as asker:
+            asker.ask("/panic")
+        assert box.end() == 0
+        assert house(tmp_path) == House()
+        assert is_free(box.control)
+        assert os.listdir(tmp_path / "runtime") == ["stage.lock"]  # noqa: PTH208
+
+
+def test_show_control_that_is_killed_comes_back_and_misses_nothing(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path) as box, asking(box) as asker:
+        asker.ask("/panic")
+        [control] = children_of(box.process.pid)
+        os.kill(control, signal.SIGKILL)
+        asker.tell("/master", 0.5)  # the port is there all the time
+        assert asker.hear()[:3] == ["/reply", "/master", 1]  # type: ignore[index]
+        assert house(tmp_path).panic
+        assert house(tmp_path).master == 0.5
+        assert children_of(box.process.pid) != [control]
+        assert box.end() == 0
+    assert "Show control was killed (signal 9)." in box.words
+    assert "Panic is still in force" in box.words
+
+
+def test_a_flood_does_not_touch_the_dance(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, settings=JOURNAL) as box, asking(box):
+        flood = Asker(box.control)
+        before = box.frames(1)[0][0]
+        for number in range(20_000):
+            flood.tell(*(("/player/jump", 0.5), ("/iterations", 3, 2), ("/nonsense",))[number % 3])
+        frames = box.frames(50)
+        until(lambda: answers(box.control))
+        assert box.end() == 0
+        flood.close()
+    numbers = [frame[0] for frame in frames]
+    assert numbers == sorted(set(numbers))
+    assert numbers[-1] > before
+    ticks = read_journal(tmp_path / "run.journal").ticks
+    assert float(np.median(ticks["sections_ms"].sum(axis=1))) < 20.0
+    assert "refused, the last one" in box.words
+    assert "Traceback" not in box.words
+
+
+@contextlib.contextmanager
+def process(command: Sequence[str], words: Path, **more: Any) -> Iterator[subprocess.Popen[bytes]]:
+    with words.open("ab") as out:
+        one = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, **more
+        )
+    try:
+        yield one
+    finally:
+        one.kill()
+        one.wait()
+
+
+def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_both(
+    show: Path, tmp_path: Path
+) -> None:
+    """As units of their own: `bunraku play --alone` and `bunraku control`."""
+    control = [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")]
+    with playing(show, tmp_path, "--alone") as box:
+        box.frames(1)
+        assert "commands on no port" in box.words
+        with process(control, tmp_path / "control.txt") as first:
+            with asking(box) as asker:
+                until(lambda: status(asker)["state"] == "dancing")
+                box.end(signal.SIGKILL)
+                until(lambda: status(asker)["state"] == "absent")
+                assert asker.ask("/panic")[2] == 1
+                box.kill_and_restart()
+                until(lambda: status(asker)["state"] == "panic")
+            first.send_signal(signal.SIGKILL)
+            first.wait()
+        assert house(tmp_path).panic
+        with process(control, tmp_path / "control.txt") as second, asking(box) as asker:
+            assert status(asker)["state"] == "panic"
+            with process(control, tmp_path / "third.txt") as third:
+                assert third.wait(PATIENCE_S) == 2
+            assert "cannot be opened for commands" in (tmp_path / "third.txt").read_text()
+            second.send_signal(signal.SIGTERM)
+            assert second.wait(PATIENCE_S) == 0
+        assert is_free(box.control)
+        assert box.end() == 0
+        assert house(tmp_path).panic  # nobody ended the show: its units were stopped
+    assert "Traceback" not in (tmp_path / "control.txt").read_text()
+
+
+def test_a_socket_that_systemd_has_opened_is_taken(tmp_path: Path) -> None:
+    """The protocol of sd_listen_fds: the socket is descriptor 3, the variables name this process."""
+    (tmp_path / "box.yaml").write_text("runtime: runtime\ncontrol: {port: 1}\n")
+    starter = (
+        "import os, socket, sys\n"
+        "one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)\n"
+        "one.bind(('127.0.0.1', 0))\n"
+        "print(one.getsockname()[1], flush=True)\n"
+        "os.dup2(one.fileno(), 3)\n"
+        "os.set_inheritable(3, True)\n"
+        "os.environ.update(LISTEN_PID=str(os.getpid()), LISTEN_FDS='1')\n"
+        "os.execv(sys.executable, [sys.executable, '-m', 'appliance.cli', 'control', '--box', sys.argv[1]])\n"
+    )
+    command = [sys.executable, "-c", starter, str(tmp_path / "box.yaml")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as started:
+        assert started.stdout is not None
+        asker = Asker(int(started.stdout.readline()))
+        assert asker.ask("/ping") == ["/pong"]
+        asker.close()
+        started.terminate()
+        assert started.wait(PATIENCE_S) == 0
+
+
+@pytest.mark.parametrize(
+    ("box", "complaint"),
+    [
+        ("control: null\n", "nobody commands this box"),
+        ("control: {host: 0.0.0.0}\n", "box.yaml:1: Commands are heard on 0.0.0.0, but from nobody"),
+        ("control:\n  senders: [192.168.4.300]\n", "box.yaml:2: '192.168.4.300' is neither"),
+        ("control: {heartbeat: [{port: 0}]}\n", "box.yaml:1: 'control.heartbeat[0].port' is 0"),
+        ("control: {sender: []}\n", "Did you mean 'senders'?"),
+    ],
+)
+def test_what_is_wrong_with_its_settings_is_one_clear_line(tmp_path: Path, box: str, complaint: str) -> None:
+    (tmp_path / "box.yaml").write_text(box)
+    done = subprocess.run(
+        [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert complaint in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_window_that_nobody_reads_and_a_stopped_terminal_hold_up_no_panic(
+    show: Path, tmp_path: Path
+) -> None:
+    """Who reads what the box says may stop reading: a full pipe stops nobody."""
+    reading, writing = os.pipe()
+    [port] = free_ports(1)
+    (tmp_path / "box.yaml").write_text(yaml.safe_dump({"runtime": "runtime", "control": {"port": port}}))
+    command = [*PLAY, "--show", str(show), "--box", str(tmp_path / "box.yaml")]
+    box_words = b"x" * 4096
+    os.set_blocking(writing, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writing, box_words)
+    os.set_blocking(writing, True)
+    running = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=writing, stderr=subprocess.DEVNULL)
+    try:
+        until(lambda: answers(port))
+        asker = Asker(port)
+        assert asker.ask("/panic")[2] == 1
+        asker.close()
+        running.terminate()
+        assert running.wait(PATIENCE_S) == 0
+    finally:
+        running.kill()
+        running.wait()
+        os.close(reading)
+        os.close(writing)
