@@ -142,7 +142,7 @@ class Desk:
         self._end(asker, order.address, True, words)
 
     def _cue(self, order: Command, asker: Address, now: float) -> None:
-        """The stage first; when it has done its part, picture and lights follow, if nothing newer was said."""
+        """The stage first; then picture and lights follow, where nothing newer was said about them."""
         facts = self._sight.facts
         names = None if facts is None else [cue["name"] for cue in facts.cues]
         name = known("cue", order.text, names) if order.text else next_cue(self.house, facts)
