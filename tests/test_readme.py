@@ -13,7 +13,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ("README.md", "docs/choreographer.md", "docs/dancer.md", "docs/technician.md", "docs/touring.md")
+PAGES = (
+    "README.md",
+    *(f"docs/{page}.md" for page in ("choreographer", "dancer", "lights", "technician", "touring")),
+)
 RECURSIVE = re.compile(r"^make (test|bench|lock|clean)\b")  # would run these tests in these tests
 
 

@@ -100,6 +100,7 @@ class _View:
                 fontsize=12,
                 ha="center",
                 zorder=8,
+                bbox={"facecolor": FLOOR, "edgecolor": "none", "pad": 3},
             )
         else:
             axes.axhline(0, color=AUDIENCE, lw=1.5, zorder=1)
