@@ -18,18 +18,24 @@ _UP = np.array([0.0, 1.0, 0.0])
 
 
 class Anatomy:
-    """The parts of a skeleton of any kind, from its shape; names matter for the head alone."""
+    """The parts of a skeleton of any kind, from its shape; names matter for the head and for left and right.
 
-    def __init__(self, skeleton: Skeleton) -> None:
+    pose: (J, 4) local rotations in which the body is modelled; left out: the rest pose.
+    """
+
+    def __init__(self, skeleton: Skeleton, pose: Array | None = None) -> None:
         self.skeleton = skeleton
         joints = len(skeleton)
-        self.world = np.tile(quaternion.IDENTITY.astype(float), (joints, 1))
-        self.positions, self.world = skeleton.forward_kinematics(self.world, np.zeros(3))
+        rest = np.tile(quaternion.IDENTITY.astype(float), (joints, 1))
+        self.positions, self.world = skeleton.forward_kinematics(rest if pose is None else pose, np.zeros(3))
         self.children: list[list[int]] = [[] for _ in range(joints)]
         for joint, parent in enumerate(skeleton.parents):
             if parent >= 0:
                 self.children[parent].append(joint)
-        self.tips = [(joint, self.positions[joint] + np.array(offset)) for joint, offset in skeleton.ends]
+        self.tips = [
+            (joint, self.positions[joint] + quaternion.rotate(self.world[joint], np.array(offset)))
+            for joint, offset in skeleton.ends
+        ]
         points = np.vstack([self.positions, *(tip for _, tip in self.tips)])
         self.height = float(np.ptp(points, axis=0).max()) or 1.0
         self.reach = self._reaches()
@@ -39,6 +45,11 @@ class Anatomy:
     def length(self, joint: int) -> float:
         """Metres from the parent joint."""
         return float(np.linalg.norm(self.skeleton.offsets[joint]))
+
+    def thickness(self, joint: int) -> float:
+        """Radius of a limb at a joint, metres: thick where much hangs below."""
+        share = self.reach[joint] / self.height
+        return float(self.height * min(0.0165 + 0.078 * share * share, 0.050))
 
     def below(self, joint: int) -> list[int]:
         """All joints that hang below one."""
@@ -95,7 +106,9 @@ class Anatomy:
 
     @cached_property
     def across(self) -> Array:
-        """Unit vector to the dancer's side: along which pairs of limbs lie apart; (3,)."""
+        """Unit vector to the dancer's left: along which pairs of limbs lie apart; (3,).
+
+        Where no name tells left from right, to the positive side."""
         total = np.zeros(3)
         for joint in self.trunk:
             starts = [
@@ -110,6 +123,12 @@ class Anatomy:
                     total += apart if float(apart @ (total if total.any() else apart)) >= 0 else -apart
         length = float(np.linalg.norm(total))
         side = total / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+        left = sum(
+            float(self.positions[joint] @ side) * _sidedness(self.skeleton.names[joint])
+            for joint in range(len(self.skeleton))
+        )
+        if abs(left) > 1e-3 * self.height:
+            return side if left > 0 else -side
         return side if side[int(np.argmax(np.abs(side)))] > 0 else -side
 
     @cached_property
@@ -160,3 +179,12 @@ class Anatomy:
                 trunk.add(joint)
                 joint = self.skeleton.parents[joint]
         return sorted(trunk)
+
+
+def _sidedness(name: str) -> int:
+    """1 for names of the left, -1 of the right, 0 for what is in the middle or does not say."""
+    folded = name.rpartition(":")[2]
+    for number, (word, letter) in ((1, ("left", "l")), (-1, ("right", "r"))):
+        if word in folded.casefold() or (folded[:1].casefold() == letter and folded[1:2].isupper()):
+            return number
+    return 0

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.anatomy import Anatomy
 from appliance.projector.sculpture import sculpture
 from appliance.projector.skinning import BodyMesh, weights_of
 from appliance.projector.surface import surface_of
+from appliance.projector.unfolding import anatomy_of
 from appliance.projector.volumes import sampled
 
 SPACING = 0.0065  # of the height between samples: about 14,000 vertices for a figure with fingers
@@ -14,7 +14,7 @@ SPACING = 0.0065  # of the height between samples: about 14,000 vertices for a f
 
 def body_mesh(skeleton: Skeleton) -> BodyMesh:
     """The figure's surface; takes a good half second, once."""
-    anatomy = Anatomy(skeleton)
+    anatomy = anatomy_of(skeleton)
     trunk, limbs = sculpture(anatomy)
     field, grid = sampled(trunk, limbs, SPACING * anatomy.height)
     vertices, normals, faces = surface_of(field, grid)

@@ -33,12 +33,6 @@ def sculpture(anatomy: Anatomy) -> tuple[Group, list[Group]]:
     return trunk, [*limbs, *_twigs(anatomy, covered)]
 
 
-def thickness(anatomy: Anatomy, joint: int) -> float:
-    """Radius of a limb at a joint, metres: thick where much hangs below."""
-    share = anatomy.reach[joint] / anatomy.height
-    return float(anatomy.height * min(0.0165 + 0.078 * share * share, 0.050))
-
-
 def cone(
     anatomy: Anatomy, owner: int, start: Array, end: Array, radii: tuple[float, float], softness: float
 ) -> Slab:
@@ -51,7 +45,7 @@ def _trunk(anatomy: Anatomy) -> list[Slab]:
     places, height = anatomy.positions, anatomy.height
     spine = _spine(anatomy)
     if len(spine) < 2:
-        ball = min(thickness(anatomy, spine[0]), 0.045 * height)
+        ball = min(anatomy.thickness(spine[0]), 0.045 * height)
         return [cone(anatomy, spine[0], places[spine[0]], places[spine[0]], (ball, ball), 0.0)]
     ends = [places[joint] for joint in spine]
     lengths = [float(np.linalg.norm(b - a)) for a, b in pairwise(ends)]
@@ -122,7 +116,7 @@ def _limb(anatomy: Anatomy, trunk: int, first: int) -> Group:
 def _bone(anatomy: Anatomy, joint: int, child: int, is_leg: bool) -> list[Slab]:
     """A muscle from the joint to below its middle, and the taper to the next joint."""
     start, end = anatomy.positions[joint], anatomy.positions[child]
-    first, last = thickness(anatomy, joint), thickness(anatomy, child)
+    first, last = anatomy.thickness(joint), anatomy.thickness(child)
     belly = start + 0.32 * (end - start)
     if is_leg and anatomy.reach[child] < 0.5 * anatomy.reach[joint]:
         belly = belly - 0.010 * anatomy.height * anatomy.forward  # the calf lies behind the bone
@@ -138,7 +132,7 @@ def _root_of_limb(anatomy: Anatomy, trunk: int, chain: Sequence[int], is_leg: bo
     """What joins a limb to the trunk: shoulder girdle and chest muscle, or hip and seat."""
     places, height = anatomy.positions, anatomy.height
     start = places[chain[-1]]
-    thick = thickness(anatomy, chain[-1])
+    thick = anatomy.thickness(chain[-1])
     owner = chain[-2] if len(chain) > 1 else trunk
     inner = start - anatomy.across * 0.6 * float((start - places[trunk]) @ anatomy.across)
     if is_leg:
@@ -180,12 +174,12 @@ def _twigs(anatomy: Anatomy, covered: set[int]) -> list[Group]:
     """Everything else that has bones: tails, ears, wings."""
     face = set(anatomy.below(anatomy.head)) if anatomy.head is not None else set()
     left = [joint for joint in range(len(anatomy.skeleton)) if joint not in covered | face]
-    bones = [(*bone, thickness(anatomy, bone[0])) for bone in anatomy.bones(left)]
+    bones = [(*bone, anatomy.thickness(bone[0])) for bone in anatomy.bones(left)]
     for joint in sorted({bone[0] for bone in bones}):
         parent = anatomy.skeleton.parents[joint]
         if parent in covered:
             start, end = anatomy.positions[parent], anatomy.positions[joint]
-            bones.append((parent, start, end, thickness(anatomy, joint)))
+            bones.append((parent, start, end, anatomy.thickness(joint)))
     return [
         Group((cone(anatomy, owner, start, end, (thick, 0.8 * thick), 0.0),), 0.015 * anatomy.height)
         for owner, start, end, thick in bones

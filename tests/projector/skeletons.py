@@ -86,15 +86,40 @@ def one_joint() -> Skeleton:
     return built([("thing", None, (0, 0, 0))], {"thing": (0, 0.5, 0)})
 
 
+def bvh_skeleton(path: Path) -> Skeleton:
+    """The skeleton of a recording."""
+    return read_bvh(path, metres_per_unit=0.01).skeleton
+
+
+def all_along_x() -> Skeleton:
+    """At rest every bone points along x, as in some recordings; the motion alone says how it stands."""
+    bones: list[Bone] = [
+        ("Hips", None, (0, 0, 0)),
+        ("Spine", "Hips", (0.07, -0.06, 0)),
+        ("Spine1", "Spine", (0.125, 0, 0)),
+        ("Spine2", "Spine1", (0.125, 0, 0)),
+        ("Neck", "Spine2", (0.25, 0, 0)),
+        ("Head", "Neck", (0.12, 0, 0)),
+    ]
+    for side, z in (("Left", 1), ("Right", -1)):
+        bones += [
+            (f"{side}UpLeg", "Hips", (0, 0.02, 0.11 * z)),
+            (f"{side}Leg", f"{side}UpLeg", (0.43, 0, 0)),
+            (f"{side}Foot", f"{side}Leg", (0.42, 0, 0)),
+            (f"{side}Toe", f"{side}Foot", (0.17, 0, 0)),
+            (f"{side}Shoulder", "Spine2", (0.12, 0.01, 0.05 * z)),
+            (f"{side}Arm", f"{side}Shoulder", (0.11, 0, 0)),
+            (f"{side}ForeArm", f"{side}Arm", (0.33, 0, 0)),
+            (f"{side}Hand", f"{side}ForeArm", (0.25, 0, 0)),
+        ]
+    return built(bones)
+
+
 ALL = {
     "dancer": dancer,
     "toy": toy,
     "mixamo": mixamo,
     "quadruped": quadruped,
     "one joint": one_joint,
+    "all along x": all_along_x,
 }
-
-
-def bvh_skeleton(path: Path) -> Skeleton:
-    """The skeleton of a recording."""
-    return read_bvh(path, metres_per_unit=0.01).skeleton

@@ -89,6 +89,27 @@ def test_a_figure_has_the_size_of_a_body(name: str) -> None:
     assert agree.mean() > 0.995
 
 
+@pytest.mark.parametrize("name", ["dancer", "mixamo", "quadruped", "toy"])
+def test_a_rest_pose_with_room_is_the_one_that_is_modelled(name: str) -> None:
+    np.testing.assert_array_equal(
+        mesh_of(name).bind_world, np.tile([1, 0, 0, 0], (len(skeleton_of(name)), 1))
+    )
+
+
+def test_limbs_that_lie_in_each_other_at_rest_are_spread() -> None:
+    mesh, skeleton = mesh_of("all along x"), skeleton_of("all along x")
+    places = {name: mesh.bind_positions[skeleton.index(name)] for name in skeleton.names}
+    assert places["Head"][1] - places["Hips"][1] > 0.6
+    assert places["LeftFoot"][1] - places["Hips"][1] < -0.8
+    for one, other in (("LeftHand", "RightHand"), ("LeftHand", "Hips"), ("LeftFoot", "RightFoot")):
+        assert np.linalg.norm(places[one] - places[other]) > 0.2
+    front = mesh.bind_positions[skeleton.index("LeftToe")] - places["LeftFoot"]
+    left = places["LeftHand"] - places["RightHand"]
+    assert np.cross(left, [0, 1, 0]) @ front > 0, "the feet point backwards"
+    bones = np.linalg.norm(mesh.bind_positions[1:] - mesh.bind_positions[list(skeleton.parents[1:])], axis=1)
+    np.testing.assert_allclose(bones, np.linalg.norm(skeleton.offsets[1:], axis=1), atol=1e-5)
+
+
 @pytest.mark.parametrize("name", ["mixamo", "quadruped", "toy"])
 def test_a_symmetrical_skeleton_gives_a_symmetrical_body(name: str) -> None:
     vertices = mesh_of(name).vertices
@@ -114,9 +135,9 @@ def test_weights_are_shares_of_real_joints(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", skeletons.ALL)
-def test_without_a_turn_the_body_is_as_it_was_modelled(name: str) -> None:
-    mesh, skeleton = mesh_of(name), skeleton_of(name)
-    vertices, normals = skin(mesh, *turned(skeleton, {}))
+def test_in_the_pose_in_which_it_was_modelled_the_body_is_as_it_was(name: str) -> None:
+    mesh = mesh_of(name)
+    vertices, normals = skin(mesh, mesh.bind_positions, mesh.bind_world)
     np.testing.assert_allclose(vertices, mesh.vertices, atol=1e-5)
     np.testing.assert_allclose(normals, mesh.normals, atol=1e-5)
 
@@ -128,9 +149,10 @@ def test_every_joint_with_a_bone_moves_something(name: str) -> None:
     bones = {parent for joint, parent in enumerate(skeleton.parents) if skeleton.offsets[joint].any()}
     bones |= {joint for joint, _ in skeleton.ends}
     turn = quaternion.from_axis_angle([1, 1, 1], 0.5)
+    at_rest, _ = skin(mesh, *turned(skeleton, {}))
     for joint in sorted(bones - face - {-1}):
         vertices, _ = skin(mesh, *turned(skeleton, {joint: turn}))
-        moved = np.linalg.norm(vertices - mesh.vertices, axis=1)
+        moved = np.linalg.norm(vertices - at_rest, axis=1)
         assert moved.max() > 1e-3 * mesh.height, f"{skeleton.names[joint]} moves nothing"
 
 

@@ -1,0 +1,105 @@
+"""A pose to model a body in, for skeletons whose rest pose has limbs lying in each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.skeleton import Skeleton
+from appliance.projector.anatomy import Anatomy
+
+CROWDED_SHARE = 0.3  # of a limb's points: so many must lie in another part of the body
+CLEARANCE = 0.01  # of the height, between the surfaces of two limbs
+_UP = np.array([0.0, 1.0, 0.0])
+_DOWNWARDS = 0.35  # how steeply feet point to the floor
+
+
+def anatomy_of(skeleton: Skeleton) -> Anatomy:
+    """The parts of a skeleton in its rest pose; with spread limbs where the rest pose leaves them no room.
+
+    Some recordings have all bones along one axis at rest, and only their motion says how a body stands.
+    """
+    at_rest = Anatomy(skeleton)
+    if not is_crowded(at_rest):
+        return at_rest
+    upright = Anatomy(skeleton, _aimed(skeleton, _spine_aims(at_rest)))
+    return Anatomy(skeleton, _aimed(skeleton, {**_spine_aims(at_rest), **_limb_aims(upright)}))
+
+
+def is_crowded(anatomy: Anatomy) -> bool:
+    """Whether a limb lies in another limb or in the trunk for a good part of its length."""
+    chains = [anatomy.chain(first) for _, first in anatomy.limbs()]
+    beyond = [chain[anatomy.limb_start(chain) + 1 :] for chain in chains]
+    spine = [*anatomy.trunk, *anatomy.neck]
+    for number, limb in enumerate(beyond):
+        others = [spine, *beyond[:number], *beyond[number + 1 :]]
+        near = [any(_touches(anatomy, joint, other) for other in others) for joint in limb]
+        if near and np.mean(near) > CROWDED_SHARE:
+            return True
+    return False
+
+
+def _touches(anatomy: Anatomy, joint: int, others: Sequence[int]) -> bool:
+    """Whether a joint lies within the flesh of a chain of others."""
+    place = anatomy.positions[joint]
+    for start, end in zip(others, [*others[1:], *others[-1:]], strict=True):
+        bone = anatomy.positions[end] - anatomy.positions[start]
+        along = float((place - anatomy.positions[start]) @ bone) / max(float(bone @ bone), 1e-12)
+        away = place - anatomy.positions[start] - min(max(along, 0.0), 1.0) * bone
+        flesh = anatomy.thickness(joint) + anatomy.thickness(end) + CLEARANCE * anatomy.height
+        if float(np.linalg.norm(away)) < flesh:
+            return True
+    return False
+
+
+def _spine_aims(anatomy: Anatomy) -> dict[tuple[int, int], Array]:
+    """The spine and the neck upwards: for each bone (joint, child) where it should point."""
+    spine = [*anatomy.trunk, *anatomy.neck]
+    return {(spine[place - 1], spine[place]): _UP for place in range(1, len(spine))}
+
+
+def _limb_aims(anatomy: Anatomy) -> dict[tuple[int, int], Array]:
+    """Legs downwards, their feet to the front, arms to their sides; the spine is upright already."""
+    aims = {}
+    front = np.cross(anatomy.across, _UP)
+    for trunk, first in anatomy.limbs():
+        chain = anatomy.chain(first)
+        begin = anatomy.limb_start(chain)
+        start = anatomy.positions[chain[begin]] - anatomy.positions[trunk]
+        is_leg = trunk == anatomy.trunk[0] and len(anatomy.trunk) > 1
+        side = anatomy.across if float(start @ anatomy.across) >= 0.0 else -anatomy.across
+        for joint, child in zip(chain[begin:], chain[begin + 1 :], strict=False):
+            is_foot = is_leg and joint in anatomy.skeleton.feet
+            ahead = front - _DOWNWARDS * _UP
+            aims[joint, child] = ahead if is_foot else -_UP if is_leg else side
+    return aims
+
+
+def _aimed(skeleton: Skeleton, aims: dict[tuple[int, int], Array]) -> Array:
+    """Local rotations (J, 4) by which bones point where they should, each turned the shortest way."""
+    towards = {joint: (child, aim) for (joint, child), aim in aims.items()}
+    world = np.tile(quaternion.IDENTITY.astype(float), (len(skeleton), 1))
+    local = world.copy()
+    for joint, parent in enumerate(skeleton.parents):
+        above = world[parent] if parent >= 0 else quaternion.IDENTITY.astype(float)
+        world[joint] = above
+        if joint in towards:
+            child, aim = towards[joint]
+            bone = quaternion.rotate(above, skeleton.offsets[child])
+            world[joint] = quaternion.multiply(_shortest_turn(bone, aim), above)
+        local[joint] = quaternion.multiply(quaternion.inverse(above), world[joint])
+    return local
+
+
+def _shortest_turn(start: Array, end: Array) -> Array:
+    """The rotation (4,) from one direction to another."""
+    a, b = start / max(float(np.linalg.norm(start)), 1e-12), end / np.linalg.norm(end)
+    axis, cosine = np.cross(a, b), float(a @ b)
+    if cosine < -0.9999:  # the opposite way: about any axis across
+        axis = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 0.0, 1.0])
+    if float(np.linalg.norm(axis)) < 1e-9:
+        return quaternion.IDENTITY.astype(float)
+    return quaternion.from_axis_angle(axis, np.arccos(np.clip(cosine, -1.0, 1.0)))
