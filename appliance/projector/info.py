@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _REMEMBERED = 3600  # pictures whose age counts: a minute on most displays
-_COUNTED = 120  # pictures by which the rate is counted: two seconds
+_COUNTED_S = 2.0  # over which the rate is counted
 
 # Five rows of three pixels a letter, one octal digit a row.
 _SIGNS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ.,:-%/()_+"
@@ -63,12 +63,14 @@ class Meter:
     def __init__(self) -> None:
         self.pictures = 0
         self._ages_s: deque[float] = deque(maxlen=_REMEMBERED)
-        self._swaps: deque[float] = deque(maxlen=_COUNTED)
+        self._swaps: deque[float] = deque()
 
     def shown(self, swapped: float, left_stage: float | None) -> None:
         """A picture is on the wall since `swapped`; `left_stage` None: it does not show a dance."""
         self.pictures += 1
         self._swaps.append(swapped)
+        while self._swaps[-1] - self._swaps[0] > _COUNTED_S and len(self._swaps) > 2:
+            self._swaps.popleft()
         if left_stage is not None:
             self._ages_s.append(swapped - left_stage)
 

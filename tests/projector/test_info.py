@@ -40,6 +40,14 @@ def test_frame_ages_and_rate() -> None:
     assert "50.0 pictures/s" in figures.sentence()
 
 
+def test_the_rate_is_that_of_the_last_seconds() -> None:
+    meter = Meter()
+    meter.shown(0.0, None)
+    for k in range(60):
+        meter.shown(5 + k / 10, None)  # the first looks took a while
+    assert meter.figures().rate == pytest.approx(10)
+
+
 def test_pictures_without_a_dance_have_no_age() -> None:
     meter = Meter()
     assert meter.figures().rate == 0
