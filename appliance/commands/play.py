@@ -16,7 +16,6 @@ from appliance.commands.emulation import Emulation
 from appliance.commands.rehearsal import PICTURED_S, has_display, rehearsal_picture
 from appliance.control.house import forget_house
 from appliance.control.speaker import Speaker
-from appliance.outputs.runtime_folder import runtime_folder
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.show import Show, load_show
@@ -78,7 +77,7 @@ def play_show(
             with Companions(company, speaker.say, lambda: stage.health.ticks > 0):
                 stage.dance(seconds, stopped)
         if not alone:
-            forget_house(runtime_folder(box))
+            forget_house(stage.sharing.folder)
         for line in _conclusion(stage):
             speaker.say(line)
         if filmstrip is not None and journal is not None:
@@ -139,8 +138,11 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
 def _ears(stage: Stage, control: socket.socket | None) -> str:
     """Where sensors and commands are heard."""
     sensors = ", ".join(intake.name for intake in stage.cast.link.intakes) or "no port"
-    commands = ":".join(map(str, control.getsockname())) if control is not None else "no port"
-    return f"Sensors are heard on {sensors}, commands on {commands}."
+    if control is not None:
+        commands = "on " + ":".join(map(str, control.getsockname()))
+    else:
+        commands = "by nobody" if stage.box.control is None else "by a process of their own (bunraku control)"
+    return f"Sensors are heard on {sensors}, commands {commands}."
 
 
 def _conclusion(stage: Stage) -> list[str]:

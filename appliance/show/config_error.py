@@ -44,5 +44,7 @@ def nearest(word: object, known: Sequence[str]) -> str | None:
 
 def did_you_mean(word: object, known: Sequence[str]) -> str:
     """The cure for a misspelt word: the nearest one, or all of them."""
+    if not known:
+        return "There is none at all."
     near = nearest(word, known)
     return f"Did you mean '{near}'?" if near else f"Known: {', '.join(known)}."

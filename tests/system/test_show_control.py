@@ -291,7 +291,7 @@ def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_bo
     control = [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")]
     with playing(show, tmp_path, "--alone") as box:
         box.frames(1)
-        assert "commands on no port" in box.words
+        assert "commands by a process of their own" in box.words
         with process(control, tmp_path / "control.txt") as first:
             with asking(box) as asker:
                 until(lambda: status(asker)["state"] == "dancing")
