@@ -16,7 +16,7 @@ from appliance.projector.controls import Controls
 from appliance.projector.final_pass import FinalPass, picture_size
 from appliance.projector.interpolation import Interpolation
 from appliance.projector.moment import Moment
-from appliance.projector.presence import Presence
+from appliance.projector.presence import STALE_S, Presence
 from appliance.projector.renderer import Renderer
 from appliance.projector.window import Size
 from appliance.show.config_error import ConfigError
@@ -71,7 +71,7 @@ class Projector:
     ) -> float | None:
         """Draw the picture for `now` (monotonic seconds) onto a display of so many pixels.
 
-        lines: figures to show. Gives when what is shown left the stage; None while no dance is seen.
+        lines: figures to show. Gives when what is shown left the stage; None while no fresh dance is seen.
         """
         self._follow_stage(now)
         moment = self._moment(now)
@@ -93,7 +93,8 @@ class Projector:
             return None
         seen = min(level, house.level(now)) if is_drawn else 0.0
         self._final.draw(screen, display, self._controls, seen, lines)
-        return self._poses.left_stage(moment) if self._poses and moment and is_drawn else None
+        is_fresh = newest is not None and now - newest < STALE_S
+        return self._poses.left_stage(moment) if self._poses and moment and is_drawn and is_fresh else None
 
     def release(self) -> None:
         """Give the GPU's memory back."""

@@ -35,12 +35,10 @@ def wish(
 
 
 def project_show(box_file: Path | None, wish: Wish) -> int:
-    """0: ended as asked; 69: no display or no OpenGL; 75: graphics card reset, start again."""
+    """0: ended as asked; 69: no display or no OpenGL; 73: no room for --frames; 75: graphics card reset."""
     stopped: list[int] = []
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(number, lambda came, _: stopped.append(came))
-    if wish.frames is not None:
-        wish.frames.mkdir(parents=True, exist_ok=True)
     speaker = Speaker()
     try:
         run = Run(load_box(box_file), box_file, wish, speaker.say)

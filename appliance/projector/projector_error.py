@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 
 NO_DISPLAY = os.EX_UNAVAILABLE  # 69: no display or no OpenGL; starting again helps once that is mended
+NO_PLACE = os.EX_CANTCREAT  # 73: for the pictures that were asked for as files
 GPU_LOST = os.EX_TEMPFAIL  # 75: starting again at once is the cure
 
 

@@ -22,7 +22,7 @@ from appliance.projector.keys import press
 from appliance.projector.loop import Projector
 from appliance.projector.pacing import USUAL_RATE, Pacing
 from appliance.projector.png import write_png
-from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, ProjectorError
+from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, NO_PLACE, ProjectorError
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
 
@@ -121,12 +121,22 @@ class Run:
         screen, size = self._context.gl.screen, self._window.size
         left_stage = self._projector.draw(now, screen, size, self._lines if self._controls.shows_info else ())
         if self._wish.frames is not None:
-            pixels = screen.read(viewport=(0, 0, *size), components=4)
-            write_png(self._wish.frames / f"frame-{self._meter.pictures:06d}.png", pixels, *size)
+            self._keep(self._wish.frames, screen.read(viewport=(0, 0, *size), components=4), size)
         self._window.show()
         self._context.gl.finish()  # without it the driver lets pictures queue up, each one older
         self._meter.shown(time.monotonic(), left_stage)
         self._check_context()
+
+    def _keep(self, folder: Path, pixels: bytes, size: Size) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_png(folder / f"frame-{self._meter.pictures:06d}.png", pixels, *size)
+        except OSError as error:
+            raise ProjectorError(
+                f"{folder}: pictures cannot be written there ({error.strerror}). The projector ends; the "
+                "dance goes on. Free some room, or name another folder after --frames.",
+                NO_PLACE,
+            ) from error
 
     def _press_keys(self) -> None:
         for key in self._window.events():

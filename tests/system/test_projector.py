@@ -21,7 +21,7 @@ from PIL import Image
 from pythonosc.osc_message import OscMessage
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from appliance.projector.projector_error import NO_DISPLAY
+from appliance.projector.projector_error import NO_DISPLAY, NO_PLACE
 from appliance.show.bundle import default_show_path
 from hw_sim.peers import HOST
 from tests.stage.bundles import write_show
@@ -170,6 +170,18 @@ def test_without_a_display_it_says_so(tmp_path: Path) -> None:
     done = subprocess.run(PROJECT, capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == NO_DISPLAY
     assert re.fullmatch(r"bunraku: There is no display .* Plug the projector in .*\n", done.stderr)
+
+
+def test_no_room_for_pictures(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = subprocess.run(
+        [*PROJECT, "--offscreen", SIZE, "--frames", str(tmp_path / "file")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == NO_PLACE
+    assert "pictures cannot be written there" in done.stderr and "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(
