@@ -246,18 +246,22 @@ def test_a_widget_that_is_not_there_costs_the_other_wires_nothing(tmp_path: Path
             assert "Traceback" not in box.words
 
 
+def await_levels(widget: UsbProWidget, is_wanted: Callable[[bytes], bool]) -> None:
+    until = time.monotonic() + PATIENCE_S
+    while widget.levels is None or not is_wanted(widget.levels):
+        assert time.monotonic() < until, widget.levels
+        time.sleep(0.05)
+
+
 def test_by_usb_the_same_levels_arrive(tmp_path: Path) -> None:
     show = show_with(tmp_path, DARK)
     with UsbProWidget(tmp_path / "ttyUSB0") as widget:
         wires = [{"universe": 1, "wire": "usb-pro", "device": str(widget.path)}]
         with playing(show, tmp_path, settings={"outputs": {"dmx": wires}}) as box:
-            until = time.monotonic() + PATIENCE_S
-            while not (widget.levels and widget.levels[DIMMER] == 255 and widget.levels[PAR] == 255):
-                assert time.monotonic() < until, box.words
-                time.sleep(0.05)
+            await_levels(widget, lambda levels: levels[DIMMER] == 255 and levels[PAR] == 255)
             box.await_words("Universe 2 has no wire: second stay dark.")
             assert box.end() == 0
-        assert widget.levels is not None and not any(widget.levels)
+            await_levels(widget, lambda levels: not any(levels))
 
 
 def test_another_show_in_the_same_box_lights_its_own_rig(tmp_path: Path) -> None:

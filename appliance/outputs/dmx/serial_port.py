@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import termios
+import time
 from collections.abc import Callable
 
 import serial
@@ -59,7 +60,15 @@ def write(port: serial.Serial, data: bytes) -> None:
 
 
 def close_port(port: serial.Serial) -> None:
-    """Close without waiting: a hung adapter would keep Linux waiting for 30 s for what it has not taken."""
-    for step in (port.reset_output_buffer, port.close):
-        with contextlib.suppress(OSError, termios.error):
-            step()
+    """Close once the last universe has left; what a hung adapter has not taken is thrown away.
+
+    Linux would wait 30 s for it to take the rest.
+    """
+    give_up = time.monotonic() + WRITE_TIMEOUT_S
+    with contextlib.suppress(OSError, termios.error):
+        while port.out_waiting and time.monotonic() < give_up:
+            time.sleep(0.002)
+        if port.out_waiting:
+            port.reset_output_buffer()
+    with contextlib.suppress(OSError, termios.error):
+        port.close()
