@@ -31,6 +31,7 @@ def control_box(box_file: Path | None, descriptor: int | None) -> None:
         descriptor = _from_systemd()
     if descriptor is None:
         descriptor = open_control_port(box.control).detach()
+    _require_udp(descriptor)
     os.set_inheritable(descriptor, True)
     command = control_command(box, descriptor)
     os.execv(command[0], command)
@@ -68,11 +69,20 @@ def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
 def _from_systemd() -> int | None:
     """The socket that a socket unit has opened for this process."""
     ours = os.environ.get("LISTEN_PID") == str(os.getpid()) and os.environ.get("LISTEN_FDS", "0") != "0"
-    if not ours:
-        return None
-    one = socket.socket(fileno=_FIRST_OF_SYSTEMD)
-    kind = one.family, one.type
-    one.detach()
-    if kind != (socket.AF_INET, socket.SOCK_DGRAM):
-        raise StageError("The socket unit's first socket is not UDP over IPv4. Write ListenDatagram= in it.")
-    return _FIRST_OF_SYSTEMD
+    return _FIRST_OF_SYSTEMD if ours else None
+
+
+def _require_udp(descriptor: int) -> None:
+    try:
+        one = socket.socket(fileno=os.dup(descriptor))
+    except OSError as error:
+        raise StageError(
+            f"Descriptor {descriptor} is no open socket ({error.strerror}). Nobody hears commands. "
+            "Leave --socket-fd out, and the port is opened here."
+        ) from error
+    with one:
+        if (one.family, one.type) != (socket.AF_INET, socket.SOCK_DGRAM):
+            raise StageError(
+                f"The socket with descriptor {descriptor} is not UDP over IPv4. Nobody hears commands. "
+                "In a socket unit, write ListenDatagram= with an IPv4 address."
+            )

@@ -14,11 +14,20 @@ def main() -> int:
     from appliance.control.settings import Settings
     from appliance.control.speaker import Speaker
 
-    speaker = Speaker()
+    speaker, settings = Speaker(), Settings.unpacked(sys.argv[1])
     try:
-        return control(Settings.unpacked(sys.argv[1]), speaker.say)
+        return control(settings, speaker.say)
+    except BlockingIOError:
+        speaker.say(
+            f"Another show control is at work in {settings.folder}. It goes on, and this one does not start. "
+            "Stop it, or give each box a folder of its own: `runtime:` in the box file."
+        )
+        return 1
     except OSError as error:
-        speaker.say(f"Show control does not start: {error}.")
+        speaker.say(
+            f"{settings.folder}: show control has no place there ({error.strerror}). Nobody hears commands; "
+            "the dance goes on. Free memory there, or give another folder as `runtime:` in the box file."
+        )
         return 1
     finally:
         speaker.close()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import socket
+import subprocess
+import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -161,9 +164,9 @@ class ControlInThread:
 class Asker:
     """A desk that sends commands and hears what comes back."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, host: str = HOST) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.connect((HOST, port))
+        self.socket.connect((host, port))
 
     def tell(self, address: str, *arguments: Any) -> None:
         self.socket.send(datagram((address, *arguments)))
@@ -193,6 +196,27 @@ class Asker:
 
     def close(self) -> None:
         self.socket.close()
+
+
+@contextlib.contextmanager
+def control_process(folder: Path, words: Path) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+    """Show control as the process that a box runs, and its port."""
+    bound = open_port(HOST, 0)
+    os.set_inheritable(bound.fileno(), True)
+    settings = Settings(str(folder), bound.fileno())
+    with words.open("wb") as out:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "appliance.control", settings.packed()],
+            pass_fds=[bound.fileno()],
+            stdout=out,
+            stderr=subprocess.STDOUT,
+        )
+    try:
+        yield process, bound.getsockname()[1]
+    finally:
+        bound.close()
+        process.kill()
+        process.wait()
 
 
 def until(is_so: Callable[[], bool]) -> None:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import math
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,9 +17,8 @@ from appliance.control.key_file import KeyFile
 from appliance.control.orders import OrderSender
 from appliance.control.packet import Message, datagram
 from appliance.control.port import LARGEST_DATAGRAM, Address
-from appliance.control.settings import Settings
 from appliance.control.sight import StageSight
-from tests.control.doubles import Asker, InboxDouble, StageDouble, until
+from tests.control.doubles import Asker, InboxDouble, StageDouble, control_process, until
 from tests.control.fuzz import datagrams
 
 COUNT, OVER_THE_SOCKET = 100_000, 10_000
@@ -73,29 +68,6 @@ def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
     projector.close()
     sender.close()
     writer.close()
-
-
-@contextlib.contextmanager
-def control_process(folder: Path, words: Path) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
-    """Show control as the process that a box runs, and its port."""
-    from appliance.control.port import open_port
-
-    bound = open_port("127.0.0.1", 0)
-    os.set_inheritable(bound.fileno(), True)
-    settings = Settings(str(folder), bound.fileno())
-    with words.open("wb") as out:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "appliance.control", settings.packed()],
-            pass_fds=[bound.fileno()],
-            stdout=out,
-            stderr=subprocess.STDOUT,
-        )
-    try:
-        yield process, bound.getsockname()[1]
-    finally:
-        bound.close()
-        process.kill()
-        process.wait()
 
 
 def answers(asker: Asker) -> bool:

@@ -10,9 +10,11 @@ import pytest
 
 from appliance.control.packet import datagram, messages_in
 from appliance.control.port import LARGEST_DATAGRAM, Address, Port, open_port
-from tests.control.doubles import Asker, ControlInThread
+from tests.control.doubles import Asker, ControlInThread, until
+from tests.system.namespace import Cable, Namespace, why_not
 
 NOW = 1000.0
+WHY_NOT = why_not()
 
 
 class Wire:
@@ -101,18 +103,28 @@ def test_what_is_too_large_is_counted_and_an_asker_who_is_gone_is_passed_over() 
     assert port.too_large == 1
 
 
-def test_a_stranger_over_a_real_socket_changes_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On one machine every address is its own; so the stranger is told apart by a port that knows none."""
-    monkeypatch.setattr(Port, "_may_command", lambda self, host: False)
-    control = ControlInThread(folder)
-    asker = Asker(control.port)
-    asker.tell("/panic")
-    assert asker.hear(0.3) is None
-    assert control.process.port.strangers == 1
-    assert not control.process.desk.house.panic
-    assert len(control.said) == 1
-    control.close()
-    asker.close()
+@pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))
+@pytest.mark.parametrize(("senders", "may"), [(["10.77.0.3"], False), (["10.77.0.0/24"], True)])
+def test_over_a_network_the_listed_are_heard_and_strangers_change_nothing(
+    folder: Path, senders: list[str], may: bool
+) -> None:
+    with Namespace("box") as box, Namespace("desk") as desk:
+        Cable(box, "10.77.0.1/24", desk, "10.77.0.2/24")
+        with box.entered():
+            control = ControlInThread(folder, host="0.0.0.0", senders=senders)
+        with desk.entered():
+            asker = Asker(control.port, "10.77.0.1")
+        for _ in range(50):
+            asker.tell("/panic")
+        until(lambda: control.process.port.strangers == 50 or asker.hear(0.0) is not None)
+        assert control.process.desk.house.panic == may
+        assert control.process.port.strangers == (0 if may else 50)
+        until(lambda: may or bool(control.said))
+        assert [("10.77.0.2" in words) for words in control.said] == ([] if may else [True])
+        if not may:
+            assert asker.hear(0.1) is None  # not even told
+        control.close()
+        asker.close()
 
 
 def test_a_taken_port_raises_and_a_closed_one_is_free_again() -> None:

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -337,6 +338,23 @@ def test_a_socket_that_systemd_has_opened_is_taken(tmp_path: Path) -> None:
         asker.close()
         started.terminate()
         assert started.wait(PATIENCE_S) == 0
+
+
+def test_a_descriptor_that_is_no_port_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "box.yaml").write_text("runtime: runtime\n")
+    command = [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")]
+    done = subprocess.run([*command, "--socket-fd", "77"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "is no open socket" in done.stderr
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as stream:
+        done = subprocess.run(
+            [*command, "--socket-fd", str(stream.fileno())],
+            capture_output=True,
+            text=True,
+            check=False,
+            pass_fds=[stream.fileno()],
+        )
+    assert "is not UDP over IPv4" in done.stderr
 
 
 @pytest.mark.parametrize(
