@@ -1,4 +1,4 @@
-"""The body's surface on the GPU: fine for the eye, coarse for its shadows, with the hollows that light misses."""
+"""The body's surface on the GPU: fine for the eye, coarse for its shadows; and what little light reaches."""
 
 from __future__ import annotations
 
@@ -9,53 +9,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.projector.skinning import BodyMesh
+from appliance.projector.vertices import layout, packed
 
 COARSE = 0.02  # of the figure's height: vertices so close are one in its shadow
 OCCLUDER = 0.028  # of the figure's height between the points that keep light from each other
 REACH = 0.22  # of the figure's height: what is further away keeps no light off
 
 Floats = NDArray[np.float32]
-LAYOUT = "3f4 3f4 1f4 4u1 4f4"
-NAMES = ("in_position", "in_normal", "in_open", "in_joints", "in_weights")
+PARTS = ("position", "normal", "joints", "weights")
 
 
 class BodyBuffers:
-    """Vertices in figure heights; `fine` and `coarse` are (buffer, indices) of the same layout."""
+    """The surface in figure heights, rest pose; content(coarse) is what a vertex array is made of.
+
+    positions, normals: (V, 3); joints, weights: (V, 4); faces: (F, 3); open: (V,) how much light comes near.
+    """
 
     def __init__(self, ctx: moderngl.Context, mesh: BodyMesh) -> None:
         self.positions = (mesh.vertices / mesh.height).astype(np.float32)
         self.normals, self.joints, self.weights = mesh.normals, mesh.joints, mesh.weights
         self.faces = mesh.faces
         self.open = openness(self.positions, self.normals)
-        self.fine = self._upload(ctx, np.arange(len(self.positions)), mesh.faces)
-        self.coarse = self._upload(ctx, *merged(self.positions, mesh.faces, COARSE))
+        self._fine = self._uploaded(ctx, np.arange(len(self.positions)), mesh.faces)
+        self._coarse = self._uploaded(ctx, *merged(self.positions, mesh.faces, COARSE))
 
     def content(self, coarse: bool) -> tuple[list[tuple[Any, ...]], moderngl.Buffer]:
-        """What a vertex array is made of: the buffer with its layout, and the indices."""
-        vertices, indices = self.coarse if coarse else self.fine
-        return [(vertices, LAYOUT, *NAMES)], indices
+        """The vertices with their layout, and the indices."""
+        vertices, indices = self._coarse if coarse else self._fine
+        return [(vertices, *layout(PARTS))], indices
 
     @property
-    def bytes(self) -> int:
+    def gpu_bytes(self) -> int:
         """What they take on the GPU."""
-        return sum(buffer.size for pair in (self.fine, self.coarse) for buffer in pair)
+        return sum(buffer.size for pair in (self._fine, self._coarse) for buffer in pair)
 
     def release(self) -> None:
-        for buffer in (*self.fine, *self.coarse):
+        for buffer in (*self._fine, *self._coarse):
             buffer.release()
 
-    def _upload(
+    def _uploaded(
         self, ctx: moderngl.Context, chosen: NDArray[np.int64], faces: NDArray[np.int32]
     ) -> tuple[moderngl.Buffer, moderngl.Buffer]:
-        return ctx.buffer(self._records(chosen)), ctx.buffer(np.ascontiguousarray(faces, np.int32).tobytes())
-
-    def _records(self, chosen: NDArray[np.int64]) -> bytes:
-        kinds = [("p", "f4", 3), ("n", "f4", 3), ("o", "f4"), ("j", "u1", 4), ("w", "f4", 4)]
-        records = np.zeros(len(chosen), kinds)
-        parts = (self.positions, self.normals, self.open, self.joints, self.weights)
-        for name, values in zip("pnojw", parts, strict=True):
-            records[name] = values[chosen]
-        return records.tobytes()
+        whole = np.concatenate([self.normals, self.open[:, None]], axis=1)
+        values: tuple[Any, ...] = (self.positions, whole, self.joints, self.weights)
+        parts = {name: value[chosen] for name, value in zip(PARTS, values, strict=True)}
+        return ctx.buffer(packed(parts)), ctx.buffer(np.ascontiguousarray(faces, np.int32).tobytes())
 
 
 def merged(

@@ -11,7 +11,7 @@ from appliance.projector.poses import ROWS, Poses
 from appliance.show.look import CameraConfig
 
 AIM = 0.5  # height that the camera looks at, in figure heights
-ROOM = 0.86  # of the half picture that joints may use; the rest is for the flesh around them
+ROOM = 0.82  # of the half picture that joints may use; the rest is for the flesh around them
 KNEE = 8  # how suddenly the camera draws back when a joint comes near the edge: higher is later
 NEAR, FAR = 0.2, 30.0  # figure heights
 
@@ -63,10 +63,10 @@ class _Stand:
 
 
 def view(
-    config: CameraConfig, before: CameraConfig, mix: float, time_s: float, poses: Poses, aspect: float
+    before: CameraConfig, now: CameraConfig, mix: float, time_s: float, poses: Poses, aspect: float
 ) -> View:
-    """The camera at time_s for a picture of width / height `aspect`; mix 0: as in `before`, 1: as in `config`."""
-    stand = _between(_stand(before, time_s), _stand(config, time_s), mix * mix * (3 - 2 * mix))
+    """The camera at time_s; mix 0: as in `before`, 1: as in `now`; aspect: the picture's width / height."""
+    stand = _between(_stand(before, time_s), _stand(now, time_s), mix * mix * (3 - 2 * mix))
     slope = float(np.tan(stand.lens / 2))
     slopes = (slope * aspect, slope) if aspect >= 1 else (slope, slope / aspect)
     distance = 0.5 / (stand.figure * slope)

@@ -1,30 +1,27 @@
-"""Drawing: a shader program with what it draws, counted so that the cost of a picture is known."""
+"""Drawing: a shader program with what it draws; each use is put down, for the cost of a picture."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import moderngl
+import numpy as np
+
+from appliance.projector.tally import Tally, Use
 
 _SHADERS = Path(__file__).parent / "shaders"
 _HEAD = "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
-
-
-@dataclass
-class Tally:
-    """What was drawn since it was last emptied; `pixels` weighs each by the work that its shader does."""
-
-    draw_calls: int = 0
-    triangles: int = 0
-    vertices: int = 0
-    pixels: float = 0.0
+_SAMPLER_2D = 0x8B5E  # OpenGL's name for the type of a texture in a shader
 
 
 class Drawing:
-    """One shader program and the vertices that it draws."""
+    """One shader program and the vertices that it draws.
+
+    vertex and fragment name files in the shaders' folder, without .vert.glsl and .frag.glsl; content and
+    index are a vertex array's. Without content it draws the three corners of a triangle over the picture.
+    """
 
     def __init__(
         self,
@@ -34,49 +31,64 @@ class Drawing:
         content: Iterable[tuple[Any, ...]] = (),
         index: moderngl.Buffer | None = None,
     ) -> None:
+        self._names = vertex, fragment
+        content = list(content)
+        self._count = index.size // 4 if index else 3
+        self._vertices = content[0][0].size // _stride(content[0][1]) if index else None
         self._program = ctx.program(
-            vertex_shader=_source(vertex + ".vert"), fragment_shader=_source(fragment + ".frag")
+            vertex_shader=_HEAD + source(f"{vertex}.vert"), fragment_shader=_HEAD + source(f"{fragment}.frag")
         )
-        self._array = ctx.vertex_array(self._program, list(content), index, skip_errors=True)
+        self._array = ctx.vertex_array(self._program, content, index, skip_errors=True)
+        members = {name: self._program[name] for name in self._program}
+        self._uniforms = {
+            name: member for name, member in members.items() if isinstance(member, moderngl.Uniform)
+        }
         self._textures = [
-            name
-            for name in self._program
-            if isinstance(self._program[name], moderngl.Uniform) and self._program[name].gl_type == 0x8B5E
+            name for name, member in self._uniforms.items() if getattr(member, "gl_type", 0) == _SAMPLER_2D
         ]
         for unit, name in enumerate(self._textures):
-            self._program[name].value = unit
+            self._uniforms[name].value = unit
 
     def draw(
         self,
         tally: Tally,
+        pixels: float,
+        inputs: dict[str, Any],
         mode: int = moderngl.TRIANGLES,
-        vertices: int = -1,
+        vertices: int = 0,
         instances: int = 1,
-        **inputs: Any,
     ) -> None:
-        """Draw with uniforms and textures by name; names that the shader does without are ignored."""
-        tally.draw_calls += 1
+        """Draw with textures and uniforms by name; the shader takes those that it knows.
+
+        pixels: about how many it will shade; vertices: draw the first so many, not all. Matrices are numpy's,
+        for column vectors.
+        """
         for name, value in inputs.items():
             if isinstance(value, moderngl.Texture):
                 if name in self._textures:
                     value.use(self._textures.index(name))
-            elif name in self._program:
-                uniform = self._program[name]
-                if isinstance(value, (int, float)) or not hasattr(value, "tobytes"):
-                    uniform.value = value
+            elif name in self._uniforms:
+                if isinstance(value, np.ndarray):
+                    self._uniforms[name].write(value.T.astype("f4").tobytes())
                 else:
-                    uniform.write(value.T.astype("f4").tobytes())  # OpenGL keeps matrices by column
-        self._array.render(mode, vertices, instances=instances)
+                    self._uniforms[name].value = value
+        count = vertices or self._count
+        self._array.render(mode, count, instances=instances)
+        per_vertex = {moderngl.TRIANGLES: 1 / 3, moderngl.TRIANGLE_STRIP: 1.0, moderngl.POINTS: 2.0}[mode]
+        placed = round(self._vertices * count / self._count) if self._vertices else count * instances
+        tally.put_down(Use(*self._names, placed, round(count * instances * per_vertex), pixels))
 
     def release(self) -> None:
         self._array.release()
         self._program.release()
 
 
-def _source(name: str) -> str:
-    return _HEAD + _resolved(name)
+def _stride(layout: str) -> int:
+    """Bytes of a vertex of a layout such as '3f4 4u1'."""
+    return sum(int(part[0]) * int(part[-1]) for part in layout.split())
 
 
-def _resolved(name: str) -> str:
+def source(name: str) -> str:
+    """A shader's text, with the files in place of its #include lines."""
     lines = (_SHADERS / f"{name}.glsl").read_text(encoding="utf-8").splitlines()
-    return "\n".join(_resolved(line.split()[1]) if line.startswith("#include") else line for line in lines)
+    return "\n".join(source(line.split()[1]) if line.startswith("#include") else line for line in lines)

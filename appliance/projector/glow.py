@@ -32,11 +32,11 @@ class Glow:
         size = (max(2, round(picture.size[0] * lines / picture.size[1])), lines)
         first, second = easel.canvas(name, size), easel.canvas(name + " half", size)
         first.start()
-        texel = (0.25 / size[0], 0.25 / size[1])
-        self._shrink.draw(easel.tally, vertices=3, source=picture.texture, texel=texel, gain=gain)
+        inputs = {"source": picture.texture, "texel": (0.25 / size[0], 0.25 / size[1]), "gain": gain}
+        self._shrink.draw(easel.tally, first.pixels, inputs)
         for source, into, step in ((first, second, (1 / size[0], 0.0)), (second, first, (0.0, 1 / size[1]))):
             into.start()
-            self._blur.draw(easel.tally, vertices=3, source=source.texture, step_uv=step)
+            self._blur.draw(easel.tally, into.pixels, {"source": source.texture, "step_uv": step})
         return first
 
     def finish(
@@ -49,39 +49,29 @@ class Glow:
         target: moderngl.Framebuffer,
     ) -> None:
         """Lay the picture with its glow over what is in the target."""
+        easel, view = self._easel, scene.view
         near = self.spread(picture, "near glow", NEAR)
         far = self.spread(near, "far glow", FAR, FAR_GAIN)
-        easel, view = self._easel, scene.view
         air = easel.canvas("air", near.size)
+        inputs = {
+            **scene.inputs,
+            "picture": picture.texture,
+            "near_glow": near.texture,
+            "far_glow": far.texture,
+            "air": air.texture,
+            "noise": easel.noise,
+            "heart": view.on_picture(np.array([view.ground[0], 0.5, view.ground[1]])),
+            "air_colour": colours.background,
+            "fog": look.fog,
+            "glow": look.glow,
+            "vignette": look.vignette,
+            "exposure": look.exposure,
+            "opacity": opacity,
+        }
         air.start()
-        self._air.draw(
-            easel.tally,
-            vertices=3,
-            near_glow=near.texture,
-            far_glow=far.texture,
-            noise=easel.noise,
-            axes=np.stack([view.right, view.up, view.back], axis=1),
-            slopes=view.slopes,
-            eye=view.eye,
-            ground=view.ground,
-            heart=view.on_picture(np.array([view.ground[0], 0.5, view.ground[1]])),
-            air_colour=colours.background,
-            aspect=scene.aspect,
-            fog=look.fog,
-            glow=look.glow,
-            time=scene.time_s % 4096.0,
-        )
+        self._air.draw(easel.tally, air.pixels, inputs)
         easel.finish(target)
-        self._finish.draw(
-            easel.tally,
-            vertices=3,
-            picture=picture.texture,
-            air=air.texture,
-            aspect=scene.aspect,
-            vignette=look.vignette,
-            exposure=look.exposure,
-            opacity=opacity,
-        )
+        self._finish.draw(easel.tally, target.width * target.height, inputs)
 
     def release(self) -> None:
         for drawing in (self._shrink, self._blur, self._air, self._finish):

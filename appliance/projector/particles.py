@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,18 +23,15 @@ class Particles:
     joints: NDArray[np.uint8]
     weights: Floats
 
-    def packed(self) -> bytes:
-        """As vertices of the layout that LAYOUT says."""
-        kinds = [("p", "f4", 3), ("n", "f4", 3), ("c", "f4", 4), ("j", "u1", 4), ("w", "f4", 4)]
-        records = np.zeros(len(self.positions), kinds)
-        parts = (self.positions, self.normals, self.chances, self.joints, self.weights)
-        for name, values in zip("pncjw", parts, strict=True):
-            records[name] = values
-        return records.tobytes()
-
-
-LAYOUT = "3f4 3f4 4f4 4u1 4f4"
-NAMES = ("in_position", "in_normal", "in_chance", "in_joints", "in_weights")
+    def parts(self) -> dict[str, Any]:
+        """As parts of vertices."""
+        return {
+            "position": self.positions,
+            "normal": self.normals,
+            "chance": self.chances,
+            "joints": self.joints,
+            "weights": self.weights,
+        }
 
 
 def particles_of(body: BodyBuffers, count: int) -> Particles:

@@ -20,7 +20,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Poses:
-    """Where the joints were: row 0 now, row i ROW_S * i seconds ago; lengths in figure heights, floor at y = 0.
+    """Where the joints were: row 0 now, row i ROW_S * i seconds ago; in figure heights, the floor at y = 0.
 
     positions: (ROWS, J, 3); world: (ROWS, J, 4).
     """
@@ -30,7 +30,7 @@ class Poses:
 
 
 def poses_of(moment: Moment, height: float, sole: float) -> Poses:
-    """A moment's trail at even ages; height: the figure's, metres; sole: lowest skin below lowest joint, metres.
+    """A moment's trail at even ages; height: the figure's, metres; sole: skin below the lowest joint, metres.
 
     Ages that the trail does not reach show its oldest pose.
     """
@@ -57,7 +57,7 @@ def _floor(positions: Floats, height: float, sole: float) -> float:
 
 
 class PoseTexture:
-    """Dual quaternions of all joints in all rows: joint j in the texels 2j (rotation) and 2j + 1 (dual part)."""
+    """Dual quaternions of all joints in all rows: joint j in texels 2j (rotation) and 2j + 1 (dual part)."""
 
     def __init__(self, ctx: moderngl.Context, mesh: BodyMesh, joints: int) -> None:
         self._back = quaternion.inverse(mesh.bind_world)
@@ -75,7 +75,7 @@ class PoseTexture:
         self.texture.write(np.ascontiguousarray(texels))
 
     @property
-    def bytes(self) -> int:
+    def gpu_bytes(self) -> int:
         """What it takes on the GPU."""
         return self.texture.width * self.texture.height * 16
 

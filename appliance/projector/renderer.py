@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from typing import Protocol
 
 import moderngl
 
@@ -17,21 +17,33 @@ from appliance.projector.looks.veil import Veil
 from appliance.projector.moment import Moment
 from appliance.projector.poses import poses_of
 from appliance.projector.scene import Easel, Scene
-from appliance.show.look import LookConfig
+from appliance.projector.tally import Figures
+from appliance.show.look import LookConfig, Style
 
 
-@dataclass(frozen=True)
-class Figures:
-    """What one frame costs."""
+class _Look(Protocol):
+    """A way of drawing; ends in one pass that lays the picture over the target with an opacity."""
 
-    draw_calls: int
-    triangles: int
-    overdraw: float
-    gpu_bytes: int
+    def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None: ...
+
+    def release(self) -> None: ...
+
+
+_LOOKS: dict[Style, Callable[[Easel], _Look]] = {
+    "plaster": Plaster,
+    "lines": Lines,
+    "ink": Ink,
+    "cloud": Cloud,
+    "veil": Veil,
+}
 
 
 class Renderer:
-    """Owns what the looks need on the GPU; draws any of them into a framebuffer of the given size."""
+    """Owns what the looks need on the GPU; draws any of them into a framebuffer.
+
+    size: width and height of the picture, pixels; looks: by name, at least one, in the show's order.
+    The same moment makes the same picture, whatever was drawn before.
+    """
 
     def __init__(
         self,
@@ -40,38 +52,43 @@ class Renderer:
         skeleton: Skeleton,
         looks: Mapping[str, LookConfig],
     ) -> None:
-        self.ctx, self.size, self.looks = ctx, size, looks
+        self._size, self._looks = size, looks
         self._easel = Easel(ctx, skeleton)
-        self._styles = {
-            "plaster": Plaster(self._easel),
-            "lines": Lines(self._easel),
-            "cloud": Cloud(self._easel),
-            "ink": Ink(self._easel),
-            "veil": Veil(self._easel),
-        }
+        styles = dict.fromkeys(look.style for look in looks.values())
+        self._styles = {style: _LOOKS[style](self._easel) for style in styles}
 
     def draw(
         self, moment: Moment, look: str, look_before: str, mix: float, target: moderngl.Framebuffer
     ) -> None:
-        """Draw into `target`; mix 0: only look_before, 1: only look. Unknown names: the first look."""
-        first = next(iter(self.looks.values()))
-        now, before = self.looks.get(look, first), self.looks.get(look_before, first)
-        poses = poses_of(moment, self._easel.height, self._easel.sole)
-        aspect = target.size[0] / target.size[1]
-        seen = view(now.camera, before.camera, mix, moment.time_s, poses, aspect)
-        scene = Scene(moment.time_s, seen, poses, aspect, moment.held)
-        self._easel.poses.write(poses)
-        layers = [(before, 1.0), (now, mix)] if 0.0 < mix < 1.0 else [(now if mix else before, 1.0)]
+        """Draw into `target`; mix 0: only look_before, 1: only look. Unknown names: the first look.
+
+        While two looks cross-fade, the camera moves from the one's place to the other's, and both see the
+        figure from there: it changes what it is made of, not where it is.
+        """
+        first = next(iter(self._looks.values()))
+        now, before = self._looks.get(look, first), self._looks.get(look_before, first)
+        easel = self._easel
+        easel.tally.clear()
+        poses = poses_of(moment, easel.height, easel.sole)
+        aspect = target.width / target.height
+        seen = view(before.camera, now.camera, mix, moment.time_s, poses, aspect)
+        scene = Scene(moment.time_s, seen, poses, aspect)
+        easel.poses.write(poses)
+        layers = [(before, 1.0), (now, mix)] if 0.0 < mix < 1.0 else [(now if mix > 0 else before, 1.0)]
         for layer, opacity in layers:
             self._styles[layer.style].draw(scene, layer, opacity, target)
 
     def resize(self, size: tuple[int, int]) -> None:
         """The picture's size in pixels from the next draw on."""
-        self.size = size
+        self._size = size
 
     def figures(self) -> Figures:
-        """What the last frame cost."""
-        return Figures(self._easel.tally.draw_calls, 0, 0, self._easel.bytes)
+        """What the last picture took."""
+        width, height = self._size
+        return self._easel.tally.figures(width * height, self._easel.gpu_bytes + 4 * width * height)
 
     def release(self) -> None:
         """Give the GPU's memory back."""
+        for look in self._styles.values():
+            look.release()
+        self._easel.release()

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.body_buffers import BodyBuffers
 from appliance.projector.body_mesh import body_mesh
 from appliance.projector.camera import View
-from appliance.projector.drawing import Drawing, Tally
+from appliance.projector.drawing import Drawing
 from appliance.projector.noise import SIDE, noise_pixels
 from appliance.projector.poses import Poses, PoseTexture
+from appliance.projector.tally import Tally
 from appliance.projector.targets import Target
+from appliance.projector.vertices import layout, packed
 
-
+BODY_AREA = 0.16  # of a figure height squared that the figure covers, about
 FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most
 
 
@@ -30,6 +35,34 @@ class Scene:
     poses: Poses
     aspect: float
     held: tuple[int, ...] = ()
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """What shaders know of the moment and of the camera."""
+        view = self.view
+        return {
+            "projection": view.projection,
+            "eye": view.eye,
+            "axes": np.stack([view.right, view.up, view.back], axis=1),
+            "slopes": view.slopes,
+            "ground": view.ground,
+            "aspect": self.aspect,
+            "time": self.time_s % 4096.0,
+        }
+
+    @property
+    def distance(self) -> float:
+        """From the eye to the dancer's middle, figure heights."""
+        return float(np.linalg.norm(self.view.eye - [self.view.ground[0], 0.5, self.view.ground[1]]))
+
+    @property
+    def share_of_picture(self) -> float:
+        """Of the picture's height that a figure height takes where the dancer is."""
+        return 0.5 / (self.view.slopes[1] * self.distance)
+
+    def body_pixels(self, size: tuple[int, int]) -> float:
+        """About how many pixels the figure covers in a picture of that size."""
+        return BODY_AREA * (self.share_of_picture * size[1]) ** 2
 
     @property
     def box(self) -> tuple[float, float, float, float]:
@@ -58,6 +91,18 @@ class Easel:
         self.noise.build_mipmaps()
         self.noise.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
         self._canvases: dict[str, Target] = {}
+        self._buffers: list[moderngl.Buffer] = []
+
+    def vertices(self, parts: Mapping[str, Any], instanced: bool = False) -> list[tuple[Any, ...]]:
+        """Bring vertices onto the GPU; returns what a vertex array is made of. instanced: one an instance."""
+        self._buffers.append(self.ctx.buffer(packed(parts)))
+        formats, *names = layout(tuple(parts))
+        return [(self._buffers[-1], formats + ("/i" if instanced else ""), *names)]
+
+    def indices(self, values: NDArray[np.int32]) -> moderngl.Buffer:
+        """Bring the corners of triangles onto the GPU."""
+        self._buffers.append(self.ctx.buffer(values.tobytes()))
+        return self._buffers[-1]
 
     def canvas(self, name: str, size: tuple[int, int], depth: bool = False) -> Target:
         """The canvas of that name, made anew when its size has changed."""
@@ -86,14 +131,20 @@ class Easel:
         return Drawing(self.ctx, vertex, fragment, *self.body.content(coarse))
 
     @property
-    def bytes(self) -> int:
+    def gpu_bytes(self) -> int:
         """What all this takes on the GPU."""
         canvases = sum(canvas.bytes for canvas in self._canvases.values())
-        return canvases + self.body.bytes + self.poses.bytes + SIDE * SIDE * 16 // 3
+        buffers = sum(buffer.size for buffer in self._buffers)
+        return canvases + buffers + self.body.gpu_bytes + self.poses.gpu_bytes + SIDE * SIDE * 16 // 3
 
     def release(self) -> None:
-        for part in (self.body, self.poses, self.noise, *self._canvases.values()):
-            part.release()
+        self.body.release()
+        self.poses.release()
+        self.noise.release()
+        for canvas in self._canvases.values():
+            canvas.release()
+        for buffer in self._buffers:
+            buffer.release()
 
 
 def direction(azimuth: float, elevation_deg: float) -> Array:

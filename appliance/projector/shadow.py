@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import moderngl
 import numpy as np
 
@@ -9,10 +11,11 @@ from appliance.pose.quaternion import Array
 from appliance.projector.drawing import Drawing
 from appliance.projector.scene import Easel, Scene
 
-DEPTH_SIDE, CAST_SIDE = 512, 192  # pixels
+DEPTH_SIDE, CAST_SIDE = 384, 192  # pixels
 FIELD = 0.85  # figure heights around the dancer's middle that the lamp sees
 REACH = 1.7  # figure heights of floor around the dancer on which a shadow can fall
-SPREAD = 1.5  # pixels from one sample of the floor shadow's blur to the next
+BODY_SHARE = 0.1  # of the lamp's picture that the body takes, about
+SPREAD = 1.0  # pixels from one sample of the floor shadow's blur to the next
 
 
 class Shadow:
@@ -24,7 +27,7 @@ class Shadow:
         self._cast = easel.surface("cast", "cast", coarse=True)
         self._blur = Drawing(easel.ctx, "screen", "cast_blur")
 
-    def draw(self, scene: Scene, lamp: Array) -> dict[str, object]:
+    def draw(self, scene: Scene, lamp: Array) -> dict[str, Any]:
         """Draw both for a lamp in that direction; returns what shaders that receive shadows need."""
         ctx, easel = self._easel.ctx, self._easel
         root = scene.poses.positions[0, 0].astype(float)
@@ -32,26 +35,27 @@ class Shadow:
         depth = easel.canvas("lamp depth", (DEPTH_SIDE, DEPTH_SIDE), depth=True)
         depth.start((1.0, 1.0, 1.0, 1.0))
         ctx.enable_only(moderngl.DEPTH_TEST)
-        self._depth.draw(easel.tally, poses=easel.poses.texture, projection=lamp_projection, row=0)
+        poses = {"poses": easel.poses.texture, "row": 0}
+        seen = BODY_SHARE * depth.pixels
+        self._depth.draw(easel.tally, seen, poses | {"projection": lamp_projection})
         middle = root[[0, 2]] - 0.5 * lamp[[0, 2]] / lamp[1]
+        on_floor = {"lamp": lamp, "middle": middle, "reach": REACH}
         first, second = (easel.canvas(name, (CAST_SIDE, CAST_SIDE)) for name in ("cast", "cast blurred"))
         first.start()
         ctx.enable_only(moderngl.BLEND)
-        ctx.blend_equation = moderngl.MAX
-        self._cast.draw(
-            easel.tally, poses=easel.poses.texture, lamp=tuple(lamp), middle=tuple(middle), reach=REACH
-        )
-        ctx.blend_equation = moderngl.FUNC_ADD
+        ctx.blend_equation = moderngl.MAX, moderngl.MAX
+        self._cast.draw(easel.tally, BODY_SHARE * first.pixels, poses | on_floor)
+        ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         ctx.enable_only(moderngl.NOTHING)
-        for source, into, step in ((first, second, (1.0, 0.0)), (second, first, (0.0, 1.0))):
+        step = SPREAD / CAST_SIDE
+        for source, into, step_uv in ((first, second, (step, 0.0)), (second, first, (0.0, step))):
             into.start()
-            step_uv = (step[0] * SPREAD / CAST_SIDE, step[1] * SPREAD / CAST_SIDE)
-            self._blur.draw(easel.tally, vertices=3, source=source.texture, step_uv=step_uv)
+            self._blur.draw(easel.tally, into.pixels, {"source": source.texture, "step_uv": step_uv})
         return {
             "lamp_depth": depth.texture,
             "lamp_projection": lamp_projection,
             "floor_shadow": first.texture,
-            "middle": tuple(middle),
+            "middle": middle,
             "reach": REACH,
         }
 
@@ -61,7 +65,7 @@ class Shadow:
 
 
 def _orthographic(lamp: Array, centre: Array) -> Array:
-    """(4, 4) from figure heights to the lamp's picture, that moves in whole pixels so that edges stay calm."""
+    """(4, 4) from figure heights to the lamp's picture; it moves in whole pixels, so that edges stay calm."""
     right = np.cross([0.0, 1.0, 0.0], lamp)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(lamp, right), lamp])

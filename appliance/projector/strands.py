@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,9 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.body_buffers import BodyBuffers, merged
 
-STEP = 0.014  # figure heights from one point of a strand to the next
-POINTS = 40  # steps of a strand
+STEP = 0.02  # figure heights from one point of a strand to the next
+POINTS = 28  # steps of a strand
+TAPER = 7  # steps in which a strand ends
 SPACING = 0.045  # figure heights between where strands start
 TURN = 0.35  # how far a strand turns around its limb, per length that it runs along it
 
@@ -21,8 +23,8 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Strands:
-    """(S, POINTS + 1, ..): places and the directions at them, in figure heights, rest pose; normals; strengths
-    from 0 to 1; what moves them."""
+    """(S, POINTS + 1, ..): places in figure heights, rest pose, directions and normals there; strengths from
+    0 to 1; what moves them. Any first part of the strands covers the whole body."""
 
     positions: Floats
     tangents: Floats
@@ -30,6 +32,27 @@ class Strands:
     strengths: Floats
     joints: NDArray[np.uint8]
     weights: Floats
+
+    def ribbons(self) -> tuple[dict[str, Any], NDArray[np.int32]]:
+        """Parts of vertices, two for each point, and the indices of the triangles between them."""
+        count, points = self.strengths.shape
+        along = np.zeros((count, points, 2, 3))  # the side, the strength, a chance
+        along[..., 0] = [-1.0, 1.0]
+        along[..., 1] = self.strengths[..., None]
+        along[..., 2] = np.random.RandomState(6).random_sample((count, 1, 1))
+        values: dict[str, Any] = {
+            "position": self.positions,
+            "tangent": self.tangents,
+            "normal": self.normals,
+            "joints": self.joints,
+            "weights": self.weights,
+        }
+        parts = {
+            name: np.repeat(value.reshape(-1, value.shape[-1]), 2, axis=0) for name, value in values.items()
+        }
+        first = (2 * np.arange(count * points).reshape(count, points)[:, :-1]).reshape(-1, 1)
+        indices = (first + np.array([[0, 1, 2, 1, 3, 2]])).astype(np.int32)
+        return {**parts, "along": along.reshape(-1, 3)}, indices
 
 
 def strands_of(body: BodyBuffers, skeleton: Skeleton, bind_positions: Array) -> Strands:
@@ -42,6 +65,7 @@ def strands_of(body: BodyBuffers, skeleton: Skeleton, bind_positions: Array) -> 
     ways -= normals * np.sum(ways * normals, axis=1, keepdims=True)
     ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-6)
     starts, _ = merged(body.positions, body.faces, SPACING)
+    starts = np.random.RandomState(5).permutation(starts)
     run = [(body.positions[starts], _nearest(places, body.positions[starts]))]
     backwards = _walk(run[0], -ways[run[0][1]], places, normals, ways)
     run = backwards[::-1] + run + _walk(run[0], ways[run[0][1]], places, normals, ways)
@@ -96,7 +120,7 @@ def _tapered(runs_on: NDArray[np.bool_]) -> Floats:
     whole = np.concatenate([behind, ahead], axis=1)
     last, first = whole.shape[1] - 1 - np.argmax(whole[:, ::-1], axis=1), np.argmax(whole, axis=1)
     place = np.arange(POINTS + 1)[None]
-    from_end = np.minimum(place - first[:, None], last[:, None] - place) / 9.0
+    from_end = np.minimum(place - first[:, None], last[:, None] - place) / TAPER
     return np.asarray(np.clip(from_end, 0, 1), np.float32)
 
 
@@ -110,7 +134,7 @@ def reach_of(skeleton: Skeleton, bind_positions: Array) -> Array:
 
 
 def _along(skeleton: Skeleton, bind_positions: Array) -> Array:
-    """(J, 3) along the body beyond each joint, to its longest branch; turned so that it runs on from its parent."""
+    """(J, 3) along the body beyond each joint, to its longest branch; it runs on from its parent."""
     length, along = np.zeros(len(skeleton)), np.zeros((len(skeleton), 3))
     for joint, offset in skeleton.ends:
         along[joint] = offset

@@ -16,6 +16,11 @@ class Target:
         self.buffer = ctx.framebuffer([self.texture], self._depth)
         self.bytes = size[0] * size[1] * (8 if depth else 4)
 
+    @property
+    def pixels(self) -> int:
+        """How many it has."""
+        return self.size[0] * self.size[1]
+
     def start(self, colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)) -> None:
         """What is drawn next goes here, over one colour."""
         self.buffer.use()
@@ -24,7 +29,7 @@ class Target:
 
     def keep(self, channels: str, depth: bool = True) -> None:
         """What is drawn next changes these channels ('r' to 'a') alone, and depth only if wanted."""
-        self.buffer.color_mask = tuple(channel in channels for channel in "rgba")
+        self.buffer.color_mask = ("r" in channels, "g" in channels, "b" in channels, "a" in channels)
         self.buffer.depth_mask = depth
         self.buffer.use()
 

@@ -32,7 +32,7 @@ def _hexadecimal(colour: str) -> str:
     return colour.lower()
 
 
-Colour = Annotated[str, BeforeValidator(_given), AfterValidator(_hexadecimal)]
+Colour = Annotated[Annotated[str, AfterValidator(_hexadecimal)] | None, BeforeValidator(_given)]
 
 
 class CameraConfig(Section):
@@ -85,10 +85,10 @@ class LookConfig(Section):
         description="plaster: a sculpture in stage light; lines: strands of light; ink: brush and paper; "
         "cloud: thousands of points; veil: glass and its echoes.",
     )
-    figure: Colour | None = Field(default=None, description="The figure: plaster, strands, ink, points.")
-    light: Colour | None = Field(default=None, description="The key light; what is fresh and fast.")
-    accent: Colour | None = Field(default=None, description="The rim light; what fades away.")
-    background: Colour | None = Field(
+    figure: Colour = Field(default=None, description="The figure: plaster, strands, ink, points.")
+    light: Colour = Field(default=None, description="The key light; what is fresh and fast.")
+    accent: Colour = Field(default=None, description="The rim light; what fades away.")
+    background: Colour = Field(
         default=None, description="Air and floor, or the paper. Dark ones end in true black at the edges."
     )
     exposure: float = Field(default=1.0, ge=0.1, le=4, description="Brightness of the whole picture.")
@@ -104,10 +104,10 @@ class LookConfig(Section):
         default=0.6, ge=0.1, le=1, description="How many strands, echoes or points; the grain of the ink."
     )
     vignette: float = Field(
-        default=0.5, ge=0, le=1, description="How far the picture fades to black towards its edges."
+        default=0.4, ge=0, le=1, description="How far the picture fades to black towards its edges."
     )
     render_scale: float = Field(
-        default=1.0,
+        default=0.7,
         ge=0.25,
         le=1,
         description="Resolution that the figure is drawn at, in proportion to the picture; "

@@ -10,16 +10,18 @@ import numpy as np
 from appliance.projector.drawing import Drawing
 from appliance.projector.glow import Glow
 from appliance.projector.looks.palette import palette
-from appliance.projector.particles import LAYOUT, NAMES
 from appliance.projector.poses import ROW_S, ROWS
 from appliance.projector.scene import Easel, Scene
 from appliance.projector.strands import reach_of
+from appliance.projector.targets import Target
 from appliance.projector.trails import traced
 from appliance.show.look import LookConfig
 
 ECHOES = 5
-STROKES = 12
+STROKES, BRUSH = 12, 0.026  # how many points of the body hold a brush, and how wide it is in figure heights
 WET = 180  # lines of the picture in which ink spreads
+PAPER_LINES = 400  # of the sheet, which is made once
+PULL = 0.016  # of the picture's height: how far fibres pull the ink
 
 
 class Ink:
@@ -29,67 +31,83 @@ class Ink:
         self._easel = easel
         self._figure = easel.surface("body", "ink")
         self._echo = easel.surface("body", "ink", coarse=True)
-        reach = reach_of(easel.skeleton, easel.bind_positions)
-        self._buffer = easel.ctx.buffer(traced(easel.body, reach, STROKES).packed())
-        self._strokes = Drawing(easel.ctx, "trail", "stroke", [(self._buffer, LAYOUT + "/i", *NAMES)])
+        strokes = traced(easel.body, reach_of(easel.skeleton, easel.bind_positions), STROKES)
+        self._strokes = Drawing(easel.ctx, "trail", "stroke", easel.vertices(strokes.parts(), instanced=True))
         self._glow = Glow(easel)
-        self._finish = Drawing(easel.ctx, "air", "ink_finish")
+        self._sheet = Drawing(easel.ctx, "screen", "paper")
+        self._made: dict[str, float] = {}
+        self._finish = Drawing(easel.ctx, "screen", "ink_finish")
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
         """Lay the look over what is in the target."""
-        easel, view, colours = self._easel, scene.view, palette(look)
+        easel, colours = self._easel, palette(look)
         picture = easel.picture(target.size, look.render_scale)
+        inputs: dict[str, Any] = {**scene.inputs, "poses": easel.poses.texture, "noise": easel.noise}
         picture.start()
-        common: dict[str, Any] = {
-            "poses": easel.poses.texture,
-            "noise": easel.noise,
-            "projection": view.projection,
-            "eye": view.eye,
-        }
         picture.keep("r")
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._figure.draw(easel.tally, **common, row=0, level=1.0, hollow=1.0)
-        easel.ctx.enable_only(moderngl.BLEND)
-        easel.ctx.blend_equation = moderngl.MAX
+        self._figure.draw(
+            easel.tally, scene.body_pixels(picture.size), inputs | {"row": 0, "level": 1.0, "hollow": 1.0}
+        )
         if look.trail_s > 0:
-            rows = min(ROWS, max(6, round(look.trail_s / ROW_S)))
-            picture.keep("g")
-            for echo in range(1, ECHOES + 1):
-                level = 0.85 * (1 - echo / (ECHOES + 1)) ** 1.2
-                self._echo.draw(
-                    easel.tally, **common, row=round((rows - 1) * echo / ECHOES), level=level, hollow=0.0
-                )
-            picture.keep("b")
-            self._strokes.draw(
-                easel.tally, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES, **common,
-                pixel=(2 / picture.size[0], 2 / picture.size[1]), width=0.013 * picture.size[1], rows=rows, row_s=ROW_S, floor_side=1.0, brightness=0.9,
-            )  # fmt: skip
-        easel.ctx.blend_equation = moderngl.FUNC_ADD
+            self._leave_traces(scene, look.trail_s, inputs, picture)
         picture.keep("rgba")
         wet = self._glow.spread(picture, "near glow", WET)
-        x, y, _, w = view.projection @ [view.ground[0], 0.0, view.ground[1], 1.0]
+        inputs |= {
+            "picture": picture.texture,
+            "wet_picture": wet.texture,
+            "figure_colour": np.sqrt(colours.figure),
+            "light_colour": np.sqrt(colours.light),
+            "accent_colour": np.sqrt(colours.accent),
+            "air_colour": np.sqrt(look.exposure * colours.background),
+            "paper": self._paper(look, scene.aspect).texture,
+            "reach": (PULL / scene.aspect, PULL),
+            "fog": look.fog,
+            "opacity": opacity,
+        }
         easel.finish(target)
-        self._finish.draw(
-            easel.tally,
-            vertices=3,
-            picture=picture.texture,
-            near_glow=wet.texture,
-            noise=easel.noise,
-            figure_colour=np.sqrt(colours.figure),
-            light_colour=np.sqrt(colours.light),
-            accent_colour=np.sqrt(colours.accent),
-            air_colour=np.sqrt(colours.background),
-            foot=(scene.aspect * (0.5 + 0.5 * x / w), 0.5 + 0.5 * y / w),
-            foot_size=0.28 / (view.slopes[1] * w),
-            aspect=scene.aspect,
-            fog=look.fog,
-            shadow=look.shadow,
-            density=look.density,
-            vignette=look.vignette,
-            exposure=look.exposure,
-            opacity=opacity,
-        )
+        self._finish.draw(easel.tally, target.width * target.height, inputs)
+
+    def _paper(self, look: LookConfig, aspect: float) -> Target:
+        """The sheet; made anew when its shape or the look has changed."""
+        wanted = {"aspect": aspect, "density": look.density, "vignette": look.vignette}
+        sheet = self._easel.canvas("paper", (round(PAPER_LINES * aspect), PAPER_LINES))
+        if wanted != self._made:
+            sheet.start()
+            self._easel.ctx.enable_only(moderngl.NOTHING)
+            self._sheet.draw(self._easel.tally, sheet.pixels, wanted | {"noise": self._easel.noise})
+            self._made = wanted
+        return sheet
+
+    def _leave_traces(self, scene: Scene, trail_s: float, inputs: dict[str, Any], picture: Target) -> None:
+        """Echoes into green, brush strokes into blue; where some overlap the strongest stays."""
+        easel = self._easel
+        rows = min(ROWS, max(6, round(trail_s / ROW_S)))
+        easel.ctx.enable_only(moderngl.BLEND)
+        easel.ctx.blend_equation = moderngl.MAX, moderngl.MAX
+        picture.keep("g")
+        for echo in range(1, ECHOES + 1):
+            inputs |= {
+                "row": round((rows - 1) * echo / ECHOES),
+                "level": 0.85 * (1 - echo / (ECHOES + 1)) ** 1.2,
+                "hollow": 0.0,
+            }
+            self._echo.draw(easel.tally, 1.6 * scene.body_pixels(picture.size), inputs)
+        picture.keep("b")
+        brush = max(2.0, BRUSH * scene.share_of_picture * picture.size[1])
+        inputs |= {
+            "pixel": (2 / picture.size[0], 2 / picture.size[1]),
+            "width": 0.5 * brush,
+            "rows": float(rows),
+            "row_s": ROW_S,
+            "floor_side": 1.0,
+            "brightness": 0.9,
+        }
+        length = trail_s * scene.share_of_picture * picture.size[1]  # at a figure height a second
+        pixels = STROKES * length * brush
+        self._strokes.draw(easel.tally, pixels, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
+        easel.ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
 
     def release(self) -> None:
-        for part in (self._figure, self._echo, self._strokes, self._buffer, self._glow, self._finish):
+        for part in (self._figure, self._echo, self._strokes, self._glow, self._sheet, self._finish):
             part.release()

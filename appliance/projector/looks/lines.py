@@ -1,26 +1,26 @@
-"""Lines: strands of light along the limbs, the ways that hands and feet have gone, a floor that mirrors them."""
+"""Lines: strands of light along the limbs, the ways that hands and feet have gone, a floor that mirrors."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import moderngl
-import numpy as np
 
 from appliance.projector.drawing import Drawing
 from appliance.projector.glow import Glow
-from appliance.projector.looks.palette import Palette, palette
-from appliance.projector.particles import LAYOUT, NAMES
+from appliance.projector.looks.palette import Palette, palette, stored
 from appliance.projector.poses import ROW_S, ROWS
 from appliance.projector.scene import Easel, Scene
-from appliance.projector.strands import POINTS, Strands, reach_of, strands_of
+from appliance.projector.strands import POINTS, STEP, reach_of, strands_of
+from appliance.projector.targets import Target
 from appliance.projector.trails import traced
 from appliance.show.look import LookConfig
 
 ECHOES = 5
 TRACES = 56  # points of the body that leave a trail
-STRAND_LAYOUT = "3f4 3f4 3f4 3f4 4u1 4f4"
-STRAND_NAMES = ("in_position", "in_tangent", "in_normal", "in_along", "in_joints", "in_weights")
+WIDTH = 1 / 420  # half of a strand's, of the picture's height
+THINNEST = 1.4  # pixels: half of the thinnest strand that has no gaps
+MIRROR = 0.35  # of the light comes back from the floor
 
 
 class Lines:
@@ -29,21 +29,11 @@ class Lines:
     def __init__(self, easel: Easel) -> None:
         self._easel = easel
         strands = strands_of(easel.body, easel.skeleton, easel.bind_positions)
-        vertices, indices = _ribbons(strands)
-        self._buffers = [easel.ctx.buffer(vertices), easel.ctx.buffer(indices)]
-        self._strands = Drawing(
-            easel.ctx,
-            "strand",
-            "strand",
-            [(self._buffers[0], STRAND_LAYOUT, *STRAND_NAMES)],
-            self._buffers[1],
-        )
-        self._buffers.append(
-            easel.ctx.buffer(
-                traced(easel.body, reach_of(easel.skeleton, easel.bind_positions), TRACES).packed()
-            )
-        )
-        self._trails = Drawing(easel.ctx, "trail", "trail", [(self._buffers[2], LAYOUT + "/i", *NAMES)])
+        parts, indices = strands.ribbons()
+        self._count = len(strands.positions)
+        self._strands = Drawing(easel.ctx, "strand", "strand", easel.vertices(parts), easel.indices(indices))
+        traces = traced(easel.body, reach_of(easel.skeleton, easel.bind_positions), TRACES)
+        self._trails = Drawing(easel.ctx, "trail", "trail", easel.vertices(traces.parts(), instanced=True))
         self._glow = Glow(easel)
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
@@ -53,67 +43,76 @@ class Lines:
         picture.start()
         easel.ctx.enable_only(moderngl.BLEND)
         easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
-        for side, share in ((-1.0, 0.35 * look.shadow), (1.0, 1.0)):
+        for side, share in ((-1.0, MIRROR * look.shadow), (1.0, 1.0)):
             if share > 0:
-                self._figure(scene, look, colours, picture.size, side, share)
+                self._figure(scene, look, colours, picture, side, share)
         self._glow.finish(scene, look, colours, picture, opacity, target)
 
     def _figure(
+        self, scene: Scene, look: LookConfig, colours: Palette, picture: Target, side: float, share: float
+    ) -> None:
+        """The strands with their trails; side -1: as the floor mirrors them; share: of the brightness."""
+        width = max(THINNEST, WIDTH * picture.size[1])
+        share *= WIDTH * picture.size[1] / width  # as much light from a small picture as from a large one
+        inputs: dict[str, Any] = {
+            **scene.inputs,
+            "poses": self._easel.poses.texture,
+            "pixel": (2 / picture.size[0], 2 / picture.size[1]),
+            "floor_side": side,
+            "width": width,
+            "far_colour": stored(colours.accent),
+        }
+        if look.trail_s > 0:
+            self._leave_traces(scene, look, colours, picture, inputs, share)
+        inputs |= {"row": 0, "near_colour": stored(colours.figure), "brightness": 1.2 * share}
+        self._draw_strands(scene, picture, inputs, look.density)
+
+    def _leave_traces(
         self,
         scene: Scene,
         look: LookConfig,
         colours: Palette,
-        size: tuple[int, int],
-        side: float,
+        picture: Target,
+        inputs: dict[str, Any],
         share: float,
     ) -> None:
-        easel = self._easel
-        common: dict[str, Any] = {
-            "poses": easel.poses.texture,
-            "projection": scene.view.projection,
-            "eye": scene.view.eye,
-            "pixel": (2 / size[0], 2 / size[1]),
-            "floor_side": side,
+        """Ribbons where hands and feet have gone; above the floor also some strands where they have been."""
+        rows = min(ROWS, max(2, round(look.trail_s / ROW_S)))
+        trail = {
+            "width": 1.3 * inputs["width"],
+            "rows": float(rows),
+            "row_s": ROW_S,
+            "fresh_colour": stored(colours.light),
+            "old_colour": stored(colours.accent),
+            "brightness": 0.8 * share,
         }
-        rows = max(2, round(look.trail_s / ROW_S))
-        width = max(1.4, size[1] / 420)
-        figure, accent = np.sqrt(colours.figure) * 0.5, np.sqrt(colours.accent) * 0.5
-        if look.trail_s > 0:
-            self._trails.draw(
-                easel.tally, moderngl.TRIANGLE_STRIP, 2 * min(rows, ROWS), TRACES, **common, width=1.3 * width,
-                rows=min(rows, ROWS), row_s=ROW_S, fresh_colour=np.sqrt(colours.light) * 0.5, old_colour=accent, brightness=0.8 * share,
-            )  # fmt: skip
-            for echo in range(ECHOES, 0, -1):
-                row = round(min(rows, ROWS - 1) * echo / ECHOES * 0.7)
-                self._strands.draw(
-                    easel.tally, **common, width=width, row=row, near_colour=accent, far_colour=accent,
-                    share=0.4 * look.density, brightness=0.5 * share * (1 - echo / (ECHOES + 1)) ** 1.5,
-                )  # fmt: skip
+        length = look.trail_s * scene.share_of_picture * picture.size[1]  # at a figure height a second
+        self._trails.draw(
+            self._easel.tally,
+            TRACES * length * 2 * trail["width"],
+            inputs | trail,
+            moderngl.TRIANGLE_STRIP,
+            2 * rows,
+            TRACES,
+        )
+        echoes = ECHOES if inputs["floor_side"] > 0 else 0
+        for echo in range(echoes, 0, -1):
+            age = echo / (echoes + 1)
+            inputs |= {
+                "row": round(0.8 * (rows - 1) * age),
+                "near_colour": stored(colours.accent),
+                "brightness": 0.5 * share * (1 - age) ** 1.5,
+            }
+            self._draw_strands(scene, picture, inputs, 0.4 * look.density)
+
+    def _draw_strands(self, scene: Scene, picture: Target, inputs: dict[str, Any], part: float) -> None:
+        """The first part of all strands."""
+        count = round(part * self._count)
+        length = count * POINTS * STEP * scene.share_of_picture * picture.size[1]
         self._strands.draw(
-            easel.tally, **common, width=width, row=0, near_colour=figure, far_colour=accent,
-            share=look.density, brightness=1.2 * share,
-        )  # fmt: skip
+            self._easel.tally, length * 2 * inputs["width"], inputs, vertices=count * POINTS * 6
+        )
 
     def release(self) -> None:
-        for part in (self._strands, self._trails, self._glow, *self._buffers):
+        for part in (self._strands, self._trails, self._glow):
             part.release()
-
-
-def _ribbons(strands: Strands) -> tuple[bytes, bytes]:
-    """Vertices, two a point, and indices of the triangles between them."""
-    count = len(strands.positions)
-    kinds = [("p", "f4", 3), ("t", "f4", 3), ("n", "f4", 3), ("a", "f4", 3), ("j", "u1", 4), ("w", "f4", 4)]
-    records = np.zeros((count, POINTS + 1, 2), kinds)
-    for name, values in zip(
-        "ptnjw",
-        (strands.positions, strands.tangents, strands.normals, strands.joints, strands.weights),
-        strict=True,
-    ):
-        records[name] = values[:, :, None]
-    chances = np.random.RandomState(5).random_sample((count, 1))
-    records["a"][..., 0] = [-1.0, 1.0]
-    records["a"][..., 1] = strands.strengths[..., None]
-    records["a"][..., 2] = chances[..., None]
-    first = (2 * np.arange(count * (POINTS + 1)).reshape(count, POINTS + 1)[:, :-1]).reshape(-1, 1)
-    indices = first + np.array([[0, 1, 2, 1, 3, 2]])
-    return records.tobytes(), indices.astype(np.int32).tobytes()

@@ -37,3 +37,8 @@ def palette(look: LookConfig) -> Palette:
 def linear(colour: str) -> Array:
     """'#rrggbb' as linear light."""
     return np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]) ** 2
+
+
+def stored(light: Array) -> Array:
+    """Light as a canvas of eight bits keeps it where lights are added: as its root, with room above white."""
+    return 0.5 * np.sqrt(light)

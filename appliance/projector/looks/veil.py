@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import moderngl
-import numpy as np
 
 from appliance.projector.glow import Glow
-from appliance.projector.looks.palette import palette
+from appliance.projector.looks.palette import palette, stored
 from appliance.projector.poses import ROW_S, ROWS
 from appliance.projector.scene import Easel, Scene, direction
 from appliance.show.look import LookConfig
 
-ECHOES = 7
+ECHOES = 10  # at density 1
+KEY_FROM, KEY_ABOVE = -0.9, 40.0  # radians beside the camera, degrees above the floor
 
 
 class Veil:
@@ -25,26 +25,28 @@ class Veil:
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
         """Lay the look over what is in the target."""
-        easel, view, colours = self._easel, scene.view, palette(look)
+        easel, colours = self._easel, palette(look)
         picture = easel.picture(target.size, look.render_scale)
         picture.start()
         easel.ctx.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
         easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
+        inputs = {
+            **scene.inputs,
+            "poses": easel.poses.texture,
+            "lamp": direction(scene.view.azimuth + KEY_FROM, KEY_ABOVE),
+            "light_colour": stored(colours.light),
+        }
+        echoes = round(ECHOES * look.density) if look.trail_s > 0 else 0
         rows = min(ROWS - 1, round(look.trail_s / ROW_S))
-        for echo in range(ECHOES if look.trail_s > 0 else 0, -1, -1):
-            share = echo / (ECHOES + 1)
-            colour = colours.figure * (1 - share) + colours.accent * share
-            (self._figure if echo == 0 else self._echo).draw(
-                easel.tally,
-                poses=easel.poses.texture,
-                projection=view.projection,
-                eye=view.eye,
-                lamp=direction(view.azimuth - 0.9, 40.0),
-                row=round(rows * echo / ECHOES),
-                figure_colour=np.sqrt(colour) * 0.5,
-                light_colour=np.sqrt(colours.light) * 0.5,
-                brightness=1.15 if echo == 0 else 0.5 * (1 - share) ** 1.5,
-            )
+        for echo in range(echoes, -1, -1):
+            share = echo / (echoes + 1)
+            inputs |= {
+                "row": round(rows * echo / max(echoes, 1)),
+                "figure_colour": stored(colours.figure * (1 - share) + colours.accent * share),
+                "brightness": 1.5 if echo == 0 else 0.75 * (1 - share) ** 1.3,
+            }
+            body = self._figure if echo == 0 else self._echo
+            body.draw(easel.tally, 1.6 * scene.body_pixels(picture.size), inputs)
         self._glow.finish(scene, look, colours, picture, opacity, target)
 
     def release(self) -> None:

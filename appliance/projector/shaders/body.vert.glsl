@@ -1,8 +1,7 @@
 // The body's surface in the pose of one row.
 #include skin
 in vec3 in_position;
-in vec3 in_normal;
-in float in_open;
+in vec4 in_normal;  // w: how much light comes near
 in uvec4 in_joints;
 in vec4 in_weights;
 uniform mat4 projection;
@@ -15,8 +14,8 @@ out float open;
 void main() {
     mat2x4 by = blended(in_joints, in_weights, row);
     place = moved(by, in_position);
-    normal = turned(by, in_normal);
+    normal = turned(by, 2.0 * in_normal.xyz - 1.0);
     skin = in_position;
-    open = in_open;
+    open = 2.0 * in_normal.w - 1.0;
     gl_Position = projection * vec4(place, 1.0);
 }

@@ -1,7 +1,7 @@
 // A grain of the cloud: on the body, or on its way off it since it was left behind by a movement.
 #include skin
 in vec3 in_position;
-in vec3 in_normal;
+in vec4 in_normal;
 in vec4 in_chance;
 in uvec4 in_joints;
 in vec4 in_weights;
@@ -37,7 +37,7 @@ void main() {
     vec3 place = place_at(back), before = place_at(back + 1.5);
     vec3 velocity = (place - before) / (1.5 * row_s);
     float age = back / life, age_s = back * row_s, speed = length(velocity);
-    vec3 normal = turned(joint_at(in_joints.x, row), in_normal);
+    vec3 normal = turned(joint_at(in_joints.x, row), 2.0 * in_normal.xyz - 1.0);
     vec3 drift = textureLod(noise, place.xy * 0.9 + in_chance.zw * 0.15 + time * 0.01, 0.0).rgb
                + textureLod(noise, place.zy * 1.7 - time * 0.013, 0.0).gbr - 1.0;
     place += age_s * (0.30 * velocity * (1.0 - 0.45 * age) + (0.12 + 0.20 * speed) * drift + 0.03 * normal);
@@ -48,11 +48,13 @@ void main() {
     float rim = pow(1.0 - clamp(abs(facing), 0.0, 1.0), 2.5);
     float deep = exp(-fog * 1.6 * max(distance - focus, -0.3));
     float spark = 0.35 + 0.5 * in_chance.w + 1.4 * pow(in_chance.y, 12.0);
-    vec3 on_body = figure_colour * (0.06 + 1.25 * key * key) + accent_colour * (0.16 + 1.2 * rim);
+    vec3 on_body = figure_colour * (0.05 + 0.95 * key * key) + accent_colour * (0.16 + 1.2 * rim);
     vec3 in_air = mix(light_colour, accent_colour, smoothstep(0.1, 0.8, age));
     float shown = loose ? smoothstep(0.30, 1.5, speed) * pow(1.0 - age, 1.5) : smoothstep(-0.1, 0.3, facing);
     grain_colour = vec4((loose ? in_air * 1.3 : on_body) * spark * shown * deep, 1.0);
     gl_Position = projection * vec4(place + 0.012 * way / distance, 1.0);
-    gl_PointSize = clamp(pixels * (0.55 + 0.5 * in_chance.w + 0.6 * pow(in_chance.y, 12.0)) / gl_Position.w, 1.6, 12.0);
+    float size = pixels * (0.55 + 0.5 * in_chance.w + 0.6 * pow(in_chance.y, 12.0)) / gl_Position.w;
+    gl_PointSize = clamp(size, 1.6, 12.0);
+    grain_colour.rgb *= min(1.0, size * size / (1.6 * 1.6));
     if (shown < 0.01) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
 }

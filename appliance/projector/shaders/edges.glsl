@@ -3,6 +3,7 @@ uniform float vignette;
 
 float edge(vec2 uv, float aspect) {
     vec2 from_edge = min(uv, 1.0 - uv) * vec2(max(aspect, 1.0), max(1.0 / aspect, 1.0));
+    from_edge = max(from_edge - 0.004, 0.0);
     vec2 near = smoothstep(vec2(0.0), vec2(0.06 + 0.30 * vignette), from_edge);
     return near.x * near.y;
 }

@@ -12,8 +12,10 @@ uniform float aspect;
 uniform float fog;
 uniform float glow;
 uniform float time;
+uniform float exposure;
 out vec4 colour;
 #include tone
+#include edges
 
 void main() {
     vec3 near = texture(near_glow, uv).rgb, far = 0.5 * texture(far_glow, uv).rgb;
@@ -27,5 +29,5 @@ void main() {
     vec3 light = glow * (1.6 * near * near + 2.6 * far * far);
     light += fog * haze * (air_colour * (1.5 * on_floor + 0.9 * exp(-7.0 * dot(off_heart, off_heart))) + 0.22 * far * far);
     float speck = texelFetch(noise, ivec2(gl_FragCoord.xy) & 255, 0).a;
-    colour = vec4(sqrt(light) + (speck - 0.5) / 255.0, 1.0);
+    colour = vec4(toned(exposure * light) + (speck - 0.5) / 255.0, edge(uv, aspect));
 }

@@ -1,16 +1,15 @@
-// Light in the dark: what was drawn, in the air that it lights.
+// Light in the dark: what was drawn, in the air that it lights; neither takes the other's place.
 in vec2 uv;
 uniform sampler2D picture;
 uniform sampler2D air;
-uniform float aspect;
 uniform float exposure;
 uniform float opacity;
 out vec4 colour;
 #include tone
-#include edges
 
 void main() {
-    vec3 drawn = texture(picture, uv).rgb, around = texture(air, uv).rgb;
-    vec3 light = 4.0 * drawn * drawn + around * around;
-    colour = vec4(dithered(toned(exposure * light) * edge(uv, aspect), gl_FragCoord.xy), opacity);
+    vec3 drawn = min((2.0 * exposure) * texture(picture, uv).rgb, 1.0);
+    vec4 around = texture(air, uv);
+    vec3 shown = (drawn + around.rgb - drawn * around.rgb) * around.a;
+    colour = vec4(dithered(shown, gl_FragCoord.xy), opacity);
 }

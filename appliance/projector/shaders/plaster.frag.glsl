@@ -23,7 +23,7 @@ float lit(vec3 n) {
     for (int i = 0; i < 8; i++) {
         float angle = turn + 2.399963 * float(i);
         vec2 around = sqrt((float(i) + 0.5) / 8.0) * vec2(cos(angle), sin(angle));
-        vec3 bytes = texture(lamp_depth, at.xy + 0.011 * around).rgb;
+        vec3 bytes = texture(lamp_depth, at.xy + 0.008 * around).rgb;
         sum += step(at.z - 0.004, dot(bytes, vec3(1.0, 1.0 / 255.0, 1.0 / 65025.0)));
     }
     return sum / 8.0;
@@ -32,7 +32,7 @@ float lit(vec3 n) {
 void main() {
     vec3 n = normalize(normal), to_eye = normalize(eye - place);
     vec4 rough = texture(noise, skin.xy * 1.9 + skin.z * 1.3) + texture(noise, skin.zy * 4.3 - skin.x) - 1.0;
-    float shaded = clamp((dot(n, lamp) + 0.10) / 1.10, 0.0, 1.0) * mix(1.0, lit(n), shadow);
+    float shaded = pow(clamp((dot(n, lamp) + 0.06) / 1.06, 0.0, 1.0), 1.3) * mix(1.0, lit(n), shadow);
     n = normalize(n + 0.10 * rough.rgr);
     float facing = clamp(dot(n, to_eye), 0.0, 1.0);
     vec3 albedo = figure_colour * (0.94 + 0.12 * rough.g);
@@ -42,10 +42,10 @@ void main() {
     vec3 bounce = light_colour * 0.16 * (1.0 - sky) * exp(-2.5 * place.y);
     vec3 ambient = (mix(vec3(0.006), accent_colour * 0.028, sky) + bounce) * cavity;
     float behind = clamp(dot(n, back_lamp) * 0.9 + 0.1, 0.0, 1.0);
-    vec3 rim = accent_colour * (0.10 * behind + 3.4 * behind * pow(1.0 - facing, 3.0)) * cavity;
+    vec3 rim = accent_colour * (0.10 * behind + 4.5 * behind * pow(1.0 - facing, 3.0)) * cavity;
     float warm = shaded * (1.0 - shaded);
     vec3 glance = vec3(0.10, 0.03, 0.0) * warm;
     float sheen = 0.07 * pow(clamp(dot(n, normalize(lamp + to_eye)), 0.0, 1.0), 14.0) * shaded;
-    vec3 light = albedo * (light_colour * (key * 1.7 * mix(1.0, open, 0.35)) + glance + ambient + rim) + light_colour * sheen;
+    vec3 light = albedo * (light_colour * (key * 1.75 * mix(1.0, open, 0.35)) + glance + ambient + rim) + light_colour * sheen;
     colour = vec4(dithered(toned(exposure * light), gl_FragCoord.xy), 1.0);
 }

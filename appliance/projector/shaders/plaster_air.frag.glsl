@@ -20,6 +20,7 @@ uniform float exposure;
 uniform float time;
 out vec4 colour;
 #include tone
+#include edges
 
 vec3 floor_light() {
     if (ray.y > -1e-3) return vec3(0.0);
@@ -30,7 +31,7 @@ vec3 floor_light() {
     vec2 on_cast = (at.xz - middle) / reach;
     vec3 bands = texture(floor_shadow, 0.5 + 0.5 * on_cast).rgb;
     float inside = 1.0 - smoothstep(0.75, 1.0, max(abs(on_cast.x), abs(on_cast.y)));
-    float dark = min(1.0, 1.15 * bands.r + 1.05 * bands.g + 0.95 * bands.b) * inside * shadow;
+    float dark = min(1.0, 1.2 * bands.r + 1.15 * bands.g + 1.1 * bands.b) * inside * shadow;
     float worn = 0.62 + 0.5 * texture(noise, at.xz * 0.21).r + 0.30 * (texture(noise, at.xz * 1.1).g - 0.5);
     vec3 bounced = light_colour * (1.0 - dark) + accent_colour * 0.05;
     return air_colour * bounced * pool * worn * 1.3;
@@ -43,11 +44,11 @@ float beam() {
     float width = beam_width * (0.06 + 0.94 * clamp(along, 0.0, 1.3));
     float drift = texture(noise, vec2(p.x * 0.30 - time * 0.006, p.y * 0.22 + time * 0.004)).r;
     float body = exp(-across * across / (width * width)) * smoothstep(1.15, 0.6, along) / (0.25 + along);
-    return body * (0.35 + 1.2 * drift);
+    return body * (0.55 + 0.7 * drift);
 }
 
 void main() {
     vec3 light = floor_light() + fog * light_colour * air_colour * 0.42 * beam();
     float speck = texelFetch(noise, ivec2(gl_FragCoord.xy) & 255, 0).a;
-    colour = vec4(toned(exposure * light) + (speck - 0.5) / 255.0, 1.0);
+    colour = vec4(toned(exposure * light) + (speck - 0.5) / 255.0, edge(uv, aspect));
 }

@@ -1,7 +1,8 @@
-// A thread of light: bright in its middle, fainter on the far side of the body.
+// A thread of light: bright in its middle, fainter on the far side of the body; brightness wanders along it.
 in float across;
 in float strength;
 in float facing;
+in float pulse;
 uniform vec3 near_colour;
 uniform vec3 far_colour;
 uniform float brightness;
@@ -10,6 +11,7 @@ out vec4 colour;
 void main() {
     float profile = exp(-3.5 * across * across) - 0.03;
     float side = smoothstep(-0.35, 0.75, facing);
+    float beat = 0.62 + 0.38 * cos(6.2832 * pulse);
     vec3 light = mix(far_colour * 0.16, near_colour, side);
-    colour = vec4(brightness * strength * max(profile, 0.0) * light, 1.0);
+    colour = vec4(brightness * strength * beat * max(profile, 0.0) * light, 1.0);
 }

@@ -13,7 +13,7 @@ out vec4 colour;
 void main() {
     vec3 n = normalize(normal), to_eye = normalize(eye - place);
     float facing = abs(dot(n, to_eye));
-    float rim = pow(1.0 - facing, 2.6);
+    float rim = pow(1.0 - facing, 2.4) * smoothstep(0.0, 0.22, facing);
     float glint = pow(clamp(dot(n, normalize(lamp + to_eye)), 0.0, 1.0), 40.0);
     colour = vec4(brightness * (figure_colour * (0.05 + rim) + light_colour * 0.6 * glint), 1.0);
 }

@@ -1,0 +1,40 @@
+"""Vertices packed for the GPU: places as floats, everything else in bytes and half floats."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+FORMATS = {  # moderngl's word for it, and numpy's
+    "position": ("3f4", "f4"),
+    "normal": ("4f1", "u1"),
+    "tangent": ("4f1", "u1"),
+    "chance": ("4f2", "f2"),
+    "along": ("4f2", "f2"),
+    "joints": ("4u1", "u1"),
+    "weights": ("4f1", "u1"),
+}
+
+
+def layout(parts: tuple[str, ...]) -> tuple[str, ...]:
+    """What a vertex array wants to know of vertices of these parts: the format, then names in shaders."""
+    return " ".join(FORMATS[part][0] for part in parts), *(f"in_{part}" for part in parts)
+
+
+def packed(parts: Mapping[str, Any]) -> bytes:
+    """Parts (V, ..) by name, vertex after vertex; what has fewer numbers than its format ends in zeros.
+
+    Bytes hold 0 to 1, or -1 to 1 for normals and tangents; a shader doubles those and takes 1 away.
+    """
+    count = len(next(iter(parts.values())))
+    kinds: list[Any] = [(part, FORMATS[part][1], int(FORMATS[part][0][0])) for part in parts]
+    records = np.zeros(count, kinds)
+    for part, values in parts.items():
+        if part in ("normal", "tangent"):
+            values = 0.5 + 0.5 * values
+        if FORMATS[part][0].endswith("f1"):
+            values = np.round(255.0 * values)
+        records[part][:, : values.shape[1]] = values
+    return records.tobytes()

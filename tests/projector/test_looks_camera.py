@@ -1,0 +1,96 @@
+"""The camera never loses the dancer, moves softly, and is where its time says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from appliance.pose.recording import Recording
+from appliance.projector.camera import View, view
+from appliance.projector.gallery import moment_of
+from appliance.projector.moment import Moment
+from appliance.projector.poses import poses_of
+from appliance.show.look import CameraConfig
+from tests.projector.golden_looks import phrase
+
+HEIGHT, SOLE = 1.53, 0.05
+ASPECTS = (16 / 9, 4 / 3, 9 / 16)
+
+
+@pytest.fixture(scope="module")
+def dance() -> Recording:
+    return phrase()
+
+
+def seen(moment: Moment, config: CameraConfig, aspect: float) -> tuple[View, np.ndarray]:
+    """The view of a moment and where its joints are in the picture, -1 to 1."""
+    poses = poses_of(moment, HEIGHT, SOLE)
+    at = view(config, config, 1.0, moment.time_s, poses, aspect)
+    joints = np.concatenate([poses.positions[0], np.ones((poses.positions.shape[1], 1))], axis=1)
+    clip = joints @ at.projection.T
+    assert (clip[:, 3] > 0).all()
+    return at, clip[:, :2] / clip[:, 3:]
+
+
+def travelled(moment: Moment, metres: float) -> Moment:
+    """The same moment on its way across the stage at 4 m/s."""
+    way = [(metres - 4.0 * (moment.time_s - time)) * np.array([1.0, 0.0, 0.3]) for time in moment.trail_times]
+    trail = [
+        ((positions + step).astype(np.float32), world)
+        for step, (positions, world) in zip(way, moment.trail, strict=True)
+    ]
+    return Moment(moment.time_s, trail[-1][0], moment.world, trail, moment.trail_times)
+
+
+@pytest.mark.parametrize("aspect", ASPECTS)
+@pytest.mark.parametrize(
+    "config",
+    [
+        CameraConfig(),
+        CameraConfig(follow=0.0, figure=0.9),
+        CameraConfig(follow=1.0, move="orbit", lens_deg=75.0, period_s=10.0),
+        CameraConfig(move="still", angle_deg=-180.0, elevation_deg=70.0),
+    ],
+    ids=["built in", "does not follow", "orbits", "from above"],
+)
+def test_no_joint_leaves_the_picture(dance: Recording, config: CameraConfig, aspect: float) -> None:
+    for time_s in np.arange(1.5, dance.seconds, 3.7):
+        moment = moment_of(dance, float(time_s))
+        for stage in (moment, travelled(moment, 3.0), travelled(moment, -12.0)):
+            _, joints = seen(stage, config, aspect)
+            assert np.abs(joints).max() < 0.97
+
+
+def test_a_jump_of_the_phrase_is_still_in_the_picture(dance: Recording) -> None:
+    """Where a phrase starts anew the dancer is elsewhere from one tick to the next."""
+    moment = moment_of(dance, 20.0)
+    far = (moment.positions + np.float32([3.0, 0.0, -2.0])).astype(np.float32)
+    jumped = Moment(moment.time_s, far, moment.world, moment.trail, moment.trail_times)
+    assert np.abs(seen(jumped, CameraConfig(), 16 / 9)[1]).max() < 1.0
+
+
+def test_moves_softly(dance: Recording) -> None:
+    """From one display frame to the next the camera goes less than two thousandths of the figure's height."""
+    eyes = [
+        seen(moment_of(dance, 15.0 + tick / 50), CameraConfig(figure=0.5), 16 / 9)[0].eye
+        for tick in range(150)
+    ]
+    steps = np.linalg.norm(np.diff(eyes, axis=0), axis=1)
+    jolts = np.linalg.norm(np.diff(eyes, n=2, axis=0), axis=1)
+    assert steps.max() < 0.03 and jolts.max() < 0.003
+
+
+def test_stands_where_its_time_says(dance: Recording) -> None:
+    poses = poses_of(moment_of(dance, 20.0), HEIGHT, SOLE)
+    orbit = CameraConfig(move="orbit", angle_deg=0.0, period_s=40.0)
+    angles = [np.degrees(view(orbit, orbit, 1.0, at, poses, 1.5).azimuth) for at in (0.0, 10.0, 40.0)]
+    assert angles == pytest.approx([0.0, 90.0, 360.0])
+    still = CameraConfig(move="still", angle_deg=90.0)
+    assert view(still, still, 1.0, 7.0, poses, 1.5).back[0] > 0.9
+
+
+def test_fades_from_place_to_place_the_short_way(dance: Recording) -> None:
+    poses = poses_of(moment_of(dance, 20.0), HEIGHT, SOLE)
+    before, now = CameraConfig(move="still", angle_deg=170.0), CameraConfig(move="still", angle_deg=-170.0)
+    ends = [np.degrees(view(before, now, mix, 0.0, poses, 1.5).azimuth) for mix in (0.0, 0.5, 1.0)]
+    assert ends == pytest.approx([170.0, 180.0, 190.0])
