@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from appliance.projector.controls import Controls
-from appliance.projector.window import Key, Size
+from appliance.projector.keyboards import Key
+from appliance.projector.window import Size
 
 HELP = """\
 c            corner mode: lay the picture onto the wall

@@ -83,8 +83,14 @@ class Run:
             f"The picture is {width}x{height} ({self._window.driver}, {self._context.renderer}). "
             f"Its alignment is kept in {self._file.path}.",
         ]
-        if self._window.kind != "offscreen":
-            lines.append("Keys work in the picture's window: h tells which, q ends.")
+        keyboards = self._window.keyboards
+        if keyboards is not None and keyboards.is_refused:
+            lines.append(
+                "No keyboard can be read: the picture is laid onto the wall by OSC alone. "
+                "Put this user into the group input for keys."
+            )
+        elif self._window.kind != "offscreen":
+            lines.append("Keys work on the picture: h tells which, q ends.")
         return lines
 
     def project(self, stopped: Callable[[], bool]) -> Figures:

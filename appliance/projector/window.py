@@ -4,26 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Literal
 
+from appliance.projector.keyboards import Key, Keyboards
 from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
 from appliance.projector.sdl import sdl2
 from appliance.show.projector import ProjectorConfig
 
 Size = tuple[int, int]
 Kind = Literal["fullscreen", "window", "offscreen"]
+_WITHOUT_DESKTOP = "kmsdrm"
 _TITLE = b"Bunraku"
 _BLACK = "The audience sees no picture; the dance goes on."
 _SHIFT = sdl2.KMOD_LSHIFT | sdl2.KMOD_RSHIFT
-
-
-@dataclass(frozen=True)
-class Key:
-    """A key that was pressed: its name on the keyboard, and whether shift was held."""
-
-    name: str
-    shift: bool = False
 
 
 class Window:
@@ -40,6 +33,7 @@ class Window:
         except BaseException:
             sdl2.SDL_QuitSubSystem(sdl2.SDL_INIT_VIDEO)
             raise
+        self.keyboards = Keyboards() if self.driver == _WITHOUT_DESKTOP else None
         sdl2.SDL_ShowCursor(sdl2.SDL_DISABLE)
         sdl2.SDL_DisableScreenSaver()
 
@@ -64,9 +58,11 @@ class Window:
         while sdl2.SDL_PollEvent(event):
             if event.type == sdl2.SDL_QUIT:
                 yield None
-            elif event.type == sdl2.SDL_KEYDOWN:
+            elif event.type == sdl2.SDL_KEYDOWN and self.keyboards is None:
                 key = event.key.keysym
                 yield Key(sdl2.SDL_GetKeyName(key.sym).decode(errors="replace"), bool(key.mod & _SHIFT))
+        if self.keyboards is not None:
+            yield from self.keyboards.pressed()
 
     def toggle_fullscreen(self) -> None:
         """From the window onto the whole display and back."""
@@ -78,6 +74,8 @@ class Window:
 
     def close(self) -> None:
         """Give the display back."""
+        if self.keyboards is not None:
+            self.keyboards.close()
         sdl2.SDL_DestroyWindow(self.handle)
         sdl2.SDL_QuitSubSystem(sdl2.SDL_INIT_VIDEO)
 
@@ -115,7 +113,7 @@ def _drivers(kind: Kind) -> list[str]:
     found = [
         driver for driver, at in (("wayland", "WAYLAND_DISPLAY"), ("x11", "DISPLAY")) if os.environ.get(at)
     ]
-    return [*found, "kmsdrm"]
+    return [*found, _WITHOUT_DESKTOP]
 
 
 def _find_display(wanted: int | str) -> int:

@@ -8,8 +8,8 @@ from appliance.control.orders import Order
 from appliance.projector.alignment import Alignment
 from appliance.projector.controls import Controls
 from appliance.projector.corners import WHOLE
+from appliance.projector.keyboards import Key
 from appliance.projector.keys import HELP, press
-from appliance.projector.window import Key
 
 SIZE = (1000, 500)
 

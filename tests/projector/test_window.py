@@ -15,11 +15,12 @@ from PIL import Image
 
 from appliance.projector import context as context_module
 from appliance.projector.context import GlContext, offscreen
+from appliance.projector.keyboards import Key
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, ProjectorError
 from appliance.projector.run import Run, Wish
 from appliance.projector.sdl import sdl2
-from appliance.projector.window import Key, Window
+from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
 

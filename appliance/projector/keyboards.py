@@ -1,0 +1,122 @@
+"""Keyboards of a box without a desktop, read from the kernel (evdev), also those plugged in later.
+
+SDL's library as Python packages bring it is built without udev, so that on KMS/DRM it finds no keyboard.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+DEVICES = Path("/dev/input")
+_EVENT = struct.Struct(
+    "@llHHi"
+)  # linux/input.h, struct input_event: seconds, microseconds, type, code, value
+_EV_KEY = 0x01
+_EVIOCGBIT_KEY = 2 << 30 | 96 << 16 | ord("E") << 8 | 0x20 + _EV_KEY  # which keys it has, 96 bytes of bits
+_RELEASED = 0
+_SHIFTS = (42, 54)
+# linux/input-event-codes.h: by their places on a US keyboard.
+_NAMES = (
+    {1: "Escape", 15: "Tab", 103: "Up", 105: "Left", 106: "Right", 108: "Down"}
+    | {2: "1", 3: "2", 4: "3", 5: "4", 12: "-", 13: "=", 74: "Keypad -", 78: "Keypad +"}
+    | {16: "Q", 19: "R", 23: "I", 33: "F", 34: "G", 35: "H", 46: "C", 50: "M"}
+)
+_MOST_EVENTS = 64  # at once, from one keyboard
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key that was pressed: its name on the keyboard, and whether shift was held."""
+
+    name: str
+    shift: bool = False
+
+
+class Keyboards:
+    """All keyboards in a folder of devices. Nothing here raises or waits.
+
+    is_refused: whether there are devices, none of which this user may read.
+    """
+
+    def __init__(self, devices: Path = DEVICES) -> None:
+        self._devices = devices
+        self._open: dict[Path, int] = {}
+        self._changed: int | None = None
+        self._shifts: set[tuple[int, int]] = set()
+        self.is_refused = False
+        self._look()
+
+    def pressed(self) -> Iterator[Key]:
+        """Keys that were pressed, or repeat, since the last time."""
+        self._look()
+        for path, descriptor in list(self._open.items()):
+            try:
+                received = os.read(descriptor, _MOST_EVENTS * _EVENT.size)
+            except BlockingIOError:
+                continue
+            except OSError:
+                received = b""
+            if not received:  # unplugged
+                self._forget(path)
+                continue
+            whole = len(received) - len(received) % _EVENT.size
+            for _, _, kind, code, value in _EVENT.iter_unpack(received[:whole]):
+                if kind == _EV_KEY:
+                    yield from self._key(descriptor, code, value)
+
+    def close(self) -> None:
+        """Let go of all of them."""
+        for path in list(self._open):
+            self._forget(path)
+
+    def _key(self, descriptor: int, code: int, value: int) -> Iterator[Key]:
+        if code in _SHIFTS:
+            held = (descriptor, code)
+            self._shifts = self._shifts - {held} if value == _RELEASED else self._shifts | {held}
+        elif value != _RELEASED and code in _NAMES:
+            yield Key(_NAMES[code], bool(self._shifts))
+
+    def _look(self) -> None:
+        """Open what was plugged in since the folder last changed."""
+        try:
+            changed = self._devices.stat().st_mtime_ns
+        except OSError:
+            return
+        if changed == self._changed:
+            return
+        self._changed = changed
+        refused = 0
+        for path in self._devices.glob("event*"):
+            if path not in self._open:
+                try:
+                    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+                except OSError:
+                    refused += 1
+                    continue
+                if is_keyboard(descriptor):
+                    self._open[path] = descriptor
+                else:
+                    os.close(descriptor)
+        self.is_refused = refused > 0 and not self._open
+
+    def _forget(self, path: Path) -> None:
+        descriptor = self._open.pop(path)
+        self._shifts = {held for held in self._shifts if held[0] != descriptor}
+        self._changed = None  # what has this name next is another device
+        with contextlib.suppress(OSError):
+            os.close(descriptor)
+
+
+def is_keyboard(descriptor: int) -> bool:
+    """Whether a device has the keys that are asked for here; mice and power buttons have not."""
+    try:
+        bits = fcntl.ioctl(descriptor, _EVIOCGBIT_KEY, bytes(96))
+    except OSError:
+        return False
+    return all(bits[code // 8] >> code % 8 & 1 for code in (*_SHIFTS, 16, 46, 105))
