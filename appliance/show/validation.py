@@ -72,6 +72,8 @@ def _cure(error: ErrorDetails, field: FieldInfo | None) -> str:
         return did_you_mean(error["input"], words)
     if isinstance(error["input"], str) and _is_number(error["input"]):
         return "Write it without quotes and without an exponent (0.001, not 1e-3)."
+    if isinstance(error["input"], str) and _is_number(error["input"].replace(",", ".", 1)):
+        return f"Write it with a point: {error['input'].replace(',', '.', 1)}."
     return " ".join(part for part in (f"Write {limits}." if limits else "", field.description) if part)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +13,7 @@ import yaml
 from appliance.show.config_error import ConfigError, Problem
 
 MAX_BYTES = 256 * 1024  # a long show file has some 2 kB
+_BARE_COLOUR = re.compile(r"[:\[,]\s+#[0-9a-fA-F]{3}")
 _TIMESTAMP = "tag:yaml.org,2002:timestamp"
 _TAGS = {
     f"tag:yaml.org,2002:{kind}" for kind in ("map", "seq", "str", "int", "float", "bool", "null", "merge")
@@ -49,12 +51,11 @@ def read_yaml(path: Path) -> YamlFile:
         if root is not None:
             file.values = _Plain(file, problems).value(root, ())
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        raise _not_yaml(path, mark.line + 1 if mark else 1, error.problem or "it breaks off") from None
+        raise _not_yaml(path, text, error) from None
     except yaml.YAMLError as error:
-        raise _not_yaml(path, 1, str(error).splitlines()[0]) from None
+        raise _refused(path, 1, str(error).splitlines()[0]) from None
     except RecursionError:
-        raise _not_yaml(path, 1, "it is nested too deeply") from None
+        raise _refused(path, 1, "it is nested too deeply") from None
     if not problems and not isinstance(file.values, dict):
         problems.append(Problem(path, 1, "The file does not consist of keys.", "Write 'key: value' lines."))
     if problems:
@@ -79,8 +80,29 @@ def _read_text(path: Path) -> str:
         raise ConfigError([Problem(path, line, "This line is not text.", "Save it as UTF-8.")]) from None
 
 
-def _not_yaml(path: Path, line: int, why: str) -> ConfigError:
-    cure = "Check indentation, colons and brackets on this line and the one above."
+def _not_yaml(path: Path, text: str, error: yaml.MarkedYAMLError) -> ConfigError:
+    """The three slips that are made most, in plain words; all others in those of the YAML library."""
+    mark, start = error.problem_mark or error.context_mark, error.context_mark
+    line = mark.line + 1 if mark else 1
+    why = error.problem or "it breaks off"
+    if "'\\t'" in why:
+        return _refused(path, line, "a tab stands on this line", "Put spaces in its place.")
+    first = start.line + 1 if start else line
+    above = max(first - 1, 1)  # a line that breaks off is noticed on the next one
+    for number, written in enumerate(text.splitlines()[above - 1 : line], start=above):
+        if _BARE_COLOUR.search(written):
+            cure = "Write colours in quotes, like '#f2e6d8'."
+            return _refused(path, number, "what stands behind a bare # is taken for a comment", cure)
+    if error.context in ("while parsing a flow mapping", "while parsing a flow sequence"):
+        bracket = "{" if "mapping" in error.context else "["
+        cure = "Close it where it ends, and put commas between its parts and a colon behind each key."
+        until = f", up to line {line}" if line > first else ""
+        return _refused(path, first, f"something is wrong behind the '{bracket}' on this line{until}", cure)
+    return _refused(path, line, why)
+
+
+def _refused(path: Path, line: int, why: str, cure: str = "") -> ConfigError:
+    cure = cure or "Check indentation, colons and brackets on this line and the one above."
     return ConfigError([Problem(path, line, f"This is not YAML: {why}.", cure)])
 
 
