@@ -12,7 +12,8 @@ from appliance.projector.skinning import BodyMesh
 from appliance.projector.vertices import layout, packed
 
 COARSE = 0.02  # of the figure's height: vertices so close are one in its shadow
-OCCLUDER = 0.028  # of the figure's height between the points that keep light from each other
+OCCLUDER = 0.03  # of the figure's height: how large the points are that keep light from each other
+SMOOTHINGS = 6
 REACH = 0.22  # of the figure's height: what is further away keeps no light off
 
 Floats = NDArray[np.float32]
@@ -29,7 +30,7 @@ class BodyBuffers:
         self.positions = (mesh.vertices / mesh.height).astype(np.float32)
         self.normals, self.joints, self.weights = mesh.normals, mesh.joints, mesh.weights
         self.faces = mesh.faces
-        self.open = openness(self.positions, self.normals)
+        self.open = openness(self.positions, self.normals, mesh.faces)
         self._fine = self._uploaded(ctx, np.arange(len(self.positions)), mesh.faces)
         self._coarse = self._uploaded(ctx, *merged(self.positions, mesh.faces, COARSE))
 
@@ -56,31 +57,39 @@ class BodyBuffers:
         return ctx.buffer(packed(parts)), ctx.buffer(np.ascontiguousarray(faces, np.int32).tobytes())
 
 
+def cells(positions: Floats, size: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """One vertex for each cell of space that has any, and for each vertex the number of its cell."""
+    places = np.floor(positions / size).astype(np.int64)
+    _, first, cell = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    return first, cell.reshape(-1)
+
+
 def merged(
-    positions: Floats, faces: NDArray[np.int32], cell: float
+    positions: Floats, faces: NDArray[np.int32], size: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """One vertex for all in a cell of space: which vertices stay, and the faces between those that stay."""
-    _, first, now = np.unique(
-        np.floor(positions / cell).astype(np.int64), axis=0, return_index=True, return_inverse=True
-    )
-    merged = now.reshape(-1)[faces]
-    whole = (merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2]) & (merged[:, 2] != merged[:, 0])
-    return first, merged[whole].astype(np.int32)
+    first, cell = cells(positions, size)
+    corners = cell[faces]
+    a, b, c = corners.T
+    return first, corners[(a != b) & (b != c) & (c != a)].astype(np.int32)
 
 
-def openness(positions: Floats, normals: Floats) -> Floats:
-    """(V,) 0..1: how much of the light from all around reaches each point of a body with spread limbs."""
-    _, first = np.unique(np.floor(positions / OCCLUDER).astype(np.int64), axis=0, return_index=True)
-    blockers, facing = positions[first], normals[first]
-    open_ = np.empty(len(positions), np.float32)
-    for start in range(0, len(positions), 512):
-        part = slice(start, start + 512)
-        way = blockers[None] - positions[part, None]
-        distance = np.linalg.norm(way, axis=-1) + 1e-4
-        above = np.einsum("vbc,vc->vb", way, normals[part]) / distance
-        towards = -np.einsum("vbc,bc->vb", way, facing) / distance
-        share = (
-            np.clip(above - 0.08, 0, 1) * np.clip(towards, 0, 1) * OCCLUDER**2 / (distance**2 + OCCLUDER**2)
-        )
-        open_[part] = np.exp(-1.6 * np.sum(share * (distance < REACH), axis=1))
-    return open_
+def openness(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> Floats:
+    """(V,) 0..1: how much of the light from all around reaches each point of a body with spread limbs.
+
+    Reckoned for one point of each cell, then smoothed along the surface.
+    """
+    first, cell = cells(positions, OCCLUDER)
+    at, facing = positions[first], normals[first]
+    way = at[None] - at[:, None]
+    distance = np.linalg.norm(way, axis=-1) + 1e-4
+    above = np.einsum("vbc,vc->vb", way, facing) / distance
+    towards = -np.einsum("vbc,bc->vb", way, facing) / distance
+    area = OCCLUDER**2 / (distance**2 + OCCLUDER**2)
+    kept_off = np.clip(above - 0.08, 0, 1) * np.clip(towards, 0, 1) * area * (distance < REACH)
+    values = np.exp(-1.6 * kept_off.sum(axis=1))[cell]
+    corners, count = faces.reshape(-1), np.bincount(faces.reshape(-1), minlength=len(positions))
+    for _ in range(SMOOTHINGS):
+        of_faces = np.repeat(values[faces].mean(axis=1), 3)
+        values = np.bincount(corners, of_faces, len(positions)) / np.maximum(count, 1)
+    return np.asarray(values, np.float32)

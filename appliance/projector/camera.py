@@ -10,6 +10,7 @@ from appliance.pose.quaternion import Array
 from appliance.projector.poses import ROWS, Poses
 from appliance.show.look import CameraConfig
 
+UPRIGHT = 1.35  # a figure may stand taller than an upright picture is wide: it is slender
 AIM = 0.5  # height that the camera looks at, in figure heights
 ROOM = 0.82  # of the half picture that joints may use; the rest is for the flesh around them
 KNEE = 8  # how suddenly the camera draws back when a joint comes near the edge: higher is later
@@ -69,7 +70,7 @@ def view(
     stand = _between(_stand(before, time_s), _stand(now, time_s), mix * mix * (3 - 2 * mix))
     slope = float(np.tan(stand.lens / 2))
     slopes = (slope * aspect, slope) if aspect >= 1 else (slope, slope / aspect)
-    distance = 0.5 / (stand.figure * slope)
+    distance = 0.5 / (stand.figure * min(slopes[1], UPRIGHT * slopes[0]))
     across = np.array([np.cos(stand.azimuth), 0.0, -np.sin(stand.azimuth)])
     towards = np.array([np.sin(stand.azimuth), 0.0, np.cos(stand.azimuth)])
     centre = (_SMOOTH[:, None] * poses.positions[:, 0]).sum(axis=0) * [1.0, 0.0, 1.0]
@@ -80,7 +81,7 @@ def view(
     back = towards * np.cos(stand.elevation) + np.array([0.0, np.sin(stand.elevation), 0.0])
     up = np.cross(back, across)
     seen = (poses.positions.astype(float) - aim) @ np.stack([across, up, back]).T
-    distance *= _drawn_back(seen, distance, slopes)
+    distance = _drawn_back(seen, distance, slopes)
     return View(aim + distance * back, across, up, back, slopes, centre[[0, 2]], stand.azimuth)
 
 
@@ -116,9 +117,8 @@ def _limited(value: float, limit: float) -> float:
 
 
 def _drawn_back(seen: Array, distance: float, slopes: tuple[float, float]) -> float:
-    """By how much the distance must grow; seen: (ROWS, J, 3) right, up, towards the camera from the aim."""
-    ahead = np.maximum(distance - seen[..., 2], 0.2 * distance)
-    wide = np.abs(seen[..., 0]) / (ahead * slopes[0] * ROOM)
-    high = np.abs(seen[..., 1]) / (ahead * slopes[1] * ROOM)
-    need = float(np.max(_RECENT * np.maximum(wide, high).max(axis=1)))
-    return float((1.0 + need**KNEE) ** (1.0 / KNEE))
+    """The distance from which all joints are in the picture; seen: (ROWS, J, 3) from the aim to the right, up
+    and towards the camera."""
+    half = ROOM * np.array(slopes)
+    needed = np.max(np.abs(seen[..., :2]) / half + seen[..., 2:], axis=(1, 2))
+    return float((distance**KNEE + max(0.0, float(np.max(_RECENT * needed))) ** KNEE) ** (1.0 / KNEE))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 import appliance.show
 from appliance.pose.bvh import read_bvh
@@ -15,10 +16,11 @@ from appliance.pose.recording import Recording
 from appliance.projector.context import offscreen
 from appliance.projector.moment import Moment
 from appliance.projector.renderer import Renderer
-from appliance.show.look import CameraConfig, LookConfig
+from appliance.show.look import STYLES, CameraConfig, LookConfig
 
 SIZE = 864, 486
 FINER = 2  # drawn so many times larger and then shrunk, as a projector's pixels melt on the wall
+UPRIGHT, TOGETHER_S = (320, 400), 49.6  # of the four looks beside each other
 TRAIL_S = 1.2
 SHOW = Path(appliance.show.__file__).parent / "default_show"
 CHALK = LookConfig(
@@ -31,8 +33,11 @@ PICTURES = {  # what each picture is called: the look, and the moment of the phr
     "cloud": (LookConfig(name="cloud", style="cloud"), 17.4),
     "veil": (LookConfig(name="veil", style="veil"), 17.4),
     "chalk": (CHALK, 17.4),
-    "close": (LookConfig(name="close", style="plaster", camera=CameraConfig(figure=0.9, lens_deg=55)), 46.2),
+    "above": (LookConfig(name="above", camera=CameraConfig(elevation_deg=50, figure=0.85)), 17.4),
 }
+
+
+Image = NDArray[np.uint8]
 
 
 def moment_of(recording: Recording, time_s: float, held: Sequence[int] = ()) -> Moment:
@@ -55,7 +60,7 @@ def moment_of(recording: Recording, time_s: float, held: Sequence[int] = ()) -> 
 
 def drawn(
     ctx: moderngl.Context, renderer: Renderer, moment: Moment, look: str, size: tuple[int, int]
-) -> np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]:
+) -> Image:
     """One look of a moment as an image (height, width, 3), the upper row first."""
     target = ctx.framebuffer([ctx.texture(size, 4)])
     try:
@@ -70,7 +75,7 @@ def drawn(
 
 def gallery(folder: Path) -> list[Path]:
     """Draw all pictures into a folder; returns them."""
-    from PIL import Image  # of the extra `pictures`, which the show itself runs without
+    from PIL import Image as Files  # of the extra `pictures`, which the show itself runs without
 
     recording = read_bvh(SHOW / "phrase.bvh")
     size = SIZE[0] * FINER, SIZE[1] * FINER
@@ -80,11 +85,28 @@ def gallery(folder: Path) -> list[Path]:
             ctx, size, recording.skeleton, {name: look for name, (look, _) in PICTURES.items()}
         )
         for name, (_, time_s) in PICTURES.items():
-            image = Image.fromarray(drawn(ctx, renderer, moment_of(recording, time_s), name, size))
+            image = Files.fromarray(drawn(ctx, renderer, moment_of(recording, time_s), name, size))
             paths.append(folder / f"look-{name}.png")
-            image.resize(SIZE, Image.Resampling.BOX).save(paths[-1], optimize=True)
+            image.resize(SIZE, Files.Resampling.BOX).save(paths[-1], optimize=True)
         renderer.release()
+        paths.append(folder / "looks.png")
+        Files.fromarray(_side_by_side(ctx, recording)).save(paths[-1], optimize=True)
     return paths
+
+
+def _side_by_side(ctx: moderngl.Context, recording: Recording) -> Image:
+    """Four looks of one instant, upright, beside each other."""
+    size = UPRIGHT[0] * FINER, UPRIGHT[1] * FINER
+    looks: dict[str, LookConfig] = {
+        style: LookConfig(name=style, style=style, vignette=0.2) for style in STYLES[:4]
+    }
+    renderer = Renderer(ctx, size, recording.skeleton, looks)
+    moment = moment_of(recording, TOGETHER_S)
+    pictures = np.hstack([drawn(ctx, renderer, moment, style, size) for style in looks]).astype(np.uint16)
+    renderer.release()
+    height, width = pictures.shape[0] // FINER, pictures.shape[1] // FINER
+    fine = pictures.reshape(height, FINER, width, FINER, 3)
+    return np.asarray(fine.mean(axis=(1, 3)), np.uint8)
 
 
 if __name__ == "__main__":

@@ -33,9 +33,9 @@ void main() {
     vec3 n = normalize(normal), to_eye = normalize(eye - place);
     vec4 rough = texture(noise, skin.xy * 1.9 + skin.z * 1.3) + texture(noise, skin.zy * 4.3 - skin.x) - 1.0;
     float shaded = pow(clamp((dot(n, lamp) + 0.06) / 1.06, 0.0, 1.0), 1.3) * mix(1.0, lit(n), shadow);
-    n = normalize(n + 0.10 * rough.rgr);
+    n = normalize(n + 0.17 * rough.rgr);
     float facing = clamp(dot(n, to_eye), 0.0, 1.0);
-    vec3 albedo = figure_colour * (0.94 + 0.12 * rough.g);
+    vec3 albedo = figure_colour * (0.90 + 0.24 * rough.g);
     float key = min(shaded, 1.0) * clamp(0.35 + 0.65 * dot(n, lamp) / max(dot(normalize(normal), lamp), 0.2), 0.4, 1.3);
     float cavity = mix(1.0, open * open, 0.9);
     float sky = 0.5 + 0.5 * n.y;
