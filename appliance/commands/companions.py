@@ -17,6 +17,7 @@ SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0
 UNAVAILABLE = 69  # sysexits.h: what it needs is not on this machine, and starting it again brings nothing
 _LIVED_S = 10.0  # whoever lived so long begins with the shortest pause again
 _SAID = 3  # deaths in a row that are told one by one
+_MOST_DOUBLINGS = 10  # of the pause: beyond it is the longest one anyway
 _LOOK_S = 0.1
 _LAST_WORDS_S = 3.0
 
@@ -139,7 +140,8 @@ class _Running:
 
     def _again(self, what: str, now: float) -> None:
         self._deaths = 1 if now - self._started_at > _LIVED_S else self._deaths + 1
-        self._starts_at = now + min(SHORTEST_PAUSE_S * 2 ** (self._deaths - 1), LONGEST_PAUSE_S)
+        doublings = min(self._deaths - 1, _MOST_DOUBLINGS)
+        self._starts_at = now + min(SHORTEST_PAUSE_S * 2**doublings, LONGEST_PAUSE_S)
         if self._deaths <= _SAID:
             self._say(f"{self._companion.name} {what}. {self._companion.meanwhile} It is started again.")
         elif self._deaths == _SAID + 1:

@@ -101,6 +101,13 @@ def test_pauses_grow_and_one_that_lived_begins_anew(monkeypatch: pytest.MonkeyPa
     assert pauses == [0.2, 0.4, 0.8, 1.6, 2.0, 2.0, 0.2, 0.4]
 
 
+def test_one_that_dies_all_evening_takes_nobody_with_it() -> None:
+    child = companions._Running(Companion("The child", ("/nowhere/at/all",), ""), lambda words: None)
+    for second in range(0, 3 * 1100, 3):
+        child.look(float(second))
+    assert child._starts_at - second == companions.LONGEST_PAUSE_S
+
+
 def test_one_that_a_person_has_closed_stays_closed(diary: Diary) -> None:
     said: list[str] = []
     with Companions([diary.child("sys.exit(0)", may_close=True)], said.append, lambda: True):
