@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from appliance.control.house import HouseReader
+from appliance.control.speaker import Speaker
 from appliance.lights.bill import Bill
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
@@ -33,14 +34,20 @@ class Lights:
     """The rig of one show on the wires of one box. Raises ConfigError before there is light."""
 
     def __init__(
-        self, show: Show, box: BoxConfig, box_file: Path | None, stage: FrameReader, house: HouseReader
+        self,
+        show: Show,
+        box: BoxConfig,
+        box_file: Path | None,
+        stage: FrameReader,
+        house: HouseReader,
+        say: Callable[[str], None],
     ) -> None:
         config = rig_here(show, box, box_file)
         patch = Patch(config.fixtures, show.directory)
         self.show, self.box = show, box
         self.rig = Rig(config, patch, show.skeleton)
         self.universes = wired(patch, box)
-        self._stage, self._house = stage, house
+        self._stage, self._house, self._say = stage, house, say
         self._stranger: int | None = None
         self._was_lost = True
         self._troubles: dict[str, str] = {}
@@ -50,9 +57,9 @@ class Lights:
         mappings = [mapping.name for mapping in self.show.config.lights.mappings]
         wires = ", ".join(universe.wire.name for universe in self.universes)
         rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: they rest at their defaults"
-        say(f"Lights: {len(self.rig.patch.fixtures)} fixtures by {wires}; {rules}.")
+        self._say(f"Lights: {len(self.rig.patch.fixtures)} fixtures by {wires}; {rules}.")
         for sentence in unwired(self.show, self.box):
-            say(sentence)
+            self._say(sentence)
 
     def shine(self, stopped: Callable[[], bool]) -> None:
         """Pass after pass on a grid of absolute deadlines until `stopped`; then fade to the safe look."""
@@ -93,7 +100,7 @@ class Lights:
             return frame
         if self._stranger != self._stage.generation:
             self._stranger = self._stage.generation
-            say(
+            self._say(
                 f"The stage dances '{facts.show_name}' with another skeleton. The lights stay in their safe "
                 f"look. Start them with --show {facts.show_directory}."
             )
@@ -103,17 +110,17 @@ class Lights:
         """Once a second: what has changed with the stage and the wires."""
         lost = self.rig.is_lost(now)
         if lost and not self._was_lost:
-            say(
+            self._say(
                 f"No frame from the stage for {LOST_S:g} s. The lights fade to their safe look; they dance "
                 "again as soon as the stage does. Look what `bunraku play` says."
             )
         elif self._was_lost and not lost:
-            say("The stage dances, and the lights with it.")
+            self._say("The stage dances, and the lights with it.")
         self._was_lost = lost
         for universe in self.universes:
             name, trouble = universe.wire.name, universe.wire.trouble or ""
             if trouble != self._troubles.get(name, ""):
-                say(trouble or f"{name} is well again.")
+                self._say(trouble or f"{name} is well again.")
             self._troubles[name] = trouble
 
 
@@ -155,21 +162,23 @@ def light_up(directory: Path | None, box_file: Path | None) -> None:
     box = load_box(box_file)
     require_wires(box, box_file)
     with stop_signals() as stopped, ExitStack() as opened:
+        speaker = Speaker()  # a terminal that stands still must not hold up the lights
+        opened.callback(speaker.close)
         folder = runtime_folder(box)
         opened.callback(Claim(folder, "lights").close)
         stage, house = FrameReader(folder), HouseReader(folder)
         opened.callback(stage.close)
         opened.callback(house.close)
         if directory is not None:
-            _light(Lights(load_show(directory), box, box_file, stage, house), stopped)
+            _light(Lights(load_show(directory), box, box_file, stage, house, speaker.say), stopped)
             return
         bill = Bill(stage)
         while not stopped():
             if bill.is_new(time.monotonic()):
                 try:
-                    lights = Lights(bill.take(), box, box_file, stage, house)
+                    lights = Lights(bill.take(), box, box_file, stage, house, speaker.say)
                 except ConfigError as error:
-                    say(f"{error}\nThe lights stay off until the stage dances another show.")
+                    speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
                 else:
                     _light(lights, lambda: stopped() or bill.is_new(time.monotonic()))
             time.sleep(_LOOK_S)
@@ -184,7 +193,7 @@ def _light(lights: Lights, stopped: Callable[[], bool]) -> None:
 
 
 def say(words: str) -> None:
-    """A line on standard output; light matters more than a terminal that is gone."""
+    """A line for a person who walks through the rig; light matters more than a terminal that is gone."""
     with contextlib.suppress(OSError, ValueError):
         print(words, flush=True)
 

@@ -96,13 +96,13 @@ def node() -> Iterator[tuple[Node, int]]:
 class LightsProcess:
     """`bunraku lights` by itself, as systemd runs it."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, terminal: int | None = None) -> None:
         self.words_file = folder / "lights.txt"
         with self.words_file.open("ab") as words:
             self.process = subprocess.Popen(
                 [*LIGHTS, "--box", str(folder / "box.yaml")],
                 stdin=subprocess.DEVNULL,
-                stdout=words,
+                stdout=words if terminal is None else terminal,
                 stderr=subprocess.STDOUT,
                 env={**os.environ, "PYTHONUNBUFFERED": "1"},
             )
@@ -195,6 +195,34 @@ def test_a_stage_that_hangs_brings_the_safe_look_too(tmp_path: Path) -> None:
         lamp.await_dance()
 
 
+@contextlib.contextmanager
+def terminal_that_stands_still() -> Iterator[int]:
+    """Takes not one sign more, as after Ctrl-S or in a connection that is gone: whoever writes waits."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writing, bytes(1 << 16))
+    os.set_blocking(writing, True)
+    yield writing
+    os.close(reading)
+    os.close(writing)
+
+
+def test_a_terminal_that_stands_still_holds_up_neither_dance_nor_safe_look(tmp_path: Path) -> None:
+    show = show_with(tmp_path, RIG)
+    with (
+        node() as (lamp, port),
+        playing(show, tmp_path, settings=artnet(port, 1, 2), command=ALONE) as box,
+        terminal_that_stands_still() as terminal,
+        LightsProcess(tmp_path, terminal) as lights,
+    ):
+        lamp.await_dance()
+        box.end(signal.SIGKILL)
+        lamp.await_safe()
+        assert lights.end() == 0
+
+
 def test_lights_that_start_first_wait_for_the_stage(tmp_path: Path) -> None:
     show = show_with(tmp_path, RIG)
     with node() as (lamp, port), playing(show, tmp_path, settings=artnet(port, 1, 2), command=ALONE) as box:
@@ -259,7 +287,7 @@ def test_by_usb_the_same_levels_arrive(tmp_path: Path) -> None:
         wires = [{"universe": 1, "wire": "usb-pro", "device": str(widget.path)}]
         with playing(show, tmp_path, settings={"outputs": {"dmx": wires}}) as box:
             await_levels(widget, lambda levels: levels[DIMMER] == 255 and levels[PAR] == 255)
-            box.await_words("Universe 2 has no wire: second stay dark.")
+            box.await_words("Universe 2 has no wire, so these stay dark: second.")
             assert box.end() == 0
             await_levels(widget, lambda levels: not any(levels))
 
