@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 # A Raspberry Pi 4's GPU, the VideoCore VI, has 8 units of 4 lanes with a multiplication and an addition a
-# cycle at 500 MHz: 32 thousand million operations a second at most. What shaders get of it is taken from glmark2
+# cycle at 500 MHz: 32 thousand million operations a second at most. What shaders get is taken from glmark2
 # on a Raspberry Pi 5 (12 units, 960 MHz): effect2d with 25 samples a pixel, 10 operations each, takes 2.2 ms
 # more at 800x600 than an empty picture. For the units and the clock of the 4 that makes 14 thousand million
-# operations and 1.4 thousand million samples a second. Of its memory's 12.8 GB/s a third is taken for the GPU's.
+# operations and 1.4 thousand million samples a second. Of its memory's 12.8 GB/s a third is for the GPU.
 _OPERATIONS_S, _FETCHES_S, _BYTES_S = 14e9, 1.4e9, 4e9
 _DRAW_CALL_S = 30e-6  # of the driver, state and uniforms included
 _VERTEX_PASSES = 2  # the GPU goes over vertices twice: for where they are, and to draw them
