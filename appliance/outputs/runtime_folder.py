@@ -35,7 +35,7 @@ def runtime_folder(box: BoxConfig, environment: Mapping[str, str] = os.environ) 
     except OSError as error:
         raise RuntimeFolderError(
             f"{folder}: the folder where the box's processes meet cannot be made ({error.strerror}). "
-            f"Nothing dances. {_CURE}"
+            f"Nothing starts there. {_CURE}"
         ) from error
     _require_own(folder)
     return folder
@@ -58,17 +58,17 @@ def _require_own(folder: Path) -> None:
     if not stat.S_ISDIR(found.st_mode):
         raise RuntimeFolderError(
             f"{folder} is no folder (a file or a link), so the box's processes cannot meet there. "
-            f"Nothing dances. Remove it. {_CURE}"
+            f"Nothing starts there. Remove it. {_CURE}"
         )
     if found.st_uid != os.getuid():
         raise RuntimeFolderError(
             f"{folder} belongs to another user (number {found.st_uid}), so the box's processes do not meet "
-            f"there. Nothing dances. {_CURE}"
+            f"there. Nothing starts there. {_CURE}"
         )
     if found.st_mode & _OTHERS:
         raise RuntimeFolderError(
             f"{folder} is open to other users (mode {stat.S_IMODE(found.st_mode):o}), so the box's processes "
-            f"do not meet there. Nothing dances. Run: chmod 700 {folder}. Or leave it out, and it is made."
+            f"do not meet there. Nothing starts there. Run: chmod 700 {folder}. Or leave it out, and it is made."
         )
 
 
@@ -86,7 +86,7 @@ class Claim:
             )
         except OSError as error:
             raise RuntimeFolderError(
-                f"{path}: cannot be opened ({error.strerror}). Nothing dances. {_CURE}"
+                f"{path}: cannot be opened ({error.strerror}). Nothing starts there. {_CURE}"
             ) from error
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

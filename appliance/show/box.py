@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
@@ -176,6 +176,20 @@ class BoxConfig(Section):
         default=True, description="Place each tick just after the primary sensor's usual arrival."
     )
     journal: JournalConfig = Field(default_factory=JournalConfig, description=str(JournalConfig.__doc__))
+
+    @model_validator(mode="after")
+    def _a_port_for_each(self) -> BoxConfig:
+        udp, control = self.sensors.udp, self.control
+        if udp is None or control is None or not udp.port or udp.port != control.port:
+            return self
+        if udp.host == control.host or "0.0.0.0" in (udp.host, control.host):
+            raise refusal(
+                f"Commands and sensors cannot both arrive on port {control.port}.",
+                f"Give one of them another port, like {ControlConfig().port} for commands and "
+                f"{UdpConfig().port} for sensors.",
+                at=("control", "port"),
+            )
+        return self
 
     @property
     def state_folder(self) -> Path | None:

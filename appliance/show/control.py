@@ -59,4 +59,12 @@ class ControlConfig(Section):
                 "`[192.168.0.0/24]`; or listen on 127.0.0.1 for this machine alone.",
                 at="host",
             )
+        unheard = [sender for sender in self.senders if not sender.startswith("127.")]
+        if self.host.startswith("127.") and unheard:
+            raise refusal(
+                f"{unheard[0].removesuffix('/32')} may command the box, but commands are heard on {self.host}: "
+                "from this machine alone.",
+                "Write `host: 0.0.0.0` beside `senders`, or this machine's address in that network.",
+                at="senders",
+            )
         return self

@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from appliance.show import describe
-from appliance.show.config_error import ConfigError, Problem, did_you_mean
+from appliance.show.config_error import ConfigError, Problem, did_you_mean, nearest
 from appliance.show.section import Section
 from appliance.show.yaml_file import Location, YamlFile
 
@@ -69,12 +69,23 @@ def _cure(error: ErrorDetails, field: FieldInfo | None) -> str:
         return ""
     words, limits = describe.choices(field.annotation), describe.bounds(field)
     if error["type"] == "literal_error" and len(words) > 1:
-        return did_you_mean(error["input"], words)
+        near = nearest(error["input"], words)  # the message lists them all
+        return f"Did you mean '{near}'?" if near else str(field.description or "")
+    if isinstance(error["loc"][-1], int):
+        limits = _share_of(error)
     if isinstance(error["input"], str) and _is_number(error["input"]):
         return "Write it without quotes and without an exponent (0.001, not 1e-3)."
     if isinstance(error["input"], str) and _is_number(error["input"].replace(",", ".", 1)):
         return f"Write it with a point: {error['input'].replace(',', '.', 1)}."
     return " ".join(part for part in (f"Write {limits}." if limits else "", field.description) if part)
+
+
+def _share_of(error: ErrorDetails) -> str:
+    """Bounds of a number in brackets, as far as they are known: those around it count the entries."""
+    limits = error.get("ctx", {})
+    if "ge" in limits:
+        return f"at least {limits['ge']:g}"
+    return f"at most {limits['le']:g}" if "le" in limits else ""
 
 
 def _section_at(model: type[Section], location: Location) -> type[Section]:

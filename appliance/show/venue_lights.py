@@ -58,7 +58,7 @@ def unwired(show: Show, box: BoxConfig) -> list[str]:
     wired = {wire.universe for wire in box.outputs.dmx}
     fixtures = at_venue(show.config.lights, box.lights).fixtures
     return [
-        f"Universe {universe} has no wire: {_names(fixtures, universe)} stay dark. "
+        f"Universe {universe} has no wire, so these stay dark: {_names(fixtures, universe)}. "
         f"Add {{universe: {universe}, wire: artnet}} (or another wire) under outputs: dmx: in the box file."
         for universe in sorted({fixture.universe for fixture in fixtures} - wired)
     ]

@@ -105,7 +105,9 @@ def test_check_reads_a_box_file_against_the_show(tmp_path: Path, capsys: pytest.
     write_checksums(show)
     box = tmp_path / "box.yaml"
     box.write_text("sensors: {udp: null}\n")
-    assert "Universe 1 has no wire: wash" in succeeded(capsys, "check", str(show), "--box", str(box))
+    assert "Universe 1 has no wire, so these stay dark: wash" in succeeded(
+        capsys, "check", str(show), "--box", str(box)
+    )
     box.write_text("outputs:\n  posistagenet: [{joints: [Chset]}]\nlights:\n  places: [{fixture: wahs}]\n")
     words = refused(capsys, "check", str(show), "--box", str(box))
     assert "box.yaml:2: The show's skeleton has no joint 'Chset'. Did you mean 'Chest'?" in words

@@ -80,6 +80,13 @@ def test_the_files_are_sound_without_the_faults(bundle: Path) -> None:
         ("profile: led-par", "profile: led-pra", 13, ["Did you mean 'led-par'?"]),
         ("fixtures: [wash]", "fixtures: [wahs]", 19, ["no fixture 'wahs'", "Did you mean 'wash'?"]),
         ("drives: dimmer", "drives: dimer", 19, ["'dimer'", "Did you mean 'dimmer'?"]),
+        ("reads: speed", "reads: velocity", 19, ["not one of place, across", "place (for aim), across"]),
+        (
+            "reads: speed",
+            "reads: speed\n          colours: [[255, 0, 0]]",
+            20,
+            ["[0]' is 255, out of range. Write at most 1."],
+        ),
         ("reads: speed", "reads: spede", 19, ["Did you mean 'speed'?"]),
         ("look: marble", "look: marbel", 25, ["no look 'marbel'", "Did you mean 'marble'?"]),
         ("lights: warm", "lights: wram", 26, ["mappings 'wram'", "Did you mean 'warm'?"]),
@@ -110,6 +117,12 @@ def test_a_fault_of_the_rig_is_named_with_its_line(
         ("channels: 512", "device: /dev/ttyUSB0", ["'device' belongs to usb-pro and open-dmx"]),
         ("host: 10.0.0.5", "host: node.local", ["is not an IPv4 address"]),
         ("port: 9002", "host: 0.0.0.0", ["from nobody", "senders"]),
+        (
+            "port: 9002",
+            "senders: [10.0.0.5]",
+            ["10.0.0.5 may command", "this machine alone", "`host: 0.0.0.0`"],
+        ),
+        ("port: 9002", "port: 9750", ["Commands and sensors cannot both arrive on port 9750"]),
     ],
 )
 def test_a_fault_of_the_venue_is_named_with_its_line(
@@ -172,6 +185,6 @@ def test_a_venue_may_hang_the_rig_otherwise(bundle: Path) -> None:
     show, box = load_show(bundle), load_box(bundle / "box.yaml")
     assert misplaced(show, box, bundle / "box.yaml") == []
     assert [sentence[:23] for sentence in unwired(show, box)] == [
-        "Universe 1 has no wire:",
-        "Universe 7 has no wire:",
+        "Universe 1 has no wire,",
+        "Universe 7 has no wire,",
     ]
