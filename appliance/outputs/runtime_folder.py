@@ -68,7 +68,8 @@ def _require_own(folder: Path) -> None:
     if found.st_mode & _OTHERS:
         raise RuntimeFolderError(
             f"{folder} is open to other users (mode {stat.S_IMODE(found.st_mode):o}), so the box's processes "
-            f"do not meet there. Nothing starts there. Run: chmod 700 {folder}. Or leave it out, and it is made."
+            f"do not meet there. Nothing starts there. Run: chmod 700 {folder}. "
+            "Or leave it out, and it is made."
         )
 
 

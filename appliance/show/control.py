@@ -62,8 +62,8 @@ class ControlConfig(Section):
         unheard = [sender for sender in self.senders if not sender.startswith("127.")]
         if self.host.startswith("127.") and unheard:
             raise refusal(
-                f"{unheard[0].removesuffix('/32')} may command the box, but commands are heard on {self.host}: "
-                "from this machine alone.",
+                f"{unheard[0].removesuffix('/32')} may command the box, but commands are heard on "
+                f"{self.host}: from this machine alone.",
                 "Write `host: 0.0.0.0` beside `senders`, or this machine's address in that network.",
                 at="senders",
             )
