@@ -24,7 +24,8 @@ class OpenDmx:
     def __init__(self, device: str, channels: int) -> None:
         self._channels = channels
         self._lasts_s = (channels + 1) * SLOT_S + CHIP_S
-        self._port = open_port(device, BAUD, serial.STOPBITS_TWO)
+        # ENTTEC's cable sends while RTS is off; with RTS on it listens, and the lamps hear nothing.
+        self._port = open_port(device, BAUD, serial.STOPBITS_TWO, rts=False)
 
     def write(self, data: bytes) -> None:
         """Break, mark, start code, levels; returns when the last slot has left, so that no break cuts it."""

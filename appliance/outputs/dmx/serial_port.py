@@ -15,6 +15,7 @@ from appliance.outputs.dmx.adapter_wire import AdapterError
 
 WRITE_TIMEOUT_S = 0.25  # ten universes: an adapter that takes nothing for so long hangs
 FTDI = (0x0403, 0x6001)
+_PRO_WORDS = ("DMX USB PRO", "ULTRADMX")
 
 
 def find_device(device: str | None, number: str | None, is_kind: Callable[[ListPortInfo], bool]) -> str:
@@ -29,8 +30,8 @@ def find_device(device: str | None, number: str | None, is_kind: Callable[[ListP
 
 
 def is_usb_pro(port: ListPortInfo) -> bool:
-    """Whether it calls itself a DMX USB Pro, as ENTTEC's and DMXking's do."""
-    return "DMX USB PRO" in (port.product or "").upper()
+    """Whether it calls itself a DMX USB Pro, as ENTTEC's do, or an ultraDMX, as DMXking's do."""
+    return any(word in (port.product or "").upper() for word in _PRO_WORDS)
 
 
 def is_bare_ftdi(port: ListPortInfo) -> bool:
@@ -38,12 +39,17 @@ def is_bare_ftdi(port: ListPortInfo) -> bool:
     return (port.vid, port.pid) == FTDI and not is_usb_pro(port)
 
 
-def open_port(device: str, baud: int, stopbits: float = serial.STOPBITS_ONE) -> serial.Serial:
-    """The device, for this program alone. Raises OSError."""
+def open_port(
+    device: str, baud: int, stopbits: float = serial.STOPBITS_ONE, rts: bool = True
+) -> serial.Serial:
+    """The device, for this program alone; `rts`: its line 'request to send'. Raises OSError."""
+    port = serial.Serial(
+        None, baud, stopbits=stopbits, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True
+    )
+    port.port, port.rts = device, rts
     try:
-        return serial.Serial(
-            device, baud, stopbits=stopbits, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True
-        )
+        port.open()
+        return port
     except termios.error as error:  # no OSError, although it is one
         raise OSError(*error.args) from None
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import pty
+import struct
+import termios
 import time
 import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -42,7 +46,7 @@ class Port:
 
 def test_break_mark_and_slots_are_as_long_as_dmx_wants(monkeypatch: pytest.MonkeyPatch) -> None:
     port = Port()
-    monkeypatch.setattr(open_dmx, "open_port", lambda *_: port)
+    monkeypatch.setattr(open_dmx, "open_port", lambda *_, **__: port)
     cable = OpenDmx("cable", 512)
     for _ in range(10):
         cable.write(universe())
@@ -60,7 +64,7 @@ def test_break_mark_and_slots_are_as_long_as_dmx_wants(monkeypatch: pytest.Monke
 
 def test_the_port_speaks_250000_baud_with_two_stop_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[tuple[object, ...]] = []
-    monkeypatch.setattr(open_dmx, "open_port", lambda *settings: opened.append(settings))
+    monkeypatch.setattr(open_dmx, "open_port", lambda *settings, **_: opened.append(settings))
     OpenDmx("/dev/ttyUSB0", 512)
     assert opened == [("/dev/ttyUSB0", 250_000, 2)]
 
@@ -100,3 +104,22 @@ def test_nothing_is_told_before_there_is_something(cable: tuple[int, Path], unti
     wire.close(0.0)
     with pytest.raises(BlockingIOError):
         os.read(master, 1)
+
+
+def test_request_to_send_is_off_or_the_cable_would_listen(
+    cable: tuple[int, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pseudo-terminal has no such line: what a real port would be told is written down."""
+    told: list[tuple[int, int]] = []
+    real = fcntl.ioctl
+
+    def ioctl(descriptor: int, request: int, *arguments: Any) -> Any:
+        if request in (termios.TIOCMBIS, termios.TIOCMBIC):
+            told.append((request, struct.unpack("I", arguments[0])[0]))
+            return b""
+        return real(descriptor, request, *arguments)
+
+    monkeypatch.setattr(fcntl, "ioctl", ioctl)
+    OpenDmx(str(cable[1]), 512).close()
+    assert (termios.TIOCMBIC, termios.TIOCM_RTS) in told
+    assert (termios.TIOCMBIS, termios.TIOCM_RTS) not in told

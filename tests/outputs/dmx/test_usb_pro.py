@@ -185,6 +185,12 @@ def test_an_adapter_is_found_by_what_it_is() -> None:
         find_device(None, "EN9", is_usb_pro)
 
 
+def test_an_ultradmx_is_no_bare_cable() -> None:
+    ultra = port("/dev/ttyUSB0", "ultraDMX Micro", "6A1")
+    assert is_usb_pro(ultra)
+    assert not is_bare_ftdi(ultra)
+
+
 def test_no_adapter_of_the_kind(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(list_ports, "comports", list)
     with pytest.raises(AdapterError, match="no adapter of this kind is plugged in"):
