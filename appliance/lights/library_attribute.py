@@ -54,8 +54,9 @@ def meaning_of(key: str, channel: Json, fixture: Json) -> Meaning:
     leading = max((one for one in capabilities if one["type"] == kind), key=_width)
     name = _name(key, kind, leading)
     special: dict[str, Any] = {}
-    if name in (DIMMER, PAN, TILT) and _width(leading) > 0 and tuple(leading["dmxRange"]) != (0, 255):
-        special["limits"] = list(leading["dmxRange"])
+    limits = _limits(name, leading, capabilities)
+    if name in (DIMMER, PAN, TILT) and _width(leading) > 0 and limits != (0, 255):
+        special["limits"] = list(limits)
     if name in (PAN, TILT):
         special.update(_turning(name, leading, fixture))
     elif kind == "Intensity" and _is_falling(leading):
@@ -134,11 +135,27 @@ def _degrees(angle: object) -> float | None:
     return float(angle.removesuffix("deg")) if isinstance(angle, str) and angle.endswith("deg") else None
 
 
+def _limits(name: str, leading: Json, capabilities: Sequence[Json]) -> tuple[int, int]:
+    """The part of the channel that is used; a dimmer that only begins to glow there is off at 0."""
+    first, last = leading["dmxRange"]
+    if name == DIMMER and 0.0 < _brightness(leading)[0] < _brightness(leading)[1]:
+        lowest = min(capabilities, key=lambda one: one["dmxRange"][0])
+        if lowest.get("brightness") == "off" or lowest.get("shutterEffect") == "Closed":
+            first = 0
+    return first, last
+
+
 def _is_falling(leading: Json) -> bool:
+    start, end = _brightness(leading)
+    return start > end
+
+
+def _brightness(leading: Json) -> tuple[float, float]:
+    """How bright a dimmer is at the start and at the end of its range, percent."""
     words = {"off": 0.0, "dark": 1.0, "bright": 100.0}
     ends = [leading.get("brightnessStart", "off"), leading.get("brightnessEnd", "bright")]
-    values = [words[end] if end in words else float(str(end).rstrip("%lm")) for end in ends]
-    return values[0] > values[1]
+    start, end = (words[end] if end in words else float(str(end).rstrip("%lm")) for end in ends)
+    return start, end
 
 
 def _default(name: str, channel: Json, capabilities: Sequence[Json], largest: int) -> float:

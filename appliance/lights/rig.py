@@ -58,7 +58,7 @@ class Rig:
         dark = 0.0 if house.blackout and not house.panic else 1.0
         danced = self.patch.dimmed(wishes.values, house.level(now)) if safety < 1.0 else wishes.values
         safe = self.patch.dimmed(self._safe, dark)
-        self.values = danced + (safe - danced) * safety
+        self.values = danced + (safe - danced) * np.where(self.patch.snaps, float(safety >= 0.5), safety)
         self._turn_heads(wishes, seconds)
         return self.patch.encode(self.values)
 

@@ -250,3 +250,20 @@ def test_a_fixture_larger_than_a_universe_in_all_modes_is_refused() -> None:
 def test_a_library_error_is_what_the_converter_raises() -> None:
     with pytest.raises(LibraryError):
         profile_values({"name": 3})
+
+
+def test_a_dimmer_that_glows_at_the_start_of_its_range_is_off_at_nothing() -> None:
+    """As strobes write it: 0 to 5 off, 6 to 255 from dark to bright. Blackout has to mean off."""
+    dimmer = {
+        "capabilities": [
+            {"dmxRange": [0, 5], "type": "Intensity", "brightness": "off"},
+            {
+                "dmxRange": [6, 255],
+                "type": "Intensity",
+                "brightnessStart": "dark",
+                "brightnessEnd": "bright",
+            },
+        ]
+    }
+    strobe = {"name": "S", "availableChannels": {"D": dimmer}, "modes": [{"name": "1", "channels": ["D"]}]}
+    assert profile_values(strobe)[0]["attributes"] == []

@@ -139,6 +139,14 @@ def test_a_lost_stage_fades_to_the_safe_look_after_a_second_and_comes_back() -> 
     assert back[-1] == 1.0
 
 
+def test_on_the_way_to_the_safe_look_a_wheel_jumps_instead_of_showing_all_it_has() -> None:
+    spot = {"name": "spot", "profile": "moving-spot", "address": 1}
+    night = Evening(rig(lights([spot], FULL, {"reads": "steady", "drives": "gobo", "value": 0.8})))
+    shown = [levels[10] for levels in (*night.dance(1.0), *night.hang(3.0), *night.dance(2.0))]
+    assert sorted(set(shown)) == [0, 204]
+    assert np.count_nonzero(np.diff(shown)) == 2
+
+
 def test_a_rig_begins_safe_and_stays_so_without_a_stage() -> None:
     config = lights([PAR, SHY, HEAD], FULL, safe={"dimmer": 0.2})
     made = rig(config)
