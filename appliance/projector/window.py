@@ -89,6 +89,8 @@ def _start(kind: Kind) -> str:
     """Start SDL on the first display system that is there; its name."""
     sdl2.SDL_SetHint(sdl2.SDL_HINT_NO_SIGNAL_HANDLERS, b"1")
     sdl2.SDL_SetHint(b"SDL_VIDEO_X11_FORCE_EGL", b"1")  # with GLX many drivers have no OpenGL ES
+    # KMS/DRM would take a picture and return while the one before waits for the display: one frame older.
+    sdl2.SDL_SetHint(sdl2.SDL_HINT_VIDEO_DOUBLE_BUFFER, b"1")
     complaints = []
     for driver in _drivers(kind):
         sdl2.SDL_SetHintWithPriority(sdl2.SDL_HINT_VIDEODRIVER, driver.encode(), sdl2.SDL_HINT_OVERRIDE)

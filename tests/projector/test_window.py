@@ -152,6 +152,14 @@ def test_a_context_of_this_machine() -> None:
     window.close()
 
 
+def test_no_picture_waits_behind_another_one_on_kms() -> None:
+    window = Window(ProjectorConfig(), "offscreen", (64, 48))
+    try:
+        assert sdl2.SDL_GetHintBoolean(b"SDL_VIDEO_DOUBLE_BUFFER", 0)
+    finally:
+        window.close()
+
+
 def test_a_lost_context_ends_the_projector_with_a_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
