@@ -15,7 +15,7 @@ from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.projector.context import offscreen
 from appliance.projector.moment import Moment
-from appliance.projector.renderer import Renderer
+from appliance.projector.picture.renderer import Renderer
 from appliance.show.look import STYLES, CameraConfig, LookConfig
 
 SIZE = 864, 486

@@ -16,8 +16,8 @@ from appliance.projector.controls import Controls
 from appliance.projector.final_pass import FinalPass, picture_size
 from appliance.projector.interpolation import Interpolation
 from appliance.projector.moment import Moment
+from appliance.projector.picture.renderer import Renderer
 from appliance.projector.presence import STALE_S, Presence
-from appliance.projector.renderer import Renderer
 from appliance.projector.window import Size
 from appliance.show.config_error import ConfigError
 from appliance.show.look import LookConfig, looks_by_name

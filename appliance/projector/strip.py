@@ -12,8 +12,8 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.context import offscreen
 from appliance.projector.moment import Moment
+from appliance.projector.picture.renderer import Renderer
 from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
-from appliance.projector.renderer import Renderer
 from appliance.show.look import LookConfig
 
 COLUMNS, ROWS = 5, 2

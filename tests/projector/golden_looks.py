@@ -21,7 +21,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.context import offscreen
 from appliance.projector.gallery import drawn, moment_of
-from appliance.projector.renderer import Renderer
+from appliance.projector.picture.renderer import Renderer
 from appliance.show.bundle import default_show_path
 from appliance.show.look import STYLES, LookConfig, looks_by_name
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.body_mesh import body_mesh
-from appliance.projector.skinning import BodyMesh, skin
-from appliance.projector.surface import Grid, surface_of
+from appliance.projector.body.body_mesh import body_mesh
+from appliance.projector.body.skinning import BodyMesh, skin
+from appliance.projector.body.surface import Grid, surface_of
 from tests.projector import skeletons
 
 Faces = NDArray[np.int32]

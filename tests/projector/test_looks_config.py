@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from appliance.projector.looks.palette import palette
+from appliance.projector.picture.looks.palette import palette
 from appliance.show.look import STYLES, LookConfig, looks_by_name
 
 

@@ -8,16 +8,16 @@ from typing import Protocol
 import moderngl
 
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.camera import view
-from appliance.projector.looks.cloud import Cloud
-from appliance.projector.looks.ink import Ink
-from appliance.projector.looks.lines import Lines
-from appliance.projector.looks.plaster import Plaster
-from appliance.projector.looks.veil import Veil
 from appliance.projector.moment import Moment
-from appliance.projector.poses import poses_of
-from appliance.projector.scene import Easel, Scene
-from appliance.projector.tally import Figures
+from appliance.projector.picture.camera import view
+from appliance.projector.picture.looks.cloud import Cloud
+from appliance.projector.picture.looks.ink import Ink
+from appliance.projector.picture.looks.lines import Lines
+from appliance.projector.picture.looks.plaster import Plaster
+from appliance.projector.picture.looks.veil import Veil
+from appliance.projector.picture.poses import poses_of
+from appliance.projector.picture.scene import Easel, Scene
+from appliance.projector.picture.tally import Figures
 from appliance.show.look import LookConfig, Style
 
 

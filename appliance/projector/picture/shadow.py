@@ -8,8 +8,8 @@ import moderngl
 import numpy as np
 
 from appliance.pose.quaternion import Array
-from appliance.projector.drawing import Drawing
-from appliance.projector.scene import Easel, Scene
+from appliance.projector.picture.drawing import Drawing
+from appliance.projector.picture.scene import Easel, Scene
 
 DEPTH_SIDE, CAST_SIDE = 384, 192  # pixels
 FIELD = 0.85  # figure heights around the dancer's middle that the lamp sees

@@ -7,14 +7,14 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from appliance.projector.drawing import Drawing
-from appliance.projector.glow import Glow
-from appliance.projector.looks.palette import palette
-from appliance.projector.poses import ROW_S, ROWS
-from appliance.projector.scene import Easel, Scene
-from appliance.projector.strands import reach_of
-from appliance.projector.targets import Target
-from appliance.projector.trails import traced
+from appliance.projector.picture.drawing import Drawing
+from appliance.projector.picture.glow import Glow
+from appliance.projector.picture.looks.palette import palette
+from appliance.projector.picture.poses import ROW_S, ROWS
+from appliance.projector.picture.scene import Easel, Scene
+from appliance.projector.picture.strands import reach_of
+from appliance.projector.picture.targets import Target
+from appliance.projector.picture.trails import traced
 from appliance.show.look import LookConfig
 
 ECHOES = 5

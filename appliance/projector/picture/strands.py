@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.body_buffers import BodyBuffers, merged
+from appliance.projector.picture.body_buffers import BodyBuffers, merged
 
 STEP = 0.02  # figure heights from one point of a strand to the next
 POINTS = 28  # steps of a strand

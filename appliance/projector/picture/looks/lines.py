@@ -6,14 +6,14 @@ from typing import Any
 
 import moderngl
 
-from appliance.projector.drawing import Drawing
-from appliance.projector.glow import Glow
-from appliance.projector.looks.palette import Palette, palette, stored
-from appliance.projector.poses import ROW_S, ROWS
-from appliance.projector.scene import Easel, Scene
-from appliance.projector.strands import POINTS, STEP, reach_of, strands_of
-from appliance.projector.targets import Target
-from appliance.projector.trails import traced
+from appliance.projector.picture.drawing import Drawing
+from appliance.projector.picture.glow import Glow
+from appliance.projector.picture.looks.palette import Palette, palette, stored
+from appliance.projector.picture.poses import ROW_S, ROWS
+from appliance.projector.picture.scene import Easel, Scene
+from appliance.projector.picture.strands import POINTS, STEP, reach_of, strands_of
+from appliance.projector.picture.targets import Target
+from appliance.projector.picture.trails import traced
 from appliance.show.look import LookConfig
 
 ECHOES = 5

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.body_buffers import BodyBuffers
-from appliance.projector.body_mesh import body_mesh
-from appliance.projector.camera import View
-from appliance.projector.drawing import Drawing
-from appliance.projector.noise import SIDE, noise_pixels
-from appliance.projector.poses import Poses, PoseTexture
-from appliance.projector.tally import Tally
-from appliance.projector.targets import Target
-from appliance.projector.vertices import layout, packed
+from appliance.projector.body.body_mesh import body_mesh
+from appliance.projector.picture.body_buffers import BodyBuffers
+from appliance.projector.picture.camera import View
+from appliance.projector.picture.drawing import Drawing
+from appliance.projector.picture.noise import SIDE, noise_pixels
+from appliance.projector.picture.poses import Poses, PoseTexture
+from appliance.projector.picture.tally import Tally
+from appliance.projector.picture.targets import Target
+from appliance.projector.picture.vertices import layout, packed
 
 BODY_AREA = 0.16  # of a figure height squared that the figure covers, about
 FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
-from appliance.projector.volumes import Slab
+from appliance.projector.body.volumes import Slab
 
 
 @dataclass(frozen=True, eq=False)

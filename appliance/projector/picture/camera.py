@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from appliance.pose.quaternion import Array
-from appliance.projector.poses import ROWS, Poses
+from appliance.projector.picture.poses import ROWS, Poses
 from appliance.show.look import CameraConfig
 
 UPRIGHT = 1.35  # a figure may stand taller than an upright picture is wide: it is slender

@@ -5,10 +5,10 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from appliance.projector.drawing import Drawing
-from appliance.projector.looks.palette import Palette
-from appliance.projector.scene import Easel, Scene
-from appliance.projector.targets import Target
+from appliance.projector.picture.drawing import Drawing
+from appliance.projector.picture.looks.palette import Palette
+from appliance.projector.picture.scene import Easel, Scene
+from appliance.projector.picture.targets import Target
 from appliance.show.look import LookConfig
 
 NEAR, FAR = 180, 60  # lines of the glow's pictures

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import moderngl
 
-from appliance.projector.drawing import Drawing
-from appliance.projector.glow import Glow
-from appliance.projector.looks.palette import palette, stored
-from appliance.projector.particles import particles_of
-from appliance.projector.poses import ROW_S, ROWS
-from appliance.projector.scene import Easel, Scene, direction
+from appliance.projector.picture.drawing import Drawing
+from appliance.projector.picture.glow import Glow
+from appliance.projector.picture.looks.palette import palette, stored
+from appliance.projector.picture.particles import particles_of
+from appliance.projector.picture.poses import ROW_S, ROWS
+from appliance.projector.picture.scene import Easel, Scene, direction
 from appliance.show.look import LookConfig
 
 GRAINS = 40000  # at density 1

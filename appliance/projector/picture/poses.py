@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.projector.body.skinning import BodyMesh
 from appliance.projector.moment import Moment
-from appliance.projector.skinning import BodyMesh
 
 ROWS = 48
 ROW_S = 0.025  # from one row to the next; 48 of them reach 1.175 s back

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from appliance.pose.quaternion import Array
-from appliance.projector.anatomy import LONG_BONE, Anatomy
-from appliance.projector.extremities import foot, hand, head
-from appliance.projector.volumes import Group, Slab
+from appliance.projector.body.anatomy import LONG_BONE, Anatomy
+from appliance.projector.body.extremities import foot, hand, head
+from appliance.projector.body.volumes import Group, Slab
 
 # Along the spine from the pelvis (0) to the neck (1): half the width as a share of the hips' and of the
 # shoulders' half width; flesh beside it, half the depth, and how far before the bones, in heights.

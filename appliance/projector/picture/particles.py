@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.projector.body_buffers import BodyBuffers
+from appliance.projector.picture.body_buffers import BodyBuffers
 
 Floats = NDArray[np.float32]
 

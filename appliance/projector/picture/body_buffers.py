@@ -8,8 +8,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.projector.skinning import BodyMesh
-from appliance.projector.vertices import layout, packed
+from appliance.projector.body.skinning import BodyMesh
+from appliance.projector.picture.vertices import layout, packed
 
 COARSE = 0.02  # of the figure's height: vertices so close are one in its shadow
 OCCLUDER = 0.03  # of the figure's height: how large the points are that keep light from each other

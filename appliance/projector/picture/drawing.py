@@ -9,9 +9,9 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from appliance.projector.tally import Tally, Use
+from appliance.projector.picture.tally import Tally, Use
 
-_SHADERS = Path(__file__).parent / "shaders"
+_SHADERS = Path(__file__).parents[1] / "shaders"
 _HEAD = "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
 _SAMPLER_2D = 0x8B5E  # OpenGL's name for the type of a texture in a shader
 

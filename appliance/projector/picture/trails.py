@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from appliance.pose.quaternion import Array
-from appliance.projector.body_buffers import BodyBuffers, merged
-from appliance.projector.particles import Particles
+from appliance.projector.picture.body_buffers import BodyBuffers, merged
+from appliance.projector.picture.particles import Particles
 
 
 def traced(body: BodyBuffers, reach: Array, count: int) -> Particles:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from appliance.projector.drawing import Drawing
-from appliance.projector.looks.palette import palette
-from appliance.projector.scene import Easel, Scene, direction
-from appliance.projector.shadow import Shadow
+from appliance.projector.picture.drawing import Drawing
+from appliance.projector.picture.looks.palette import palette
+from appliance.projector.picture.scene import Easel, Scene, direction
+from appliance.projector.picture.shadow import Shadow
 from appliance.show.look import LookConfig
 
 KEY_FROM, KEY_ABOVE = -1.2, 50.0  # radians beside the camera, degrees above the floor

@@ -1,0 +1,1 @@
+"""A body for any skeleton: its surface, made once at the start, and how its joints move it."""

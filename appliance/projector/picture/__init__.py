@@ -1,0 +1,1 @@
+"""The picture: the dance drawn in its looks, before it is fitted to the wall."""
