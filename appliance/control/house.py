@@ -10,7 +10,7 @@ from typing import Any
 from appliance.outputs.block import BlockReader, BlockWriter
 
 FILE, KIND = "house", "house"
-LARGEST = 4096  # bytes; the longest names of a show fit
+LARGEST = 8192  # bytes; the longest names of a show fit, whatever they are written in
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,11 @@ class House:
 
 
 class HouseReader:
-    """Reads the house of a runtime folder; the defaults while nobody writes one: the show simply runs."""
+    """Reads the house of a runtime folder; the defaults before anybody wrote one: the show simply runs.
+
+    A house that is gone stays in force until there is another one: whatever emptied the folder, panic stays
+    panic, and what is dark does not flash up while a box ends.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._block = BlockReader(folder / FILE, KIND)

@@ -36,6 +36,7 @@ class BlockWriter:
 class BlockReader:
     """Reads what a BlockWriter of the same kind wrote; finds a file that was replaced by itself.
 
+    A file that is gone is read on until there is another one: its writer may still be at work in it.
     `writer`: what people call the program that writes it.
     """
 
@@ -48,10 +49,8 @@ class BlockReader:
         return self._file.complaint
 
     def read(self) -> bytes | None:
-        """The newest whole payload; None without one. Never waits, never raises."""
+        """The newest whole payload; None before the first one. Never waits, never raises."""
         self._file.look()
-        if not self._file.is_there:
-            return None
         for ring in self._file.rings:
             newest = ring.newest()
             return newest[1] if newest else None

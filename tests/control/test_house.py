@@ -100,12 +100,33 @@ def test_only_one_writes_at_a_time(tmp_path: Path) -> None:
 
 
 def test_a_forgotten_house_is_the_default_for_a_new_reader(tmp_path: Path) -> None:
-    writer = HouseWriter(tmp_path)
+    writer, reader = HouseWriter(tmp_path), HouseReader(tmp_path)
     writer.write(House(blackout=True))
+    assert reader.read().blackout
     writer.close()
     forget_house(tmp_path)
     assert HouseReader(tmp_path).read() == House()
+    assert reader.read().blackout  # the last frames are not seen to flash up
     forget_house(tmp_path)
+    HouseWriter(tmp_path).write(House())
+    assert reader.read() == House()
+
+
+def test_panic_works_in_a_folder_that_somebody_emptied(tmp_path: Path) -> None:
+    """As happens to the folder of a user who logs out while the show runs."""
+    writer, reader = HouseWriter(tmp_path), HouseReader(tmp_path)
+    writer.write(House())
+    assert not reader.read().panic
+    (tmp_path / FILE).unlink()
+    writer.write(House(panic=True))
+    assert reader.read().panic
+
+
+def test_the_longest_names_of_a_show_fit(tmp_path: Path) -> None:
+    name = "\N{PERFORMING ARTS}" * 64
+    house = House(True, look=name, look_before=name, lights=name, lights_before=name, cue=name)
+    HouseWriter(tmp_path).write(house)
+    assert HouseReader(tmp_path).read() == house
 
 
 @pytest.mark.parametrize(

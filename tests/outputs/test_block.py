@@ -61,10 +61,13 @@ def test_a_payload_that_is_too_long_is_refused_and_changes_nothing(path: Path, r
 
 def test_a_reader_waits_for_a_file_and_outlives_it(path: Path, reader: BlockReader) -> None:
     assert reader.read() is None
-    written(path, b"there").close()
+    writer = written(path, b"there")
     assert reader.read() == b"there"
     path.unlink()
-    assert reader.read() is None
+    assert reader.read() == b"there"
+    writer.write(b"still there")
+    assert reader.read() == b"still there"
+    writer.close()
     written(path, b"again").close()
     assert reader.read() == b"again"
 
