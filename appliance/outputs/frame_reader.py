@@ -29,6 +29,7 @@ from appliance.outputs.shared_frame import (
 State = Literal["absent", "fresh", "stale"]
 STALE_S = 0.5
 _LOOK_S = 0.1  # how often the file system is asked for a new stage
+_AHEAD_S = 1.0  # no reader's clock is so far behind the stage's
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,7 @@ class FrameReader:
         if not self._file.rings:
             return None
         found = self._file.rings[FRAMES].newest()
-        return self._frame(found[1]) if found else None
+        return self._frame(found[1], now) if found else None
 
     def frames(self, count: int, now: float) -> list[SeenFrame]:
         """The newest frames of this stage, at most `count`, newest last; torn ones are left out."""
@@ -84,7 +85,7 @@ class FrameReader:
         ring = self._file.rings[FRAMES]
         newest = ring.newest_sequence()
         payloads = map(ring.payload, range(max(newest - count, 0) + 1, newest + 1))
-        seen = (self._frame(payload) for payload in payloads if payload is not None)
+        seen = (self._frame(payload, now) for payload in payloads if payload is not None)
         return [frame for frame in seen if frame is not None]
 
     def health(self) -> dict[str, Any] | None:
@@ -139,11 +140,15 @@ class FrameReader:
         self._layout = FrameLayout(len(self.facts.skeleton))
         self.generation += 1
 
-    def _frame(self, payload: bytes) -> SeenFrame | None:
+    def _frame(self, payload: bytes, now: float) -> SeenFrame | None:
+        """None for what nobody may show: not a number, or left from before this machine was started anew."""
         layout, joints = self._layout, self._layout.joints
         if len(payload) != layout.bytes:
             return None
         tick, frame_time, left, sequence, arrival, flags, _ = FRAME_HEAD.unpack_from(payload)
+        numbers = np.frombuffer(payload, "<f4", -1, layout.root_at)
+        if frame_time > now + _AHEAD_S or not np.isfinite(numbers).all():
+            return None
         return SeenFrame(
             tick,
             frame_time,
