@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -21,6 +22,8 @@ Place = Literal["stage", "projector", "lights"]
 Delivery = Literal["sent", "full", "absent"]  # full: too many wait there already; absent: nobody is there
 ANSWERS = "control"
 _LARGEST = 65536
+# What reading a datagram raises that nobody of this box has sent.
+_NONSENSE = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +106,7 @@ class OrderSender:
     def take(self) -> Answer | None:
         """The oldest answer that waits, or None; never blocks, never raises."""
         while (received := self._socket.take()) is not None:
-            with contextlib.suppress(ValueError, KeyError, TypeError):
+            with contextlib.suppress(*_NONSENSE):
                 values = json.loads(received)
                 return Answer(int(values["ask"]), bool(values["done"]), str(values["words"]))
         return None
@@ -179,15 +182,22 @@ def _parsed(received: bytes) -> Order | None:
         values = json.loads(received)
         return Order(
             name=str(values["name"]),
-            values=tuple(float(value) for value in values["values"]),
+            values=_finite(values["values"]),
             text=values["text"] if isinstance(values["text"], int) else str(values["text"]),
             keys=_keys(values.get("keys", {})),
             ask=int(values["ask"]),
             quiet=bool(values["quiet"]),
             until=float(values["until"]),
         )
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except _NONSENSE:
         return None
+
+
+def _finite(values: Sequence[Any]) -> tuple[float, ...]:
+    numbers = tuple(float(value) for value in values)
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError("not a number")
+    return numbers
 
 
 def _keys(values: Mapping[str, Any]) -> dict[str, SensorKey]:

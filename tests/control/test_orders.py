@@ -91,6 +91,11 @@ def test_what_its_asker_no_longer_waits_for_is_not_done(sender: OrderSender, inb
         json.dumps(
             {"name": "x", "values": [], "text": "", "ask": 0, "quiet": 0, "until": 1e9, "keys": {"a": 1}}
         ).encode(),
+        *(
+            b'{"name": "x", "values": [%b], "text": "", "ask": %b, "quiet": 0, "until": 1e9, "keys": %b}'
+            % parts
+            for parts in ((b"NaN", b"0", b"{}"), (b"", b"Infinity", b"{}"), (b"", b"0", b"[1]"))
+        ),
     ],
 )
 def test_what_is_no_order_is_passed_over(folder: Path, inbox: OrderInbox, datagram: bytes) -> None:
