@@ -31,7 +31,7 @@ def _go(house: House, command: Command, facts: Facts | None, now: float) -> tupl
 
 def _stop(house: House, command: Command, facts: Facts | None, now: float) -> tuple[House, str]:
     fade_s = command.values[0] if command.values else STOP_FADE_S
-    if not house.going:
+    if not house.going and house.going_level(now) <= 0.0:
         return house, "The show stands still already. /go lets it go on."
     words = f"Picture and lights fade out over {fade_s:g} s, then the phrase stands still. /go lets it go on."
     return house.with_going(False, now, fade_s), words

@@ -60,6 +60,13 @@ def test_panic_needs_no_stage(folder: Path, asker: Asker) -> None:
     assert house(folder).panic
 
 
+def test_a_slow_stop_can_be_made_a_quick_one(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    assert asker.ask("/stop", 60.0)[2] == 1
+    assert not house(folder).is_safe(time.monotonic() + 1.0)
+    assert asker.ask("/stop", 0.0)[2] == 1
+    assert house(folder).is_safe(time.monotonic())
+
+
 def test_stop_fades_then_the_phrase_stands_until_go(folder: Path, stage: StageDouble, asker: Asker) -> None:
     assert asker.ask("/stop", 0.3)[2] == 1
     assert not house(folder).going
