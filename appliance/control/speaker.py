@@ -34,6 +34,6 @@ class Speaker:
     def _speak(self) -> None:
         while (line := self._lines.get()) is not None:
             try:
-                os.write(self._descriptor, f"{line}\n".encode())
+                os.write(self._descriptor, f"{line}\n".encode(errors="backslashreplace"))
             except OSError:
                 return  # nobody listens any more: the show goes on
