@@ -11,7 +11,7 @@ from appliance.show.config_error import ConfigError
 from appliance.show.cues import too_much
 from appliance.show.posistagenet import misfits
 from appliance.show.show import Show, load_show
-from appliance.show.venue_lights import misplaced, unwired
+from appliance.show.venue_rig import misplaced, unwired
 from appliance.stage.cast import admission, assemble, reach
 from appliance.stage.stage_error import StageError
 

@@ -16,11 +16,12 @@ from appliance.commands.emulation import Emulation
 from appliance.commands.rehearsal import PICTURED_S, has_display, rehearsal_picture
 from appliance.control.house import forget_house
 from appliance.control.speaker import Speaker
+from appliance.control.stop_signals import stop_signals
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.show import Show, load_show
 from appliance.stage.cast import reach
-from appliance.stage.run import Stage, stop_signals
+from appliance.stage.run import Stage
 
 _NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
 # In a technician's words; what is not here goes by its name in docs/wire.md.

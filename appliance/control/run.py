@@ -17,10 +17,12 @@ from appliance.control.errands import Errands
 from appliance.control.heartbeat import Heartbeat
 from appliance.control.house import House, HouseReader, HouseWriter
 from appliance.control.key_file import KeyFile
+from appliance.control.news import News, held_back
 from appliance.control.orders import OrderSender
 from appliance.control.port import Port
 from appliance.control.settings import Settings
 from appliance.control.sight import StageSight
+from appliance.control.stop_signals import stop_signals
 
 _LONGEST_SLEEP_S = 0.25  # a stage that was started anew is found so soon
 _AT_ONCE = 64  # datagrams; then answers, heartbeat and signals have their turn
@@ -53,8 +55,9 @@ class ControlProcess:
                 self._poll.register(one.fileno(), select.POLLIN)
             self._closing = opened.pop_all()
         writer.write(house)
-        if words := _in_force(house):
-            say(words)
+        self._news = News(house)
+        if words := held_back(house):
+            say(f"Still from before: {words}")
 
     def run(self, ended: Callable[[], bool], wake: int) -> None:
         """Until `ended` says so; `wake` is a descriptor that can be read when it may."""
@@ -75,8 +78,9 @@ class ControlProcess:
         self.desk.look(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.desk.status(self.port.strangers, now), now)
-        if words := self.port.news(now):
-            self._say(words)
+        for words in (self.port.news(now), self._news.look(self.desk.house, now)):
+            if words:
+                self._say(words)
         if taken == _AT_ONCE:
             time.sleep(_REST_S)
 
@@ -100,7 +104,7 @@ class ControlProcess:
 def control(settings: Settings, say: Callable[[str], None]) -> int:
     """Show control until SIGTERM, Ctrl-C or a closed terminal; the exit status."""
     logging.disable(logging.CRITICAL)  # python-osc logs what it cannot read, in the sender's own signs
-    with _stop_signals() as (ended, wake):
+    with _waking_stop_signals() as (ended, wake):
         process = ControlProcess(settings, say, time.monotonic())
         try:
             process.run(ended, wake)
@@ -117,30 +121,15 @@ def _house_left(folder: Path, now: float) -> House:
         return reader.read().settled(now)
 
 
-def _in_force(house: House) -> str:
-    """What an audience would miss, in a sentence; empty where nothing is held back."""
-    if house.panic:
-        return "Panic is still in force: black, lights safe. /go or /panic 0 lifts it."
-    if not house.going:
-        return "The show is still stopped: dark. /go lets it go on."
-    return "Blackout is still in force. /blackout 0 lifts it." if house.blackout else ""
-
-
 @contextmanager
-def _stop_signals() -> Iterator[tuple[Callable[[], bool], int]]:
+def _waking_stop_signals() -> Iterator[tuple[Callable[[], bool], int]]:
     """While inside: whether one came, and a descriptor that can be read when one did."""
-    came: list[int] = []
     reading, writing = socket.socketpair()
     for one in (reading, writing):
         one.setblocking(False)
-    signals = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-    before = [signal.signal(number, lambda caught, _: came.append(caught)) for number in signals]
-    wake_before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
-    try:
-        yield (lambda: bool(came)), reading.fileno()
-    finally:
-        signal.set_wakeup_fd(wake_before)
-        for number, handler in zip(signals, before, strict=True):
-            signal.signal(number, handler)
-        reading.close()
-        writing.close()
+    with reading, writing, stop_signals() as came:
+        wake_before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
+        try:
+            yield came, reading.fileno()
+        finally:
+            signal.set_wakeup_fd(wake_before)

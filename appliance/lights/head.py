@@ -10,17 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.lights.slot import Slot
 from appliance.pose import quaternion
 from appliance.show.fixture_profile import PAN, TILT
 from appliance.show.lights import FixtureConfig
-
-if TYPE_CHECKING:
-    from appliance.lights.patch import Slot
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +10,14 @@ from numpy.typing import NDArray
 
 from appliance.lights.colour import SUBTRACTIVE, components_of, mixed
 from appliance.lights.head import Heads, heads_of
+from appliance.lights.slot import Slot
 from appliance.show.fixture_profile import (
     DIMMER,
     FINE,
-    LAMPS,
     PAN,
     TILT,
     AttributeConfig,
     ModeConfig,
-    base,
     load_profile,
 )
 from appliance.show.light_rules import COLOUR
@@ -27,33 +25,6 @@ from appliance.show.lights import UNIVERSE_CHANNELS, FixtureConfig
 
 Values = NDArray[np.float64]
 Places = NDArray[np.intp]
-
-
-@dataclass(frozen=True)
-class Slot:
-    """One attribute of one fixture. channels: its bytes from coarse to fine, counted over all universes."""
-
-    fixture: FixtureConfig
-    name: str
-    config: AttributeConfig
-    component: int  # which colour component it shows (colour.COMPONENTS); -1: none
-    channels: tuple[int, ...]  # empty: a dimmer that the fixture does not have and its colours stand in for
-
-    @property
-    def base(self) -> str:
-        """'red' for 'red 2'."""
-        return base(self.name)
-
-    @property
-    def is_lamp(self) -> bool:
-        """Whether light comes from it: one colour of several."""
-        return self.component >= 0 or self.base in LAMPS
-
-    @property
-    def is_inverted(self) -> bool:
-        """Whether its channel runs the other way round, by profile or by patch."""
-        turned = {PAN: self.fixture.invert_pan, TILT: self.fixture.invert_tilt}
-        return self.config.invert != turned.get(self.base, False)
 
 
 class Patch:

@@ -22,7 +22,7 @@ from appliance.show.bundle import default_show_path
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.lights import FixtureConfig, LightsConfig, channel_count
 from appliance.show.show import Show, load_show
-from appliance.show.venue_lights import at_venue, misplaced, unwired
+from appliance.show.venue_rig import at_venue, misplaced, unwired
 
 _PASS_S = 0.02
 _SETTLING_PASSES = 250  # five seconds: every head has arrived

@@ -6,8 +6,9 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from appliance.control.stop_signals import stop_signals
 from appliance.lights.patch import Patch
-from appliance.lights.run import require_wires, rig_here, say, stop_signals, wired
+from appliance.lights.run import require_wires, rig_here, say, wired
 from appliance.lights.walk import steps, walk
 from appliance.outputs.runtime_folder import Claim, runtime_folder
 from appliance.show.box import load_box
@@ -15,7 +16,7 @@ from appliance.show.bundle import default_show_path
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.lights import drivable
 from appliance.show.show import Show, load_show
-from appliance.show.venue_lights import unwired
+from appliance.show.venue_rig import unwired
 
 
 def walk_rig(

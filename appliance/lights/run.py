@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import math
-import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 from appliance.control.house import HouseReader
 from appliance.control.speaker import Speaker
+from appliance.control.stop_signals import stop_signals
 from appliance.lights.bill import Bill
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
@@ -23,7 +23,7 @@ from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError, Problem
 from appliance.show.lights import LightsConfig
 from appliance.show.show import Show, load_show
-from appliance.show.venue_lights import at_venue, misplaced, unwired
+from appliance.show.venue_rig import at_venue, misplaced, unwired
 
 _REPORT_S = 1.0
 _LOOK_S = 0.1  # how often the stage is looked for
@@ -196,19 +196,6 @@ def say(words: str) -> None:
     """A line for a person who walks through the rig; light matters more than a terminal that is gone."""
     with contextlib.suppress(OSError, ValueError):
         print(words, flush=True)
-
-
-@contextmanager
-def stop_signals() -> Iterator[Callable[[], bool]]:
-    """While inside, SIGTERM, Ctrl-C and a closed terminal are only noted."""
-    caught: list[int] = []
-    signals = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-    before = [signal.signal(number, lambda came, _: caught.append(came)) for number in signals]
-    try:
-        yield lambda: bool(caught)
-    finally:
-        for number, handler in zip(signals, before, strict=True):
-            signal.signal(number, handler)
 
 
 def _wait_for(deadline: float, period_s: float) -> float:

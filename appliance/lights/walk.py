@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.lights.patch import Patch, Slot, Values
+from appliance.lights.patch import Patch, Values
+from appliance.lights.slot import Slot
 from appliance.show.fixture_profile import DIMMER, PAN, TILT
 from appliance.show.light_rules import AIM
 from appliance.show.lights import UNIVERSE_CHANNELS

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 from appliance.control.house import HouseReader
@@ -217,19 +216,6 @@ class Stage:
         except JournalError as error:
             self.say(str(error))
             return None
-
-
-@contextmanager
-def stop_signals() -> Iterator[Callable[[], bool]]:
-    """While inside, SIGTERM, Ctrl-C and a closed terminal end the dance after the tick at hand."""
-    caught: list[int] = []
-    signals = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-    before = [signal.signal(number, lambda came, _: caught.append(came)) for number in signals]
-    try:
-        yield lambda: bool(caught)
-    finally:
-        for number, handler in zip(signals, before, strict=True):
-            signal.signal(number, handler)
 
 
 def _open_inbox(folder: Path) -> OrderInbox:

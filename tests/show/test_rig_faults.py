@@ -9,7 +9,7 @@ import pytest
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
-from appliance.show.venue_lights import misplaced, unwired
+from appliance.show.venue_rig import misplaced, unwired
 
 SHOW = """\
 name: Rig
