@@ -29,10 +29,12 @@ class Iterations:
             self.advance()
         if self._wanted == (coding, interaction):
             return ""
+        why = "the interaction iterations are part of the coding iterations, and there is at least one"
+        if coding > self.most:
+            why = f"at most {self.most} fit the tick's budget here"
         return (
             f"{coding} coding and {interaction} interaction iterations were asked for; "
-            f"the dancer runs with {self._wanted[0]} and {self._wanted[1]}: "
-            f"at most {self.most} fit the tick's budget here."
+            f"the dancer runs with {self._wanted[0]} and {self._wanted[1]}: {why}."
         )
 
     def advance(self) -> None:

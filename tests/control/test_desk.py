@@ -422,7 +422,9 @@ def test_what_was_in_force_stays_in_force_over_a_restart_and_is_said(folder: Pat
     asker.close()
     first.close()
     second = ControlInThread(folder)
-    assert second.said == ["Panic is still in force: black, lights safe. /go or /panic 0 lifts it."]
+    assert second.said == [
+        "Still from before: Panic is in force: black, lights safe. /go or /panic 0 lifts it."
+    ]
     assert house(folder).panic
     assert house(folder).master == 0.5
     second.close()

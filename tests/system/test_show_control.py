@@ -218,7 +218,7 @@ def test_a_killed_box_leaves_nobody_behind_and_panic_is_in_force_when_it_comes_b
         until(lambda: not Path(f"/proc/{control}").exists())
         box.kill_and_restart()
         with asking(box) as asker:
-            box.await_words("Panic is still in force")
+            box.await_words("Still from before: Panic is in force")
             box.await_words("The show goes on in the cue 'storm'.")
             assert status(asker)["panic"] == 1
             assert asker.ask("/panic", 0)[2] == 1
@@ -250,7 +250,7 @@ def test_show_control_that_is_killed_comes_back_and_misses_nothing(show: Path, t
         assert children_of(box.process.pid) != [control]
         assert box.end() == 0
     assert "Show control was killed (signal 9)." in box.words
-    assert "Panic is still in force" in box.words
+    assert "Still from before: Panic is in force" in box.words
 
 
 def test_a_flood_does_not_touch_the_dance(show: Path, tmp_path: Path) -> None:
