@@ -61,7 +61,7 @@ _ANY = -_FAR, _FAR
 _PLACE = (Number("x", 0, 1), Number("y", 0, 1))
 
 FORMS: dict[str, Form] = {
-    "/go": Form(),
+    "/go": Form(numbers=(_ON,), optional=1),
     "/stop": Form(numbers=(_FADE,), optional=1),
     "/panic": Form(numbers=(_ON,), optional=1),
     "/blackout": Form(numbers=(_ON,)),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from appliance.control.command import Command, command
 from appliance.control.errands import Errands
 from appliance.control.house import House
-from appliance.control.house_commands import CHANGES, PARTS, in_cue, known, next_cue, of_this_show
+from appliance.control.house_commands import CHANGES, PARTS, in_cue, known, let_go, next_cue, of_this_show
 from appliance.control.key_file import KeyFile
 from appliance.control.orders import Order, Place
 from appliance.control.packet import Message, messages_in, readable
@@ -121,6 +121,8 @@ class Desk:
         address = order.address
         if address == "/ping":
             self._tell(asker, (PONG,))
+        elif words := let_go(order):
+            self._tell(asker, (REPLY, address, 0, words))  # not done, and nothing was refused
         elif address in CHANGES:
             self._change(order, asker, now)
         elif address in QUESTIONS:

@@ -33,16 +33,15 @@ def _stop(house: House, command: Command, facts: Facts | None, now: float) -> tu
     fade_s = command.values[0] if command.values else STOP_FADE_S
     if not house.going and house.going_level(now) <= 0.0:
         return house, "The show stands still already. /go lets it go on."
+    if not house.going and fade_s == 0.0:  # a button let go: the fade of its press is not to be cut
+        return house, "The show stops already, and its fade runs on. /go lets it go on."
     words = f"Picture and lights fade out over {fade_s:g} s, then the phrase stands still. /go lets it go on."
     return house.with_going(False, now, fade_s), words
 
 
 def _panic(house: House, command: Command, facts: Facts | None, now: float) -> tuple[House, str]:
-    if not command.values or command.values[0]:
-        words = "The picture is black, and the lights show their safe look. /go or /panic 0 lifts it."
-        return replace(house, panic=True), words
-    words = "Panic is lifted: everything is as it was before." if house.panic else "There was no panic."
-    return replace(house, panic=False), words
+    words = "The picture is black, and the lights show their safe look. /go lifts it."
+    return replace(house, panic=True), words
 
 
 def _blackout(house: House, command: Command, facts: Facts | None, now: float) -> tuple[House, str]:
@@ -78,6 +77,16 @@ CHANGES: dict[str, Change] = {
     "/look": _look,
     "/lights": _lights,
 }
+
+_LET_GO = {
+    "/go": "/go 0 is a button let go: nothing changes.",
+    "/panic": "/panic 0 is a button let go: nothing changes. /go lifts a panic.",
+}
+
+
+def let_go(command: Command) -> str:
+    """What to answer when a tablet's button, which sent 1 when it was pressed, sends 0; else empty."""
+    return _LET_GO.get(command.address, "") if command.values == (0.0,) else ""
 
 
 PARTS = ("look", "lights", "master")  # of the house, that cues set

@@ -10,7 +10,7 @@ _PAUSE_S = 0.5  # a fader or a button that somebody plays with never floods the 
 def held_back(house: House) -> str:
     """Why the audience sees nothing, and what lifts it; empty where nothing is held back."""
     if house.panic:
-        return "Panic is in force: black, lights safe. /go or /panic 0 lifts it."
+        return "Panic is in force: black, lights safe. /go lifts it."
     if not house.going:
         return "The show is stopped: dark. /go lets it go on."
     if house.blackout:

@@ -15,6 +15,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs" / "osc.md"
     ("address", "arguments", "expected"),
     [
         ("/go", [], Command("/go")),
+        ("/go", [1.0], Command("/go", (1.0,))),
         ("/panic", [], Command("/panic")),
         ("/panic", [0], Command("/panic", (0.0,))),
         ("/blackout", [True], Command("/blackout", (1.0,))),

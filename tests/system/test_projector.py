@@ -148,7 +148,7 @@ def test_panic_and_alignment_by_osc(box: Box, tmp_path: Path) -> None:
         projection.await_dance()
         assert ask(box.control, "/panic", 1)[1] == 1
         projection.await_black()
-        assert ask(box.control, "/panic", 0)[1] == 1
+        assert ask(box.control, "/go")[1] == 1
         projection.await_dance()
 
         assert ask(box.control, "/projector/grid", 1)[1:] == [1, "The grid is on the wall."]
