@@ -34,6 +34,11 @@ def toy() -> Skeleton:
     )
 
 
+def point() -> Skeleton:
+    """One joint and nothing else: a thing that is carried about, or a file that is not what it should be."""
+    return built([("thing", None, (0, 0, 0))])
+
+
 def mixamo() -> Skeleton:
     """Named as by Mixamo, centimetre by centimetre symmetrical, without fingers."""
     bones: list[Bone] = [

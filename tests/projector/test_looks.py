@@ -26,7 +26,7 @@ from tests.projector.golden_looks import (
     phrase,
     renderer,
 )
-from tests.projector.skeletons import mixamo, toy
+from tests.projector.skeletons import mixamo, point, toy
 
 MOST_GPU_BYTES = 25e6
 MOST_DRAW_CALLS = 20
@@ -139,6 +139,13 @@ def test_any_skeleton_of_any_size_looks_alike(skeleton: Skeleton, ctx: moderngl.
     assert pictures[0].max() > 100
     mean, p99 = difference(*pictures)
     assert mean < MEAN_LIMIT and p99 < P99_LIMIT
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_single_joint_can_be_shown(style: str, ctx: moderngl.Context) -> None:
+    recording = still(point())
+    with renderer(ctx, recording.skeleton) as made:
+        assert drawn(ctx, made, moment_of(recording, 0.5), style, SIZE).max() > 20
 
 
 def test_first_picture_of_a_show_has_no_past(

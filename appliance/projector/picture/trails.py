@@ -13,9 +13,11 @@ def traced(body: BodyBuffers, reach: Array, count: int) -> Particles:
     """`count` points, most of them far out along the limbs; reach (J,): how far out each joint is."""
     candidates, _ = merged(body.positions, body.faces, 0.02)
     out = np.sum(reach[body.joints[candidates]] * body.weights[candidates], axis=1)
-    likely = np.clip(out / out.max() - 0.35, 0.0, None) ** 2
+    has_limbs = out.max() > 0.0  # a skeleton of one joint has none
+    likely = np.clip(out / out.max() - 0.35, 0.0, None) ** 2 if has_limbs else np.ones(len(out))
+    count = min(count, int(np.count_nonzero(likely)))
     random = np.random.RandomState(11)
-    chosen = random.choice(candidates, min(count, len(candidates)), replace=False, p=likely / likely.sum())
+    chosen = random.choice(candidates, count, replace=False, p=likely / likely.sum())
     return Particles(
         body.positions[chosen],
         body.normals[chosen],
