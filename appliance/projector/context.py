@@ -33,6 +33,7 @@ class GlContext:
             raise _unusable(str(error)) from error
         self.renderer = str(self.gl.info["GL_RENDERER"])
         self._reset_status = _reset_status()
+        self._finish = ctypes.CFUNCTYPE(None)(sdl2.SDL_GL_GetProcAddress(b"glFinish"))
 
     @property
     def is_software(self) -> bool:
@@ -43,6 +44,10 @@ class GlContext:
     def is_lost(self) -> bool:
         """Whether the graphics card was reset: all that was on it is gone, for good."""
         return self._reset_status() != 0
+
+    def finish(self) -> None:
+        """Wait until all is drawn. Unlike moderngl's own, this lets other threads run meanwhile."""
+        self._finish()
 
     def close(self) -> None:
         """Give the graphics card's memory back."""

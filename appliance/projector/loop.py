@@ -65,6 +65,7 @@ class Projector:
         self._drawn: tuple[Skeleton, Looks] | None = None  # what the painter was made for
         self._to_draw: tuple[Skeleton, Looks] | None = None  # a show that waits for its painter
         self._is_black = False  # since that show waits
+        self.is_preparing = False  # which takes as long as it takes
 
     def draw(
         self, now: float, screen: moderngl.Framebuffer, display: Size, lines: tuple[str, ...] = ()
@@ -126,11 +127,13 @@ class Projector:
         if self._painter is not None:  # that took time, which is not to count for the fade
             self._drawn, self._to_draw = show, None
             return
+        self.is_preparing = True
         self._final.resize(picture_size(self._config, display))
         self._painter = self._make_painter(self._gl, self._final.picture.size, *show)
         for look in show[1]:
             self._painter.draw(moment, look, look, 1.0, self._final.picture)
         self._gl.finish()
+        self.is_preparing = False
 
     def _meet(self, facts: Facts) -> None:
         self._poses = Interpolation(self._reader, facts.held)

@@ -35,7 +35,7 @@ def wish(
 
 
 def project_show(box_file: Path | None, wish: Wish) -> int:
-    """0: ended as asked; 69: no display or no OpenGL; 73: no room for --frames; 75: graphics card reset."""
+    """0: ended as asked; 69: no display or no OpenGL; 73: no room for --frames; 75: reset or hung."""
     stopped: list[int] = []
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(number, lambda came, _: stopped.append(came))

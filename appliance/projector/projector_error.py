@@ -6,7 +6,7 @@ import os
 
 NO_DISPLAY = os.EX_UNAVAILABLE  # 69: no display or no OpenGL; starting again helps once that is mended
 NO_PLACE = os.EX_CANTCREAT  # 73: for the pictures that were asked for as files
-GPU_LOST = os.EX_TEMPFAIL  # 75: starting again at once is the cure
+GPU_LOST = os.EX_TEMPFAIL  # 75, also for a display that hangs: starting again at once is the cure
 
 
 class ProjectorError(Exception):

@@ -23,6 +23,7 @@ from appliance.projector.loop import Projector
 from appliance.projector.pacing import USUAL_RATE, Pacing
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, NO_PLACE, ProjectorError
+from appliance.projector.watchdog import Patience, end_process, guarded
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
 
@@ -73,6 +74,7 @@ class Run:
         rate = config.rate or self._window.display_rate or USUAL_RATE
         self._pacing = Pacing(rate, self._window.set_pace(config.vsync))
         self._meter = Meter()
+        self._patience = Patience()
         self._lines: tuple[str, ...] = ()
         self._warned = not self._context.is_software
 
@@ -96,7 +98,8 @@ class Run:
     def project(self, stopped: Callable[[], bool]) -> Figures:
         """Show pictures until `stopped`, the seconds are over or somebody ends it; how they came out."""
         try:
-            self._show_on(stopped)
+            with guarded(self._patience, lambda: self._projector.is_preparing, end_process):
+                self._show_on(stopped)
         except moderngl.Error as error:
             self._check_context()
             raise ProjectorError(
@@ -129,8 +132,10 @@ class Run:
         if self._wish.frames is not None:
             self._keep(self._wish.frames, screen.read(viewport=(0, 0, *size), components=4), size)
         self._window.show()
-        self._context.gl.finish()  # without it the driver lets pictures queue up, each one older
-        self._meter.shown(time.monotonic(), left_stage)
+        self._context.finish()  # without it the driver lets pictures queue up, each one older
+        swapped = time.monotonic()
+        self._patience.swapped(swapped)
+        self._meter.shown(swapped, left_stage)
         self._check_context()
 
     def _keep(self, folder: Path, pixels: bytes, size: Size) -> None:

@@ -1,0 +1,82 @@
+"""The watchdog: waiting for a display has no limit of its own, so a thread ends what waits for too long."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from appliance.projector.projector_error import GPU_LOST
+
+PATIENCE_S = 5.0
+_LOOK_S = 0.5
+_STOOD_STILL_S = 2.0  # between two looks: this process itself was held up, by Ctrl-Z or a machine asleep
+_LAST_WORDS_S = 0.5
+WORDS = (
+    f"The display has taken no picture for {PATIENCE_S:g} s. The audience sees one that stands still, or "
+    "none; the dance goes on. The projector ends so that it can be started anew (a supervisor does it by "
+    "itself); if it happens often, look at the cable, the projector and the graphics card's driver."
+)
+
+
+class Patience:
+    """Whether the display hangs. Times are monotonic seconds; before the first picture it does not."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+        self._looked_at = 0.0
+
+    def swapped(self, now: float) -> None:
+        """The display took a picture."""
+        self._since = now
+
+    def is_over(self, now: float, is_preparing: bool) -> bool:
+        """Look often. What a show's preparation takes does not count, nor what held up the looks as well."""
+        stood_still = now - self._looked_at > _STOOD_STILL_S
+        self._looked_at = now
+        if self._since is None:
+            return False
+        if is_preparing or stood_still:
+            self._since = now
+        return now - self._since >= PATIENCE_S
+
+
+@contextmanager
+def guarded(
+    patience: Patience,
+    is_preparing: Callable[[], bool],
+    give_up: Callable[[], None],
+    monotonic: Callable[[], float] = time.monotonic,
+) -> Iterator[None]:
+    """Meanwhile a thread looks, and gives up once when patience is over."""
+    is_done = threading.Event()
+
+    def watch() -> None:
+        while not is_done.wait(_LOOK_S):
+            if patience.is_over(monotonic(), is_preparing()):
+                give_up()
+                return
+
+    thread = threading.Thread(target=watch, name="watchdog", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        is_done.set()
+        thread.join()
+
+
+def end_process() -> None:
+    """Say why, and end without waiting for anybody: who waits for the display hears no signal either."""
+    words = threading.Thread(target=_say, daemon=True)  # a terminal that is stopped may not hold this up
+    words.start()
+    words.join(_LAST_WORDS_S)
+    os._exit(GPU_LOST)
+
+
+def _say() -> None:
+    print(f"bunraku: {WORDS}", file=sys.stderr, flush=True)
+    sys.stdout.flush()

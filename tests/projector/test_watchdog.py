@@ -1,0 +1,104 @@
+"""A display that hangs: noticed in time, by nobody else's fault, and the process ends with words."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.projector import watchdog
+from appliance.projector.projector_error import GPU_LOST
+from appliance.projector.watchdog import PATIENCE_S, Patience, guarded
+
+HANGS = """
+import ctypes, sys, time
+from pathlib import Path
+from appliance.projector import watchdog
+from appliance.projector.run import Run, Wish
+from appliance.projector.window import Window
+from appliance.show.box import BoxConfig
+
+watchdog.PATIENCE_S, watchdog._LOOK_S = 0.6, 0.1
+shown, show = [], Window.show
+
+def hang(window):
+    shown.append(show(window))
+    if len(shown) > 3:
+        print("hangs", flush=True)
+        while True:
+            ctypes.CDLL(None).pause()
+
+Window.show = hang
+place = Path(sys.argv[1])
+run = Run(BoxConfig(runtime=place / "run", state=place / "state"), None, Wish("offscreen", (64, 36)), print)
+run.project(lambda: False)
+"""
+
+
+def over_at(patience: Patience, begin: float, end: float, is_preparing: bool = False) -> float | None:
+    """Look each half second; when patience is over."""
+    for now in np.arange(begin, end, 0.5):
+        if patience.is_over(float(now), is_preparing):
+            return float(now)
+    return None
+
+
+def test_patience_is_over_after_five_seconds_without_a_picture() -> None:
+    patience = Patience()
+    assert over_at(patience, 100.0, 160.0) is None  # before the first picture nothing is expected
+    patience.swapped(160.0)
+    assert over_at(patience, 160.0, 164.6) is None
+    patience.swapped(164.0)
+    assert over_at(patience, 165.0, 190.0) == 164.0 + PATIENCE_S
+
+
+def test_a_show_that_is_prepared_may_take_its_time() -> None:
+    patience = Patience()
+    patience.is_over(99.5, False)
+    patience.swapped(100.0)
+    assert over_at(patience, 100.0, 130.0, is_preparing=True) is None
+    assert over_at(patience, 130.0, 150.0) == 129.5 + PATIENCE_S
+
+
+def test_a_process_that_was_stopped_blames_no_display() -> None:
+    patience = Patience()
+    patience.is_over(99.5, False)
+    patience.swapped(100.0)
+    assert over_at(patience, 100.0, 102.0) is None
+    assert over_at(patience, 160.0, 180.0) == 160.0 + PATIENCE_S
+
+
+def test_the_guard_gives_up_once_and_ends_with_what_it_guards(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watchdog, "_LOOK_S", 0.01)
+    clock, gave_up = [100.0], threading.Event()
+    patience = Patience()
+    patience.swapped(100.0)
+    with guarded(patience, lambda: False, gave_up.set, lambda: clock[0]):
+        time.sleep(0.1)
+        assert not gave_up.is_set()
+        for _ in range(4):
+            clock[0] += 1.5
+            time.sleep(0.05)
+        assert gave_up.wait(5.0)
+    assert "watchdog" not in [thread.name for thread in threading.enumerate()]
+
+
+def test_a_display_that_hangs_ends_the_projector_with_words_and_75(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", HANGS, str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None and "hangs" in process.stdout.readline()
+        _, words = process.communicate(timeout=20.0)
+    finally:
+        process.kill()
+    assert process.returncode == GPU_LOST
+    assert "The display has taken no picture" in words and "The audience sees" in words
