@@ -55,7 +55,7 @@ class Lights:
     def introduce(self) -> None:
         """Say what is lit by which wires, and what stays dark."""
         mappings = [mapping.name for mapping in self.show.config.lights.mappings]
-        wires = ", ".join(universe.wire.name for universe in self.universes)
+        wires = " and ".join(universe.wire.name for universe in self.universes)
         rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: they rest at their defaults"
         self._say(f"Lights: {len(self.rig.patch.fixtures)} fixtures by {wires}; {rules}.")
         for sentence in unwired(self.show, self.box):
