@@ -58,7 +58,9 @@ _ON = Number("0 or 1", 0, 1, is_whole=True)
 _FADE = Number("fade in seconds", 0, _MOST_FADE_S)
 _SECOND = Number("second", 0, _FAR)
 _ANY = -_FAR, _FAR
-_PLACE = (Number("x", 0, 1), Number("y", 0, 1))
+_CORNER = Number("corner", 1, 4, is_whole=True)
+_PLACE = (Number("x", -0.5, 1.5), Number("y", -0.5, 1.5))  # as far as keys move a corner
+_WAY = (Number("dx", -1, 1), Number("dy", -1, 1))
 
 FORMS: dict[str, Form] = {
     "/go": Form(numbers=(_ON,), optional=1),
@@ -78,10 +80,11 @@ FORMS: dict[str, Form] = {
     "/phrases": Form(),
     "/looks": Form(),
     "/hands": Form(),
-    "/projector/corner": Form(numbers=(Number("corner", 1, 4, True), *_PLACE)),
+    "/projector/corner": Form(numbers=(_CORNER, *_PLACE)),
     "/projector/corners": Form(numbers=_PLACE * 4),
     "/projector/corners/reset": Form(),
-    "/projector/brightness": Form(numbers=(Number("brightness", 0, 1),)),
+    "/projector/nudge": Form(numbers=(_CORNER, *_WAY)),
+    "/projector/brightness": Form(numbers=(Number("brightness", 0, 2),)),
     "/projector/mirror": Form(numbers=(_ON,)),
     "/projector/grid": Form(numbers=(_ON,)),
     "/projector/info": Form(numbers=(_ON,)),

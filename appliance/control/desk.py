@@ -49,6 +49,7 @@ _ORDERS: Mapping[str, tuple[Place, str]] = {
     "/projector/corner": ("projector", "corner"),
     "/projector/corners": ("projector", "corners"),
     "/projector/corners/reset": ("projector", "corners/reset"),
+    "/projector/nudge": ("projector", "nudge"),
     "/projector/brightness": ("projector", "brightness"),
     "/projector/mirror": ("projector", "mirror"),
     "/projector/grid": ("projector", "grid"),

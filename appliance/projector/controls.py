@@ -57,6 +57,14 @@ class Controls:
         x, y = self.alignment.corners[self.corner]
         return self.place(self.corner, (x + dx, y + dy))[1]
 
+    def nudge(self, corner: int, dx: float, dy: float) -> tuple[bool, str]:
+        """Move one corner, 0 to 3; whether it was done, and where it is now."""
+        x, y = self.alignment.corners[corner]
+        done, words = self.place(corner, (x + dx, y + dy))
+        x, y = self.alignment.corners[corner]
+        here = f"The {_CORNER_NAMES[corner]} corner lies at ({x:.4f}, {y:.4f})."
+        return done, here if done else f"{words} {here}"
+
     def place(self, corner: int, point: Point) -> tuple[bool, str]:
         """Put one corner there, 0 to 3; whether it was done, and a sentence."""
         corners = list(self.alignment.corners)
@@ -105,6 +113,8 @@ class Controls:
         match order.name, len(values):
             case "corner", 3 if values[0] in (1, 2, 3, 4):
                 return self.place(int(values[0]) - 1, (values[1], values[2]))
+            case "nudge", 3 if values[0] in (1, 2, 3, 4):
+                return self.nudge(int(values[0]) - 1, values[1], values[2])
             case "corners", 8:
                 a, b, c, d = ((values[k], values[k + 1]) for k in range(0, 8, 2))
                 return self.place_all((a, b, c, d))

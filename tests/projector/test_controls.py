@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from appliance.control.command import FORMS
 from appliance.control.orders import Order
-from appliance.projector.alignment import Alignment
+from appliance.projector.alignment import MOST_BRIGHT, Alignment
 from appliance.projector.controls import Controls
-from appliance.projector.corners import WHOLE
+from appliance.projector.corners import FARTHEST, WHOLE
 from appliance.projector.keyboards import Key
 from appliance.projector.keys import HELP, press
 
@@ -104,6 +105,21 @@ def test_orders(controls: Controls) -> None:
     assert controls.alignment.corners == WHOLE
 
 
+def test_commands_reach_as_far_as_keys() -> None:
+    _, x, y = FORMS["/projector/corner"].numbers
+    assert {x[1:3], y[1:3]} == {(-FARTHEST, 1 + FARTHEST)}
+    assert FORMS["/projector/brightness"].numbers[0].most == MOST_BRIGHT
+
+
+def test_a_nudge_says_where_the_corner_is_now(controls: Controls, kept: list[Alignment]) -> None:
+    done, words = controls.obey(Order("nudge", (2, -0.125, 0.25)))
+    assert (done, words) == (True, "The top right corner lies at (0.8750, 0.2500).")
+    assert controls.obey(Order("nudge", (2, 0.0625, 0.0)))[1].endswith("(0.9375, 0.2500).")
+    assert kept[-1].corners[1] == (0.9375, 0.25)
+    done, words = controls.obey(Order("nudge", (2, -1, 1)))
+    assert not done and "fold" in words and words.endswith("(0.9375, 0.2500).")
+
+
 @pytest.mark.parametrize(
     "order",
     [
@@ -111,6 +127,8 @@ def test_orders(controls: Controls) -> None:
         Order("corner", (1, 0.9, 0.9)),
         Order("corner", (1, float("nan"), 0.0)),
         Order("corner", (1,)),
+        Order("nudge", (0, 0.1, 0.1)),
+        Order("nudge", (1, 0.1)),
         Order("corners", (1, 0, 0, 0, 0, 1, 1, 1)),
         Order("brightness"),
         Order("dance", (1,)),
