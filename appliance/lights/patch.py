@@ -68,6 +68,10 @@ class Patch:
             shown[self.scaled] = np.where(self._subtractive, 1.0 - (1.0 - light) * by, light * by)
         return shown
 
+    def rest(self) -> Values:
+        """Zero (S,), and dark where that would be light: cyan, magenta, yellow of a lamp without dimmer."""
+        return self.dimmed(np.zeros(len(self.slots)), 0.0)
+
     def encode(self, values: Values) -> dict[int, bytes]:
         """512 levels for each universe: coarse and fine bytes, inverted and limited as the profiles say."""
         turned = np.where(self._inverted, 1.0 - values, values)

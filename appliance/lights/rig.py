@@ -63,10 +63,12 @@ class Rig:
         return self.patch.encode(self.values)
 
     def last_levels(self) -> dict[int, bytes]:
-        """What is left on the wires at the end: the safe look where it has light in it, else zeros."""
-        if self._is_dark:
-            return {universe: bytes(512) for universe in self.patch.universes}
-        heads, values = self.patch.heads, self.patch.dimmed(self._safe, 1.0)
+        """What is left on the wires at the end: the safe look where it has light in it, else zeros.
+
+        Heads stay where they point: at zero they would swing to the end of their range.
+        """
+        heads = self.patch.heads
+        values = self.patch.dimmed(self._safe, 1.0) if not self._is_dark else self.patch.rest()
         values[heads.axes.slots] = heads.axes.shares(heads.angles)
         return self.patch.encode(values)
 

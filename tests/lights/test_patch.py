@@ -185,3 +185,16 @@ def test_a_show_may_bring_its_own_version_of_a_profile(tmp_path: Path) -> None:
     assert load_profile("led-par", None).name != "Mine"
     with pytest.raises(KeyError):
         load_profile("../show", tmp_path)
+
+
+def test_at_rest_everything_is_zero_but_what_would_be_light(show: Path) -> None:
+    patch = patch_of(
+        [
+            {"name": "par", "profile": "led-par", "address": 1},
+            {"name": "cmy", "profile": "cmy", "address": 21},
+        ],
+        show,
+    )
+    levels = patch.encode(patch.rest())[1]
+    assert levels[20:23] == bytes((255, 255, 255))
+    assert not any(levels[:20]) and not any(levels[23:])

@@ -175,7 +175,18 @@ def test_at_the_end_it_fades_and_leaves_zeros_or_the_safe_look(safe: dict[str, A
     assert night.rig.safety == 1.0
     last = night.rig.last_levels()[1]
     assert last[0] == left
-    assert any(last) == bool(left)
+    heads = set(range(20, 24))  # pan and tilt, coarse and fine
+    assert any(level for channel, level in enumerate(last) if channel not in heads) == bool(left)
+
+
+def test_at_the_end_heads_stay_where_they_point() -> None:
+    night = evening(FULL, AIM)
+    shown = night.dance(2.0)[-1]
+    night.rig.leave()
+    night.dance(LEAVING_FADE_S + PERIOD_S, hand=(-2.0, 1.0, 1.0))
+    before, last = night.dance()[0], night.rig.last_levels()[1]
+    assert last[20:24] == before[20:24] != shown[20:24]
+    assert any(last[20:24]) and not any(last[:20]) and not any(last[24:])
 
 
 def test_after_a_pause_of_the_whole_machine_nothing_jumps_but_time() -> None:
