@@ -59,6 +59,11 @@ class DatagramPath:
             raise
         return opened
 
+    def way(self) -> str:
+        """This machine's own address on that path; sends nothing. Raises OSError."""
+        with self.open() as opened:
+            return str(opened.getsockname()[0])
+
 
 class DatagramSender:
     """One socket that opens itself again. `send` never waits and never raises."""

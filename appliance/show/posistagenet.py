@@ -45,7 +45,7 @@ class PosiStageNetConfig(Section):
         ge=0,
         le=LAST_TRACKER,
         description="Number of the first joint's tracker; the next ones follow. Two boxes in one network "
-        "need numbers of their own.",
+        "need numbers of their own. Some consoles count trackers from 1.",
     )
     every: int = Field(
         default=1, ge=1, le=50, description="Send each n-th frame: 1 is 50 a second, 2 is 25 a second."

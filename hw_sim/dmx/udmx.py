@@ -39,6 +39,7 @@ class UdmxBackend(usb.backend.IBackend):  # type: ignore[misc]
         self.pull_out_after: int | None = None
         self.is_readable = True  # False: the user has no rights to the device
         self.handles = 0  # opened and not closed
+        self.takes_ms = 60  # a transfer of levels
         self._plug = Plug(product, serial_number, 1)
         self._is_in = True
 
@@ -101,6 +102,8 @@ class UdmxBackend(usb.backend.IBackend):  # type: ignore[misc]
             return self._tell(handle, value & 0xFF, data)
         if (request_type, request) != (0x40, _SET_CHANNEL_RANGE):
             raise usb.core.USBError("Pipe error", -9, errno.EPIPE)
+        if timeout < self.takes_ms:
+            raise usb.core.USBTimeoutError("Operation timed out", -7, errno.ETIMEDOUT)
         return self._take(handle, value, index, bytes(data))
 
     def _require(self, device: Plug) -> None:

@@ -28,15 +28,18 @@ def open_universes(
     usb_backend: pyusb's; None for the machine's libusb.
     """
     sources = _sources(configs, state)
-    return tuple(Universe(config, open_wire(config, sources, usb_backend)) for config in configs)
+    return tuple(
+        Universe(config, open_wire(config, source, usb_backend))
+        for config, source in zip(configs, sources, strict=True)
+    )
 
 
-def open_wire(config: DmxConfig, sources: dict[str, SacnSource], usb_backend: Any = None) -> Wire:
-    """The wire of one entry; `sources` by the interface's address, for sACN alone."""
+def open_wire(config: DmxConfig, source: SacnSource | None, usb_backend: Any = None) -> Wire:
+    """The wire of one entry; `source`: for sACN alone."""
     if config.wire == "artnet":
         return ArtNetWire(config)
-    if config.wire == "sacn":
-        return SacnWire(config, sources[config.interface or LOOPBACK])
+    if source is not None:
+        return SacnWire(config, source)
     if config.wire == "usb-pro":
         return usb_pro_wire(config)
     if config.wire == "open-dmx":
@@ -44,17 +47,31 @@ def open_wire(config: DmxConfig, sources: dict[str, SacnSource], usb_backend: An
     return udmx_wire(config, usb_backend)
 
 
-def _sources(configs: Sequence[DmxConfig], state: Path | None) -> dict[str, SacnSource]:
-    """One source for each network that sACN leaves by, all with this box's identity."""
-    sacn = [config for config in configs if config.wire == "sacn"]
-    if not sacn:
-        return {}
+def _sources(configs: Sequence[DmxConfig], state: Path | None) -> list[SacnSource | None]:
+    """The source of each entry: one for each network that sACN leaves by, all with this box's identity."""
+    if not any(config.wire == "sacn" for config in configs):
+        return [None] * len(configs)
     cid = component_identifier(state)
-    sources: dict[str, SacnSource] = {}
-    for config in sacn:
-        interface = config.interface or LOOPBACK
-        if interface not in sources:
+    by_interface: dict[str, SacnSource] = {}
+    sources: list[SacnSource | None] = []
+    for config in configs:
+        if config.wire != "sacn":
+            sources.append(None)
+            continue
+        interface = config.interface or _way_to(config.host, config.udp_port)
+        if interface not in by_interface:
             everyone = sacn_packet.group(sacn_packet.DISCOVERY_UNIVERSE)
             path = DatagramPath(everyone, config.udp_port, interface, hops=config.ttl)
-            sources[interface] = SacnSource(cid, config.source_name, path)
+            by_interface[interface] = SacnSource(cid, config.source_name, path)
+        sources.append(by_interface[interface])
     return sources
+
+
+def _way_to(host: str | None, port: int) -> str:
+    """The address of the interface by which the kernel reaches a host; inside this machine without one."""
+    if host is None:
+        return LOOPBACK
+    try:
+        return DatagramPath(host, port).way()
+    except OSError:
+        return LOOPBACK

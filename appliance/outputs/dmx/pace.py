@@ -5,7 +5,7 @@ from __future__ import annotations
 from appliance.outputs.dmx.wire import Wire
 from appliance.show.dmx import SLOTS, DmxConfig
 
-KEEP_ALIVE_S = 0.85  # E1.31 section 6.6.2: 0.8 to 1.0 s; Art-Net 4 asks for 4 s at the latest
+KEEP_ALIVE_S = 0.85  # E1.31 section 6.6.2: 0.8 to 1.0 s, as Art-Net 4 by now; before: 4 s at the latest
 EARLY = 0.75  # of a period
 REPEATS = 3  # E1.31 section 6.6.2: so often what does not change any more, before only keep-alives follow
 

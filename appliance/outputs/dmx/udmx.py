@@ -15,7 +15,7 @@ VENDOR, PRODUCT = 0x16C0, 0x05DC  # shared by many makers: only its words say wh
 PRODUCT_WORD = "uDMX"
 _TO_DEVICE = 0x40  # vendor request to the device
 _SET_CHANNEL_RANGE = 2
-TIMEOUT_MS = 250  # a full universe takes about 60 ms on its slow USB
+TIMEOUT_MS = 500  # as OLA waits; a full universe takes about 60 ms on its slow USB
 
 
 class Udmx:

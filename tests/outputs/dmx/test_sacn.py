@@ -18,6 +18,8 @@ from hw_sim.dmx.sacn import Data, Discovery, MalformedSacnError, decode
 from hw_sim.dmx.sacn_node import SacnNode, SacnReceiver
 from hw_sim.peers import free_ports
 from tests.outputs.dmx.conftest import config, universe
+from tests.system import namespace
+from tests.system.namespace import Cable, Namespace
 
 CID = UUID("00112233-4455-6677-8899-aabbccddeeff")
 
@@ -132,6 +134,27 @@ def test_a_source_lists_its_universes_each_ten_seconds() -> None:
         ("Box", 0, 0)
     }
     assert len({packet.cid for packet in found}) == 1
+
+
+def test_the_list_of_universes_goes_where_the_receiver_is() -> None:
+    if namespace.why_not() is not None:
+        pytest.skip(f"This needs a network of its own: {namespace.why_not()}")
+    with Namespace("box") as box, Namespace("desk") as desk:
+        Cable(box, "10.77.3.1/24", desk, "10.77.3.2/24")
+        with desk.entered():
+            receiver = SacnReceiver((64214,), interface="10.77.3.2")
+        with receiver, box.entered():
+            wires = [
+                config("sacn", universe=1, host="10.77.3.2"),
+                config("sacn", universe=2, host="127.0.0.1"),
+            ]
+            universes = open_universes(wires)
+            for one in universes:
+                one.offer(bytes(512), 0.0)
+            found = [packet for _, packet in receiver.poll(1.0) if isinstance(packet, Discovery)]
+            for one in universes:
+                one.close(1.0)
+    assert [packet.universes for packet in found] == [(1,)]
 
 
 def test_a_box_keeps_its_identity(tmp_path: Path) -> None:

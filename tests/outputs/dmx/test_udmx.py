@@ -41,6 +41,16 @@ def test_only_what_changed_travels(until: Until) -> None:
     wire.close(0.0)
 
 
+def test_an_adapter_on_a_busy_hub_gets_its_time(until: Until) -> None:
+    bus = UdmxBackend()
+    bus.takes_ms = 400
+    wire = udmx_wire(config("udmx"), bus)
+    wire.send(universe(), 0.0)
+    until(lambda: wire.sent == 1 or wire.last_error != "")
+    assert bus.levels == universe()
+    wire.close(0.0)
+
+
 def test_fewer_channels(until: Until) -> None:
     bus = UdmxBackend()
     wire = udmx_wire(config("udmx", channels=24), bus)
