@@ -44,8 +44,8 @@ def open_control_port(control: ControlConfig) -> socket.socket:
     except OSError as error:
         raise StageError(
             f"UDP port {control.port} on {control.host} cannot be opened for commands ({error.strerror}). "
-            "Nobody would hear commands, so nothing is started. Is a second bunraku running? Stop it, or give "
-            "another port under control: in the box file, or `control: null` for none."
+            "Nobody would hear commands, so nothing is started. Is a second bunraku running? Stop it, or "
+            "give another port under control: in the box file, or `control: null` for none."
         ) from error
 
 
