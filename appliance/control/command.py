@@ -114,6 +114,8 @@ class Command:
 
 def command(address: str, arguments: Sequence[object]) -> Command:
     """The command in one message. Raises ValueError with one clear sentence."""
+    if address == "/panic":  # whatever a desk or a bridge puts behind it; 0 alone is a button that is let go
+        return Command(address, (0.0,) if list(arguments) == [0] else ())
     if not is_readable([address, *arguments]):
         raise ValueError("A command has no control characters in it.")
     form = FORMS.get(address)

@@ -11,6 +11,7 @@ from appliance.control.packet import Message, datagram
 
 LARGEST_DATAGRAM = 4096  # no command comes near; what is larger is none
 _SAY_EVERY_S = 60.0
+_WAITING_BYTES = 1 << 20  # or as much as the kernel allows: what may wait behind somebody's noise
 
 Address = tuple[str, int]
 
@@ -18,6 +19,7 @@ Address = tuple[str, int]
 def open_port(host: str, port: int) -> socket.socket:
     """The control port's socket, bound. Raises OSError when it is taken."""
     one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WAITING_BYTES)
     try:
         one.bind((host, port))
     except OSError:
