@@ -11,7 +11,7 @@ import numpy as np
 
 from appliance.projector.controls import Controls
 from appliance.projector.corners import WHOLE, homography
-from appliance.projector.info import letters
+from appliance.projector.page import page
 from appliance.projector.window import Size
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 
@@ -54,7 +54,7 @@ class FinalPass:
         self._through = _Program(gl, "through", [])
         self._plain, self._marked = (_Program(gl, "final", [*fixed, *marks]) for marks in ((), ("MARKS",)))
         self._text = gl.texture((1, 1), 1)
-        self._lines: tuple[str, ...] = ()
+        self._written: tuple[object, ...] = ()
         self._pictures = 0
         self._texture, self.picture = self._target((1, 1))
 
@@ -128,21 +128,25 @@ class FinalPass:
         program.set("seed", (self._pictures % 64 * _DITHER_STEP, self._pictures % 61 * _DITHER_STEP))
 
     def _mark(self, program: _Program, lines: tuple[str, ...], display: Size, controls: Controls) -> None:
-        """Grid, chosen corner and figures."""
-        if lines != self._lines:
-            image = letters(lines)
+        """Grid, chosen corner, figures and numbers."""
+        text_scale = max(1, display[1] // _TEXT_ROWS)
+        corners = controls.alignment.corners if controls.shows_grid else None
+        written = (display, lines, corners)
+        if written != self._written:
+            blend = self._config.edge_blend
+            size = -(-display[0] // text_scale), -(-display[1] // text_scale)
+            image = page(size, lines, corners, "" if blend is None else f"{blend.part} part")
             self._text.release()
             self._text = self._gl.texture((image.shape[1], image.shape[0]), 1, image.tobytes(), alignment=1)
             self._text.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            self._lines = lines
+            self._written = written
         self._text.use(1)
-        text_scale = float(max(1, display[1] // _TEXT_ROWS))
-        columns, rows = self._text.size if lines else (0, 0)
+        width, height = picture_size(self._config, display)
         x, y = controls.alignment.corners[controls.corner or 0]
         radius = 0.0 if controls.corner is None else _MARKER_RADIUS
         program.set("text", 1)
-        program.set("text_scale", text_scale)
-        program.set("text_size", (text_scale * columns, text_scale * rows))
+        program.set("text_scale", float(text_scale))
+        program.set("aspect", width / height)
         program.set("grid", float(controls.shows_grid))
         program.set("marker", (x * display[0], y * display[1], radius))
 

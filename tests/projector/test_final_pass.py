@@ -8,12 +8,14 @@ from typing import Any
 import moderngl
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
 
 from appliance.projector.alignment import Alignment
 from appliance.projector.context import offscreen
 from appliance.projector.controls import Controls
 from appliance.projector.corners import Corners
 from appliance.projector.final_pass import FinalPass, part_of, picture_size
+from appliance.projector.info import letters
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 from tests.projector.stage_double import pixels
 
@@ -33,6 +35,7 @@ def show(gl: moderngl.Context) -> Show:
 
     def shown(
         picture: np.ndarray,
+        /,
         alignment: Alignment | None = None,
         level: float = 1.0,
         controls: Controls | None = None,
@@ -172,4 +175,46 @@ def test_the_grid_of_two_projectors_meets(show: Show) -> None:
     for part in ("left", "right"):
         blend = EdgeBlendConfig(part=part, overlap=0.5)
         columns.append(show(flat(0, 240), controls=controls, edge_blend=blend)[..., 0])
-    assert np.abs(columns[0][:, 80:].astype(int) - columns[1][:, :80]).max() <= 2
+    between = np.r_[20:38, 52:70]  # rows without numbers and names
+    assert np.abs(columns[0][between, 80:].astype(int) - columns[1][between, :80]).max() <= 2
+
+
+@pytest.mark.parametrize(("picture", "width"), [(None, 70), ((120, 90), 93)])
+def test_the_grid_has_a_circle_as_round_as_the_picture_is_drawn(
+    show: Show, picture: tuple[int, int] | None, width: int
+) -> None:
+    """In a picture of 4:3 that fills 16:9 it is as wrong as the dancer."""
+    controls = Controls(Alignment(), lambda _: None)
+    controls.set_grid(True)
+    light = show(flat(0), controls=controls, picture=picture)[..., 0] > 100
+    turns = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    lit = light[
+        (SIZE[1] / 2 + 35 * np.sin(turns)).astype(int), (SIZE[0] / 2 + width / 2 * np.cos(turns)).astype(int)
+    ]
+    assert lit.mean() > 0.9
+
+
+def test_the_grid_numbers_the_corners_and_names_the_projector(show: Show) -> None:
+    corners = ((0.1, 0.1), (0.9, 0.1), (0.95, 0.95), (0.05, 0.9))
+    controls = Controls(Alignment(corners), lambda _: None)
+    controls.set_grid(True)
+    grids = [
+        show(flat(0, 240), controls=controls, edge_blend=EdgeBlendConfig(part=part, overlap=0.5))
+        for part in ("left", "right")
+    ]
+    for grid, name in zip(grids, ("LEFT PART", "RIGHT PART"), strict=True):
+        white = (grid == 255).all(axis=-1)
+        for number, (x, y) in zip("1234", ((26, 19), (134, 19), (142, 76), (18, 71)), strict=True):
+            assert is_written(number, white, x, y)
+        assert is_written(name, white, 80, 45)
+    controls.set_grid(False)
+    assert not show(flat(0), controls=controls).any()
+
+
+def is_written(words: str, white: np.ndarray, x: int, y: int) -> bool:
+    """Whether it stands there, give or take two pixels."""
+    wanted = letters((words,)) > 0
+    spots = sliding_window_view(white, wanted.shape)
+    top, left = y - wanted.shape[0] // 2, x - wanted.shape[1] // 2
+    near = spots[max(0, top - 2) : top + 3, max(0, left - 2) : left + 3]
+    return bool((near == wanted).all(axis=(2, 3)).any())

@@ -239,6 +239,23 @@ def test_each_look_is_drawn_unseen_before_the_first_is_seen(
     assert set(seen[: first + 1]) == {(0, 0, 0)}
 
 
+def test_a_show_that_is_prepared_is_told_from_a_display_that_hangs(
+    evening: Evening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw = TellingPainter.draw
+    prepares: list[bool] = []
+
+    def noted(painter: TellingPainter, *arguments: object) -> None:
+        prepares.append(evening.projector.is_preparing)
+        draw(painter, *arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(TellingPainter, "draw", noted)
+    evening.begin()
+    evening.colour(1.0)
+    assert prepares[: len(STYLES)] == [True] * len(STYLES)
+    assert not prepares[-1]
+
+
 def test_the_window_may_change_its_size(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)

@@ -29,11 +29,11 @@ float blended(float u) {
 #endif
 
 #ifdef MARKS
-uniform sampler2D text;            // figures, one byte a pixel, top row first
+uniform sampler2D text;            // 1: a letter, 0.5: the ground under it, 0: neither; top row first
 uniform float grid;                // 0 or 1
 uniform vec3 marker;               // the chosen corner, wall pixels; radius, 0: none
-uniform vec2 text_size;            // pixels on the wall; 0: none
 uniform float text_scale;          // wall pixels a text pixel
+uniform float aspect;              // width over height of the whole picture
 
 float lines(vec2 place, vec2 pixel_size) {
     vec2 nearest = abs(fract(place - 0.5) - 0.5) / pixel_size;
@@ -44,6 +44,9 @@ float grid_lines(vec2 place, vec2 pixel_size) {
     vec2 cells = vec2(16.0, 9.0);
     float upright = lines(place * cells, pixel_size * cells);
     vec2 diagonals = vec2(place.x - place.y, place.x + place.y);
+    float radius = length((place - 0.5) * vec2(aspect, 1.0));
+    float off_circle = abs(radius - 3.5 / 9.0) / max(fwidth(radius), 1e-9);  // it touches two of the lines
+    upright = max(upright, 1.0 - clamp(off_circle - 0.5, 0.0, 1.0));
     return max(upright, lines(diagonals, vec2(pixel_size.x + pixel_size.y)));
 }
 #endif
@@ -80,9 +83,8 @@ void main() {
     light = mix(light, vec3(0.9), grid * seen * grid_lines(across, pixel_size * vec2(part.y, 1.0)));
     float ring = abs(distance(wall, marker.xy) - marker.z);
     if (marker.z > 0.0) light = mix(light, vec3(1.0, 0.6, 0.1), 1.0 - clamp(ring - 2.0, 0.0, 1.0));
-    if (wall.x < text_size.x && wall.y < text_size.y) {
-        light = mix(0.3 * light, vec3(1.0), texelFetch(text, ivec2(wall / text_scale), 0).r);
-    }
+    float ink = texelFetch(text, ivec2(wall / text_scale), 0).r;
+    if (ink > 0.25) light = ink > 0.75 ? vec3(1.0) : 0.3 * light;
 #endif
     colour = vec4(light, 1.0);
 }
