@@ -8,17 +8,23 @@ from importlib import resources
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from appliance.projector.controls import Controls
-from appliance.projector.corners import WHOLE, homography
+from appliance.projector.corners import homography
 from appliance.projector.page import page
+from appliance.projector.picture.tally import Figures, Tally, Use
+from appliance.projector.picture.wall import FLAT, Wall, flat
 from appliance.projector.window import Size
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 
 _SHADERS = resources.files("appliance.projector") / "shaders"
+_NO_SIZE = (1, 1)  # of a picture that nothing goes through
 _MARKER_RADIUS = 28.0  # pixels
 _TEXT_ROWS = 160  # letters are as large as if the display had so many rows of pixels
 _DITHER_STEP = 0.618034  # pixels: no two neighbouring pictures have the same pattern
+_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+_CLIP_FROM_DISPLAY = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.0]])  # of the square, y down
 
 
 @dataclass(frozen=True)
@@ -37,26 +43,56 @@ def part_of(blend: EdgeBlendConfig | None) -> Part:
     return Part(0.0 if blend.part == "left" else 1.0 - width, width)
 
 
-def picture_size(config: ProjectorConfig, display: Size) -> Size:
-    """In what size the scene is drawn, pixels: the display's unless the box file says otherwise."""
-    width, height = config.picture or display
-    return round(width / part_of(config.edge_blend).width), height
+def picture_size(config: ProjectorConfig, display: Size, share: float = 1.0) -> Size:
+    """Pixels that the scene is drawn in: a share of the display's unless the box file says otherwise."""
+    width, height = config.picture or (round(display[0] * share), round(display[1] * share))
+    return max(1, round(width / part_of(config.edge_blend).width)), max(1, height)
 
 
 class FinalPass:
-    """Owns the picture's texture and the programs that lay it onto the wall, one of them with marks."""
+    """Owns the picture's texture and the programs that lay it onto the wall, one of them with marks.
+
+    Where no edges are blended and no marks shown, a look does most of it or all: `wall`.
+    """
 
     def __init__(self, gl: moderngl.Context, config: ProjectorConfig) -> None:
         self._gl, self._config = gl, config
         self._part = part_of(config.edge_blend)
         fixed = ["GAMMA"] * (config.gamma != 1.0) + ["BLEND"] * (config.edge_blend is not None)
-        self._leaves_unchanged = not fixed and not config.upside_down
-        self._through = _Program(gl, "through", [])
-        self._plain, self._marked = (_Program(gl, "final", [*fixed, *marks]) for marks in ((), ("MARKS",)))
+        self._is_graded = False  # whether the picture has its brightness and gamma already
+        self._unchanged = _Program(gl, [])
+        self._dimmed, self._marked = (_Program(gl, [*fixed, "DIM", *marks]) for marks in ((), ("MARKS",)))
+        self._tally = Tally()
         self._text = gl.texture((1, 1), 1)
         self._written: tuple[object, ...] = ()
         self._pictures = 0
         self._texture, self.picture = self._target((1, 1))
+
+    def wall(
+        self,
+        screen: moderngl.Framebuffer,
+        display: Size,
+        controls: Controls,
+        level: float,
+        size: Size,
+        lines: tuple[str, ...] = (),
+    ) -> Wall:
+        """What a look draws its picture of that size onto; `draw` does the rest.
+
+        That is the display itself where nothing is left to do, which spares a small computer to write the
+        picture to memory and to read it again; else a texture.
+        """
+        self._tally.clear()
+        scale, gamma = level * controls.alignment.brightness, self._config.gamma
+        self._is_graded = self._config.edge_blend is None and not lines and not controls.shows_grid
+        if self._is_graded and size == display:
+            self.resize(_NO_SIZE)
+            return Wall(screen, display, size, self._clip_from_part(controls) @ _Y_UP, scale, gamma)
+        self.resize(size)
+        if not self._is_graded:
+            return flat(self.picture)
+        finer = 1.0 if self._config.picture else display[1] / size[1]
+        return Wall(self.picture, size, size, FLAT, scale, gamma, finer)
 
     def resize(self, size: Size) -> None:
         """The size in which the scene is drawn, pixels."""
@@ -75,26 +111,32 @@ class FinalPass:
         """Lay the picture onto the display. level 0..1; `lines`: figures to show, maybe none."""
         scale = level * controls.alignment.brightness
         has_marks = bool(lines) or controls.shows_grid
+        self.black(screen, display)
         if scale == 0.0 and not has_marks:
-            self.black(screen, display)
             return
-        screen.use()
-        screen.viewport = (0, 0, *display)
-        is_whole = controls.alignment.corners == WHOLE and not controls.alignment.mirror
-        is_same = is_whole and scale == 1.0 and self._leaves_unchanged and self.picture.size == display
         self._gl.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        if is_same and not has_marks:
-            self._through.draw(self._texture)
-            return
-        program = self._marked if has_marks else self._plain
-        self._place(program, display, controls)
-        self._light(program, scale)
+        program = self._marked if has_marks else self._dimmed
+        if self._is_graded:
+            program = self._unchanged
+        else:
+            self._light(program, scale)
+        program.set("part", (self._part.begin, self._part.width))
         if has_marks:
+            self._place(program, display, controls)
             self._mark(program, lines, display, controls)
+        else:
+            program.set("clip_from_part", tuple(self._clip_from_part(controls).T.ravel()))  # by columns
         program.draw(self._texture)
+        self._put_down(program, display)
+
+    def figures(self) -> Figures:
+        """What the last step of the last picture took; nothing where a look did it itself."""
+        width, height = self.picture.size
+        return self._tally.figures(width * height, 4 * width * height)
 
     def black(self, screen: moderngl.Framebuffer, display: Size) -> None:
         """Nothing at all, not even what was asked for."""
+        self._tally.clear()
         screen.use()
         screen.viewport = (0, 0, *display)
         screen.clear(0.0, 0.0, 0.0, 0.0)
@@ -102,8 +144,15 @@ class FinalPass:
     def release(self) -> None:
         """Give the GPU's memory back."""
         self._forget_picture()
-        for owned in (self._text, self._through, self._plain, self._marked):
+        for owned in (self._text, self._unchanged, self._dimmed, self._marked):
             owned.release()
+
+    def _clip_from_part(self, controls: Controls) -> NDArray[np.float64]:
+        """(3, 3) from the unit square of this display's part of the picture (y down) to clip space."""
+        across, upside_down = controls.alignment.mirror != self._config.upside_down, self._config.upside_down
+        flipped = np.diag([-1.0 if across else 1.0, -1.0 if upside_down else 1.0, 1.0])
+        flipped[:2, 2] = across, upside_down
+        return np.asarray(_CLIP_FROM_DISPLAY @ flipped @ homography(controls.alignment.corners))
 
     def _place(self, program: _Program, display: Size, controls: Controls) -> None:
         width, height = display
@@ -113,7 +162,6 @@ class FinalPass:
         program.set("display", (float(width), float(height)))
         program.set("flips", (float(alignment.mirror != upside_down), float(upside_down)))
         program.set("picture_from_wall", tuple(picture_from_wall.T.ravel()))  # column by column
-        program.set("part", (self._part.begin, self._part.width))
 
     def _light(self, program: _Program, scale: float) -> None:
         blend = self._config.edge_blend
@@ -123,7 +171,6 @@ class FinalPass:
         if self._config.gamma != 1.0:
             program.set("inverse_gamma", 1.0 / self._config.gamma)
         program.set("scale", scale)
-        program.set("dither", 0.0 if scale == 1.0 and self._leaves_unchanged else 1.0)
         self._pictures += 1
         program.set("seed", (self._pictures % 64 * _DITHER_STEP, self._pictures % 61 * _DITHER_STEP))
 
@@ -150,6 +197,11 @@ class FinalPass:
         program.set("grid", float(controls.shows_grid))
         program.set("marker", (x * display[0], y * display[1], radius))
 
+    def _put_down(self, program: _Program, display: Size) -> None:
+        pixels, (width, height) = display[0] * display[1], self.picture.size
+        self._tally.put_down(Use("laid", program.name, 4, 2, pixels))
+        self._tally.move(4 * pixels + 4 * width * height * self._part.width)
+
     def _target(self, size: Size) -> tuple[moderngl.Texture, moderngl.Framebuffer]:
         texture = self._gl.texture(size, 4)
         texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -164,14 +216,13 @@ class FinalPass:
 class _Program:
     """A final shader with some of its parts: what is not asked for would cost time on a small computer."""
 
-    def __init__(self, gl: moderngl.Context, name: str, parts: Sequence[str]) -> None:
-        version, _, source = (_SHADERS / f"{name}.frag.glsl").read_text().partition("\n")
-        defines = "".join(f"#define {part}\n" for part in parts)
+    def __init__(self, gl: moderngl.Context, parts: Sequence[str]) -> None:
+        self.name = " ".join(["final", *parts])
+        self._corners = 3 if "MARKS" in parts else 4
         self._program = gl.program(
-            vertex_shader=(_SHADERS / "final.vert.glsl").read_text(),
-            fragment_shader=f"{version}\n{defines}{source}",
+            vertex_shader=_with(parts, "final.vert"), fragment_shader=_with(parts, "final.frag")
         )
-        self._triangle = gl.vertex_array(self._program, [])
+        self._sheet = gl.vertex_array(self._program, [])
 
     def set(self, name: str, value: object) -> None:
         """The value of a uniform."""
@@ -180,10 +231,16 @@ class _Program:
         uniform.value = value
 
     def draw(self, picture: moderngl.Texture) -> None:
-        """Cover the whole display."""
+        """Lay it onto the display."""
         picture.use(0)
-        self._triangle.render(vertices=3)
+        self._sheet.render(moderngl.TRIANGLE_STRIP, vertices=self._corners)
 
     def release(self) -> None:
-        self._triangle.release()
+        self._sheet.release()
         self._program.release()
+
+
+def _with(parts: Sequence[str], name: str) -> str:
+    """A shader's text with these parts switched on."""
+    version, _, source = (_SHADERS / f"{name}.glsl").read_text().partition("\n")
+    return f"{version}\n" + "".join(f"#define {part}\n" for part in parts) + source

@@ -17,7 +17,9 @@ from appliance.projector.final_pass import FinalPass, picture_size
 from appliance.projector.interpolation import Interpolation
 from appliance.projector.moment import Moment
 from appliance.projector.picture.renderer import Renderer
+from appliance.projector.picture.wall import Wall
 from appliance.projector.presence import STALE_S, Presence
+from appliance.projector.resolution import SHARES
 from appliance.projector.window import Size
 from appliance.show.config_error import ConfigError
 from appliance.show.look import LookConfig, looks_by_name
@@ -31,10 +33,8 @@ class Painter(Protocol):
     """What draws the looks of one show."""
 
     def draw(
-        self, moment: Moment, look: str, look_before: str, mix: float, target: moderngl.Framebuffer
+        self, moment: Moment, look: str, look_before: str, mix: float, target: Wall | moderngl.Framebuffer
     ) -> None: ...
-
-    def resize(self, size: Size) -> None: ...
 
     def release(self) -> None: ...
 
@@ -65,35 +65,46 @@ class Projector:
         self._drawn: tuple[Skeleton, Looks] | None = None  # what the painter was made for
         self._to_draw: tuple[Skeleton, Looks] | None = None  # a show that waits for its painter
         self._is_black = False  # since that show waits
+        self.shown: str | None = None  # the look of the last picture; None: none, or two that cross-fade
         self.is_preparing = False  # which takes as long as it takes
 
     def draw(
-        self, now: float, screen: moderngl.Framebuffer, display: Size, lines: tuple[str, ...] = ()
+        self,
+        now: float,
+        screen: moderngl.Framebuffer,
+        display: Size,
+        lines: tuple[str, ...] = (),
+        share: float = 1.0,
     ) -> float | None:
         """Draw the picture for `now` (monotonic seconds) onto a display of so many pixels.
 
-        lines: figures to show. Gives when what is shown left the stage; None while no fresh dance is seen.
+        lines: figures to show; share: of the display's size that the scene is drawn in, where the box file
+        does not say its size. Gives when what is shown left the stage; None while no fresh dance is seen.
         """
+        self.shown = None
         self._follow_stage(now)
         moment = self._moment(now)
         if self._to_draw is not None and moment is not None:
-            self._prepare(self._to_draw, moment, display)
+            self._prepare(self._to_draw, moment, screen, display, share)
         newest = self._poses.newest if self._poses is not None and self._drawn is not None else None
         presence = self._presence.step(newest, now)
         house = self._house.read()
         level = house.level(now) * presence
         is_drawn = self._painter is not None and moment is not None and level > 0.0
+        size = picture_size(self._config, display, share)
+        wall = self._final.wall(screen, display, self._controls, level, size, lines)
         if self._painter is not None and moment is not None and is_drawn:
-            self._fit(display)
-            self._painter.draw(
-                moment, house.look, house.look_before, house.look_mix(now), self._final.picture
-            )
+            mix = house.look_mix(now)
+            self._painter.draw(moment, house.look, house.look_before, mix, wall)
+            self.shown = house.look if mix in (0.0, 1.0) else None
         house = self._house.read()  # again: a panic that came meanwhile is in this picture already
         if house.panic or house.blackout:
             self._final.black(screen, display)
+            self.shown = None
             return None
-        seen = min(level, house.level(now)) if is_drawn else 0.0
-        self._final.draw(screen, display, self._controls, seen, lines)
+        if wall.framebuffer is not screen or not is_drawn:
+            seen = min(level, house.level(now)) if is_drawn else 0.0
+            self._final.draw(screen, display, self._controls, seen, lines)
         is_fresh = newest is not None and now - newest < STALE_S
         return self._poses.left_stage(moment) if self._poses and moment and is_drawn and is_fresh else None
 
@@ -119,8 +130,19 @@ class Projector:
             self._generation = self._reader.generation
             self._meet(self._reader.facts)
 
-    def _prepare(self, show: tuple[Skeleton, Looks], moment: Moment, display: Size) -> None:
-        """Draw each look once, unseen: what a driver puts off until then would halt the dance."""
+    def _prepare(
+        self,
+        show: tuple[Skeleton, Looks],
+        moment: Moment,
+        screen: moderngl.Framebuffer,
+        display: Size,
+        share: float,
+    ) -> None:
+        """Draw each look once, unseen: what a driver puts off until then would halt the dance.
+
+        Once over itself, as in a cross-fade, onto a texture and onto the display: drivers make shaders anew
+        for each of these.
+        """
         if not self._is_black:
             self._is_black = True
             return
@@ -128,10 +150,12 @@ class Projector:
             self._drawn, self._to_draw = show, None
             return
         self.is_preparing = True
-        self._final.resize(picture_size(self._config, display))
-        self._painter = self._make_painter(self._gl, self._final.picture.size, *show)
-        for look in show[1]:
-            self._painter.draw(moment, look, look, 1.0, self._final.picture)
+        self._painter = self._make_painter(self._gl, picture_size(self._config, display), *show)
+        for part in (SHARES[-1], share):
+            size = picture_size(self._config, display, part)
+            wall = self._final.wall(screen, display, self._controls, 1.0, size)
+            for look in show[1]:
+                self._painter.draw(moment, look, look, 0.5, wall)
         self._gl.finish()
         self.is_preparing = False
 
@@ -154,13 +178,6 @@ class Projector:
                 f"{error} The audience sees the built-in looks. Correct the show, then start the stage again."
             )
             return looks_by_name(())
-
-    def _fit(self, display: Size) -> None:
-        """The window may have another size than before."""
-        size = picture_size(self._config, display)
-        if self._painter is not None and self._final.picture.size != size:
-            self._final.resize(size)
-            self._painter.resize(size)
 
 
 def _are_alike(one: tuple[Skeleton, Looks], other: tuple[Skeleton, Looks]) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 USUAL_RATE = 60.0
 _JUDGED_AFTER = 60  # pictures: a second on most displays
 _TOO_FAST = 0.7  # of the display's period: a display that takes pictures faster sets no pace
+_ON_TIME = 0.25  # of a period that a picture may begin late and still be drawn for its place on the grid
 _FOLLOW = 0.1  # how far one measured swap moves the display's grid
 
 
@@ -45,7 +46,7 @@ class Pacing:
             return self._grid
         if now < self._grid:
             self._sleep(self._grid - now)
-        elif now - self._grid > self.period_s:
+        elif now - self._grid > _ON_TIME * self.period_s:
             self._grid = now  # pictures that were missed are never made up for
         return self._grid
 

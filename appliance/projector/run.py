@@ -23,6 +23,7 @@ from appliance.projector.loop import Projector
 from appliance.projector.pacing import USUAL_RATE, Pacing
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, NO_PLACE, ProjectorError
+from appliance.projector.resolution import Resolution
 from appliance.projector.watchdog import Patience, end_process, guarded
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
@@ -73,6 +74,8 @@ class Run:
             self._closing = opened.pop_all()
         rate = config.rate or self._window.display_rate or USUAL_RATE
         self._pacing = Pacing(rate, self._window.set_pace(config.vsync))
+        self._resolution = Resolution(self._pacing.period_s, adapts=config.picture is None)
+        self._is_resolution_said = False
         self._meter = Meter()
         self._patience = Patience()
         self._lines: tuple[str, ...] = ()
@@ -127,16 +130,28 @@ class Run:
                 self._report(now)
 
     def _show(self, now: float) -> None:
-        screen, size = self._context.gl.screen, self._window.size
-        left_stage = self._projector.draw(now, screen, size, self._lines if self._controls.shows_info else ())
+        screen, size, begun = self._context.gl.screen, self._window.size, time.monotonic()
+        lines = self._lines if self._controls.shows_info else ()
+        left_stage = self._projector.draw(now, screen, size, lines, self._resolution.share)
         if self._wish.frames is not None:
             self._keep(self._wish.frames, screen.read(viewport=(0, 0, *size), components=4), size)
-        self._window.show()
         self._context.finish()  # without it the driver lets pictures queue up, each one older
+        drawn = time.monotonic()
+        self._window.show()
         swapped = time.monotonic()
         self._patience.swapped(swapped)
         self._meter.shown(swapped, left_stage)
+        look = self._projector.shown if left_stage is not None else None
+        if self._resolution.drawn(drawn, drawn - begun, look):
+            self._say_resolution()
         self._check_context()
+
+    def _say_resolution(self) -> None:
+        """Once: afterwards the figures tell."""
+        if not self._is_resolution_said:
+            self._is_resolution_said = True
+            rate = 1.0 / self._pacing.period_s
+            self._say(_about_resolution(self._resolution.share, self._window.size, rate))
 
     def _keep(self, folder: Path, pixels: bytes, size: Size) -> None:
         try:
@@ -175,16 +190,18 @@ class Run:
         figures = self._meter.figures()
         state = self._reader.state(now)
         width, height = self._window.size
+        share = self._resolution.share
+        drawn_at = "" if share == 1.0 else f" at {share:.0%}"
         age = "-" if figures.age_p50_ms is None else f"{figures.age_p50_ms:.0f} / {figures.age_p99_ms:.0f} ms"
         self._lines = (
             f"{figures.rate:.1f} pictures/s",
             f"frame age {age}",
             f"stage {state}",
             f"look {self._house.read().look or 'of the show'}",
-            f"{width}x{height} {'software' if self._context.is_software else self._window.driver}",
+            f"{width}x{height}{drawn_at} {'software' if self._context.is_software else self._window.driver}",
         )
         if self._wish.shows_info:
-            self._say(f"{figures.sentence()}, stage {state}")
+            self._say(f"{figures.sentence()}, {width}x{height}{drawn_at}, stage {state}")
         if not self._warned and figures.dances >= _JUDGED_AFTER:
             self._warned = True
             self._say(_about_software(figures.rate, 1.0 / self._pacing.period_s, self._context.renderer))
@@ -199,13 +216,24 @@ class Run:
             )
 
 
+def _about_resolution(share: float, display: Size, wanted: float) -> str:
+    """What it means that pictures of the display's own size take too long."""
+    width, height = (round(share * side) for side in display)
+    return (
+        f"Pictures of {display[0]}x{display[1]} take longer here than a display of {wanted:.0f} Hz waits. "
+        f"The audience sees the dance in {width}x{height}: softer, and smoother. That changes by itself with "
+        "the look and with what else this machine does; `picture` in the projector's part of the box file "
+        "fixes it."
+    )
+
+
 def _about_software(rate: float, wanted: float, renderer: str) -> str:
     """What it means that no graphics card draws."""
     seen = "The audience sees a jerky dance." if rate < _SMOOTH * wanted else "The audience sees the dance."
     return (
         f"No graphics card draws here but the processor ({renderer}): about {rate:.0f} of {wanted:.0f} "
-        f"pictures a second. {seen} Use a machine with a graphics card and its driver, or a smaller "
-        "`picture` in the projector's part of the box file."
+        f"pictures a second. {seen} Use a machine with a graphics card and its driver, or a display "
+        "mode of fewer pixels."
     )
 
 

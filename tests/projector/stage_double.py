@@ -12,6 +12,7 @@ from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.loop import Looks
 from appliance.projector.moment import Moment
+from appliance.projector.picture.wall import Wall, flat
 
 SIZE = (64, 36)
 
@@ -55,15 +56,15 @@ class TellingPainter:
 
     def __init__(self, gl: moderngl.Context, size: tuple[int, int], skeleton: Skeleton, looks: Looks) -> None:
         type(self).made += 1
-        self.looks, self.size, self._joints = looks, size, len(skeleton)
+        self.looks, self.sizes, self._joints = looks, [size], len(skeleton)
 
     def draw(
-        self, moment: Moment, look: str, look_before: str, mix: float, target: moderngl.Framebuffer
+        self, moment: Moment, look: str, look_before: str, mix: float, target: Wall | moderngl.Framebuffer
     ) -> None:
-        target.clear(float(moment.positions[0, 1]), 0.1 * self._joints, mix, 1.0)
-
-    def resize(self, size: tuple[int, int]) -> None:
-        self.size = size
+        wall = target if isinstance(target, Wall) else flat(target)
+        self.sizes.append(wall.picture)
+        colours = float(moment.positions[0, 1]), 0.1 * self._joints, mix
+        wall.framebuffer.clear(*(wall.level * colour for colour in colours), 1.0)
 
     def release(self) -> None:
         type(self).released += 1

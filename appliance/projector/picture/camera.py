@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class View:
     ground: Array
     azimuth: float
 
-    @property
+    @cached_property
     def projection(self) -> Array:
         """(4, 4) from figure heights to clip space, for column vectors."""
         axes = np.stack([self.right, self.up, self.back])

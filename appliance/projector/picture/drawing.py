@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,15 @@ from appliance.projector.picture.tally import Tally, Use
 _SHADERS = Path(__file__).parents[1] / "shaders"
 _HEAD = "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
 _SAMPLER_2D = 0x8B5E  # OpenGL's name for the type of a texture in a shader
+_BYTES = {"f1": 1, "f4": 4}
 
 
 class Drawing:
     """One shader program and the vertices that it draws.
 
     vertex and fragment name files in the shaders' folder, without .vert.glsl and .frag.glsl; content and
-    index are a vertex array's. Without content it draws the three corners of a triangle over the picture.
+    index are a vertex array's; parts are switched on in both. Without content it draws the three corners of a
+    triangle over the picture.
     """
 
     def __init__(
@@ -30,13 +32,15 @@ class Drawing:
         fragment: str,
         content: Iterable[tuple[Any, ...]] = (),
         index: moderngl.Buffer | None = None,
+        parts: Sequence[str] = (),
     ) -> None:
-        self._names = vertex, fragment
+        self._names = vertex, " ".join([fragment, *parts])
         content = list(content)
         self._count = index.size // 4 if index else 3
         self._vertices = content[0][0].size // _stride(content[0][1]) if index else None
+        head = _HEAD + "".join(f"#define {part}\n" for part in parts)
         self._program = ctx.program(
-            vertex_shader=_HEAD + source(f"{vertex}.vert"), fragment_shader=_HEAD + source(f"{fragment}.frag")
+            vertex_shader=head + source(f"{vertex}.vert"), fragment_shader=head + source(f"{fragment}.frag")
         )
         self._array = ctx.vertex_array(self._program, content, index, skip_errors=True)
         members = {name: self._program[name] for name in self._program}
@@ -47,7 +51,8 @@ class Drawing:
             name for name, member in self._uniforms.items() if getattr(member, "gl_type", 0) == _SAMPLER_2D
         ]
         for unit, name in enumerate(self._textures):
-            self._uniforms[name].value = unit
+            self._uniforms.pop(name).value = unit
+        self._sent: dict[str, Any] = {}  # what each uniform holds: to send it again takes time for nothing
 
     def draw(
         self,
@@ -63,20 +68,27 @@ class Drawing:
         pixels: about how many it will shade; vertices: draw the first so many, not all. Matrices are numpy's,
         for column vectors.
         """
-        for name, value in inputs.items():
-            if isinstance(value, moderngl.Texture):
-                if name in self._textures:
-                    value.use(self._textures.index(name))
-            elif name in self._uniforms:
-                if isinstance(value, np.ndarray):
-                    self._uniforms[name].write(value.T.astype("f4").tobytes())
-                else:
-                    self._uniforms[name].value = value
+        for unit, name in enumerate(self._textures):
+            texture = inputs[name]
+            texture.use(unit)
+            tally.move(texture.width * texture.height * texture.components * _BYTES[texture.dtype])
+        self._send(inputs)
         count = vertices or self._count
         self._array.render(mode, count, instances=instances)
         per_vertex = {moderngl.TRIANGLES: 1 / 3, moderngl.TRIANGLE_STRIP: 1.0, moderngl.POINTS: 2.0}[mode]
         placed = round(self._vertices * count / self._count) if self._vertices else count * instances
         tally.put_down(Use(*self._names, placed, round(count * instances * per_vertex), pixels))
+
+    def _send(self, inputs: dict[str, Any]) -> None:
+        """The uniforms that have changed."""
+        for name, uniform in self._uniforms.items():
+            value, sent = inputs[name], self._sent.get(name)
+            if isinstance(value, np.ndarray):
+                if value is not sent:
+                    uniform.write(value.T.astype("f4").tobytes())
+            elif value != sent:
+                uniform.value = value
+            self._sent[name] = value
 
     def release(self) -> None:
         self._array.release()

@@ -9,6 +9,7 @@ from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.looks.palette import Palette
 from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.targets import Target
+from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 NEAR, FAR = 180, 60  # lines of the glow's pictures
@@ -23,7 +24,6 @@ class Glow:
         self._shrink = Drawing(easel.ctx, "screen", "glow_shrink")
         self._blur = Drawing(easel.ctx, "screen", "glow_blur")
         self._air = Drawing(easel.ctx, "air", "light_air")
-        self._finish = Drawing(easel.ctx, "screen", "light_finish")
 
     def spread(self, picture: Target, name: str, lines: int, gain: float = 1.0) -> Target:
         """A small, soft copy of a picture, `gain` times as bright."""
@@ -46,9 +46,9 @@ class Glow:
         colours: Palette,
         picture: Target,
         opacity: float,
-        target: moderngl.Framebuffer,
+        wall: Wall,
     ) -> None:
-        """Lay the picture with its glow over what is in the target."""
+        """Lay the picture with its glow onto the wall."""
         easel, view = self._easel, scene.view
         near = self.spread(picture, "near glow", NEAR)
         far = self.spread(near, "far glow", FAR, FAR_GAIN)
@@ -66,13 +66,11 @@ class Glow:
             "glow": look.glow,
             "vignette": look.vignette,
             "exposure": look.exposure,
-            "opacity": opacity,
         }
         air.start()
         self._air.draw(easel.tally, air.pixels, inputs)
-        easel.finish(target)
-        self._finish.draw(easel.tally, target.width * target.height, inputs)
+        easel.lay("light_finish", wall, opacity, inputs)
 
     def release(self) -> None:
-        for drawing in (self._shrink, self._blur, self._air, self._finish):
+        for drawing in (self._shrink, self._blur, self._air):
             drawing.release()

@@ -18,13 +18,14 @@ from appliance.projector.picture.looks.veil import Veil
 from appliance.projector.picture.poses import poses_of
 from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.tally import Figures
+from appliance.projector.picture.wall import Wall, flat
 from appliance.show.look import LookConfig, Style
 
 
 class _Look(Protocol):
-    """A way of drawing; ends in one pass that lays the picture over the target with an opacity."""
+    """A way of drawing; ends in one pass that lays the picture onto the wall with an opacity."""
 
-    def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None: ...
+    def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None: ...
 
     def release(self) -> None: ...
 
@@ -39,9 +40,9 @@ _LOOKS: dict[Style, Callable[[Easel], _Look]] = {
 
 
 class Renderer:
-    """Owns what the looks need on the GPU; draws any of them into a framebuffer.
+    """Owns what the looks need on the GPU; draws any of them into a framebuffer, or right onto the wall.
 
-    size: width and height of the picture, pixels; looks: by name, at least one, in the show's order.
+    size: of the first picture, pixels; looks: by name, at least one, in the show's order.
     The same moment makes the same picture, whatever was drawn before.
     """
 
@@ -52,15 +53,16 @@ class Renderer:
         skeleton: Skeleton,
         looks: Mapping[str, LookConfig],
     ) -> None:
-        self._size, self._looks = size, looks
+        self._looks = looks
+        self._pixels, self._target_bytes = size[0] * size[1], 0
         self._easel = Easel(ctx, skeleton)
         styles = dict.fromkeys(look.style for look in looks.values())
         self._styles = {style: _LOOKS[style](self._easel) for style in styles}
 
     def draw(
-        self, moment: Moment, look: str, look_before: str, mix: float, target: moderngl.Framebuffer
+        self, moment: Moment, look: str, look_before: str, mix: float, target: Wall | moderngl.Framebuffer
     ) -> None:
-        """Draw into `target`; mix 0: only look_before, 1: only look. Unknown names: the first look.
+        """Draw onto `target`; mix 0: only look_before, 1: only look. Unknown names: the first look.
 
         While two looks cross-fade, the camera moves from the one's place to the other's, and both see the
         figure from there: it changes what it is made of, not where it is.
@@ -70,22 +72,19 @@ class Renderer:
         easel = self._easel
         easel.tally.clear()
         poses = poses_of(moment, easel.height, easel.sole)
-        aspect = target.width / target.height
-        seen = view(before.camera, now.camera, mix, moment.time_s, poses, aspect)
-        scene = Scene(moment.time_s, seen, poses, aspect)
+        wall = target if isinstance(target, Wall) else flat(target)
+        self._pixels = wall.picture[0] * wall.picture[1]
+        self._target_bytes = 0 if wall.framebuffer is easel.ctx.screen else 4 * wall.pixels
+        seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect)
+        scene = Scene(moment.time_s, seen, poses, wall.aspect)
         easel.poses.write(poses)
         layers = [(before, 1.0), (now, mix)] if 0.0 < mix < 1.0 else [(now if mix > 0 else before, 1.0)]
         for layer, opacity in layers:
-            self._styles[layer.style].draw(scene, layer, opacity, target)
-
-    def resize(self, size: tuple[int, int]) -> None:
-        """The picture's size in pixels from the next draw on."""
-        self._size = size
+            self._styles[layer.style].draw(scene, layer, opacity, wall)
 
     def figures(self) -> Figures:
         """What the last picture took."""
-        width, height = self._size
-        return self._easel.tally.figures(width * height, self._easel.gpu_bytes + 4 * width * height)
+        return self._easel.tally.figures(self._pixels, self._easel.gpu_bytes + self._target_bytes)
 
     def release(self) -> None:
         """Give the GPU's memory back."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import moderngl
@@ -21,8 +22,11 @@ from appliance.projector.picture.poses import Poses, PoseTexture
 from appliance.projector.picture.tally import Tally
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.vertices import layout, packed
+from appliance.projector.picture.wall import Wall
 
 BODY_AREA = 0.16  # of a figure height squared that the figure covers, about
+Box = tuple[float, float, float, float]
+WHOLE: Box = (0.0, 0.0, 1.0, 1.0)
 FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most
 
 
@@ -36,7 +40,7 @@ class Scene:
     aspect: float
     held: tuple[int, ...] = ()
 
-    @property
+    @cached_property
     def inputs(self) -> dict[str, Any]:
         """What shaders know of the moment and of the camera."""
         view = self.view
@@ -64,15 +68,18 @@ class Scene:
         """About how many pixels the figure covers in a picture of that size."""
         return BODY_AREA * (self.share_of_picture * size[1]) ** 2
 
-    @property
-    def box(self) -> tuple[float, float, float, float]:
-        """Where the figure is in the picture: left, lower, right and upper edge, 0..1."""
-        places = self.poses.positions[0].astype(float)
+    def box(self, rows: int = 1, margin: float = 0.0) -> Box:
+        """Where the figure is in the picture, or has been in the last `rows` of its poses: left, lower, right
+        and upper edge, 0..1; margin: around it, of the picture's height."""
+        places = self.poses.positions[:rows].reshape(-1, 3).astype(float)
         x, y, _, w = self.view.projection @ np.concatenate([places, np.ones((len(places), 1))], axis=1).T
         flesh = 0.5 * FLESH / (np.abs(w) * np.array(self.view.slopes)[:, None])
         across, up = 0.5 + 0.5 * x / w, 0.5 + 0.5 * y / w
         low, high = np.stack([across, up]) - flesh, np.stack([across, up]) + flesh
-        return (*low.min(axis=1).tolist(), *high.max(axis=1).tolist())
+        around = np.array([margin / self.aspect, margin])
+        edges = np.concatenate([low.min(axis=1) - around, high.max(axis=1) + around])
+        left, lower, right, upper = np.clip(edges, 0.0, 1.0).tolist()
+        return left, lower, right, upper
 
 
 class Easel:
@@ -92,6 +99,7 @@ class Easel:
         self.noise.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
         self._canvases: dict[str, Target] = {}
         self._buffers: list[moderngl.Buffer] = []
+        self._sheets: dict[tuple[str, ...], Drawing] = {}
 
     def vertices(self, parts: Mapping[str, Any], instanced: bool = False) -> list[tuple[Any, ...]]:
         """Bring vertices onto the GPU; returns what a vertex array is made of. instanced: one an instance."""
@@ -110,21 +118,53 @@ class Easel:
         if known is None or known.size != size:
             if known:
                 known.release()
-            known = self._canvases[name] = Target(self.ctx, size, depth)
+            known = self._canvases[name] = Target(self.ctx, self.tally, size, depth)
         return known
 
-    def picture(self, size: tuple[int, int], scale: float) -> Target:
-        """The canvas for the figure, with depth, at a share of the target's resolution."""
-        return self.canvas(
-            "picture", (max(1, round(size[0] * scale)), max(1, round(size[1] * scale))), depth=True
-        )
+    def picture(self, wall: Wall, scale: float) -> Target:
+        """The canvas for the figure, with depth, at a share of the picture's resolution."""
+        share = min(1.0, scale * wall.finer)
+        width, height = (max(1, round(share * side)) for side in wall.picture)
+        return self.canvas("picture", (width, height), depth=True)
 
-    def finish(self, target: moderngl.Framebuffer) -> None:
-        """What is drawn next covers the target as far as its alpha says."""
-        target.use()
-        target.viewport = (0, 0, *target.size)
-        self.ctx.enable_only(moderngl.BLEND)
-        self.ctx.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+    def lay(
+        self, fragment: str, wall: Wall, opacity: float, inputs: dict[str, Any], box: Box = WHOLE
+    ) -> None:
+        """The last step of a look: onto the wall; opacity 1 in place of what was there, else over it.
+
+        fragment: names the shader; where it is simpler outside of a box, its part FRAME is drawn there.
+        """
+        wall.framebuffer.use()
+        wall.framebuffer.viewport = (0, 0, *wall.display)
+        if opacity == 1.0:
+            self.ctx.enable_only(moderngl.NOTHING)
+            wall.framebuffer.clear()  # a GPU that draws in tiles would else fetch the picture before
+        else:
+            self.ctx.enable_only(moderngl.BLEND)
+            self.ctx.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+            self.tally.move(4 * wall.pixels)
+        inputs |= {
+            "clip_from_picture": wall.clip_from_picture,
+            "box": box,
+            "opacity": opacity,
+            "level": wall.level,
+            "inverse_gamma": 1.0 / wall.gamma,
+        }
+        parts = ("GAMMA",) if wall.gamma != 1.0 else ()
+        inside = (box[2] - box[0]) * (box[3] - box[1])
+        strip = moderngl.TRIANGLE_STRIP
+        self._sheet(fragment, *parts).draw(self.tally, inside * wall.pixels, inputs, strip, 4)
+        if box != WHOLE:
+            frame = self._sheet(fragment, *parts, "FRAME")
+            frame.draw(self.tally, (1 - inside) * wall.pixels, inputs, strip, 10)
+        self.tally.move(4 * wall.pixels)
+
+    def _sheet(self, fragment: str, *parts: str) -> Drawing:
+        """Made when it is first needed."""
+        key = fragment, *parts
+        if key not in self._sheets:
+            self._sheets[key] = Drawing(self.ctx, "laid", fragment, parts=parts)
+        return self._sheets[key]
 
     def surface(self, vertex: str, fragment: str, coarse: bool = False) -> Drawing:
         """The body's surface, drawn by these shaders."""
@@ -145,6 +185,8 @@ class Easel:
             canvas.release()
         for buffer in self._buffers:
             buffer.release()
+        for sheet in self._sheets.values():
+            sheet.release()
 
 
 def direction(azimuth: float, elevation_deg: float) -> Array:

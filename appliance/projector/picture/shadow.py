@@ -38,6 +38,7 @@ class Shadow:
         poses = {"poses": easel.poses.texture, "row": 0}
         seen = BODY_SHARE * depth.pixels
         self._depth.draw(easel.tally, seen, poses | {"projection": lamp_projection})
+        depth.forget_depth()
         middle = root[[0, 2]] - 0.5 * lamp[[0, 2]] / lamp[1]
         on_floor = {"lamp": lamp, "middle": middle, "reach": REACH}
         first, second = (easel.canvas(name, (CAST_SIDE, CAST_SIDE)) for name in ("cast", "cast blurred"))

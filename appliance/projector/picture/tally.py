@@ -8,36 +8,55 @@ from dataclasses import dataclass
 # cycle at 500 MHz: 32 thousand million operations a second at most. What shaders get is taken from glmark2
 # on a Raspberry Pi 5 (12 units, 960 MHz): effect2d with 25 samples a pixel, 10 operations each, takes 2.2 ms
 # more at 800x600 than an empty picture. For the units and the clock of the 4 that makes 14 thousand million
-# operations and 1.4 thousand million samples a second. Of its memory's 12.8 GB/s a third is for the GPU.
-_OPERATIONS_S, _FETCHES_S, _BYTES_S = 14e9, 1.4e9, 4e9
+# operations and 1.4 thousand million samples a second. Published scores of glmark2 as a whole are 290 and 425
+# for the 4, 880 for the 5: 2.1 to 3 times, where units and clock say 2.9. Memory: units that do nothing but
+# read got 7.2 GB/s (py-videocore6's summation); 5 leaves room for writing, the display and the processor.
+# All in all a half more or less: no rate was measured with these shaders.
+_OPERATIONS_S, _FETCHES_S, _BYTES_S = 14e9, 1.4e9, 5e9
 _DRAW_CALL_S = 30e-6  # of the driver, state and uniforms included
 _VERTEX_PASSES = 2  # the GPU goes over vertices twice: for where they are, and to draw them
-_BYTES_A_PIXEL = 4.0  # what a pixel writes; tiles keep depth and blending off the memory
 
 # Operations and texture fetches of each fragment shader for a pixel and of each vertex shader for a vertex,
-# counted by hand in their main paths.
+# counted by hand in their main paths; a power counts as 8.
 _FRAGMENT = {
     "depth": (8, 0),
     "cast": (12, 0),
     "cast_blur": (90, 13),
     "plaster": (230, 10),
     "plaster_air": (125, 5),
-    "plaster_finish": (26, 2),
+    "plaster_finish": (75, 6),
+    "plaster_finish FRAME": (14, 1),
+    "plaster_finish GAMMA": (99, 6),
+    "plaster_finish GAMMA FRAME": (38, 1),
     "strand": (20, 0),
     "trail": (25, 0),
     "glow_shrink": (10, 4),
     "glow_blur": (20, 7),
     "light_air": (85, 4),
     "light_finish": (22, 2),
+    "light_finish GAMMA": (46, 2),
     "ink": (45, 1),
     "stroke": (45, 2),
     "paper": (75, 2),
-    "ink_finish": (40, 3),
+    "ink_finish": (55, 3),
+    "ink_finish FRAME": (20, 1),
+    "ink_finish GAMMA": (79, 3),
+    "ink_finish GAMMA FRAME": (44, 1),
     "cloud": (10, 0),
     "veil": (40, 0),
+    "final": (6, 1),
+    "final DIM": (26, 1),
+    "final GAMMA DIM": (50, 1),
+    "final BLEND DIM": (48, 1),
+    "final GAMMA BLEND DIM": (72, 1),
+    "final DIM MARKS": (130, 2),
+    "final GAMMA DIM MARKS": (154, 2),
+    "final BLEND DIM MARKS": (152, 2),
+    "final GAMMA BLEND DIM MARKS": (176, 2),
 }
 _VERTEX = {
     "screen": (8, 0),
+    "laid": (20, 0),
     "air": (20, 0),
     "body": (130, 5),
     "cast": (110, 5),
@@ -59,7 +78,7 @@ class Use:
 
     @property
     def seconds(self) -> float:
-        """On a Raspberry Pi 4, reckoned: operations or fetches, whichever is more, and memory."""
+        """On a Raspberry Pi 4, reckoned, without its memory: operations or fetches, whichever is more."""
         operations, fetches = _FRAGMENT[self.fragment]
         vertex_operations, vertex_fetches = _VERTEX[self.vertex]
         shaded, placed = self.pixels, self.vertices * _VERTEX_PASSES
@@ -68,7 +87,6 @@ class Use:
                 (shaded * operations + placed * vertex_operations) / _OPERATIONS_S,
                 (shaded * fetches + placed * vertex_fetches) / _FETCHES_S,
             )
-            + shaded * _BYTES_A_PIXEL / _BYTES_S
             + _DRAW_CALL_S
         )
 
@@ -77,27 +95,39 @@ class Use:
 class Figures:
     """What one picture takes.
 
-    overdraw: pixels shaded by all passes, for each pixel of the picture; gpu_bytes: textures and buffers, the
-    caller's target included; pi4_ms: milliseconds on a Raspberry Pi 4, reckoned, not measured.
+    overdraw: pixels shaded by all passes, for each pixel of the picture; moved_bytes: textures read and
+    targets written; gpu_bytes: textures and buffers, a texture that is drawn onto included, a display not;
+    pi4_ms: milliseconds of a Raspberry Pi 4's GPU, reckoned, not measured.
     """
 
     draw_calls: int
     triangles: int
     vertices: int
     overdraw: float
+    moved_bytes: float
     gpu_bytes: int
     pi4_ms: float
 
 
 class Tally:
-    """The draw calls of one picture."""
+    """The draw calls of one picture, and what they move through memory.
+
+    Each texture is read from memory once a draw call: its neighbours' samples come from a cache. A target is
+    written once: a GPU that draws in tiles keeps depth and blending to itself.
+    """
 
     def __init__(self) -> None:
         self._uses: list[Use] = []
+        self._moved_bytes = 0.0
 
     def clear(self) -> None:
         """A new picture begins."""
         self._uses.clear()
+        self._moved_bytes = 0.0
+
+    def move(self, count: float) -> None:
+        """Bytes that are read from memory or written to it."""
+        self._moved_bytes += count
 
     def put_down(self, use: Use) -> None:
         """Count a draw call."""
@@ -110,6 +140,7 @@ class Tally:
             triangles=sum(use.triangles for use in self._uses),
             vertices=sum(use.vertices for use in self._uses),
             overdraw=sum(use.pixels for use in self._uses) / max(picture_pixels, 1),
+            moved_bytes=self._moved_bytes,
             gpu_bytes=gpu_bytes,
-            pi4_ms=1000 * sum(use.seconds for use in self._uses),
+            pi4_ms=1000 * (sum(use.seconds for use in self._uses) + self._moved_bytes / _BYTES_S),
         )

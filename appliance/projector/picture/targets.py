@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Callable
+
 import moderngl
+
+from appliance.projector.picture.tally import Tally
+from appliance.projector.sdl import sdl2
+
+_FRAMEBUFFER, _DEPTH = 0x8D40, 0x8D00  # GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT
 
 
 class Target:
     """A texture of four bytes a pixel that can be drawn into, with depth where it is asked for."""
 
-    def __init__(self, ctx: moderngl.Context, size: tuple[int, int], depth: bool = False) -> None:
-        self.size = size
+    def __init__(
+        self, ctx: moderngl.Context, tally: Tally, size: tuple[int, int], depth: bool = False
+    ) -> None:
+        self.size, self._tally = size, tally
         self.texture = ctx.texture(size, 4)
         self.texture.repeat_x = self.texture.repeat_y = False
         self._depth = ctx.depth_renderbuffer(size) if depth else None
         self.buffer = ctx.framebuffer([self.texture], self._depth)
         self.bytes = size[0] * size[1] * (8 if depth else 4)
+        self._invalidate = _invalidation() if depth else None
 
     @property
     def pixels(self) -> int:
@@ -26,6 +37,7 @@ class Target:
         self.buffer.use()
         self.buffer.viewport = (0, 0, *self.size)
         self.buffer.clear(*colour)
+        self._tally.move(4 * self.pixels)
 
     def keep(self, channels: str, depth: bool = True) -> None:
         """What is drawn next changes these channels ('r' to 'a') alone, and depth only if wanted."""
@@ -33,8 +45,19 @@ class Target:
         self.buffer.depth_mask = depth
         self.buffer.use()
 
+    def forget_depth(self) -> None:
+        """Right after the last of what has depth: who draws in tiles then never writes it to memory."""
+        if self._invalidate is not None:
+            self._invalidate(_FRAMEBUFFER, 1, ctypes.byref(ctypes.c_uint(_DEPTH)))
+
     def release(self) -> None:
         self.buffer.release()
         self.texture.release()
         if self._depth:
             self._depth.release()
+
+
+def _invalidation() -> Callable[..., None]:
+    """OpenGL's glInvalidateFramebuffer, which the library does not offer."""
+    address = sdl2.SDL_GL_GetProcAddress(b"glInvalidateFramebuffer")
+    return ctypes.CFUNCTYPE(None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p)(address)

@@ -1,16 +1,15 @@
 #version 300 es
-// The picture onto the wall: corner-pin, mirror, brightness; GAMMA, BLEND for edge blend, MARKS on demand.
+// The picture onto the wall: corner-pin, mirror; GAMMA, BLEND for edge blend, DIM for brightness, MARKS.
 precision highp float;
 precision highp sampler2D;
 
 uniform sampler2D picture;         // what the looks have drawn; with edge blend wider than this display
-uniform vec2 display;              // width, height, pixels
-uniform vec2 flips;                // 1: exchange left and right; 1: exchange top and bottom
-uniform mat3 picture_from_wall;    // wall pixels (y down) to the unit square of this display's part
 uniform vec2 part;                 // where this part begins in the picture, and how wide it is
+#ifdef DIM
 uniform float scale;               // brightness * level
-uniform float dither;              // steps of 1/255; 0 where the picture passes unchanged
 uniform vec2 seed;                 // another pattern of dither for each picture
+
+#endif
 
 out vec4 colour;
 
@@ -29,6 +28,9 @@ float blended(float u) {
 #endif
 
 #ifdef MARKS
+uniform vec2 display;              // width, height, pixels
+uniform vec2 flips;                // 1: exchange left and right; 1: exchange top and bottom
+uniform mat3 picture_from_wall;    // wall pixels (y down) to the unit square of this display's part
 uniform sampler2D text;            // 1: a letter, 0.5: the ground under it, 0: neither; top row first
 uniform float grid;                // 0 or 1
 uniform vec3 marker;               // the chosen corner, wall pixels; radius, 0: none
@@ -49,35 +51,47 @@ float grid_lines(vec2 place, vec2 pixel_size) {
     upright = max(upright, 1.0 - clamp(off_circle - 0.5, 0.0, 1.0));
     return max(upright, lines(diagonals, vec2(pixel_size.x + pixel_size.y)));
 }
-#endif
 
 float coverage(vec2 uv, vec2 pixel_size) {
     vec2 inside = min(uv, 1.0 - uv) / pixel_size;
     return clamp(min(inside.x, inside.y) + 0.5, 0.0, 1.0);
 }
+#else
+in vec2 uv;
+#endif
 
+#ifdef DIM
 float noise(vec2 place) {
     return fract(52.9829189 * fract(dot(place + seed, vec2(0.06711056, 0.00583715)))) - 0.5;
 }
+#endif
 
 void main() {
+#ifdef MARKS
     vec2 wall = vec2(gl_FragCoord.x, display.y - gl_FragCoord.y);
     wall = mix(wall, display - wall, flips);
     vec3 projected = picture_from_wall * vec3(wall, 1.0);
     vec2 uv = projected.xy / projected.z;
     vec2 pixel_size = max(fwidth(uv), 1e-9);
     float seen = projected.z > 0.0 ? coverage(uv, pixel_size) : 0.0;
-    vec2 place = vec2(part.x + clamp(uv.x, 0.0, 1.0) * part.y, clamp(uv.y, 0.0, 1.0));
-
-    vec3 light = textureLod(picture, vec2(place.x, 1.0 - place.y), 0.0).rgb;
+    vec2 inside = clamp(uv, 0.0, 1.0);
+#else
+    vec2 inside = uv;
+#endif
+    vec3 light = textureLod(picture, vec2(part.x + inside.x * part.y, 1.0 - inside.y), 0.0).rgb;
 #ifdef GAMMA
     light = pow(light, vec3(inverse_gamma));
 #endif
 #ifdef BLEND
     light *= blended(uv.x);
 #endif
-    light *= scale * seen;
-    light += dither * noise(gl_FragCoord.xy) / 255.0 * step(0.5 / 255.0, light);
+#ifdef MARKS
+    light *= seen;
+#endif
+#ifdef DIM
+    light *= scale;
+    light += noise(gl_FragCoord.xy) / 255.0 * step(0.5 / 255.0, light);
+#endif
 #ifdef MARKS
     vec2 across = vec2(part.x + uv.x * part.y, uv.y);
     light = mix(light, vec3(0.9), grid * seen * grid_lines(across, pixel_size * vec2(part.y, 1.0)));

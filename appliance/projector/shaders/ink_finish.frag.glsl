@@ -1,5 +1,5 @@
 // Ink on paper: edges that the fibres pull, darker where it dried last; echoes are washed out. Colours are as
-// the eye sees them, not light: thin ink darkens paper evenly.
+// the eye sees them, not light: thin ink darkens paper evenly. With FRAME blank paper.
 in vec2 uv;
 uniform sampler2D picture;
 uniform sampler2D wet_picture;
@@ -10,16 +10,15 @@ uniform vec3 light_colour;
 uniform vec3 accent_colour;
 uniform vec3 air_colour;
 uniform float fog;
-uniform float opacity;
-out vec4 colour;
-#include tone
+#include wall
 
 void main() {
     vec4 sheet = texture(paper, uv);
-    vec2 at = uv + (sheet.rg - 0.5) * reach;
     float rough = sheet.b - 0.5;
-    vec3 wet = texture(wet_picture, at).rgb;
     vec3 blank = air_colour * (0.95 + 0.10 * (sheet.r - 0.5) + 0.12 * rough), shown = blank;
+#ifndef FRAME
+    vec2 at = uv + (sheet.rg - 0.5) * reach;
+    vec3 wet = texture(wet_picture, at).rgb;
     if (wet.r + wet.g + wet.b > 0.004) {
         vec3 ink = texture(picture, at).rgb;
         float body = smoothstep(0.30, 0.42, 0.6 * wet.r + 0.4 * ink.r + 0.25 * rough);
@@ -32,5 +31,6 @@ void main() {
         shown = mix(shown, accent_colour, clamp(stroke, 0.0, 1.0));
         shown = mix(shown, figure_colour, covers);
     }
-    colour = vec4(dithered(shown * sheet.a, gl_FragCoord.xy), opacity);
+#endif
+    show(sheet.a * min(shown, 1.0));
 }

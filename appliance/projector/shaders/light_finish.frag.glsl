@@ -3,13 +3,11 @@ in vec2 uv;
 uniform sampler2D picture;
 uniform sampler2D air;
 uniform float exposure;
-uniform float opacity;
-out vec4 colour;
-#include tone
+#include wall
 
 void main() {
     vec3 drawn = min((2.0 * exposure) * texture(picture, uv).rgb, 1.0);
     vec4 around = texture(air, uv);
     vec3 shown = (drawn + around.rgb - drawn * around.rgb) * around.a;
-    colour = vec4(dithered(shown, gl_FragCoord.xy), opacity);
+    show(shown);
 }

@@ -10,6 +10,7 @@ from appliance.projector.picture.looks.palette import palette, stored
 from appliance.projector.picture.particles import particles_of
 from appliance.projector.picture.poses import ROW_S, ROWS
 from appliance.projector.picture.scene import Easel, Scene, direction
+from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 GRAINS = 40000  # at density 1
@@ -28,10 +29,10 @@ class Cloud:
         self._body = easel.surface("body", "depth", coarse=True)
         self._glow = Glow(easel)
 
-    def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
-        """Lay the look over what is in the target."""
+    def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
+        """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, view, colours = self._easel, scene.view, palette(look)
-        picture = easel.picture(target.size, look.render_scale)
+        picture = easel.picture(wall, look.render_scale)
         inputs = {
             **scene.inputs,
             "poses": easel.poses.texture,
@@ -64,7 +65,8 @@ class Cloud:
             grains,
         )
         picture.keep("rgba")
-        self._glow.finish(scene, look, colours, picture, opacity, target)
+        picture.forget_depth()
+        self._glow.finish(scene, look, colours, picture, opacity, wall)
 
     def release(self) -> None:
         for part in (self._grains, self._body, self._glow):

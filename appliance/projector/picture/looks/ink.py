@@ -15,12 +15,14 @@ from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.strands import reach_of
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.trails import traced
+from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 ECHOES = 5
 STROKES, BRUSH = 12, 0.026  # how many points of the body hold a brush, and how wide it is in figure heights
 WET = 180  # lines of the picture in which ink spreads
 PAPER_LINES = 400  # of the sheet, which is made once
+SPILL = 0.07  # of the picture's height that ink reaches beyond the figure: brush, spreading and pull
 PULL = 0.016  # of the picture's height: how far fibres pull the ink
 
 
@@ -36,12 +38,11 @@ class Ink:
         self._glow = Glow(easel)
         self._sheet = Drawing(easel.ctx, "screen", "paper")
         self._made: dict[str, float] = {}
-        self._finish = Drawing(easel.ctx, "screen", "ink_finish")
 
-    def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
-        """Lay the look over what is in the target."""
+    def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
+        """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, colours = self._easel, palette(look)
-        picture = easel.picture(target.size, look.render_scale)
+        picture = easel.picture(wall, look.render_scale)
         inputs: dict[str, Any] = {**scene.inputs, "poses": easel.poses.texture, "noise": easel.noise}
         picture.start()
         picture.keep("r")
@@ -52,6 +53,7 @@ class Ink:
         if look.trail_s > 0:
             self._leave_traces(scene, look.trail_s, inputs, picture)
         picture.keep("rgba")
+        picture.forget_depth()
         wet = self._glow.spread(picture, "near glow", WET)
         inputs |= {
             "picture": picture.texture,
@@ -63,10 +65,9 @@ class Ink:
             "paper": self._paper(look, scene.aspect).texture,
             "reach": (PULL / scene.aspect, PULL),
             "fog": look.fog,
-            "opacity": opacity,
         }
-        easel.finish(target)
-        self._finish.draw(easel.tally, target.width * target.height, inputs)
+        box = scene.box(ROWS, SPILL) if look.trail_s > 0 else scene.box(margin=SPILL)
+        easel.lay("ink_finish", wall, opacity, inputs, box)
 
     def _paper(self, look: LookConfig, aspect: float) -> Target:
         """The sheet; made anew when its shape or the look has changed."""
@@ -109,5 +110,5 @@ class Ink:
         easel.ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
 
     def release(self) -> None:
-        for part in (self._figure, self._echo, self._strokes, self._glow, self._sheet, self._finish):
+        for part in (self._figure, self._echo, self._strokes, self._glow, self._sheet):
             part.release()

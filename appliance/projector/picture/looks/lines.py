@@ -14,6 +14,7 @@ from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.strands import POINTS, STEP, reach_of, strands_of
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.trails import traced
+from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 ECHOES = 5
@@ -36,17 +37,18 @@ class Lines:
         self._trails = Drawing(easel.ctx, "trail", "trail", easel.vertices(traces.parts(), instanced=True))
         self._glow = Glow(easel)
 
-    def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
-        """Lay the look over what is in the target."""
+    def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
+        """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, colours = self._easel, palette(look)
-        picture = easel.picture(target.size, look.render_scale)
+        picture = easel.picture(wall, look.render_scale)
         picture.start()
         easel.ctx.enable_only(moderngl.BLEND)
         easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
         for side, share in ((-1.0, MIRROR * look.shadow), (1.0, 1.0)):
             if share > 0:
                 self._figure(scene, look, colours, picture, side, share)
-        self._glow.finish(scene, look, colours, picture, opacity, target)
+        picture.forget_depth()
+        self._glow.finish(scene, look, colours, picture, opacity, wall)
 
     def _figure(
         self, scene: Scene, look: LookConfig, colours: Palette, picture: Target, side: float, share: float

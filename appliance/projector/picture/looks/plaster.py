@@ -9,6 +9,7 @@ from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.looks.palette import palette
 from appliance.projector.picture.scene import Easel, Scene, direction
 from appliance.projector.picture.shadow import Shadow
+from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 KEY_FROM, KEY_ABOVE = -1.2, 50.0  # radians beside the camera, degrees above the floor
@@ -25,10 +26,9 @@ class Plaster:
         self._shadow = Shadow(easel)
         self._figure = easel.surface("body", "plaster")
         self._air = Drawing(easel.ctx, "air", "plaster_air")
-        self._finish = Drawing(easel.ctx, "screen", "plaster_finish")
 
-    def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
-        """Lay the look over what is in the target."""
+    def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
+        """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, view, colours = self._easel, scene.view, palette(look)
         lamp = direction(view.azimuth + KEY_FROM, KEY_ABOVE)
         inputs = {
@@ -47,12 +47,12 @@ class Plaster:
             "fog": look.fog,
             "exposure": look.exposure,
             "vignette": look.vignette,
-            "opacity": opacity,
         }
-        picture = easel.picture(target.size, look.render_scale)
+        picture = easel.picture(wall, look.render_scale)
         picture.start()
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._figure.draw(easel.tally, scene.body_pixels(picture.size), inputs)
+        picture.forget_depth()
         pool = np.array([view.ground[0], 0.0, view.ground[1]])
         inputs |= {
             "beam_from": view.on_picture(pool + BEAM * lamp),
@@ -63,15 +63,13 @@ class Plaster:
         air.start()
         easel.ctx.enable_only(moderngl.NOTHING)
         self._air.draw(easel.tally, air.pixels, inputs)
-        easel.finish(target)
         inputs |= {
             "picture": picture.texture,
             "air": air.texture,
             "texel": (1 / picture.size[0], 1 / picture.size[1]),
-            "box": scene.box,
         }
-        self._finish.draw(easel.tally, target.width * target.height, inputs)
+        easel.lay("plaster_finish", wall, opacity, inputs, scene.box())
 
     def release(self) -> None:
-        for part in (self._shadow, self._figure, self._air, self._finish):
+        for part in (self._shadow, self._figure, self._air):
             part.release()

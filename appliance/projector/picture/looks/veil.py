@@ -8,6 +8,7 @@ from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import palette, stored
 from appliance.projector.picture.poses import ROW_S, ROWS
 from appliance.projector.picture.scene import Easel, Scene, direction
+from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 ECHOES = 10  # at density 1
@@ -23,10 +24,10 @@ class Veil:
         self._echo = easel.surface("body", "veil", coarse=True)
         self._glow = Glow(easel)
 
-    def draw(self, scene: Scene, look: LookConfig, opacity: float, target: moderngl.Framebuffer) -> None:
-        """Lay the look over what is in the target."""
+    def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
+        """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, colours = self._easel, palette(look)
-        picture = easel.picture(target.size, look.render_scale)
+        picture = easel.picture(wall, look.render_scale)
         picture.start()
         easel.ctx.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
         easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
@@ -47,7 +48,8 @@ class Veil:
             }
             body = self._figure if echo == 0 else self._echo
             body.draw(easel.tally, 1.6 * scene.body_pixels(picture.size), inputs)
-        self._glow.finish(scene, look, colours, picture, opacity, target)
+        picture.forget_depth()
+        self._glow.finish(scene, look, colours, picture, opacity, wall)
 
     def release(self) -> None:
         for part in (self._figure, self._echo, self._glow):

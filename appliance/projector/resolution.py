@@ -1,0 +1,113 @@
+"""How finely the scene is drawn: in smaller pictures where a machine does not keep up, else in full ones."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+SHARES = (1.0, 0.67, 0.5)  # of the display's width and height
+_WINDOW_S = 1.5  # that a judgement looks back
+_FEWEST = 15  # pictures of which one is made
+_SETTLES_S = 0.5  # after a change, or a new look: what a driver does then is no measure
+_MOST = 0.95  # of the display's period that drawing may take
+_EASY = 0.7  # of it that a larger picture must be expected to take at most
+_UP_AFTER_S, _UP_AFTER_MOST_S = 20.0, 640.0  # of ease before a larger picture is tried
+_FAILED_S = 60.0  # a larger picture that lasts for less was a mistake
+_GAIN = 0.9  # smallest pictures that take more of the full ones' time blur for nothing
+_TYPICAL = 75  # percentile of the times: a few pictures that another program holds up do not count
+
+
+class Resolution:
+    """Judges how long pictures take; `share` says how large the next one is.
+
+    It goes down at once and up slowly, each time that a larger picture was a mistake twice as slowly, and
+    stays where it is while looks cross-fade. Where even the smallest pictures bring nothing, because
+    something else takes the time, it goes back to full ones and stays there.
+    """
+
+    def __init__(self, period_s: float, adapts: bool = True) -> None:
+        self._period_s, self._adapts = period_s, adapts
+        self._place = 0
+        self._times: deque[tuple[float, float]] = deque()
+        self._look: str | None = None
+        self._settled = -np.inf
+        self._eased: float | None = None  # since when a larger picture would do
+        self._grew = -np.inf
+        self._up_after_s = _UP_AFTER_S
+        self._took_s: dict[int, float] = {}  # what pictures took at each place when last judged
+        self._ratios: dict[int, float] = {}  # how much longer than there they take at the next larger size
+        self._left: int | None = None  # the place that was just left for a smaller one
+        self._hopeless: set[str] = set()  # looks that smaller pictures do not make faster
+
+    @property
+    def share(self) -> float:
+        """Of the display's width and height."""
+        return SHARES[self._place]
+
+    def drawn(self, now: float, took_s: float, look: str | None) -> bool:
+        """A picture took so long, waiting for the display not counted; look None: no look alone.
+
+        Whether the next one has another size. now: monotonic seconds.
+        """
+        if not self._adapts or look is None:
+            self._times.clear()
+            return False
+        if look != self._look:
+            self._look, self._left = look, None
+            self._took_s.clear()
+            self._ratios.clear()
+            self._settle(now)
+        if now < self._settled:
+            return False
+        self._times.append((now, took_s))
+        while self._times[0][0] < now - _WINDOW_S:
+            self._times.popleft()
+        if len(self._times) < _FEWEST:
+            return False
+        return self._judge(now, float(np.percentile([took for _, took in self._times], _TYPICAL)))
+
+    def _judge(self, now: float, took_s: float) -> bool:
+        self._took_s[self._place] = took_s
+        if self._left is not None:
+            self._ratios[self._place], self._left = self._took_s[self._left] / took_s, None
+        if took_s > _MOST * self._period_s:
+            return self._shrink(now)
+        if self._place == 0 or self._expected(took_s) > _EASY * self._period_s:
+            self._eased = None
+            return False
+        self._eased = now if self._eased is None else self._eased
+        if now - self._eased < self._up_after_s:
+            return False
+        self._grew = now
+        self._go(self._place - 1, now)
+        return True
+
+    def _shrink(self, now: float) -> bool:
+        self._eased = None
+        if self._look in self._hopeless:
+            return False
+        if now - self._grew < _FAILED_S:
+            self._up_after_s = min(2 * self._up_after_s, _UP_AFTER_MOST_S)
+        if self._place + 1 < len(SHARES):
+            self._left = self._place
+            self._go(self._place + 1, now)
+            return True
+        if self._look is not None and self._took_s[self._place] > _GAIN * self._took_s.get(0, np.inf):
+            self._hopeless.add(self._look)
+            self._go(0, now)
+            return True
+        return False
+
+    def _expected(self, took_s: float) -> float:
+        """What the next larger picture would take: in proportion as lately, at most to its pixels."""
+        by_pixels = (SHARES[self._place - 1] / SHARES[self._place]) ** 2
+        return took_s * min(by_pixels, self._ratios.get(self._place, by_pixels))
+
+    def _go(self, place: int, now: float) -> None:
+        self._place = place
+        self._settle(now)
+
+    def _settle(self, now: float) -> None:
+        self._settled, self._eased = now + _SETTLES_S, None
+        self._times.clear()
