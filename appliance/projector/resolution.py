@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-SHARES = (1.0, 0.67, 0.5)  # of the display's width and height
+SHARES = (1.0, 0.5, 0.35)  # of the display's width and height; between them laying takes what drawing saves
 _WINDOW_S = 1.5  # that a judgement looks back
 _FEWEST = 15  # pictures of which one is made
 _SETTLES_S = 0.5  # after a change, or a new look: what a driver does then is no measure
@@ -14,7 +14,8 @@ _MOST = 0.95  # of the display's period that drawing may take
 _EASY = 0.7  # of it that a larger picture must be expected to take at most
 _UP_AFTER_S, _UP_AFTER_MOST_S = 20.0, 640.0  # of ease before a larger picture is tried
 _FAILED_S = 60.0  # a larger picture that lasts for less was a mistake
-_GAIN = 0.9  # smallest pictures that take more of the full ones' time blur for nothing
+_GAIN = 0.85  # smallest pictures that are too slow and take more of the full ones' time blur for nothing
+_HOPELESS_S = 600.0  # before that is tried again
 _TYPICAL = 75  # percentile of the times: a few pictures that another program holds up do not count
 
 
@@ -23,7 +24,7 @@ class Resolution:
 
     It goes down at once and up slowly, each time that a larger picture was a mistake twice as slowly, and
     stays where it is while looks cross-fade. Where even the smallest pictures bring nothing, because
-    something else takes the time, it goes back to full ones and stays there.
+    something else takes the time, it goes back to full ones for ten minutes.
     """
 
     def __init__(self, period_s: float, adapts: bool = True) -> None:
@@ -38,7 +39,7 @@ class Resolution:
         self._took_s: dict[int, float] = {}  # what pictures took at each place when last judged
         self._ratios: dict[int, float] = {}  # how much longer than there they take at the next larger size
         self._left: int | None = None  # the place that was just left for a smaller one
-        self._hopeless: set[str] = set()  # looks that smaller pictures do not make faster
+        self._hopeless: dict[str, float] = {}  # looks that smaller pictures do not help, and until when
 
     @property
     def share(self) -> float:
@@ -85,7 +86,7 @@ class Resolution:
 
     def _shrink(self, now: float) -> bool:
         self._eased = None
-        if self._look in self._hopeless:
+        if now < self._hopeless.get(self._look or "", -np.inf):
             return False
         if now - self._grew < _FAILED_S:
             self._up_after_s = min(2 * self._up_after_s, _UP_AFTER_MOST_S)
@@ -94,7 +95,7 @@ class Resolution:
             self._go(self._place + 1, now)
             return True
         if self._look is not None and self._took_s[self._place] > _GAIN * self._took_s.get(0, np.inf):
-            self._hopeless.add(self._look)
+            self._hopeless[self._look] = now + _HOPELESS_S
             self._go(0, now)
             return True
         return False

@@ -43,8 +43,8 @@ class ProjectorConfig(Section):
     size: Size = Field(default=(1280, 720), description="Width and height of the window, pixels.")
     picture: Size | None = Field(
         default=None,
-        description="Width and height in which the scene is drawn, pixels; null: the display's own. "
-        "Smaller is faster.",
+        description="Width and height in which the scene is drawn, pixels; null: the display's own, and "
+        "smaller while the machine does not keep up with it.",
     )
     vsync: bool = Field(
         default=True, description="Show each picture when the display asks for one: without tearing."

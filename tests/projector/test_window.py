@@ -18,6 +18,7 @@ from appliance.projector.context import GlContext, offscreen
 from appliance.projector.keyboards import Key
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, ProjectorError
+from appliance.projector.resolution import Resolution
 from appliance.projector.run import Run, Wish
 from appliance.projector.sdl import sdl2
 from appliance.projector.window import Window
@@ -198,6 +199,26 @@ def test_keys_and_a_closed_window_arrive(tmp_path: Path) -> None:
         run.close()
     assert "Corner mode" in said[0] and f"({-10 / 64:.4f}, 0.0000)" in said[1] and "pressed q" in said[2]
     assert "-0.15625" in (tmp_path / "state" / "projector.alignment").read_text()
+
+
+def test_smaller_pictures_are_said_once_and_told_by_the_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
+    said: list[str] = []
+    shares: list[float] = []
+    run = Run(box, None, Wish("offscreen", (64, 36), seconds=1.5, shows_info=True), said.append)
+    monkeypatch.setattr(Resolution, "share", property(lambda _: 0.5))
+    monkeypatch.setattr(Resolution, "drawn", lambda *_: True)
+    monkeypatch.setattr(run._projector, "draw", lambda *arguments: shares.append(arguments[-1]))
+    try:
+        run.project(lambda: False)
+    finally:
+        run.close()
+    (sentence,) = (line for line in said if "sees the dance in 32x18" in line)
+    assert "Pictures of 64x36 take longer" in sentence and "box file fixes it" in sentence
+    assert any("64x36 at 50%" in line for line in said)
+    assert set(shares) == {0.5}
 
 
 def test_keys_have_the_names_that_are_printed_on_them() -> None:

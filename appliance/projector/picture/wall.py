@@ -20,8 +20,8 @@ class Wall:
 
     clip_from_picture: (3, 3), the projective map from the picture's unit square (y up) to clip space, with a
     third row above 0 all over it; the rest of the framebuffer becomes black. level: of the brightness;
-    gamma: above 1 lifts the dark tones; finer: how many times finer the figure is drawn than its look says, at
-    most as fine as the picture: in a small one its edges would else be steps.
+    gamma: above 1 lifts the dark tones; finer: how many times finer the figure is drawn than its look says,
+    at most as fine as the picture: in a small one its edges would else be steps.
     """
 
     framebuffer: moderngl.Framebuffer
