@@ -40,6 +40,7 @@ class Resolution:
         self._ratios: dict[int, float] = {}  # how much longer than there they take at the next larger size
         self._left: int | None = None  # the place that was just left for a smaller one
         self._hopeless: dict[str, float] = {}  # looks that smaller pictures do not help, and until when
+        self._helped: set[str] = set()  # looks that they do help, as measured twice
 
     @property
     def share(self) -> float:
@@ -86,16 +87,23 @@ class Resolution:
 
     def _shrink(self, now: float) -> bool:
         self._eased = None
-        if now < self._hopeless.get(self._look or "", -np.inf):
-            return False
+        look, smallest = self._look or "", len(SHARES) - 1
+        is_gain = self._took_s.get(smallest, np.inf) <= _GAIN * self._took_s.get(0, np.inf)
+        if now < self._hopeless.get(look, -np.inf):
+            if not is_gain:
+                return False
+            del self._hopeless[look]  # full pictures, measured once more, say otherwise
+            self._helped.add(look)
+            self._go(smallest, now)
+            return True
         if now - self._grew < _FAILED_S:
             self._up_after_s = min(2 * self._up_after_s, _UP_AFTER_MOST_S)
-        if self._place + 1 < len(SHARES):
+        if self._place < smallest:
             self._left = self._place
             self._go(self._place + 1, now)
             return True
-        if self._look is not None and self._took_s[self._place] > _GAIN * self._took_s.get(0, np.inf):
-            self._hopeless[self._look] = now + _HOPELESS_S
+        if 0 in self._took_s and not is_gain and look not in self._helped:
+            self._hopeless[look] = now + _HOPELESS_S
             self._go(0, now)
             return True
         return False

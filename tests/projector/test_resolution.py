@@ -98,6 +98,18 @@ def test_no_blur_where_smaller_pictures_bring_nothing() -> None:
     assert len(machine.changes) == 6 and machine.resolution.share == 1.0
 
 
+def test_full_pictures_that_were_measured_too_short_are_measured_again() -> None:
+    """Another program began meanwhile."""
+    machine = Machine(by_pixels(1.5 * PERIOD_S, fixed_s=1.1 * PERIOD_S))
+    machine.dance(2.5)
+    assert machine.resolution.share == SHARES[1]
+    machine.cost = by_pixels(2.0 * PERIOD_S, fixed_s=1.4 * PERIOD_S)
+    machine.dance(20)
+    assert [share for _, share in machine.changes] == [*SHARES[1:], 1.0, SHARES[-1]]
+    machine.dance(300)
+    assert len(machine.changes) == 4
+
+
 def test_another_look_is_judged_anew() -> None:
     machine = Machine(by_pixels(2.0 * PERIOD_S, fixed_s=1.95 * PERIOD_S))
     machine.dance(20, "cloud")
