@@ -72,6 +72,22 @@ class AlignmentFile:
         """The newest one, kept or on its way."""
         return self._wanted
 
+    def overrides(self) -> list[str]:
+        """A sentence for each thing that was chosen by hand and goes over the box file."""
+        chosen, box_file = self._wanted, self._from_box
+        sentences = []
+        if chosen.corners != WHOLE:
+            sentences.append("The corners lie as they were last put by hand.")
+        if chosen.mirror != box_file.mirror:
+            facing = "mirrored" if chosen.mirror else "not mirrored"
+            sentences.append(f"The picture is {facing}, as last chosen by hand, against the box file.")
+        if chosen.brightness != box_file.brightness:
+            sentences.append(
+                f"The brightness is {chosen.brightness:g}, as last chosen by hand, and not the box file's "
+                f"{box_file.brightness:g}."
+            )
+        return sentences
+
     def keep(self, alignment: Alignment) -> None:
         """Remember this one."""
         self._wanted = alignment

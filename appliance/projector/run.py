@@ -87,6 +87,7 @@ class Run:
         lines = [
             f"The picture is {width}x{height} ({self._window.driver}, {self._context.renderer}). "
             f"Its alignment is kept in {self._file.path}.",
+            *self._file.overrides(),
         ]
         keyboards = self._window.keyboards
         if keyboards is not None and keyboards.is_refused:

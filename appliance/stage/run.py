@@ -164,8 +164,9 @@ class Stage:
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
         if order.name in SENSOR_ORDERS:
-            return obey_for_sensors(order, self.cast, self.wearing, now)
-        done, words = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
+            done, words = obey_for_sensors(order, self.cast, self.wearing, now)
+        else:
+            done, words = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
         if words:
             self.say(words)
         return done, words

@@ -53,6 +53,15 @@ def test_what_the_box_file_says_anew_goes_over_what_was_chosen_before(
     assert found == Alignment(PINNED.corners, True, 1.5)
 
 
+def test_it_tells_what_goes_over_the_box_file(tmp_path: Path, said: list[str]) -> None:
+    assert not opened(tmp_path, said, mirror=True, brightness=0.5).overrides()
+    keep(tmp_path, said, PINNED)
+    corners, mirror, brightness = opened(tmp_path, said).overrides()
+    assert "corners" in corners and "is mirrored" in mirror
+    assert "is 0.8," in brightness and "box file's 1." in brightness
+    assert len(opened(tmp_path, said, brightness=1.5).overrides()) == 2
+
+
 @pytest.mark.parametrize(
     "text",
     [

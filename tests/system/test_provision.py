@@ -117,7 +117,7 @@ def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: P
                 "sensors", "revoke", "left-wrist", "--box", box_file(box)
             )
             assert listed(box) == {}
-            assert "but not left-wrist of this show: the dancer moves freely there" in box.words
+            box.await_words("but not left-wrist of this show: the dancer moves freely there")
             until = time.monotonic() + PATIENCE_S
             while spare.state == State.LINKED:
                 assert time.monotonic() < until
