@@ -11,10 +11,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 
-from appliance.control.lifeline import PARENT
+from appliance.control.lifeline import PARENT, TOLD
 
 SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0
-UNAVAILABLE = 69  # sysexits.h: what it needs is not on this machine, and starting it again brings nothing
+UNAVAILABLE = 69  # sysexits.h: what it needs is not here, or not yet: a projector is switched on late
+RETRY_S = 10.0
 _LIVED_S = 10.0  # whoever lived so long begins with the shortest pause again
 _SAID = 3  # deaths in a row that are told one by one
 _MOST_DOUBLINGS = 10  # of the pause: beyond it is the longest one anyway
@@ -89,6 +90,7 @@ class _Running:
         self._started_at = 0.0
         self._starts_at = 0.0
         self._deaths = 0
+        self._told: int | None = None
         self._is_over = False
 
     def look(self, now: float) -> None:
@@ -118,12 +120,16 @@ class _Running:
             self._process = subprocess.Popen(
                 self._companion.command,
                 stdin=subprocess.DEVNULL,
-                env={**os.environ, PARENT: str(os.getpid())},
+                env=self._environment(),
                 pass_fds=self._companion.descriptors,
                 start_new_session=True,  # Ctrl-C is for the box, which then ends them
             )
         except OSError as error:
             self._again(f"cannot be started ({error.strerror})", now)
+
+    def _environment(self) -> dict[str, str]:
+        told = {} if self._told is None else {TOLD: str(self._told)}
+        return {**os.environ, PARENT: str(os.getpid()), **told}
 
     def _note(self, status: int, now: float) -> None:
         companion = self._companion
@@ -131,14 +137,20 @@ class _Running:
             self._is_over = True
             self._say(f"{companion.name} was closed. The dance goes on.")
         elif status == UNAVAILABLE:
-            self._is_over = True
-            self._say(f"{companion.name} cannot run on this machine. The dance goes on without.")
+            if self._told is None:
+                self._say(
+                    f"{companion.name} cannot run now. The dance goes on without, and it is tried again "
+                    f"each {RETRY_S:g} s."
+                )
+            self._told = status
+            self._starts_at = now + RETRY_S
         elif status < 0:
             self._again(f"was killed (signal {-status})", now)
         else:
             self._again(f"ended by itself (status {status})", now)
 
     def _again(self, what: str, now: float) -> None:
+        self._told = None
         self._deaths = 1 if now - self._started_at > _LIVED_S else self._deaths + 1
         doublings = min(self._deaths - 1, _MOST_DOUBLINGS)
         self._starts_at = now + min(SHORTEST_PAUSE_S * 2**doublings, LONGEST_PAUSE_S)

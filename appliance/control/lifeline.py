@@ -8,6 +8,7 @@ import signal
 import sys
 
 PARENT = "BUNRAKU_PARENT"  # in the environment: the process to end with
+TOLD = "BUNRAKU_TOLD"  # in the environment: the exit status before this try, whose reason people have read
 _PR_SET_PDEATHSIG = 1
 
 
@@ -19,3 +20,8 @@ def hold_lifeline() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
     if os.getppid() != int(parent):  # it ended while this one started
         sys.exit(0)
+
+
+def was_told(status: int) -> bool:
+    """Whether the try before this one ended with the same status, and said why."""
+    return os.environ.get(TOLD) == str(status)

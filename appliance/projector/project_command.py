@@ -8,6 +8,7 @@ from pathlib import Path
 
 import typer
 
+from appliance.control.lifeline import was_told
 from appliance.control.speaker import Speaker
 from appliance.projector.projector_error import ProjectorError
 from appliance.projector.run import Run, Wish
@@ -49,7 +50,8 @@ def project_show(box_file: Path | None, wish: Wish) -> int:
         finally:
             run.close()
     except ProjectorError as error:
-        print(f"bunraku: {error}", file=sys.stderr)
+        if not was_told(error.status):
+            print(f"bunraku: {error}", file=sys.stderr)
         return error.status
     finally:
         speaker.close()

@@ -117,13 +117,21 @@ def test_one_that_a_person_has_closed_stays_closed(diary: Diary) -> None:
     assert said == ["The child was closed. The dance goes on."]
 
 
-def test_one_that_this_machine_cannot_run_is_not_tried_again(diary: Diary) -> None:
+def test_what_it_needs_may_come_late(diary: Diary, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(companions, "RETRY_S", 0.1)
     said: list[str] = []
-    with Companions([diary.child(f"sys.exit({UNAVAILABLE})")], said.append, lambda: True):
-        until(lambda: bool(said))
-        time.sleep(0.5)
-    assert len(diary.pids) == 1
-    assert "cannot run on this machine. The dance goes on without." in said[0]
+    display, told, shows = tmp_path / "display", tmp_path / "told", tmp_path / "shows"
+    waits = "from appliance.control.lifeline import was_told; "
+    waits += f"open({str(told)!r}, 'a').write(f'{{was_told({UNAVAILABLE}):d}}'); "
+    waits += f"os.path.exists({str(display)!r}) or sys.exit({UNAVAILABLE}); "
+    waits += f"open({str(shows)!r}, 'w').close(); time.sleep(60)"
+    with Companions([diary.child(waits)], said.append, lambda: True):
+        until(lambda: len(diary.pids) >= 3)
+        display.touch()
+        until(lambda: shows.exists())
+    assert said == ["The child cannot run now. The dance goes on without, and it is tried again each 0.1 s."]
+    assert told.read_text() == "0" + "1" * (len(diary.pids) - 1)  # it gives its reasons once
+    assert is_gone(diary.pids[-1])
 
 
 def test_what_cannot_be_started_is_said_and_tried_again() -> None:
