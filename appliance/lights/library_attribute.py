@@ -47,7 +47,7 @@ class Meaning:
 def meaning_of(key: str, channel: Json, fixture: Json) -> Meaning:
     """What the channel of this key does in the first place."""
     largest = _largest(channel)
-    capabilities = [_in_bytes(capability, largest) for capability in _capabilities(channel)]
+    capabilities = [_in_bytes(capability, largest) for capability in capabilities_of(channel)]
     kind = _leading_kind(capabilities)
     if kind is None:
         return Meaning(UNUSED)
@@ -71,7 +71,8 @@ def meaning_of(key: str, channel: Json, fixture: Json) -> Meaning:
     return Meaning(name, special)
 
 
-def _capabilities(channel: Json) -> Sequence[Json]:
+def capabilities_of(channel: Json) -> Sequence[Json]:
+    """What a channel does in parts of its range, or all along."""
     return channel.get("capabilities") or [channel["capability"]]
 
 

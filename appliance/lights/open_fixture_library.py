@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
-from appliance.lights.library_attribute import meaning_of
+from appliance.lights.library_attribute import capabilities_of, meaning_of
 from appliance.show.fixture_profile import DIMMER, FINE, MAX_CHANNELS, UNUSED
 
 Json = Mapping[str, Any]
@@ -225,7 +225,7 @@ def _as_people_sort(word: str) -> list[tuple[int, int, str]]:
 
 def _by_default(channel: Json) -> list[Json]:
     """Its capabilities, the one at its default value first."""
-    capabilities = list(channel.get("capabilities") or [channel["capability"]])
+    capabilities = list(capabilities_of(channel))
     default = channel.get("defaultValue", 0)
     if not isinstance(default, int):
         return capabilities

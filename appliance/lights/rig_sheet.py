@@ -12,7 +12,7 @@ from appliance.control.house import House
 from appliance.lights.patch import Patch
 from appliance.lights.plan import draw_plan
 from appliance.lights.rig import Rig
-from appliance.lights.run import say
+from appliance.lights.run import rig_problems, say
 from appliance.outputs.frame_reader import SeenFrame
 from appliance.pose.bvh import read_bvh
 from appliance.pose.filmstrip import MissingPicturesError
@@ -22,7 +22,7 @@ from appliance.show.bundle import default_show_path
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.lights import FixtureConfig, LightsConfig, channel_count
 from appliance.show.show import Show, load_show
-from appliance.show.venue_rig import at_venue, misplaced, unwired
+from appliance.show.venue_rig import at_venue, unwired
 
 _PASS_S = 0.02
 _SETTLING_PASSES = 250  # five seconds: every head has arrived
@@ -33,15 +33,13 @@ def print_rig(
 ) -> None:
     """Print the table and draw the picture. Raises ConfigError for a rig that cannot hang like this."""
     show, box = load_show(directory or default_show_path()), load_box(box_file)
-    problems = misplaced(show, box, box_file)
+    problems = rig_problems(show, box, box_file)
     names = [one.name for one in show.config.lights.mappings]
     if mapping is not None and mapping not in names:
         line = show.file.line(("lights", "mappings"))
         problems.append(
             Problem(show.file.path, line, f"There is no mapping '{mapping}'.", did_you_mean(mapping, names))
         )
-    if not show.config.lights.fixtures:
-        problems.append(Problem(show.file.path, 0, "The show has no fixtures.", "Add them under lights:."))
     if problems:
         raise ConfigError(problems)
     config = at_venue(show.config.lights, box.lights)

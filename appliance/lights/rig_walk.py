@@ -55,12 +55,11 @@ def _require_known(show: Show, fixtures: list[str], attribute: str | None) -> No
     """Refuse names that the rig does not have."""
     rig = show.config.lights.fixtures
     names = [fixture.name for fixture in rig]
+    line = show.file.line(("lights", "fixtures"))
     problems = [
-        Problem(
-            show.file.path, show.file.line(("lights", "fixtures")), f"There is no fixture '{name}'.", cure
-        )
+        Problem(show.file.path, line, f"There is no fixture '{name}'.", did_you_mean(name, names))
         for name in fixtures
-        if name not in names and (cure := did_you_mean(name, names))
+        if name not in names
     ]
     words = sorted({word for fixture in rig for word in drivable(fixture, show.directory)})
     if attribute is not None and attribute not in words:

@@ -124,19 +124,18 @@ class Lights:
             self._troubles[name] = trouble
 
 
-def rig_here(show: Show, box: BoxConfig, box_file: Path | None) -> LightsConfig:
-    """A show's lights as they hang in this venue; raises ConfigError when there is nothing to light."""
+def rig_problems(show: Show, box: BoxConfig, box_file: Path | None) -> list[Problem]:
+    """Why a show's lights cannot hang in this venue."""
     problems = misplaced(show, box, box_file)
     if not show.config.lights.fixtures:
-        problems.append(
-            Problem(
-                show.file.path,
-                0,
-                "The show has no fixtures.",
-                "Add them under lights: (docs/lights.md tells how).",
-            )
-        )
-    if problems:
+        cure = "Add them under lights: (docs/lights.md tells how)."
+        problems.append(Problem(show.file.path, 0, "The show has no fixtures.", cure))
+    return problems
+
+
+def rig_here(show: Show, box: BoxConfig, box_file: Path | None) -> LightsConfig:
+    """A show's lights as they hang in this venue; raises ConfigError when there is nothing to light."""
+    if problems := rig_problems(show, box, box_file):
         raise ConfigError(problems)
     return at_venue(show.config.lights, box.lights)
 

@@ -90,9 +90,11 @@ class Walk:
         return max([at_least_s, *needed_s])
 
     def _moved(self, step: Step, part: float) -> float:
-        rest = 0.0 if step.attribute == DIMMER else float(self._patch.defaults[step.place])
+        """From where it rests to one end, to the other, and back."""
         if self._patch.slots[step.place].base in (PAN, TILT):
-            return float(np.interp(part, (0.0, 0.25, 0.75, 1.0), (0.5, 0.0, 1.0, 0.5)))
+            rest = 0.5
+        else:
+            rest = 0.0 if step.attribute == DIMMER else float(self._patch.defaults[step.place])
         return float(np.interp(part, (0.0, 0.25, 0.75, 1.0), (rest, 0.0, 1.0, rest)))
 
     def _alone(self, step: Step, values: Values) -> None:

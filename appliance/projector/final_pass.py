@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -13,12 +12,12 @@ from numpy.typing import NDArray
 from appliance.projector.controls import Controls
 from appliance.projector.corners import homography
 from appliance.projector.page import page
-from appliance.projector.picture.tally import Figures, Tally, Use
+from appliance.projector.picture.drawing import Drawing
+from appliance.projector.picture.tally import Figures, Tally
 from appliance.projector.picture.wall import FLAT, Wall, flat
 from appliance.projector.window import Size
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 
-_SHADERS = resources.files("appliance.projector") / "shaders"
 _NO_SIZE = (1, 1)  # of a picture that nothing goes through
 _MARKER_RADIUS = 28.0  # pixels
 _TEXT_ROWS = 160  # letters are as large as if the display had so many rows of pixels
@@ -60,8 +59,10 @@ class FinalPass:
         self._part = part_of(config.edge_blend)
         fixed = ["GAMMA"] * (config.gamma != 1.0) + ["BLEND"] * (config.edge_blend is not None)
         self._is_graded = False  # whether the picture has its brightness and gamma already
-        self._unchanged = _Program(gl, [])
-        self._dimmed, self._marked = (_Program(gl, [*fixed, "DIM", *marks]) for marks in ((), ("MARKS",)))
+        self._unchanged, self._dimmed, self._marked = (
+            Drawing(gl, "final", "final", parts=parts)
+            for parts in ([], [*fixed, "DIM"], [*fixed, "DIM", "MARKS"])
+        )
         self._tally = Tally()
         self._text = gl.texture((1, 1), 1)
         self._written: tuple[object, ...] = ()
@@ -115,19 +116,20 @@ class FinalPass:
         if scale == 0.0 and not has_marks:
             return
         self._gl.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        program = self._marked if has_marks else self._dimmed
-        if self._is_graded:
-            program = self._unchanged
-        else:
-            self._light(program, scale)
-        program.set("part", (self._part.begin, self._part.width))
+        inputs = {
+            "picture": self._texture,
+            "part": (self._part.begin, self._part.width),
+            **self._light(scale),
+        }
+        pixels = display[0] * display[1]
         if has_marks:
-            self._place(program, display, controls)
-            self._mark(program, lines, display, controls)
+            inputs |= self._place(display, controls) | self._mark(lines, display, controls)
+            self._marked.draw(self._tally, pixels, inputs)
         else:
-            program.set("clip_from_part", tuple(self._clip_from_part(controls).T.ravel()))  # by columns
-        program.draw(self._texture)
-        self._put_down(program, display)
+            inputs["clip_from_part"] = self._clip_from_part(controls)
+            drawing = self._unchanged if self._is_graded else self._dimmed
+            drawing.draw(self._tally, pixels, inputs, moderngl.TRIANGLE_STRIP, 4)
+        self._tally.move(4 * pixels)
 
     def figures(self) -> Figures:
         """What the last step of the last picture took; nothing where a look did it itself."""
@@ -154,27 +156,33 @@ class FinalPass:
         flipped[:2, 2] = across, upside_down
         return np.asarray(_CLIP_FROM_DISPLAY @ flipped @ homography(controls.alignment.corners))
 
-    def _place(self, program: _Program, display: Size, controls: Controls) -> None:
+    def _place(self, display: Size, controls: Controls) -> dict[str, Any]:
+        """Where the picture lies on the display."""
         width, height = display
         alignment, upside_down = controls.alignment, self._config.upside_down
         wall_from_picture = np.diag([width, height, 1.0]) @ homography(alignment.corners)
-        picture_from_wall = np.linalg.inv(wall_from_picture)
-        program.set("display", (float(width), float(height)))
-        program.set("flips", (float(alignment.mirror != upside_down), float(upside_down)))
-        program.set("picture_from_wall", tuple(picture_from_wall.T.ravel()))  # column by column
+        return {
+            "display": (float(width), float(height)),
+            "flips": (float(alignment.mirror != upside_down), float(upside_down)),
+            "picture_from_wall": np.linalg.inv(wall_from_picture),
+        }
 
-    def _light(self, program: _Program, scale: float) -> None:
+    def _light(self, scale: float) -> dict[str, Any]:
+        """Brightness, gamma and edge blend, as far as the picture does not have them already."""
+        if self._is_graded:
+            return {}
+        self._pictures += 1
+        inputs: dict[str, Any] = {
+            "scale": scale,
+            "inverse_gamma": 1.0 / self._config.gamma,
+            "seed": (self._pictures % 64 * _DITHER_STEP, self._pictures % 61 * _DITHER_STEP),
+        }
         blend = self._config.edge_blend
         if blend is not None:
-            side = -1.0 if blend.part == "left" else 1.0
-            program.set("blend", (side, blend.overlap, 1.0 / blend.gamma))
-        if self._config.gamma != 1.0:
-            program.set("inverse_gamma", 1.0 / self._config.gamma)
-        program.set("scale", scale)
-        self._pictures += 1
-        program.set("seed", (self._pictures % 64 * _DITHER_STEP, self._pictures % 61 * _DITHER_STEP))
+            inputs["blend"] = (-1.0 if blend.part == "left" else 1.0, blend.overlap, 1.0 / blend.gamma)
+        return inputs
 
-    def _mark(self, program: _Program, lines: tuple[str, ...], display: Size, controls: Controls) -> None:
+    def _mark(self, lines: tuple[str, ...], display: Size, controls: Controls) -> dict[str, Any]:
         """Grid, chosen corner, figures and numbers."""
         text_scale = max(1, display[1] // _TEXT_ROWS)
         corners = controls.alignment.corners if controls.shows_grid else None
@@ -187,20 +195,16 @@ class FinalPass:
             self._text = self._gl.texture((image.shape[1], image.shape[0]), 1, image.tobytes(), alignment=1)
             self._text.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self._written = written
-        self._text.use(1)
         width, height = picture_size(self._config, display)
         x, y = controls.alignment.corners[controls.corner or 0]
         radius = 0.0 if controls.corner is None else _MARKER_RADIUS
-        program.set("text", 1)
-        program.set("text_scale", float(text_scale))
-        program.set("aspect", width / height)
-        program.set("grid", float(controls.shows_grid))
-        program.set("marker", (x * display[0], y * display[1], radius))
-
-    def _put_down(self, program: _Program, display: Size) -> None:
-        pixels, (width, height) = display[0] * display[1], self.picture.size
-        self._tally.put_down(Use("laid", program.name, 4, 2, pixels))
-        self._tally.move(4 * pixels + 4 * width * height * self._part.width)
+        return {
+            "text": self._text,
+            "text_scale": float(text_scale),
+            "aspect": width / height,
+            "grid": float(controls.shows_grid),
+            "marker": (x * display[0], y * display[1], radius),
+        }
 
     def _target(self, size: Size) -> tuple[moderngl.Texture, moderngl.Framebuffer]:
         texture = self._gl.texture(size, 4)
@@ -211,36 +215,3 @@ class FinalPass:
     def _forget_picture(self) -> None:
         self.picture.release()
         self._texture.release()
-
-
-class _Program:
-    """A final shader with some of its parts: what is not asked for would cost time on a small computer."""
-
-    def __init__(self, gl: moderngl.Context, parts: Sequence[str]) -> None:
-        self.name = " ".join(["final", *parts])
-        self._corners = 3 if "MARKS" in parts else 4
-        self._program = gl.program(
-            vertex_shader=_with(parts, "final.vert"), fragment_shader=_with(parts, "final.frag")
-        )
-        self._sheet = gl.vertex_array(self._program, [])
-
-    def set(self, name: str, value: object) -> None:
-        """The value of a uniform."""
-        uniform = self._program[name]
-        assert isinstance(uniform, moderngl.Uniform)
-        uniform.value = value
-
-    def draw(self, picture: moderngl.Texture) -> None:
-        """Lay it onto the display."""
-        picture.use(0)
-        self._sheet.render(moderngl.TRIANGLE_STRIP, vertices=self._corners)
-
-    def release(self) -> None:
-        self._sheet.release()
-        self._program.release()
-
-
-def _with(parts: Sequence[str], name: str) -> str:
-    """A shader's text with these parts switched on."""
-    version, _, source = (_SHADERS / f"{name}.glsl").read_text().partition("\n")
-    return f"{version}\n" + "".join(f"#define {part}\n" for part in parts) + source

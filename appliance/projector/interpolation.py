@@ -9,10 +9,9 @@ import numpy as np
 
 from appliance.outputs.frame_reader import FrameReader, SeenFrame
 from appliance.pose import quaternion
-from appliance.projector.moment import Floats, Moment
+from appliance.projector.moment import TRAIL_S, Floats, Moment
 
 TICK_S = 0.02
-TRAIL_S = 1.2
 _KEPT = 64  # frames: the ring of the shared frame, a little more than the trail
 _READ_AT_ONCE = 3  # a display of 25 Hz or more misses none; after a gap all of them are read
 _LONGEST_GAP_S = 0.1  # nobody knows where the dancer was in a longer one: the later pose simply follows

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
+TRAIL_S = 1.2  # what a look may show of the past
 
 
 @dataclass(slots=True)
@@ -17,7 +18,7 @@ class Moment:
 
     time_s: the dance's time of this picture, monotonic seconds (at least a tick behind the clock);
     positions: (J, 3); world: (J, 4) unit quaternions w, x, y, z, both interpolated to time_s;
-    trail: (positions, world) at the ticks of the last 1.2 s up to time_s, newest last, never empty;
+    trail: (positions, world) at the ticks of the last TRAIL_S up to time_s, newest last, never empty;
     trail_times: when each of these was, seconds, same clock as time_s, ascending, none later than time_s;
     held: joints that hands of this show hold.
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import signal
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import typer
 
 from appliance.control.lifeline import was_told
 from appliance.control.speaker import Speaker
+from appliance.control.stop_signals import stop_signals
 from appliance.projector.projector_error import ProjectorError
 from appliance.projector.run import Run, Wish
 from appliance.projector.window import Kind, Size
@@ -37,24 +38,16 @@ def wish(
 
 def project_show(box_file: Path | None, wish: Wish) -> int:
     """0: ended as asked; 69: no display or no OpenGL; 73: no room for --frames; 75: reset or hung."""
-    stopped: list[int] = []
-    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, lambda came, _: stopped.append(came))
-    speaker = Speaker()
-    try:
-        run = Run(load_box(box_file), box_file, wish, speaker.say)
+    with stop_signals() as stopped, closing(Speaker()) as speaker:
         try:
-            for line in run.introduction():
-                speaker.say(line)
-            speaker.say(f"Shown: {run.project(lambda: bool(stopped)).sentence()}.")
-        finally:
-            run.close()
-    except ProjectorError as error:
-        if not was_told(error.status):
-            print(f"bunraku: {error}", file=sys.stderr)
-        return error.status
-    finally:
-        speaker.close()
+            with closing(Run(load_box(box_file), box_file, wish, speaker.say)) as run:
+                for line in run.introduction():
+                    speaker.say(line)
+                speaker.say(f"Shown: {run.project(stopped).sentence()}.")
+        except ProjectorError as error:
+            if not was_told(error.status):
+                print(f"bunraku: {error}", file=sys.stderr)
+            return error.status
     return 0
 
 

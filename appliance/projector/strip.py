@@ -6,21 +6,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.context import offscreen
 from appliance.projector.moment import Moment
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
+from appliance.projector.still import FINER, Image, drawn, moment_of, shrunk
 from appliance.show.look import LookConfig
 
 COLUMNS, ROWS = 5, 2
 PICTURE = (320, 400)  # pixels of one instant
-FINER = 2  # pictures are drawn so many times larger and then shrunk: edges as smooth as on a wall
 VIGNETTE = 0.0  # pictures side by side need no black around them
-TRAIL_S = 1.2  # what a look may show of the past
 COLOURS = 256  # in the file: 160 kB instead of 800, and no more than 2 of 255 off
 
 
@@ -39,30 +38,14 @@ def strip(
     poses: (N, J, 4) local rotations; roots: (N, 3) metres; held: joints that hands hold.
     Raises ProjectorError where nothing can be drawn here, OSError where `out` cannot be written.
     """
-    positions, world = skeleton.forward_kinematics(
-        np.asarray(poses, dtype=np.float32), np.asarray(roots, dtype=np.float32)
-    )
-    chosen = np.unique(np.linspace(0, len(positions) - 1, COLUMNS * ROWS + 1)[1:].round().astype(int))
-    moments = [_moment(positions, world, int(last), fps, held) for last in chosen]
+    recording = Recording(skeleton, poses, roots, fps)
+    chosen = np.unique(np.linspace(0, len(recording) - 1, COLUMNS * ROWS + 1)[1:].round().astype(int))
+    moments = [moment_of(recording, last / fps, held) for last in chosen.tolist()]
     pictures = list(_drawn(skeleton, {name: _framed(one) for name, one in looks.items()}, look, moments))
     pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % COLUMNS)
     rows = [np.hstack(pictures[at : at + COLUMNS]) for at in range(0, len(pictures), COLUMNS)]
     _save(out, np.vstack(rows))
     return out
-
-
-def _moment(positions: Array, world: Array, last: int, fps: float, held: Sequence[int]) -> Moment:
-    """The dance at one pose of the recording, with what came before it."""
-    first = max(0, last - round(TRAIL_S * fps))
-    past = range(first, last + 1)
-    return Moment(
-        time_s=last / fps,
-        positions=positions[last],
-        world=world[last],
-        trail=[(positions[number], world[number]) for number in past],
-        trail_times=[number / fps for number in past],
-        held=tuple(held),
-    )
 
 
 def _framed(look: LookConfig) -> LookConfig:
@@ -74,27 +57,23 @@ def _framed(look: LookConfig) -> LookConfig:
 
 def _drawn(
     skeleton: Skeleton, looks: Mapping[str, LookConfig], look: str, moments: Sequence[Moment]
-) -> Iterator[NDArray[np.uint8]]:
+) -> Iterator[Image]:
     """Pictures (height, width, 3), top row first."""
-    (width, height), size = PICTURE, (FINER * PICTURE[0], FINER * PICTURE[1])
+    size = FINER * PICTURE[0], FINER * PICTURE[1]
     with offscreen(size) as gl:
         renderer = Renderer(gl, size, skeleton, looks)
-        target = gl.framebuffer([gl.texture(size, 4)])
         for moment in moments:
-            renderer.draw(moment, look, look, 1.0, target)
-            pixels = np.frombuffer(target.read(components=4), np.uint8)
-            fine = pixels.reshape(height, FINER, width, FINER, 4)[::-1, ..., :3]
-            yield fine.mean(axis=(1, 3)).round().astype(np.uint8)
+            yield shrunk(drawn(gl, renderer, moment, look, size))
         renderer.release()
 
 
-def _save(out: Path, picture: NDArray[np.uint8]) -> None:
+def _save(out: Path, picture: Image) -> None:
     try:
-        from PIL import Image
+        from PIL import Image as Files
     except ImportError as error:
         raise ProjectorError(
             f"Pictures need Pillow ({error}). Install it: pip install 'bunraku[pictures]'.", NO_DISPLAY
         ) from error
     out.parent.mkdir(parents=True, exist_ok=True)
-    few = Image.fromarray(picture).quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, kmeans=2)
+    few = Files.fromarray(picture).quantize(COLOURS, method=Files.Quantize.MAXCOVERAGE, kmeans=2)
     few.save(out, optimize=True)

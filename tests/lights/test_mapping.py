@@ -211,7 +211,8 @@ def test_heads_that_no_rule_moves_stay_where_they_are() -> None:
     np.testing.assert_allclose(made.patch.heads.angles, before)
 
 
-def test_one_mapping_fades_into_the_next() -> None:
+def dark_then_bright() -> Rig:
+    """A lamp that is dark in the first mapping, which is in force, and bright in the second."""
     config = lights(
         [PAR],
         {"reads": "steady", "drives": "dimmer", "value": 0.0},
@@ -219,6 +220,11 @@ def test_one_mapping_fades_into_the_next() -> None:
     )
     made = rig(config)
     still(made)
+    return made
+
+
+def test_one_mapping_fades_into_the_next() -> None:
+    made = dark_then_bright()
     house = House(lights="second", lights_before="first", lights_since=0.02, lights_fade_s=1.0)
     shown = [level[DIMMER] / 255 for level in levels(made, *[(0, 1, 0)] * 60, house=house, first=2)]
     assert shown[24] == pytest.approx(0.5, abs=0.02)
@@ -227,13 +233,7 @@ def test_one_mapping_fades_into_the_next() -> None:
 
 
 def test_a_mapping_called_in_the_middle_of_a_fade_starts_from_what_is_seen() -> None:
-    config = lights(
-        [PAR],
-        {"reads": "steady", "drives": "dimmer", "value": 0.0},
-        second=[{"reads": "steady", "drives": "dimmer", "value": 1.0}],
-    )
-    made = rig(config)
-    still(made)
+    made = dark_then_bright()
     to_second = House().with_lights("second", 0.02, 1.0)
     shown = levels(made, *[(0, 1, 0)] * 20, house=to_second, first=2)
     back = to_second.with_lights("first", 0.42, 1.0)

@@ -20,8 +20,8 @@ from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.context import offscreen
-from appliance.projector.gallery import drawn, moment_of
 from appliance.projector.picture.renderer import Renderer
+from appliance.projector.still import drawn, moment_of
 from appliance.show.bundle import default_show_path
 from appliance.show.look import STYLES, LookConfig, looks_by_name
 

@@ -13,8 +13,8 @@ from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.context import offscreen
-from appliance.projector.gallery import drawn, moment_of
 from appliance.projector.picture.renderer import Renderer
+from appliance.projector.still import drawn, moment_of
 from appliance.show.look import STYLES, LookConfig
 from tests.projector.golden_looks import (
     AT_S,

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from appliance.pose.recording import Recording
-from appliance.projector.gallery import moment_of
 from appliance.projector.moment import Moment
 from appliance.projector.picture.camera import View, view
 from appliance.projector.picture.poses import poses_of
+from appliance.projector.still import moment_of
 from appliance.show.look import CameraConfig
 from tests.projector.golden_looks import phrase
 

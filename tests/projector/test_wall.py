@@ -13,9 +13,9 @@ from appliance.projector.alignment import Alignment
 from appliance.projector.context import offscreen
 from appliance.projector.controls import Controls
 from appliance.projector.final_pass import FinalPass, picture_size
-from appliance.projector.gallery import moment_of
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.resolution import SHARES
+from appliance.projector.still import moment_of
 from appliance.show.look import STYLES
 from appliance.show.projector import ProjectorConfig
 from tests.projector.golden_looks import AT_S, P99_LIMIT, SIZE, difference, phrase, renderer

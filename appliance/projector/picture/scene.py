@@ -38,7 +38,6 @@ class Scene:
     view: View
     poses: Poses
     aspect: float
-    held: tuple[int, ...] = ()
 
     @cached_property
     def inputs(self) -> dict[str, Any]:

@@ -57,6 +57,7 @@ _FRAGMENT = {
 _VERTEX = {
     "screen": (8, 0),
     "laid": (20, 0),
+    "final": (20, 0),
     "air": (20, 0),
     "body": (130, 5),
     "cast": (110, 5),

@@ -1,7 +1,4 @@
-#version 300 es
 // The picture onto the wall: corner-pin, mirror; GAMMA, BLEND for edge blend, DIM for brightness, MARKS.
-precision highp float;
-precision highp sampler2D;
 
 uniform sampler2D picture;         // what the looks have drawn; with edge blend wider than this display
 uniform vec2 part;                 // where this part begins in the picture, and how wide it is

@@ -1,7 +1,5 @@
-#version 300 es
 // The picture's four corners on the wall: its perspective is the vertices' w, so that pixels need no division.
 // With MARKS one triangle that covers the display: text and rings may lie beside the picture.
-precision highp float;
 
 #ifdef MARKS
 void main() {

@@ -1,0 +1,57 @@
+"""Stills: one instant of a recording drawn offscreen, as the projector would show it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pose.recording import Recording
+from appliance.projector.moment import TRAIL_S, Moment
+from appliance.projector.picture.renderer import Renderer
+
+FINER = 2  # drawn so many times larger and then shrunk, as a projector's pixels melt on the wall
+
+Image = NDArray[np.uint8]
+
+
+def moment_of(recording: Recording, time_s: float, held: Sequence[int] = ()) -> Moment:
+    """The dance of a recording at one time, with what came before it; held: joints that hands hold."""
+    last = min(round(time_s * recording.fps), len(recording) - 1)
+    first = max(0, last - round(TRAIL_S * recording.fps))
+    positions, world = recording.skeleton.forward_kinematics(
+        recording.poses[first : last + 1].astype(np.float32),
+        recording.roots[first : last + 1].astype(np.float32),
+    )
+    return Moment(
+        time_s=last / recording.fps,
+        positions=positions[-1],
+        world=world[-1],
+        trail=list(zip(positions, world, strict=True)),
+        trail_times=[index / recording.fps for index in range(first, last + 1)],
+        held=tuple(held),
+    )
+
+
+def drawn(
+    ctx: moderngl.Context, renderer: Renderer, moment: Moment, look: str, size: tuple[int, int]
+) -> Image:
+    """One look of a moment as an image (height, width, 3), the upper row first."""
+    target = ctx.framebuffer([ctx.texture(size, 4)])
+    try:
+        target.clear()
+        renderer.draw(moment, look, look, 1.0, target)
+        pixels = np.frombuffer(target.read(components=4), np.uint8).reshape(size[1], size[0], 4)
+    finally:
+        target.color_attachments[0].release()
+        target.release()
+    return pixels[::-1, :, :3].copy()
+
+
+def shrunk(image: Image) -> Image:
+    """An image drawn FINER times as large as it is wanted: each pixel the mean of those in its place."""
+    height, width = image.shape[0] // FINER, image.shape[1] // FINER
+    fine = image.reshape(height, FINER, width, FINER, 3)
+    return np.asarray(fine.mean(axis=(1, 3)).round(), np.uint8)
