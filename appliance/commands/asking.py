@@ -6,7 +6,8 @@ import contextlib
 import math
 import socket
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -68,28 +69,35 @@ class RunningBox:
 
     def ask(self, address: str, *arguments: str) -> Answer:
         """Have one command carried out. Raises NoBoxError."""
-        for reply in self._replies((address, *arguments)):
-            if reply.address == REPLY and len(reply.params) == 3 and reply.params[0] == address:
-                return Answer(bool(reply.params[1]), readable(str(reply.params[2])))
+        with closing(self._replies((address, *arguments))) as replies:
+            for reply in replies:
+                if reply.address == REPLY and len(reply.params) == 3 and reply.params[0] == address:
+                    return Answer(bool(reply.params[1]), readable(str(reply.params[2])))
         raise self._nobody()
 
     def roll(self) -> Roll:
         """How all its sensors are. Raises NoBoxError."""
         lines: list[RosterLine] = []
-        for reply in self._replies(("/sensors/list",)):
-            if reply.address == SENSOR and _is_made_of(_LINE, reply.params):
-                lines.append(RosterLine(*(_shown(value) for value in reply.params)))
-            elif (
-                reply.address == END and _is_made_of(_ENDING, reply.params) and reply.params[0] == len(lines)
-            ):
-                _, age_s, key_file = reply.params
-                return Roll(lines, float(age_s), Path(_shown(key_file)) if key_file else None)
-            elif reply.address == REPLY and reply.params[:2] == ["/sensors/list", 0]:
-                raise NoBoxError(readable(str(reply.params[-1])))
+        with closing(self._replies(("/sensors/list",))) as replies:
+            for reply in replies:
+                if reply.address == SENSOR and _is_made_of(_LINE, reply.params):
+                    lines.append(RosterLine(*(_shown(value) for value in reply.params)))
+                elif (
+                    reply.address == END
+                    and _is_made_of(_ENDING, reply.params)
+                    and reply.params[0] == len(lines)
+                ):
+                    _, age_s, key_file = reply.params
+                    return Roll(lines, float(age_s), Path(_shown(key_file)) if key_file else None)
+                elif reply.address == REPLY and reply.params[:2] == ["/sensors/list", 0]:
+                    raise NoBoxError(readable(str(reply.params[-1])))
         raise self._nobody()
 
-    def _replies(self, message: Message) -> Iterator[OscMessage]:
-        """What the box sends back, until patience ends; nothing when no port is open there."""
+    def _replies(self, message: Message) -> Generator[OscMessage, None, None]:
+        """What the box sends back, until patience ends; nothing when no port is open there.
+
+        To be closed by whoever asks: what is left to the collector would swallow a Ctrl-C in its closing.
+        """
         if self._control is None:
             return
         until = time.monotonic() + self._patience_s
