@@ -7,7 +7,6 @@ import math
 import socket
 import time
 from collections.abc import Generator, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -69,7 +68,7 @@ class RunningBox:
 
     def ask(self, address: str, *arguments: str) -> Answer:
         """Have one command carried out. Raises NoBoxError."""
-        with closing(self._replies((address, *arguments))) as replies:
+        with contextlib.closing(self._replies((address, *arguments))) as replies:
             for reply in replies:
                 if reply.address == REPLY and len(reply.params) == 3 and reply.params[0] == address:
                     return Answer(bool(reply.params[1]), readable(str(reply.params[2])))
@@ -78,7 +77,7 @@ class RunningBox:
     def roll(self) -> Roll:
         """How all its sensors are. Raises NoBoxError."""
         lines: list[RosterLine] = []
-        with closing(self._replies(("/sensors/list",))) as replies:
+        with contextlib.closing(self._replies(("/sensors/list",))) as replies:
             for reply in replies:
                 if reply.address == SENSOR and _is_made_of(_LINE, reply.params):
                     lines.append(RosterLine(*(_shown(value) for value in reply.params)))

@@ -76,7 +76,7 @@ class Box:
         self.end(signal.SIGKILL)
         self.receiver.poll()
         with self.words_file.open("ab") as words:
-            self.process = _start(self.command, words)
+            self.process = started(self.command, words)
 
     def end(self, number: int = signal.SIGTERM) -> int:
         """Send a signal and give the exit status."""
@@ -109,7 +109,7 @@ def playing(
             box[section] = {**box.get(section, {}), **values} if section in ("sensors", "outputs") else values
         (folder / "box.yaml").write_text(yaml.safe_dump(box))
         full = [*command, "--show", str(show), "--box", str(folder / "box.yaml"), *arguments]
-        process = _start(full, words)
+        process = started(full, words)
         running = Box(process, receiver, sensors, control, keys, folder / "words.txt", full)
         try:
             yield running
@@ -118,7 +118,8 @@ def playing(
             running.process.wait()
 
 
-def _start(command: Sequence[str], words: IO[bytes]) -> subprocess.Popen[bytes]:
+def started(command: Sequence[str], words: IO[bytes] | int) -> subprocess.Popen[bytes]:
+    """A process whose words go into this file or terminal at once."""
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,

@@ -9,10 +9,7 @@ import select
 import subprocess
 import sys
 import termios
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +22,7 @@ from hw_sim.firmware_library import State
 from tests.stage.bundles import write_show
 from tests.system.bench import NETWORK, PASSWORD, Bench
 from tests.system.box import PATIENCE_S, Box, playing
+from tests.system.snoop import Snoop
 
 pytestmark = pytest.mark.realtime
 
@@ -239,38 +237,6 @@ def read_until(master: int, words: bytes) -> bytes:
         assert select.select([master], [], [], until - time.monotonic())[0], shown
         shown += os.read(master, 4096)
     return shown
-
-
-class Snoop:
-    """Another user of this machine: looks at all command lines, environments and files, again and again."""
-
-    def __init__(self, folder: Path) -> None:
-        self.seen: set[bytes] = set()
-        self.readable: set[tuple[str, int]] = set()
-        self._folder = folder
-        self._is_over = threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
-
-    def _look(self) -> None:
-        while not self._is_over.wait(0.002):
-            for process in Path("/proc").glob("[0-9]*"):
-                for name in ("cmdline", "environ"):
-                    try:
-                        self.seen.add((process / name).read_bytes())
-                    except OSError:
-                        continue
-            for path in self._folder.rglob("*"):
-                try:
-                    self.readable.add((path.name, path.stat().st_mode & 0o777))
-                except OSError:
-                    continue
-
-    @contextmanager
-    def looking(self) -> Iterator[None]:
-        self._thread.start()
-        yield
-        self._is_over.set()
-        self._thread.join()
 
 
 def test_no_secret_is_anywhere_that_others_can_see(show: Path, tmp_path: Path) -> None:
