@@ -1,0 +1,78 @@
+"""Words to systemd: ready, still alive, what is going on, about to end (sd_notify(3))."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+from collections.abc import Mapping
+
+_PINGS_IN_A_PERIOD = 4
+
+
+class Notifier:
+    """Tells systemd how this process is; silent where nobody listens, never raises, never waits.
+
+    Takes $NOTIFY_SOCKET, $WATCHDOG_USEC and $WATCHDOG_PID, which systemd sets for a unit with Type=notify
+    and WatchdogSec=. A word for which systemd has no room at the moment is lost.
+    """
+
+    def __init__(self, environ: Mapping[str, str] | None = None) -> None:
+        environ = os.environ if environ is None else environ
+        self._address = _address(environ.get("NOTIFY_SOCKET", ""))
+        self._socket: socket.socket | None = None
+        if self._address:
+            with contextlib.suppress(OSError):
+                self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
+                self._socket.setblocking(False)
+        self.every_s = _watchdog_s(environ) / _PINGS_IN_A_PERIOD
+        """The longest pause between two pings, seconds; infinite where no watchdog waits for them."""
+        self._due = 0.0
+
+    def ready(self, status: str = "") -> None:
+        """It works now."""
+        self._tell("READY=1", status)
+
+    def ping(self, now: float) -> None:
+        """It still works; monotonic seconds. Call it as often as you like: told four times a period."""
+        if now >= self._due and self._socket is not None and self.every_s != float("inf"):
+            self._due = now + self.every_s
+            self._tell("WATCHDOG=1")
+
+    def status(self, words: str) -> None:
+        """One line for whoever asks `systemctl status`."""
+        self._tell("", words)
+
+    def stopping(self) -> None:
+        """It ends by itself now."""
+        self._tell("STOPPING=1")
+
+    def close(self) -> None:
+        """Say nothing more."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _tell(self, word: str, status: str = "") -> None:
+        if self._socket is None:
+            return
+        lines = [word] if word else []
+        if status:
+            lines.append("STATUS=" + " ".join(status.splitlines()))
+        with contextlib.suppress(OSError):
+            self._socket.sendto("\n".join(lines).encode(), self._address)
+
+
+def _address(named: str) -> str:
+    """Where systemd listens: a path, or a name in the abstract space, which begins with @ in the environment."""
+    return "\0" + named[1:] if named.startswith("@") else named
+
+
+def _watchdog_s(environ: Mapping[str, str]) -> float:
+    """The watchdog's period in seconds; infinite where it waits for nobody, or for another process."""
+    if environ.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
+        return float("inf")
+    with contextlib.suppress(ValueError):
+        if (period_s := int(environ.get("WATCHDOG_USEC", "0")) / 1e6) > 0:
+            return period_s
+    return float("inf")
