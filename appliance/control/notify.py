@@ -64,7 +64,7 @@ class Notifier:
 
 
 def _address(named: str) -> str:
-    """Where systemd listens: a path, or a name in the abstract space, which begins with @ in the environment."""
+    """Where systemd listens: a path, or a name in the abstract space, which is written with an @."""
     return "\0" + named[1:] if named.startswith("@") else named
 
 
