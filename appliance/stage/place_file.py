@@ -60,9 +60,7 @@ class PlaceFile:
     def _open_here(self) -> None:
         """Have what the path leads to now open, whole, and know its newest number."""
         with contextlib.suppress(FileNotFoundError):
-            if self._descriptor >= 0 and os.path.samestat(
-                os.fstat(self._descriptor), os.stat(self._path, follow_symlinks=False)
-            ):
+            if self._descriptor >= 0 and os.path.samestat(os.fstat(self._descriptor), self._path.lstat()):
                 return
         self.close()
         flags = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -139,9 +137,9 @@ class PlaceCarrier:
     def _complain(self, error: OSError | ValueError) -> None:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         complaint = (
-            f"{self._state}: the place of the dance cannot be written there ({reason}). The dance goes on, and "
-            "after a crash too; after a power cut it begins at the beginning. Free or mend the disk, or give "
-            "another folder as `state:` in the box file."
+            f"{self._state}: the place of the dance cannot be written there ({reason}). The dance goes on, "
+            "and after a crash too; after a power cut it begins at the beginning. Free or mend the disk, "
+            "or give another folder as `state:` in the box file."
         )
         if complaint != self.complaint:
             self._say(complaint)
