@@ -76,7 +76,7 @@ def run(setting: Setting, course: Course) -> Run:
     with OscReceiver(HOST) as receiver, listening_closely():
         box = write_box_file(
             *(setting, folder, (sensors, control, receiver.port)),
-            journal={"file": "run.journal", "minutes": max(1.0, course.seconds / 60.0 + 0.5)},
+            journal={"folder": "run.journal", "minutes": max(1.0, course.seconds / 60.0 + 0.5)},
             phase_lock=course.phase_lock,
         )
         begun = time.monotonic()

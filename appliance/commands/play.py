@@ -60,7 +60,7 @@ def play_show(
         if emulate:
             emulation = opened.enter_context(Emulation(show, box, scratch))
             box = emulation.box
-        journal = journal or box.journal.file
+        journal = journal or box.journal.folder
         if (filmstrip or rehearse) is not None and journal is None:
             journal = scratch / "dance.journal"
             box = _with_short_journal(box)

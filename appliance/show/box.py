@@ -140,9 +140,11 @@ class RealtimeConfig(Section):
 class JournalConfig(Section):
     """The flight recorder."""
 
-    file: LocalFile | None = Field(default=None, description="File, relative to the box file; null: none.")
+    folder: LocalFile | None = Field(
+        default=None, description="Folder, relative to the box file; made when missing; null: no journal."
+    )
     minutes: float = Field(
-        default=30.0, ge=0.1, le=1440, description="How much it keeps before it overwrites the oldest."
+        default=30.0, ge=0.1, le=1440, description="How much it keeps before the oldest goes."
     )
 
 

@@ -25,7 +25,7 @@ def test_without_a_file_everything_is_on_this_machine() -> None:
     assert (receiver.dialect, receiver.frame_message) == ("ai-toolbox", False)
     assert config.limits.tick_budget_ms == 10.0
     assert config.realtime.enabled and config.realtime.priority == 70
-    assert config.sensors.keys is None and config.journal.file is None and config.phase_lock
+    assert config.sensors.keys is None and config.journal.folder is None and config.phase_lock
 
 
 def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
@@ -47,10 +47,10 @@ def test_everything_can_be_said(tmp_path: Path) -> None:
         "limits: {tick_budget_ms: 8, late_ms: 12.5}\n"
         "realtime: {priority: 40, enabled: false}\n"
         "phase_lock: off\n"
-        "journal: {file: /var/lib/bunraku/journal, minutes: 5}\n",
+        "journal: {folder: /var/lib/bunraku/journal, minutes: 5}\n",
     )
     assert config.sensors.keys == tmp_path / "state" / "sensors.keys"
-    assert config.journal.file == Path("/var/lib/bunraku/journal")
+    assert config.journal.folder == Path("/var/lib/bunraku/journal")
     assert [(r.host, r.port, r.dialect, r.frame_message) for r in config.outputs.osc] == [
         ("127.0.0.1", 1234, "vmc", True),
         ("10.0.0.7", 9004, "joint", False),

@@ -22,7 +22,7 @@ from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
 
-JOURNAL = {"journal": {"file": "run.journal", "minutes": 1}}
+JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 # Takes the rights away that a box needs for real time, root's too, and becomes the box.
 WITHOUT_RIGHTS = (
     sys.executable,

@@ -243,7 +243,7 @@ def test_no_secret_is_anywhere_that_others_can_see(show: Path, tmp_path: Path) -
     password_file = tmp_path / "password"
     password_file.write_text(PASSWORD + "\n")
     password_file.chmod(0o600)
-    journal = {"journal": {"file": "run.journal", "minutes": 1}}
+    journal = {"journal": {"folder": "run.journal", "minutes": 1}}
     snoop, before, said = Snoop(tmp_path), os.umask(0), ""
     try:
         with playing(show, tmp_path, settings=journal) as box, Bench(box.sensors) as bench, snoop.looking():

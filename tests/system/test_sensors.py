@@ -22,7 +22,7 @@ from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
 
-JOURNAL = {"journal": {"file": "run.journal", "minutes": 1}}
+JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 SHOULDER = FIGURE.index("lShldr")
 EIGHT = [f"hand-{number}" for number in range(8)]
 

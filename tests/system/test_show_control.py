@@ -27,7 +27,7 @@ from tests.system.box import PATIENCE_S, PLAY, Box, is_free, playing
 
 pytestmark = pytest.mark.realtime
 
-JOURNAL = {"journal": {"file": "run.journal", "minutes": 1}}
+JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 CUES: list[dict[str, Any]] = [
     {"name": "calm", "iterations": [2, 1], "look": "lines", "fade_s": 0.1},
     {"name": "storm", "iterations": [4, 3], "hands": [], "look": "ink", "master": 0.5, "fade_s": 0.1},
