@@ -1,0 +1,159 @@
+#!/bin/bash
+# Builds the root of a box: Debian 13, what the box needs of it, and a release of bunraku installed into it.
+# shellcheck disable=SC2016  # $(REPO_URI), $1 and ${Package} below are for other programs than this shell
+set -euo pipefail
+
+here=$(cd "$(dirname "$0")" && pwd)
+repository=$(cd "$here/../.." && pwd)
+
+usage() {
+    cat <<'END'
+usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--release FOLDER] OUT
+
+Builds the root file system of a box into OUT: a tar where OUT ends with .tar, else a folder.
+
+  --arch ARCH        amd64 (default) or arm64. A foreign one needs qemu-user-static and binfmt_misc.
+  --without-kernel   no kernel, no firmware: for systemd-nspawn, or for a Raspberry Pi's own boot partition
+  --release FOLDER   what `make release` made; left out: the newest in out/, else from the working tree
+
+Must run as root, with mmdebstrap. Debian packages come from where this machine's own come from
+(MIRROR="deb URL trixie main" names another place), Python packages from where pip takes them.
+END
+}
+
+fail() {
+    printf 'mkroot: %s\n' "$*" >&2
+    exit 1
+}
+
+arch=amd64 kernel=yes release='' out=''
+while [ $# -gt 0 ]; do
+    case $1 in
+        --arch) arch=${2:?--arch needs amd64 or arm64}; shift 2 ;;
+        --without-kernel) kernel=no; shift ;;
+        --release) release=${2:?--release needs a folder}; shift 2 ;;
+        --help | -h) usage; exit 0 ;;
+        -*) fail "unknown option $1. See mkroot.sh --help." ;;
+        *) out=$1; shift ;;
+    esac
+done
+[ -n "$out" ] || { usage >&2; exit 2; }
+[ "$(id -u)" = 0 ] || fail "needs root: it makes device nodes and installs packages into a new root."
+command -v mmdebstrap >/dev/null || fail "mmdebstrap is missing. Install it: apt-get install mmdebstrap"
+case $arch in
+    amd64) machine=x86_64 ;;
+    arm64) machine=aarch64; kernel=no ;;
+    *) fail "--arch $arch: a box is amd64 or arm64." ;;
+esac
+if [ "$arch" != "$(dpkg --print-architecture)" ] && ! ls /proc/sys/fs/binfmt_misc/qemu-"$machine" >/dev/null 2>&1; then
+    fail "this machine cannot run $arch programs. Install qemu-user-static binfmt-support and mount" \
+        "binfmt_misc on /proc/sys/fs/binfmt_misc, or build on such a machine."
+fi
+
+# Names of a list of packages or paths, without its comments.
+listed() { sed -e 's/#.*//' "$here/$1" | tr -s ' \n' '\n' | sed '/^$/d'; }
+
+sources() {
+    if [ -n "${MIRROR:-}" ]; then
+        printf '%s\n' "$MIRROR"
+        return
+    fi
+    local debian security
+    debian=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian' | sort -u | head -n 1)
+    security=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian-Security' |
+        sort -u | head -n 1)
+    [ -n "$debian" ] || fail "no Debian mirror among this machine's apt sources. Name one: MIRROR='deb URL trixie main'"
+    printf 'deb %s trixie main non-free-firmware\n' "$debian"
+    [ -z "$security" ] || printf 'deb %s trixie-security main non-free-firmware\n' "$security"
+}
+
+work=$(mktemp -d "${TMPDIR:-/tmp}/bunraku-root.XXXXXX")
+trap 'rm -rf "$work"' EXIT
+mkdir -p "$(dirname "$out")"
+if [[ $out == *.tar ]]; then root=$work/root; else root=$out; fi
+
+debian() {
+    local options=() pattern packages
+    while read -r pattern; do
+        case $pattern in
+            +*) options+=(--dpkgopt="path-include=${pattern#+}") ;;
+            *) options+=(--dpkgopt="path-exclude=$pattern") ;;
+        esac
+    done < <(listed drop-files.txt)
+    packages=$(listed packages-box.txt)
+    if [ "$kernel" = yes ]; then packages+=$'\n'$(listed packages-pc.txt); fi
+    echo "Debian 13 for $arch into $root"
+    sources | mmdebstrap --quiet --variant=apt --architectures="$arch" "${options[@]}" \
+        --aptopt='Acquire::Languages "none"' --aptopt='APT::Install-Recommends "false"' \
+        --include="$(tr '\n' ',' <<<"$packages" | sed 's/,$//')" \
+        --essential-hook='mkdir -p "$1/etc/initramfs-tools/conf.d"; echo "MODULES=list" > "$1/etc/initramfs-tools/conf.d/bunraku"' \
+        trixie "$root" - >"$work/debian.log" 2>&1 ||
+        { tail -n 30 "$work/debian.log" >&2; fail "Debian could not be installed; the lines above say why."; }
+}
+
+# What install.sh does not: it is made for a machine that runs. A release, by hand, from the working tree.
+release_by_hand() {
+    local version folder site
+    version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$repository/pyproject.toml")
+    folder=/opt/bunraku/releases/$version
+    echo "bunraku $version from the working tree"
+    mkdir -p "$root/opt/bunraku/releases"
+    chroot "$root" python3 -m venv --without-pip "$folder"
+    site=$root$folder/lib/python3.13/site-packages
+    python=$repository/.venv/bin/python
+    [ -x "$python" ] || python=python3
+    grep -v -i -E '^(contourpy|cycler|fonttools|kiwisolver|matplotlib|pillow|pyparsing|python-dateutil|setuptools|tzdata)=' \
+        "$repository/requirements.txt" >"$work/requirements.txt"
+    "$python" -m pip install -qq --disable-pip-version-check --no-deps --no-compile --target "$site" \
+        --only-binary :all: --implementation cp --python-version 3.13 --platform "manylinux_2_28_$machine" \
+        --platform "manylinux_2_27_$machine" --platform "manylinux2014_$machine" \
+        -r "$work/requirements.txt" || fail "pip could not bring the Python packages."
+    cp -a "$repository/appliance" "$repository/hw_sim" "$site/"
+    printf '#!%s/bin/python\nfrom appliance.cli import main\n\nmain()\n' "$folder" >"$root$folder/bin/bunraku"
+    chmod 755 "$root$folder/bin/bunraku"
+    ln -sfn "releases/$version" "$root/opt/bunraku/current"
+    ln -sfn /opt/bunraku/current/bin/bunraku "$root/usr/local/bin/bunraku"
+    chroot "$root" "$folder/bin/python" -m compileall -q "$folder/lib" || true
+}
+
+newest_release() {
+    local folder newest=''
+    for folder in "$repository"/out/bunraku-*-"$arch"; do
+        if [ -d "$folder" ] && { [ -z "$newest" ] || [ "$folder" -nt "$newest" ]; }; then newest=$folder; fi
+    done
+    printf '%s' "$newest"
+}
+
+install_release() {
+    [ -n "$release" ] || release=$(newest_release)
+    if [ -n "$release" ] && [ -x "$repository/deploy/install.sh" ]; then
+        echo "bunraku from $release"
+        "$repository/deploy/install.sh" --root "$root" "$release"
+    else
+        release_by_hand
+    fi
+}
+
+settle() {
+    echo bunraku >"$root/etc/hostname"
+    printf '127.0.0.1 localhost bunraku\n::1 localhost\n' >"$root/etc/hosts"
+    : >"$root/etc/machine-id"
+    rm -f "$root/etc/resolv.conf" "$root/var/lib/dbus/machine-id"
+    mkdir -p "$root/data" "$root/media/bunraku"
+    sed -i 's|^root:[^:]*:|root::|' "$root/etc/shadow"
+    systemctl --root="$root" set-default multi-user.target >/dev/null 2>&1
+    systemctl --root="$root" mask getty@tty1.service systemd-random-seed.service apt-daily.timer \
+        apt-daily-upgrade.timer dpkg-db-backup.timer e2scrub_all.timer fstrim.timer \
+        NetworkManager-wait-online.service >/dev/null 2>&1
+    chroot "$root" dpkg-query --show --showformat '${Package} ${Version} ${Installed-Size}\n' >"$root/etc/bunraku-packages"
+    rm -rf "$root"/var/lib/apt/lists/* "$root"/var/cache/* "$root"/var/log/* "$root"/tmp/*
+}
+
+debian
+install_release
+settle
+if [[ $out == *.tar ]]; then
+    tar -C "$root" --numeric-owner --sort=name -cf "$out.part" .
+    mv "$out.part" "$out"
+fi
+echo "$out: $(du -sh "$root" | cut -f 1) unpacked"
