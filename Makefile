@@ -21,7 +21,7 @@ DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump 
 FUZZ_SECONDS ?= 30
 
 .DEFAULT_GOAL := help
-.PHONY: help run studio firmware test firmware-test fuzz-corpus lint bench lock clean \
+.PHONY: help run release studio firmware test firmware-test fuzz-corpus lint bench lock clean \
     debian-for-firmware debian-for-tests
 
 help: ## show this list
@@ -114,6 +114,9 @@ if [ -n "$$missing" ]; then \
     DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null; \
 fi
 endef
+
+release: ## everything for a box without a network, on a stick: out/bunraku-VERSION-ARCH (ARCH=arm64: Pi)
+	@deploy/release/make-release --arch $(or $(ARCH),amd64)
 
 lock: | $(VENV)/bin/python ## choose the newest versions that pyproject.toml allows and pin them
 	@rm -rf build && $(BIN)/python -m venv build/lock
