@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -86,6 +87,15 @@ class Grounding:
         self._before: list[list[float]] | None = None
         self._shift = np.zeros(3, dtype=np.float32)
 
+    @property
+    def strayed(self) -> tuple[float, float]:
+        """How far the root is from its path, metres along x and z; set it before the first pose."""
+        return self._offset_x, self._offset_z
+
+    @strayed.setter
+    def strayed(self, metres: tuple[float, float]) -> None:
+        self._offset_x, self._offset_z = metres
+
     def stand(
         self, pose: FloatArray, root: FloatArray, lift_m: float, rest_heights: FloatArray | None = None
     ) -> Figure:
@@ -112,6 +122,26 @@ class Grounding:
         self.figure.move(self._shift)
         np.add(self.root, self._shift, out=self.root)
         return self.figure
+
+    def state(self) -> dict[str, Any]:
+        """What the places to come depend on, for `restore`: plain values and copies of arrays."""
+        return {
+            "figure": self.figure.state(),
+            "root": self.root.copy(),
+            "rest": self._rest,
+            "offset": [self._offset_x, self._offset_z],
+            "step": [self._step_x, self._step_z],
+            "height": self._height,
+            "before": self._before,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the one did that gave this state."""
+        self.figure.restore(state["figure"])
+        self.root[:] = state["root"]
+        self._rest, self._height, self._before = state["rest"], state["height"], state["before"]
+        self._offset_x, self._offset_z = state["offset"]
+        self._step_x, self._step_z = state["step"]
 
     def _pin(
         self,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
-from appliance.dancer.phrase import AT, FPS, LIFT, NUMBER, STANDING, Phrase, PhraseError
+from appliance.dancer.phrase import AT, FPS, LIFT, NUMBER, STANDING, Phrase, PhraseError, X, Z
 from appliance.dancer.reading_head import Reader, ReadingHead
 from appliance.dancer.slerp import FloatArray, Slerp
 from appliance.pose.recording import Recording
@@ -16,6 +18,7 @@ from appliance.show.dance import MAIN
 MAX_RATE = 4.0
 RATE_CHANGE_PER_TICK = 0.08  # from standing to full speed in a quarter of a second
 _HURRY = 25  # ticks that a long crossfade takes at most, once the next change waits for it
+_FRAME_DIGITS = 2  # of a place to start at: its seconds are exact to some thousandths of a frame
 _ROWS = 256  # poses of the played motion before it moves back to the start of its memory
 
 
@@ -108,6 +111,33 @@ class Playback:
     def rate(self, rate: float) -> None:
         self._wanted_rate = _checked_rate(rate)
 
+    @property
+    def excerpt_s(self) -> tuple[float, float]:
+        """First and last second of the part of the phrase that plays, or that it is about to go over to."""
+        loop = self._excerpt
+        return loop.start_s, loop.start_s + loop.length / FPS
+
+    @property
+    def going_on(self) -> tuple[str, float]:
+        """Phrase and second at which a playback should start that goes on from here: what is asked for
+        counts, also while it has not come to the window's first pose.
+        """
+        if self._request is not None:
+            loop, position, _ = self._request
+        elif self._on_the_way:
+            loop, position = self._head.loop, self._entered_at
+        else:
+            return self.phrase, self.position_s
+        return self._asked.name, loop.start_s + position / FPS
+
+    @property
+    def standing(self) -> tuple[float, float, float]:
+        """Where the root stands at the window's first pose: x, z in metres, heading in radians."""
+        first = self._end - self._window
+        x, z = self._played_track[first, [X, Z]].tolist()
+        w, _, y, _ = self._played[first, 0].tolist()
+        return x, z, 2 * math.atan2(y, w)
+
     def jump(self, to_s: float) -> None:
         """Go on at another second of the phrase, crossfaded; the nearest one inside the excerpt is taken.
 
@@ -143,6 +173,26 @@ class Playback:
         self.play(name)
         self._begin()
 
+    def start_at(
+        self,
+        name: str,
+        excerpt_s: tuple[float, float],
+        position_s: float,
+        rate: float,
+        standing: tuple[float, float, float],
+    ) -> None:
+        """Before the first tick: go on where another playback was, from its going_on, excerpt_s and standing.
+
+        Without a crossfade, at once at this rate. Raises ValueError for what this show does not have.
+        """
+        self.play(name)
+        if max(abs(one - other) for one, other in zip(self.excerpt_s, excerpt_s, strict=True)) > 0.5 / FPS:
+            self.excerpt(*excerpt_s)
+        self._rate = self._wanted_rate = _checked_rate(rate)
+        loop = self._excerpt
+        position = round((position_s - loop.start_s) * FPS, _FRAME_DIGITS)
+        self._begin(min(max(position, 0.0), loop.length - 1.0), standing)
+
     def advance(self) -> None:
         """Go one tick on. `jumped` tells whether a jump was taken up in it."""
         self.jumped = False
@@ -159,9 +209,15 @@ class Playback:
         self._rate += min(max(self._wanted_rate - self._rate, -RATE_CHANGE_PER_TICK), RATE_CHANGE_PER_TICK)
         self._push()
 
-    def _begin(self) -> None:
-        """Stand at the start of the phrase, with a full window."""
-        self._head = ReadingHead(self._excerpt, 0.0, self._excerpt.poses[0].copy())
+    def _begin(self, position: float = 0.0, standing: tuple[float, float, float] | None = None) -> None:
+        """Stand at a frame of the phrase, with a full window; `standing`: there on the stage."""
+        self._head = ReadingHead(self._excerpt, position, self._excerpt.poses[int(position)].copy())
+        if standing is not None:
+            self._reader.read(self._head, self._entering_track)
+            x, z = self._entering_track[[X, Z]].tolist()
+            w, _, y, _ = self._head.pose[0].tolist()
+            self._head.placement = Placement.bringing((x, z, 2 * math.atan2(y, w)), standing)
+        self._on_the_way, self._entered_at = 0, position
         self._leaving: ReadingHead | None = None
         self._fade_tick = self._fade_length = 0.0
         self._request = None
@@ -174,6 +230,7 @@ class Playback:
         """Append one pose to the played motion and move the heads."""
         if self._end == _ROWS:
             self._move_to_start()
+        self._on_the_way = max(0, self._on_the_way - 1)
         pose, track = self._played[self._end], self._played_track[self._end]
         leaving = self._leaving
         if leaving is None:
@@ -204,6 +261,7 @@ class Playback:
         self._head = entering
         self._leaving = leaving if fade else None
         self._fade_tick, self._fade_length = 0.0, fade + 1.0
+        self._on_the_way, self._entered_at = self._window, position
 
     def _hurry(self) -> None:
         """End a long crossfade sooner, from where it has come to: the next change waits for it."""

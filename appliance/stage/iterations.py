@@ -37,6 +37,11 @@ class Iterations:
             f"the dancer runs with {self._wanted[0]} and {self._wanted[1]}: {why}."
         )
 
+    @property
+    def asked(self) -> tuple[int, int]:
+        """Coding and interaction iterations at the end of the way that they are on."""
+        return (self.coding, self.interaction) if self._tick == self._ticks else self._wanted
+
     def advance(self) -> None:
         """One tick further on the way to what was asked for, in whole iterations: each is a small step."""
         if self._tick == self._ticks:
