@@ -8,13 +8,14 @@ repository=$(cd "$here/../.." && pwd)
 
 usage() {
     cat <<'END'
-usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--release FOLDER] OUT
+usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--release FOLDER] [--debian TAR] OUT
 
 Builds the root file system of a box into OUT: a tar where OUT ends with .tar, else a folder.
 
   --arch ARCH        amd64 (default) or arm64. A foreign one needs qemu-user-static and binfmt_misc.
   --without-kernel   no kernel, no firmware: for systemd-nspawn, or for a Raspberry Pi's own boot partition
   --release FOLDER   what `make release` made; left out: the newest in out/, else from the working tree
+  --debian TAR       keeps Debian's part in TAR, and takes it from there the next time
 
 Must run as root, with mmdebstrap. Debian packages come from where this machine's own come from
 (MIRROR="deb URL trixie main" names another place), Python packages from where pip takes them.
@@ -26,12 +27,13 @@ fail() {
     exit 1
 }
 
-arch=amd64 kernel=yes release='' out=''
+arch=amd64 kernel=yes release='' debian='' out=''
 while [ $# -gt 0 ]; do
     case $1 in
         --arch) arch=${2:?--arch needs amd64 or arm64}; shift 2 ;;
         --without-kernel) kernel=no; shift ;;
         --release) release=${2:?--release needs a folder}; shift 2 ;;
+        --debian) debian=${2:?--debian needs a file}; shift 2 ;;
         --help | -h) usage; exit 0 ;;
         -*) fail "unknown option $1. See mkroot.sh --help." ;;
         *) out=$1; shift ;;
@@ -89,6 +91,19 @@ debian() {
         --essential-hook='mkdir -p "$1/etc/initramfs-tools/conf.d"; echo "MODULES=list" > "$1/etc/initramfs-tools/conf.d/bunraku"' \
         trixie "$root" - >"$work/debian.log" 2>&1 ||
         { tail -n 30 "$work/debian.log" >&2; fail "Debian could not be installed; the lines above say why."; }
+}
+
+debian_kept() {
+    if [ -n "$debian" ] && [ -f "$debian" ]; then
+        mkdir -p "$root"
+        tar -C "$root" --numeric-owner -xpf "$debian"
+        return
+    fi
+    debian
+    if [ -n "$debian" ]; then
+        tar -C "$root" --numeric-owner -cf "$debian.part" .
+        mv "$debian.part" "$debian"
+    fi
 }
 
 # What install.sh does not: it is made for a machine that runs. A release, by hand, from the working tree.
@@ -149,7 +164,7 @@ settle() {
     rm -rf "$root"/var/lib/apt/lists/* "$root"/var/cache/* "$root"/var/log/* "$root"/tmp/*
 }
 
-debian
+debian_kept
 install_release
 settle
 if [[ $out == *.tar ]]; then
