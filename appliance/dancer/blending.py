@@ -16,6 +16,8 @@ window. From hop 5 on some poses are seen by one window only, and at hop 8 all o
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from appliance.dancer.slerp import FloatArray, Slerp
@@ -84,6 +86,25 @@ class Blending:
         self._poses[last] = self._poses[last - 1]
         self._gathered[last] = 0.0
         return pose
+
+    def state(self) -> dict[str, Any]:
+        """What the poses to come depend on, for `restore`: plain values and copies of arrays."""
+        rows = slice(self._first, self._first + self._window)
+        return {
+            "poses": self._poses[rows].copy(),
+            "gathered": self._gathered[rows].copy(),
+            "hop": self._hop,
+            "ticks_since_window": self._ticks_since_window,
+            "fresh": self._fresh,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the one did that gave this state."""
+        self._first = 0
+        self._poses[: self._window] = state["poses"]
+        self._gathered[: self._window] = state["gathered"]
+        self.hop = state["hop"]
+        self._ticks_since_window, self._fresh = state["ticks_since_window"], state["fresh"]
 
     def _move_to_start(self) -> None:
         kept = self._window - 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -63,6 +64,7 @@ class Playback:
         self._played[..., 0] = 1.0
         self._played_track = np.zeros((_ROWS, columns), dtype=np.float32)
         self._request: tuple[Loop, float, int] | None = None
+        self._leaving: ReadingHead | None = None
         self._begin()
 
     def add(self, name: str, phrase: Recording, floor: Floor | None = None) -> None:
@@ -209,6 +211,64 @@ class Playback:
         self._rate += min(max(self._wanted_rate - self._rate, -RATE_CHANGE_PER_TICK), RATE_CHANGE_PER_TICK)
         self._push()
 
+    def state(self) -> dict[str, Any]:
+        """What the poses to come depend on, for `restore`: plain values and copies of arrays."""
+        played = slice(self._end - self._window, self._end)
+        request = self._request
+        return {
+            "rate": self._rate,
+            "wanted_rate": self._wanted_rate,
+            "asked": self._asked.name,
+            "excerpt": self._named(self._excerpt),
+            "head": self._head_state(self._head),
+            "leaving": None if self._leaving is None else self._head_state(self._leaving),
+            "fade": [self._fade_tick, self._fade_length],
+            "entered": [self._on_the_way, float(self._entered_at)],
+            "request": None if request is None else [self._named(request[0]), *request[1:]],
+            "jumped": self.jumped,
+            "played": self._played[played].copy(),
+            "played_track": self._played_track[played].copy(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the one did that gave this state, with the same phrases. Raises KeyError, PhraseError."""
+        self._rate, self._wanted_rate = state["rate"], state["wanted_rate"]
+        self._asked = self._phrases[state["asked"]][0]
+        self._excerpt = self._loop(state["excerpt"])
+        self._head = self._restored_head(state["head"])
+        leaving, request = state["leaving"], state["request"]
+        self._leaving = self._restored_head(leaving) if leaving is not None else None
+        self._fade_tick, self._fade_length = state["fade"]
+        self._request = None if request is None else (self._loop(request[0]), *request[1:])
+        self._on_the_way, self._entered_at = state["entered"]
+        self.jumped = state["jumped"]
+        self._end = self._window
+        self._played[: self._end] = state["played"]
+        self._played_track[: self._end] = state["played_track"]
+
+    def _named(self, loop: Loop) -> list[Any]:
+        """A loop by its phrase, its frames in it, and whether it is what that phrase plays by itself."""
+        name = self.phrases[round(float(loop.track[0, NUMBER]))]
+        return [name, loop.start_s, loop.length, loop is self._phrases[name][1]]
+
+    def _loop(self, named: list[Any]) -> Loop:
+        name, start_s, length, is_own = named
+        phrase, own = self._phrases[name]
+        return own if is_own else phrase.cut(start_s, start_s + length / FPS)
+
+    def _head_state(self, head: ReadingHead) -> dict[str, Any]:
+        place = head.placement
+        return {
+            "loop": self._named(head.loop),
+            "position": float(head.position),
+            "pose": head.pose.copy(),
+            "placement": [float(place.yaw), float(place.x), float(place.z)],
+        }
+
+    def _restored_head(self, state: dict[str, Any]) -> ReadingHead:
+        pose = np.array(state["pose"], dtype=np.float32)
+        return ReadingHead(self._loop(state["loop"]), state["position"], pose, Placement(*state["placement"]))
+
     def _begin(self, position: float = 0.0, standing: tuple[float, float, float] | None = None) -> None:
         """Stand at a frame of the phrase, with a full window; `standing`: there on the stage."""
         self._head = ReadingHead(self._excerpt, position, self._excerpt.poses[int(position)].copy())
@@ -218,7 +278,7 @@ class Playback:
             w, _, y, _ = self._head.pose[0].tolist()
             self._head.placement = Placement.bringing((x, z, 2 * math.atan2(y, w)), standing)
         self._on_the_way, self._entered_at = 0, position
-        self._leaving: ReadingHead | None = None
+        self._leaving = None
         self._fade_tick = self._fade_length = 0.0
         self._request = None
         self.jumped = False

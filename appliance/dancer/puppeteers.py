@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +67,25 @@ class Puppeteer(ABC):
         self._target.weight = self._level * self._presence * self._presence * (3 - 2 * self._presence)
         return self._target
 
+    def state(self) -> dict[str, Any]:
+        """What the targets to come depend on, for `restore`: plain values and copies of arrays."""
+        return {
+            "weight": self.weight,
+            "enabled": self.enabled,
+            "orientation": self._target.orientation.copy(),
+            "held": self._target.weight,
+            "presence": self._presence,
+            "level": self._level,
+            "pulled_at": self._pulled_at,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the one did that gave this state."""
+        self.weight, self.enabled = state["weight"], state["enabled"]
+        self._target.orientation[:], self._target.weight = state["orientation"], state["held"]
+        self._presence, self._level = state["presence"], state["level"]
+        self._pulled_at = state["pulled_at"]
+
     @abstractmethod
     def _holds(self, now: float) -> bool:
         """Whether the joint should be held at this moment."""
@@ -110,6 +130,21 @@ class WornSensor(Puppeteer):
             self._leading_s = max(self._leading_s, min(arrival - self._heard_at, TAKE_S))
         self._heard_at = arrival
 
+    def state(self) -> dict[str, Any]:
+        return super().state() | {
+            "joint_from_reading": np.array(self._joint_from_reading, dtype=np.float32),
+            "reading": self._reading.copy(),
+            "local": self._local.copy(),
+            "heard_at": self._heard_at,
+            "leading_s": self._leading_s,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        self._joint_from_reading = np.array(state["joint_from_reading"], dtype=np.float32)
+        self._reading[:], self._local[:] = state["reading"], state["local"]
+        self._heard_at, self._leading_s = state["heard_at"], state["leading_s"]
+
     def silent_s(self, now: float) -> float:
         """Seconds since the last reading; infinite before the first one."""
         return math.inf if self._heard_at is None else now - self._heard_at
@@ -144,6 +179,13 @@ class TurningAxis(Puppeteer):
         self._x, self._y, self._z = (value / length for value in axis)
         self.seconds_per_turn = seconds_per_turn
         self._half_angle = 0.0
+
+    def state(self) -> dict[str, Any]:
+        return super().state() | {"half_angle": self._half_angle}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        self._half_angle = state["half_angle"]
 
     def _holds(self, now: float) -> bool:
         return True
@@ -197,6 +239,13 @@ class Remote(Puppeteer):
         """Give the joint back to the puppet."""
         self._held = None
 
+    def state(self) -> dict[str, Any]:
+        return super().state() | {"told": self._held}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        self._held = None if state["told"] is None else _four(state["told"])
+
     def _holds(self, now: float) -> bool:
         return self._held is not None
 
@@ -236,6 +285,21 @@ class Hands:
         np.multiply(self.targets, self._signs, out=self.targets)
         np.greater(self.weights, 0.0, out=self.mask)
 
+    def state(self) -> dict[str, Any]:
+        """What the targets to come depend on, for `restore`: plain values and copies of arrays."""
+        return {
+            "puppeteers": [puppeteer.state() for puppeteer in self.puppeteers],
+            "mask": self.mask.copy(),
+            "targets": self.targets.copy(),
+            "weights": self.weights.copy(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the hands of the same show did that gave this state."""
+        for puppeteer, kept in zip(self.puppeteers, state["puppeteers"], strict=True):
+            puppeteer.restore(kept)
+        self.mask[:], self.targets[:], self.weights[:] = state["mask"], state["targets"], state["weights"]
+
 
 def _place(joint: str, joints: Sequence[str]) -> int:
     if joint in joints:
@@ -249,5 +313,9 @@ def _unit(orientation: Sequence[float]) -> tuple[float, float, float, float]:
     length = math.hypot(*orientation)
     if len(orientation) != 4 or not 0 < length < math.inf:
         raise ValueError(f"{list(orientation)} is no orientation: four numbers w, x, y, z are needed.")
-    w, x, y, z = (float(value) / length for value in orientation)
+    return _four([float(value) / length for value in orientation])
+
+
+def _four(values: Sequence[float]) -> tuple[float, float, float, float]:
+    w, x, y, z = values
     return w, x, y, z

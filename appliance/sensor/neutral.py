@@ -79,6 +79,15 @@ class Stillness:
             self._anchor, self._since = orientation, now
         self._heard = now
 
+    def state(self) -> tuple[Quaternion, float, float]:
+        """What it remembers, for `restore`."""
+        return self._anchor, self._since, self._heard
+
+    def restore(self, state: Sequence[Any]) -> None:
+        """Go on as the one did that gave this state."""
+        (w, x, y, z), self._since, self._heard = state
+        self._anchor = (w, x, y, z)
+
     def restart(self) -> None:
         """What was before does not count any more."""
         self._anchor = (0.0, 0.0, 0.0, 0.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 from appliance.sensor.plausibility import Orientation
 
@@ -26,6 +27,14 @@ class SensorReading(NamedTuple):
     recoveries: int = 0  # restarts of the IMU since power-on; wraps at 256; its heading is lost
     flags: int = 0  # wire.HAS_PROFILE, wire.IS_NDOF
     round_trip_s: float | None = None  # by the newest heartbeat's echo
+
+
+def restored_reading(fields: Sequence[Any] | None) -> SensorReading | None:
+    """A reading from its fields in order, as a file gives them; None for none."""
+    if fields is None:
+        return None
+    sensor, (w, x, y, z), *others = fields
+    return SensorReading(sensor, (w, x, y, z), *others)
 
 
 class SensorState(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from appliance.dancer.phrase import FPS
 
@@ -41,6 +42,22 @@ class Iterations:
     def asked(self) -> tuple[int, int]:
         """Coding and interaction iterations at the end of the way that they are on."""
         return (self.coding, self.interaction) if self._tick == self._ticks else self._wanted
+
+    def state(self) -> dict[str, Any]:
+        """Where they are and where they go, for `restore`."""
+        return {
+            "now": [self.coding, self.interaction, self.most],
+            "before": self._before,
+            "wanted": self._wanted,
+            "ticks": [self._tick, self._ticks],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the one did that gave this state."""
+        self.coding, self.interaction, self.most = state["now"]
+        (coding, interaction), (wanted_coding, wanted_interaction) = state["before"], state["wanted"]
+        self._before, self._wanted = (coding, interaction), (wanted_coding, wanted_interaction)
+        self._tick, self._ticks = state["ticks"]
 
     def advance(self) -> None:
         """One tick further on the way to what was asked for, in whole iterations: each is a small step."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
+from typing import Any
 
 from appliance.dancer.puppeteers import WornSensor
 from appliance.sensor.link import SensorReading
@@ -20,6 +21,7 @@ from appliance.sensor.neutral import (
     joint_from_reading,
     with_heading_reset,
 )
+from appliance.sensor.state import restored_reading
 from appliance.show.config_error import did_you_mean
 from appliance.stage.cast import Cast
 
@@ -115,6 +117,20 @@ class Wearing:
         if wearer.reading is not None and wearer.has_pose_of(wearer.reading.boot_nonce):
             return "taken"
         return "assumed" if any(hand.pose.boot_nonce == NO_BOOT for hand in wearer.hands) else "kept"
+
+    def state(self) -> dict[str, Any]:
+        """How the sensors are worn, for `restore`: plain values."""
+        return {name: wearer.state() for name, wearer in self._wearers.items()} | {"": self._news[:]}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the one did that gave this state; the matrices of the joints are the hands' to restore."""
+        for name, wearer in self._wearers.items():
+            wearer.restore(state[name])
+            if wearer.needs_still_s:
+                self._link.wants_neutral.add(name)
+            else:
+                self._link.wants_neutral.discard(name)
+        self._news[:] = state[""]
 
     def _meet(self, wearer: _Wearer, reading: SensorReading) -> None:
         """The first reading of this run: after a restart of the box alone, its pose holds still."""
@@ -225,6 +241,22 @@ class _Wearer:
     reading: SensorReading | None = None
     needs_still_s: float = 0.0
     waits_until: float = math.inf
+
+    def state(self) -> dict[str, Any]:
+        return {
+            "poses": [astuple(hand.pose) for hand in self.hands],
+            "stillness": self.stillness.state(),
+            "reading": self.reading,
+            "needs_still_s": self.needs_still_s,
+            "waits_until": self.waits_until,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        for hand, ((w, x, y, z), heading, boot_nonce) in zip(self.hands, state["poses"], strict=True):
+            hand.pose = NeutralPose((w, x, y, z), heading, boot_nonce)
+        self.stillness.restore(state["stillness"])
+        self.reading = restored_reading(state["reading"])
+        self.needs_still_s, self.waits_until = state["needs_still_s"], state["waits_until"]
 
     def has_pose_of(self, boot_nonce: int) -> bool:
         """Whether all poses hold for the readings of that power-on."""
