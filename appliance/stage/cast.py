@@ -8,9 +8,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from appliance.dancer.blending import Blending
-from appliance.dancer.grounding import Floor, Grounding, GroundingError, survey
+from appliance.dancer.grounding import Floor, Grounding, GroundingError
 from appliance.dancer.motion_source import Playback
-from appliance.dancer.phrase import FPS, PhraseError
+from appliance.dancer.phrase import PhraseError
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.dancer.puppeteers import (
     FixedOrientation,
@@ -21,7 +21,7 @@ from appliance.dancer.puppeteers import (
     WornSensor,
 )
 from appliance.outputs.outputs import Outputs
-from appliance.pose.bvh import BvhError, read_bvh
+from appliance.pose.bvh import BvhError
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.sensor.keys import KeyFileError, SensorKey, load_keys, unknown_sensor
@@ -34,6 +34,7 @@ from appliance.show.cues import CueConfig
 from appliance.show.posistagenet import misfits
 from appliance.show.show import HandConfig, Show
 from appliance.stage.budget import Admission, admit
+from appliance.stage.prepared import Preparations
 from appliance.stage.realtime import borrowed_priority
 from appliance.stage.stage_error import StageError
 
@@ -84,8 +85,10 @@ def assemble(
     box: BoxConfig,
     profiles: Mapping[bytes, bytes] = MappingProxyType({}),
     box_file: Path | None = None,
+    memory: Path | None = None,
 ) -> Cast:
-    """Open every port and file of a show; `profiles`: the sensors' calibrations that the box has kept.
+    """Open every port and file of a show; `profiles`: the sensors' calibrations that the box has kept;
+    `memory`: a folder where phrases that were made ready are kept for the next start.
 
     Raises StageError or ConfigError before anything dances. Keys that are missing are no reason not to dance:
     see `complaints`.
@@ -93,7 +96,7 @@ def assemble(
     try:
         puppet = Puppet(show.network, show.skeleton)
         show.require_moving(puppet.joints)
-        motion, floor = _playback(show, puppet.window)
+        motion, floor = _playback(show, puppet.window, Preparations(show.directory, memory))
     except PuppetError as error:
         raise StageError(str(error)) from error
     puppeteers = [_puppeteer(hand) for hand in show.config.hands]
@@ -162,11 +165,11 @@ def _mounting(hand: HandConfig) -> Mounting:
     return Mounting(hand.facing, hand.at_neutral, hand.neutral)
 
 
-def _playback(show: Show, window: int) -> tuple[Playback, Floor | None]:
+def _playback(show: Show, window: int, preparations: Preparations) -> tuple[Playback, Floor | None]:
     """All phrases of a show, ready to be switched, and the floor of the one that it starts with."""
     motion, (path, *others) = show.config.motion, show.phrases.values()
     try:
-        phrase, floor = _phrase(show, path)
+        phrase, floor = _phrase(show, path, preparations)
         playback = Playback(
             phrase,
             start_s=motion.start_s,
@@ -177,24 +180,24 @@ def _playback(show: Show, window: int) -> tuple[Playback, Floor | None]:
             floor=floor,
         )
         for name, path in zip(motion.phrases, others, strict=True):
-            playback.add(name, *_phrase(show, path))
+            playback.add(name, *_phrase(show, path, preparations))
     except BvhError as error:
         raise StageError(str(error)) from error
     except (PhraseError, GroundingError) as error:
         raise StageError(f"{path}: {error}") from error
+    preparations.forget_others()
     return playback, floor
 
 
-def _phrase(show: Show, path: Path) -> tuple[Recording, Floor | None]:
+def _phrase(show: Show, path: Path, preparations: Preparations) -> tuple[Recording, Floor | None]:
     """A phrase at the tick's rate, and what its survey learnt of the floor."""
-    phrase = read_bvh(path)
-    if not phrase.skeleton.same_joints(show.skeleton):
+    found = preparations.phrase(path, show.skeleton, show.config.motion.grounded)
+    if found is None:
         raise StageError(
             f"{path}: the phrase has other joints than {show.directory / 'skeleton.bvh'}. "
             "Nothing can be danced. Export the show again."
         )
-    phrase = phrase.resampled(FPS)
-    return phrase, survey(phrase) if show.config.motion.grounded else None
+    return found
 
 
 def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:

@@ -1,0 +1,149 @@
+"""Phrases made ready once: read, resampled and surveyed they are kept as numbers, for the next start."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import mmap
+import os
+import struct
+import zlib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from appliance.dancer.grounding import Floor, survey
+from appliance.dancer.phrase import FPS
+from appliance.dancer.slerp import FloatArray
+from appliance.pose.bvh import read_bvh
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+
+FOLDER = ".prepared"  # in a show bundle: hidden, so it is no part of what was packed
+SUFFIX = ".phrase"
+LARGEST = 64 * 2**20  # bytes: longer phrases are read anew, the folder may be one in memory
+
+_MAGIC = b"bunraku phrase 1\n"
+_HEAD = struct.Struct("<17sII3x")  # magic, bytes of the facts, CRC-32 of all that follows
+_ALIGNED = 64
+
+
+class Preparations:
+    """Where prepared phrases lie: in the show's bundle, and in memory for as long as the machine runs."""
+
+    def __init__(self, bundle: Path, memory: Path | None) -> None:
+        """memory: a folder where what had to be read is kept; it holds the phrases of one show."""
+        self._looked_in = tuple(folder for folder in (memory, bundle / FOLDER) if folder is not None)
+        self._memory = memory
+        self._used: set[str] = set()
+
+    def phrase(self, path: Path, skeleton: Skeleton, grounded: bool) -> tuple[Recording, Floor | None] | None:
+        """A phrase at the tick's rate and its floor; None where its joints are not the skeleton's.
+
+        What was prepared is the same, to the bit, as what is read from the BVH file, and is there in a
+        hundredth of the time. Raises as read_bvh and survey do.
+        """
+        name = _name(path, grounded)
+        self._used.add(name)
+        for folder in self._looked_in:
+            found = _kept(folder / name, skeleton)
+            if found is not None:
+                return found
+        phrase = read_bvh(path)
+        if not phrase.skeleton.same_joints(skeleton):
+            return None
+        phrase = phrase.resampled(FPS)
+        floor = survey(phrase) if grounded else None
+        if self._memory is not None:
+            with contextlib.suppress(OSError):
+                _keep(self._memory / name, phrase, floor)
+        return phrase, floor
+
+    def forget_others(self) -> None:
+        """Free the memory of phrases that were not asked for: they belong to another show."""
+        if self._memory is None:
+            return
+        with contextlib.suppress(OSError):
+            for path in self._memory.iterdir():
+                if path.name not in self._used:
+                    path.unlink()
+
+
+def prepare(phrases: Iterable[Path], bundle: Path, skeleton: Skeleton, grounded: bool) -> None:
+    """Prepare a bundle's phrases in its own folder, so that even its first start is a quick one.
+
+    Does nothing where the folder takes no file. Raises as read_bvh and survey do.
+    """
+    preparations = Preparations(bundle, bundle / FOLDER)
+    for path in phrases:
+        preparations.phrase(path, skeleton, grounded)
+    preparations.forget_others()
+
+
+def _name(path: Path, grounded: bool) -> str:
+    """The file's name says what it was made from."""
+    made_from = hashlib.sha256(_MAGIC + b"grounded" * grounded)
+    with path.open("rb") as stream:
+        while chunk := stream.read(2**20):
+            made_from.update(chunk)
+    return made_from.hexdigest() + SUFFIX
+
+
+def _keep(path: Path, phrase: Recording, floor: Floor | None) -> None:
+    """Write it beside, then give it its name: nobody finds half of it. Raises OSError without room."""
+    arrays = [np.ascontiguousarray(array, np.float32) for array in _arrays(phrase, floor)]
+    names = {"joints": phrase.skeleton.names, "parents": [int(parent) for parent in phrase.skeleton.parents]}
+    facts = json.dumps({**names, "shapes": [array.shape for array in arrays]}).encode()
+    facts = facts.ljust(-(-(_HEAD.size + len(facts)) // _ALIGNED) * _ALIGNED - _HEAD.size)
+    parts = [facts, *(array.tobytes() for array in arrays)]
+    size = _HEAD.size + sum(map(len, parts))
+    if size > LARGEST:
+        return
+    path.parent.mkdir(mode=0o700, exist_ok=True)
+    free = os.statvfs(path.parent)
+    if free.f_bavail * free.f_frsize < 2 * size:
+        return
+    check = 0
+    for part in parts:
+        check = zlib.crc32(part, check)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_bytes(b"".join((_HEAD.pack(_MAGIC, len(facts), check), *parts)))
+        temporary.rename(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _kept(path: Path, skeleton: Skeleton) -> tuple[Recording, Floor | None] | None:
+    """What was kept, without a copy of it; None where there is none, or no sound one of this skeleton."""
+    try:
+        with path.open("rb") as stream:
+            memory = mmap.mmap(stream.fileno(), 0, mmap.MAP_PRIVATE | mmap.MAP_POPULATE)
+        magic, length, check = _HEAD.unpack_from(memory)
+        whole = memoryview(memory)
+        if magic != _MAGIC or zlib.crc32(whole[_HEAD.size :]) != check:
+            return None
+        facts = json.loads(whole[_HEAD.size : _HEAD.size + length].tobytes())
+        poses, roots, *floor = _taken(memory, _HEAD.size + length, facts["shapes"])
+    except (OSError, ValueError, KeyError, TypeError, struct.error):
+        return None
+    if (tuple(facts["joints"]), tuple(facts["parents"])) != (skeleton.names, tuple(skeleton.parents)):
+        return None
+    return Recording(skeleton, poses, roots, FPS), Floor(floor[0], floor[1]) if floor else None
+
+
+def _arrays(phrase: Recording, floor: Floor | None) -> list[FloatArray]:
+    arrays = [phrase.poses, phrase.roots]
+    return arrays if floor is None else [*arrays, floor.rest_heights, floor.lifts]
+
+
+def _taken(memory: mmap.mmap, at: int, shapes: Sequence[Sequence[int]]) -> list[FloatArray]:
+    """Arrays that lie one behind the other."""
+    arrays: list[FloatArray] = []
+    for shape in shapes:
+        array = np.frombuffer(memory, np.float32, int(np.prod(shape)), at)
+        arrays.append(array.reshape(shape))
+        at += array.nbytes
+    return arrays
