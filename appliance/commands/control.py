@@ -11,6 +11,7 @@ from appliance.control.port import open_port
 from appliance.control.settings import Settings
 from appliance.outputs.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.show.box import BoxConfig, load_box
+from appliance.show.config_error import NotAskedForError, Problem
 from appliance.show.control import ControlConfig
 from appliance.stage.stage_error import StageError
 
@@ -24,9 +25,9 @@ def control_box(box_file: Path | None, descriptor: int | None) -> None:
     """
     box = load_box(box_file)
     if box.control is None:
-        raise StageError(
-            "This box file says `control: null`, so nobody commands this box. Write `control: {port: 9002}`."
-        )
+        words = "This box file says `control: null`, so nobody commands this box."
+        cure = "Write `control: {port: 9002}`."
+        raise NotAskedForError([Problem(box_file or Path("box.yaml"), 0, words, cure)])
     if descriptor is None:
         descriptor = _from_systemd()
     if descriptor is None:

@@ -18,6 +18,7 @@ from appliance.control.heartbeat import Heartbeat
 from appliance.control.house import House, HouseReader, HouseWriter
 from appliance.control.key_file import KeyFile
 from appliance.control.news import News, held_back
+from appliance.control.notify import Notifier
 from appliance.control.orders import OrderSender
 from appliance.control.port import Port
 from appliance.control.settings import Settings
@@ -59,12 +60,15 @@ class ControlProcess:
         if words := held_back(house):
             say(f"Still from before: {words}")
 
-    def run(self, ended: Callable[[], bool], wake: int) -> None:
+    def run(self, ended: Callable[[], bool], wake: int, notifier: Notifier) -> None:
         """Until `ended` says so; `wake` is a descriptor that can be read when it may."""
         self._poll.register(wake, select.POLLIN)
+        notifier.ready("Commands are heard.")
         while not ended():
             self._poll.poll(1000.0 * self._sleep_s(time.monotonic()))
             self.turn(time.monotonic())
+            notifier.ping(time.monotonic())
+        notifier.stopping()
 
     def turn(self, now: float) -> None:
         """Everything that waits or is due; monotonic seconds."""
@@ -107,7 +111,7 @@ def control(settings: Settings, say: Callable[[str], None]) -> int:
     with _waking_stop_signals() as (ended, wake):
         process = ControlProcess(settings, say, time.monotonic())
         try:
-            process.run(ended, wake)
+            process.run(ended, wake, Notifier())
         finally:
             process.close()
         if words := process.conclusion():

@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from appliance.control.house import HouseReader
+from appliance.control.notify import Notifier
 from appliance.control.speaker import Speaker
 from appliance.control.stop_signals import stop_signals
 from appliance.lights.bill import Bill
@@ -20,7 +21,7 @@ from appliance.outputs.dmx.pace import Universe
 from appliance.outputs.frame_reader import FrameReader, SeenFrame
 from appliance.outputs.runtime_folder import Claim, runtime_folder
 from appliance.show.box import BoxConfig, load_box
-from appliance.show.config_error import ConfigError, Problem
+from appliance.show.config_error import ConfigError, NotAskedForError, Problem
 from appliance.show.lights import LightsConfig
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import at_venue, misplaced, unwired
@@ -61,13 +62,14 @@ class Lights:
         for sentence in unwired(self.show, self.box):
             self._say(sentence)
 
-    def shine(self, stopped: Callable[[], bool]) -> None:
+    def shine(self, stopped: Callable[[], bool], notifier: Notifier) -> None:
         """Pass after pass on a grid of absolute deadlines until `stopped`; then fade to the safe look."""
         period_s = 1.0 / self.box.lights.rate_hz
         deadline = time.monotonic()
         report_at = deadline + _REPORT_S
         while not stopped():
             now = self._next_pass()
+            notifier.ping(now)
             if now >= report_at:
                 report_at = now + _REPORT_S
                 self._report(now)
@@ -141,10 +143,11 @@ def rig_here(show: Show, box: BoxConfig, box_file: Path | None) -> LightsConfig:
 
 
 def require_wires(box: BoxConfig, box_file: Path | None) -> None:
-    """Refuse a box file from which no wire leads to lights, with a ConfigError."""
+    """Refuse a box file from which no wire leads to lights, with a NotAskedForError."""
     if not box.outputs.dmx:
         cure = "Add one under outputs: dmx:, for instance {universe: 1, wire: artnet, host: 192.168.0.30}."
-        raise ConfigError([Problem(box_file or Path("box.yaml"), 0, "No wire leads to the lights.", cure)])
+        file = box_file or Path("box.yaml")
+        raise NotAskedForError([Problem(file, 0, "No wire leads to the lights.", cure)])
 
 
 def wired(patch: Patch, box: BoxConfig) -> tuple[Universe, ...]:
@@ -165,12 +168,16 @@ def light_up(directory: Path | None, box_file: Path | None) -> None:
         opened.callback(speaker.close)
         folder = runtime_folder(box)
         opened.callback(Claim(folder, "lights").close)
-        stage, house = FrameReader(folder), HouseReader(folder)
+        notifier, stage, house = Notifier(), FrameReader(folder), HouseReader(folder)
+        opened.callback(notifier.close)
         opened.callback(stage.close)
         opened.callback(house.close)
         if directory is not None:
-            _light(Lights(load_show(directory), box, box_file, stage, house, speaker.say), stopped)
+            lights = Lights(load_show(directory), box, box_file, stage, house, speaker.say)
+            notifier.ready("The lights dance.")
+            _light(lights, stopped, notifier)
             return
+        notifier.ready("The lights follow the stage.")
         bill = Bill(stage)
         while not stopped():
             if bill.is_new(time.monotonic()):
@@ -179,14 +186,15 @@ def light_up(directory: Path | None, box_file: Path | None) -> None:
                 except ConfigError as error:
                     speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
                 else:
-                    _light(lights, lambda: stopped() or bill.is_new(time.monotonic()))
+                    _light(lights, lambda: stopped() or bill.is_new(time.monotonic()), notifier)
+            notifier.ping(time.monotonic())
             time.sleep(_LOOK_S)
 
 
-def _light(lights: Lights, stopped: Callable[[], bool]) -> None:
+def _light(lights: Lights, stopped: Callable[[], bool], notifier: Notifier) -> None:
     try:
         lights.introduce()
-        lights.shine(stopped)
+        lights.shine(stopped, notifier)
     finally:
         lights.close()
 

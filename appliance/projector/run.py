@@ -11,6 +11,7 @@ from pathlib import Path
 import moderngl
 
 from appliance.control.house import HouseReader
+from appliance.control.notify import Notifier
 from appliance.control.orders import OrderInbox
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.runtime_folder import AlreadyHereError, Claim, runtime_folder
@@ -99,11 +100,14 @@ class Run:
             lines.append("Keys work on the picture: h tells which, q ends.")
         return lines
 
-    def project(self, stopped: Callable[[], bool]) -> Figures:
+    def project(self, stopped: Callable[[], bool], notifier: Notifier | None = None) -> Figures:
         """Show pictures until `stopped`, the seconds are over or somebody ends it; how they came out."""
+        notifier = notifier or Notifier({})
         try:
-            with guarded(self._patience, lambda: self._projector.is_preparing, end_process):
-                self._show_on(stopped)
+            with guarded(
+                self._patience, lambda: self._projector.is_preparing, end_process, is_well=notifier.ping
+            ):
+                self._show_on(stopped, notifier)
         except moderngl.Error as error:
             self._check_context()
             raise ProjectorError(
@@ -117,7 +121,7 @@ class Run:
         """Give display, graphics card and files back."""
         self._closing.close()
 
-    def _show_on(self, stopped: Callable[[], bool]) -> None:
+    def _show_on(self, stopped: Callable[[], bool], notifier: Notifier) -> None:
         begun = reported = time.monotonic()
         while not stopped() and not self._controls.is_over:
             now = self._pacing.next()
@@ -126,6 +130,8 @@ class Run:
             self._press_keys()
             self._obey(now)
             self._show(now)
+            if self._meter.pictures == 1:
+                notifier.ready("The display shows pictures.")
             if now - reported >= _REPORT_S:
                 reported = now
                 self._report(now)

@@ -50,15 +50,18 @@ def guarded(
     is_preparing: Callable[[], bool],
     give_up: Callable[[], None],
     monotonic: Callable[[], float] = time.monotonic,
+    is_well: Callable[[float], None] = lambda now: None,
 ) -> Iterator[None]:
-    """Meanwhile a thread looks, and gives up once when patience is over."""
+    """Meanwhile a thread looks, and gives up once when patience is over; until then it tells `is_well`."""
     is_done = threading.Event()
 
     def watch() -> None:
         while not is_done.wait(_LOOK_S):
-            if patience.is_over(monotonic(), is_preparing()):
+            now = monotonic()
+            if patience.is_over(now, is_preparing()):
                 give_up()
                 return
+            is_well(now)
 
     thread = threading.Thread(target=watch, name="watchdog", daemon=True)
     thread.start()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,12 @@ class ConfigError(ValueError):
         first = self.problems[0]
         self.file, self.line, self.message = first.file, first.line, first.message
         super().__init__("\n".join(map(str, self.problems)))
+
+
+class NotAskedForError(ConfigError):
+    """Something is started that this box file or show has no use for; to try again does not help."""
+
+    exit_status = os.EX_CONFIG  # 78: its unit ends with it, and systemd leaves it so
 
 
 def nearest(word: object, known: Sequence[str]) -> str | None:

@@ -19,6 +19,7 @@ from pythonosc.osc_message import OscMessage
 
 from appliance.control.orders import Order, OrderInbox, Place
 from appliance.control.packet import datagram
+from appliance.control.notify import Notifier
 from appliance.control.port import open_port
 from appliance.control.run import ControlProcess
 from appliance.control.settings import Settings
@@ -147,8 +148,9 @@ class ControlInThread:
         self.port = self.process.port.number
         self._is_over = threading.Event()
         self._reading, self._writing = socket.socketpair()
+        ended, wake = self._is_over.is_set, self._reading.fileno()
         self._thread = threading.Thread(
-            target=self.process.run, args=(self._is_over.is_set, self._reading.fileno()), daemon=True
+            target=self.process.run, args=(ended, wake, Notifier({})), daemon=True
         )
         self._thread.start()
 
