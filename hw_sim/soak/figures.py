@@ -1,0 +1,254 @@
+"""What a soak has shown, in figures, and whether that is good: pure functions of what was seen."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass
+from statistics import median
+from typing import Any, NamedTuple
+
+from hw_sim.soak.box import LATE_MS
+from hw_sim.soak.run import Soak
+from hw_sim.soak.unit import Unit
+from hw_sim.soak.vitals import Vitals
+
+MOST_LATE_BEYOND = 0.001  # of all slots, beyond what cyclictest shows of the machine
+MOST_GROWTH_MB = 1.0
+FIRST_MINUTE_S = 60.0
+WINDOW_S = 10.0  # figures of memory are medians over so long
+_SHORTEST_LIFE_S = 3.0
+
+
+class Limit(NamedTuple):
+    """One demand: what it is about, what was found, whether it holds."""
+
+    name: str
+    found: str
+    demanded: str
+    holds: bool
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What one process held after its first minute, and at the end; it has lived for `lived_s`.
+
+    Memory is a median over some seconds. Handles and threads come and go with receivers and fades: their most
+    in the first half is compared with their most in the last quarter.
+    """
+
+    name: str
+    lived_s: float
+    first: Vitals
+    last: Vitals
+
+    @property
+    def rss_mb(self) -> float:
+        return self.last.rss_mb - self.first.rss_mb
+
+    @property
+    def handles(self) -> int:
+        return self.last.handles - self.first.handles
+
+    @property
+    def threads(self) -> int:
+        return self.last.threads - self.first.threads
+
+
+def growth(unit: Unit, run_s: float) -> Growth | None:
+    """Of its newest life. None when that was too short to tell.
+
+    In a run of less than four minutes the first minute is a quarter of the run.
+    """
+    history = unit.history
+    if not history:
+        return None
+    first_at = history[0][0] + min(FIRST_MINUTE_S, run_s / 4.0)
+    window_s = min(WINDOW_S, run_s / 8.0)
+    last_at = history[-1][0] - window_s
+    early = [held for at, held in history if first_at <= at <= first_at + window_s]
+    late = [held for at, held in history if at >= last_at]
+    if not early or last_at < first_at + _SHORTEST_LIFE_S:
+        return None
+    after = [held for at, held in history if at >= first_at]
+    half, quarter = len(after) // 2 + 1, len(after) // 4 + 1
+    return Growth(
+        *(unit.name, history[-1][0] - history[0][0]),
+        *(_summary(early, after[:half]), _summary(late, after[-quarter:])),
+    )
+
+
+def figures_of(soak: Soak) -> dict[str, Any]:
+    """Everything for the report; shares are of all slots of 20 ms, 0..1."""
+    frames, wakeups = soak.frames, soak.wakeups
+    usual_ms = frames.delays.percentile(50) or 0.0
+    limit_ms = LATE_MS - usual_ms
+    slots, spoilt = frames.heard + frames.missing, frames.late + frames.missing
+    machine_late = wakeups.later_than(limit_ms)
+    said, before = soak.desk.said, soak.said_before
+    temperatures = [look.temperature_c for look in soak.looks if look.temperature_c is not None]
+    return {
+        "machine": f"{platform.system()} {platform.release()} {platform.machine()}, "
+        f"Python {platform.python_version()}",
+        "planned_s": round(soak.planned_s, 1),
+        "seconds": round(soak.seconds, 1),
+        "slots": slots,
+        "frames": frames.heard,
+        "late": frames.late,
+        "missing": frames.missing,
+        "unheard": frames.unheard,
+        "longest_gap_s": round(frames.longest_gap_s, 3),
+        "lateness_ms": frames.delays.figures(),
+        "spoilt_share": _share(spoilt, slots),
+        "cyclictest": {
+            "complaint": wakeups.complaint,
+            "slots": wakeups.slots,
+            "late_after_ms": round(limit_ms, 1),
+            "late": machine_late,
+            "late_share": _share(machine_late, wakeups.slots),
+            "latency_ms": wakeups.delays.figures(),
+        },
+        "spoilt_in_seconds_in_which_cyclictest_woke_late": _shared_seconds(soak),
+        "counted_by_the_stage": None
+        if said is None or before is None
+        else {"late": said.late - before.late, "skipped": said.skipped - before.skipped},
+        "processes": {unit.name: _process(unit, soak.seconds) for unit in soak.box.units},
+        "temperature_c": {"first": temperatures[0], "max": max(temperatures)} if temperatures else None,
+        "sensors": {"outages": soak.outages, "power_ons": soak.box.sensors.starts},
+        "guests_came_or_went": soak.guest_changes,
+        "commands": dict(soak.desk.counts),
+        "universes_of_light": soak.universes,
+    }
+
+
+def limits_of(soak: Soak) -> list[Limit]:
+    """What has to hold."""
+    figures = figures_of(soak)
+    machine, box = figures["cyclictest"], figures["spoilt_share"]
+    beyond = box - machine["late_share"]
+    by_machine = machine["complaint"] or f"{100 * machine['late_share']:.3f} % of cyclictest's wake-ups"
+    found = [
+        Limit(
+            "late or missing ticks",
+            f"{100 * box:.3f} % (the machine: {by_machine})",
+            f"at most {100 * MOST_LATE_BEYOND:g} % beyond the machine's share",
+            figures["slots"] > 0 and beyond <= MOST_LATE_BEYOND,
+        )
+    ]
+    grown = [one for unit in soak.box.units if (one := growth(unit, soak.seconds)) is not None]
+    for one in grown:
+        words = f"{one.first.rss_mb:.1f} -> {one.last.rss_mb:.1f} MB, {one.last.handles} handles"
+        found.append(
+            Limit(
+                f"memory and handles of {one.name}",
+                f"{words} in {_time(one.lived_s)}",
+                f"at most {MOST_GROWTH_MB:g} MB more after the first minute, no more handles or threads",
+                one.rss_mb <= MOST_GROWTH_MB and one.handles <= 0 and one.threads <= 0,
+            )
+        )
+    untold = [u.name for u in soak.box.units if not u.is_away and u.name not in [one.name for one in grown]]
+    if untold:
+        found.append(Limit("memory", f"too short to tell: {', '.join(untold)}", "a longer run", False))
+    died = {unit.name: unit.deaths for unit in soak.box.units if unit.deaths}
+    found.append(
+        Limit(
+            "processes",
+            ", ".join(f"{name} ended {count} times" for name, count in died.items()) or "all lived",
+            "nobody ends who was not killed",
+            not died,
+        )
+    )
+    return found
+
+
+def table(soak: Soak) -> list[str]:
+    """The report for people, line by line."""
+    figures = figures_of(soak)
+    lateness, machine = figures["lateness_ms"], figures["cyclictest"]
+    counted = figures["counted_by_the_stage"]
+    lines = [
+        f"Danced {_time(soak.seconds)} of {_time(soak.planned_s)} on {figures['machine']}.",
+        f"Ticks {figures['slots']}: late {figures['late']}, missing {figures['missing']}; "
+        f"longest gap between two frames {1000 * figures['longest_gap_s']:.0f} ms.",
+        f"A frame left after its deadline by {_percentiles(lateness)}.",
+        f"The stage's own count: late {counted['late']}, skipped {counted['skipped']}."
+        if counted
+        else "The stage's own count did not come.",
+        machine["complaint"]
+        or f"cyclictest, same priority and period, woke late by {_percentiles(machine['latency_ms'])}.",
+        f"Of its {machine['slots']} wake-ups {machine['late']} came after {machine['late_after_ms']:g} ms, "
+        "or not in their slot: a tick of the usual cost begun then would have left late.",
+        f"{figures['spoilt_in_seconds_in_which_cyclictest_woke_late']} of the box's late and missing ticks "
+        "fell into a second in which cyclictest, too, woke late by 10 ms or more, or into the one beside it.",
+    ]
+    for name, process in figures["processes"].items():
+        away = ", what it needs is not on this machine" if process["away"] else ""
+        lines.append(
+            f"{name}: started {process['starts']} times, killed {process['kills']} times{away}; "
+            f"{process['words'] or 'lived too briefly to tell'}"
+        )
+    temperature = figures["temperature_c"]
+    lines += [
+        f"Warmest: {temperature['max']:.0f} degrees C."
+        if temperature
+        else "This machine tells no temperature.",
+        f"Sensors: {soak.outages} outages, {soak.box.sensors.starts} power-ons. Receivers came or went "
+        f"{soak.guest_changes} times. Commands: {soak.desk.counts['sent']} sent, {soak.desk.counts['done']} "
+        f"done, {soak.desk.counts['refused']} refused. Universes of light: {soak.universes}.",
+    ]
+    limits = limits_of(soak)
+    lines += [
+        f"{'ok  ' if limit.holds else 'FAIL'}  {limit.name}: {limit.found}; demanded: {limit.demanded}"
+        for limit in limits
+    ]
+    holds = all(limit.holds for limit in limits)
+    return [*lines, "Verdict: " + ("everything holds." if holds else "it does not hold; see FAIL above.")]
+
+
+def _shared_seconds(soak: Soak) -> int:
+    """Spoilt ticks in seconds in which cyclictest woke late, too, or in the one before or after."""
+    machine = soak.wakeups.seconds.bad
+    spoilt = soak.frames.seconds.bad.items()
+    return sum(count for second, count in spoilt if any(machine[second + near] for near in (-1, 0, 1)))
+
+
+def _process(unit: Unit, run_s: float) -> dict[str, Any]:
+    grown = growth(unit, run_s)
+    return {
+        "starts": unit.starts,
+        "kills": unit.kills,
+        "deaths": unit.deaths,
+        "away": unit.is_away,
+        "words": ""
+        if grown is None
+        else f"in {_time(grown.lived_s)} {grown.first.rss_mb:.1f} -> {grown.last.rss_mb:.1f} MB, "
+        f"handles {grown.first.handles} -> {grown.last.handles}, "
+        f"threads {grown.first.threads} -> {grown.last.threads}",
+        "after_first_minute": None if grown is None else vars(grown.first),
+        "at_the_end": None if grown is None else vars(grown.last),
+        "lived_s": 0.0 if grown is None else round(grown.lived_s, 1),
+    }
+
+
+def _summary(window: list[Vitals], while_: list[Vitals]) -> Vitals:
+    """Usual memory in the window, most handles and threads in a longer while."""
+    return Vitals(
+        round(median(one.rss_mb for one in window), 3),
+        round(median(one.anonymous_mb for one in window), 3),
+        max(one.handles for one in while_),
+        max(one.threads for one in while_),
+    )
+
+
+def _share(part: int, whole: int) -> float:
+    return part / whole if whole else 0.0
+
+
+def _percentiles(found: dict[str, float | None]) -> str:
+    if found["p50"] is None:
+        return "nothing: none was seen"
+    return ", ".join(f"{value:.1f} ms ({name})" for name, value in found.items())
+
+
+def _time(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return " ".join(f"{count} {unit}" for count, unit in ((minutes, "min"), (rest, "s")) if count) or "0 s"
