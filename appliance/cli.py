@@ -119,11 +119,14 @@ def project(
     frames: Annotated[Path | None, typer.Option(help="Write each picture as a PNG into this folder.")] = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so long.")] = None,
     info: Annotated[bool, typer.Option("--info", help="Figures on the wall and on the terminal.")] = False,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Without a display wait for one, and look each 10 s.")
+    ] = False,
 ) -> None:
     """Show what the stage dances, on a projector: before it starts, while it dances and when it is back."""
     from appliance.projector.project_command import project_show, wish
 
-    raise typer.Exit(project_show(box, wish(window, fullscreen, offscreen, frames, seconds, info)))
+    raise typer.Exit(project_show(box, wish(window, fullscreen, offscreen, frames, seconds, info), wait))
 
 
 @app.command()
@@ -165,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not _is_for_people(error):
             raise
         print(f"bunraku: {error}", file=sys.stderr)
-        sys.exit(REFUSED)
+        sys.exit(getattr(error, "exit_status", REFUSED))
 
 
 def plug_in(onto: typer.Typer, found: Iterable[EntryPoint], say: Callable[[str], None]) -> None:

@@ -17,9 +17,9 @@ from typing import Any
 
 from pythonosc.osc_message import OscMessage
 
+from appliance.control.notify import Notifier
 from appliance.control.orders import Order, OrderInbox, Place
 from appliance.control.packet import datagram
-from appliance.control.notify import Notifier
 from appliance.control.port import open_port
 from appliance.control.run import ControlProcess
 from appliance.control.settings import Settings
