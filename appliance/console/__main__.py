@@ -1,0 +1,29 @@
+"""`python -m appliance.console`: holds the page's place, says so to systemd, and listens nowhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from appliance.control.notify import Notifier
+from appliance.control.stop_signals import stop_signals
+
+_WORDS = "The technician's page comes with a later release. Nothing listens here."
+_LOOK_S = 1.0
+
+
+def main() -> int:
+    """Until it is stopped; the exit status."""
+    with stop_signals() as stopped:
+        notifier = Notifier()
+        print(_WORDS, flush=True)
+        notifier.ready(_WORDS)
+        while not stopped():
+            notifier.ping(time.monotonic())
+            time.sleep(_LOOK_S)
+        notifier.stopping()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
