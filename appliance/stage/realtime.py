@@ -38,8 +38,8 @@ def enter_realtime(priority: int) -> tuple[str, ...]:
 
 @contextlib.contextmanager
 def borrowed_priority(priority: int | None) -> Iterator[None]:
-    """Real-time priority for a measurement, where it can be had (None: leave it); ordinary again after it."""
-    if priority is None or _take_priority(priority):
+    """Real-time priority for a measurement, where it can be had (None: leave it); as before after it."""
+    if priority is None or _is_realtime() or _take_priority(priority):
         yield
         return
     try:
@@ -58,14 +58,24 @@ def leave_realtime() -> None:
     gc.enable()
 
 
+def _is_realtime() -> bool:
+    """Whether the calling thread has real-time priority already: a unit may give it, and allow no other."""
+    with contextlib.suppress(OSError, AttributeError):
+        return os.sched_getscheduler(0) == os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+    return False
+
+
 def _take_priority(priority: int) -> str:
     try:
+        if _is_realtime() and os.sched_getparam(0).sched_priority == priority:
+            return ""
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except (OSError, AttributeError) as error:
         return (
             f"No real-time priority ({_reason(error)}). The dance runs, but other programs can hold it up: "
             "on a busy machine one tick in a hundred came 25 to 340 ms late. "
-            "Allow it with `ulimit -r 70`, LimitRTPRIO=70 in the unit, or the capability CAP_SYS_NICE."
+            "Allow it with `ulimit -r 70`, with CPUSchedulingPolicy=fifo in the unit, or with the capability "
+            "CAP_SYS_NICE."
         )
     return ""
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+
+import pytest
 
 SETTINGS = """
 import gc, os, sys, threading
@@ -46,3 +49,19 @@ def test_without_rights_it_runs_and_says_what_that_costs() -> None:
     assert "25 to 340 ms late" in words
     assert "Memory is not locked" in words
     assert "ulimit -r 70" in words
+
+
+def test_what_a_unit_has_given_is_used_where_nothing_more_may_be_asked_for() -> None:
+    given = "os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(10))\n"
+    if subprocess.run(
+        [sys.executable, "-c", "import os\n" + given], capture_output=True, check=False
+    ).returncode:
+        pytest.skip(f"user {os.getuid()} may not have real-time priority here")
+    measured = """
+from appliance.stage.realtime import borrowed_priority
+with borrowed_priority(10):
+    pass
+"""
+    facts, words = run(given + WITHOUT_RIGHTS + measured)
+    assert facts.split()[-1] == "0", "another thread is ordinary"
+    assert "No real-time priority" not in words
