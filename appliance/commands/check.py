@@ -12,20 +12,16 @@ from appliance.show.cues import too_much
 from appliance.show.posistagenet import misfits
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import misplaced, unwired
-from appliance.stage.cast import admission, assemble, reach
+from appliance.stage.budget import Admission
+from appliance.stage.cast import Cast, admission, assemble, reach
 from appliance.stage.stage_error import StageError
 
 
 def check_show(directory: Path | None, box_file: Path | None) -> None:
     """Print what was found; raises StageError or ConfigError with all that is wrong."""
     directory = directory or default_show_path()
-    box = load_box(box_file)
-    _refuse_damage(directory)
-    show = load_show(directory)
-    _refuse_misfits(show, box, box_file)
-    cast = assemble(show, _without_ports(box))
-    verdict = admission(cast, show, box)
-    cast.close()
+    cast, verdict = verified(directory, box_file)
+    show, box = load_show(directory), load_box(box_file)
     if box.sensors.keys is not None and cast.complaints:
         raise StageError("\n".join(cast.complaints))
     if not verdict.fits:
@@ -35,6 +31,21 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
     too_many = too_much(show.config.cues, verdict.most_coding, show.file)
     for warning in (*reach(cast, box), *unwired(show, box), *too_many):
         print(warning)
+
+
+def verified(directory: Path, box_file: Path | None) -> tuple[Cast, Admission]:
+    """A show that can dance on this box, all ports closed, and what its iterations cost here.
+
+    Raises StageError or ConfigError with all that is wrong.
+    """
+    box = load_box(box_file)
+    _refuse_damage(directory)
+    show = load_show(directory)
+    _refuse_misfits(show, box, box_file)
+    cast = assemble(show, without_ports(box))
+    verdict = admission(cast, show, box)
+    cast.close()
+    return cast, verdict
 
 
 def pack_show(directory: Path) -> None:
@@ -71,7 +82,7 @@ def _refuse_misfits(show: Show, box: BoxConfig, box_file: Path | None) -> None:
         raise ConfigError(problems)
 
 
-def _without_ports(box: BoxConfig) -> BoxConfig:
+def without_ports(box: BoxConfig) -> BoxConfig:
     """The same box with its ports closed: a check may run beside the show."""
     return box.model_copy(
         update={

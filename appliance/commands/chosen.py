@@ -1,4 +1,4 @@
-"""`--chosen FILE`: the show and the box file that the preflight chose, for every command that has a `--box`."""
+"""`--chosen FILE`: show and box file as the preflight chose them, for every command that has a `--box`."""
 
 from __future__ import annotations
 

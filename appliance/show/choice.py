@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+import os
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 APPLIANCE_BOX = Path(__file__).resolve().parent / "appliance_box.yaml"
 EMBEDDED_SHOW = Path(__file__).resolve().parent / "default_show"
@@ -15,27 +15,53 @@ STICK = Path("/media/bunraku/bunraku")
 DATA = Path("/data/bunraku")
 RUN = Path("/run/bunraku")
 CHOSEN = "chosen.json"
+_MOST_REMEMBERED = 2  # the newest and the last good one; what comes with the box is always there
 
 
-@dataclass(frozen=True, slots=True)
-class Pair:
-    """A show and a box file that were checked together. id: "" for what comes with the box."""
+class Pair(NamedTuple):
+    """A show and a box file that were checked together.
+
+    id: of their contents, `show+box`, where nothing stands for what comes with the box; source: where they
+    came from, for people; good: the pair has danced on this box.
+    """
 
     show: Path = EMBEDDED_SHOW
     box: Path = APPLIANCE_BOX
     id: str = ""
     source: str = "comes with the box"
+    good: bool = False
+
+    @property
+    def show_id(self) -> str:
+        """Of the show alone."""
+        return self.id.partition("+")[0]
+
+    @property
+    def box_id(self) -> str:
+        """Of the box file alone."""
+        return self.id.partition("+")[2]
+
+    def here(self, box: Path = APPLIANCE_BOX) -> Pair:
+        """With what comes with the box as it comes with this release, which may be another one now."""
+        return self._replace(
+            show=self.show if self.show_id else EMBEDDED_SHOW, box=self.box if self.box_id else box
+        )
+
+    @property
+    def is_there(self) -> bool:
+        """Whether both can still be found."""
+        return (self.show / "show.yaml").is_file() and self.box.is_file()
 
 
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """pairs: in the order in which they are tried; the last one comes with the box.
+class Choice(NamedTuple):
+    """pairs: in the order in which they are tried, never empty in a file that a stage reads.
 
-    refused: what was found and is not danced, sentences for people.
+    refused: what was found and is not danced, sentences for people; aside: ids of pairs that did not dance.
     """
 
-    pairs: tuple[Pair, ...] = (Pair(),)
+    pairs: tuple[Pair, ...] = (Pair(good=True),)
     refused: tuple[str, ...] = ()
+    aside: tuple[str, ...] = ()
 
     @property
     def first(self) -> Pair:
@@ -44,28 +70,90 @@ class Choice:
 
     @staticmethod
     def read(path: Path) -> Choice | None:
-        """As written; None where there is none, or no whole one."""
+        """As written; None where there is none, no whole one, or an empty one."""
         try:
-            values: dict[str, Any] = json.loads(path.read_bytes())
-            pairs = tuple(_pair(one) for one in values["pairs"])
-            return Choice(pairs or (Pair(),), tuple(map(str, values["refused"])))
-        except (OSError, ValueError, KeyError, TypeError):
+            choice = Choice.of(json.loads(path.read_bytes()))
+        except (OSError, ValueError):
             return None
+        return choice if choice.pairs else None
 
-    def text(self) -> str:
-        """As JSON: the pairs, and what dances once more at the top for scripts."""
-        pairs = [_plain(pair) for pair in self.pairs]
-        return json.dumps({**pairs[0], "pairs": pairs, "refused": list(self.refused)}, indent=1) + "\n"
+    @staticmethod
+    def of(values: dict[str, Any]) -> Choice:
+        """From plain values; raises ValueError."""
+        try:
+            refused, aside = (tuple(map(str, values[name])) for name in ("refused", "aside"))
+            return Choice(tuple(_pair(one) for one in values["pairs"]), refused, aside)
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"This is no choice of a show ({error}).") from error
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        pairs = [pair._asdict() | {"show": str(pair.show), "box": str(pair.box)} for pair in self.pairs]
+        return {"pairs": pairs, "refused": list(self.refused), "aside": list(self.aside)}
+
+    def write(self, path: Path) -> None:
+        """As a whole or not at all, also when the power is cut; what dances stands at the top as well.
+
+        Raises OSError.
+        """
+        values = self.plain()
+        write_whole(path, (json.dumps({**values["pairs"][0], **values}, indent=1) + "\n").encode())
+
+    def with_newest(self, pair: Pair) -> Choice:
+        """To remember: this one first, then the newest of those that have danced."""
+        others = [one for one in self.pairs if one.id and one.id != pair.id]
+        good = [one for one in others if one.good] or others
+        return Choice((pair, *good[: _MOST_REMEMBERED - 1]))
+
+    def with_good(self, identity: str) -> Choice:
+        """This pair has danced."""
+        return self._replace(
+            pairs=tuple(one._replace(good=True) if one.id == identity else one for one in self.pairs)
+        )
+
+    def without(self, aside: tuple[str, ...]) -> Choice:
+        """Without pairs that did not dance; what comes with the box stays."""
+        pairs = tuple(one for one in self.pairs if not one.id or one.id not in aside)
+        return self._replace(pairs=pairs)
+
+    def complete(self, box: Path = APPLIANCE_BOX) -> Choice:
+        """With what comes with the box at the end, on the venue's box files first: never nothing on stage.
+
+        `box`: the box file of a box without one.
+        """
+        pairs = {one.id: one.here(box) for one in self.pairs if one.id}
+        pairs = {identity: one for identity, one in pairs.items() if one.is_there}
+        for one in list(pairs.values()):
+            if one.box_id:
+                pairs.setdefault(f"+{one.box_id}", Pair(box=one.box, id=f"+{one.box_id}", good=one.good))
+        return self._replace(pairs=(*pairs.values(), Pair(box=box, good=True)))
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """A file and its name in the folder, on the disk when this returns; raises OSError: the old one stays."""
+    temporary = path.with_name(f".{path.name}.new")
+    try:
+        with temporary.open("wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """A rename is on the disk only once its folder is."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _pair(values: dict[str, Any]) -> Pair:
-    return Pair(Path(values["show"]), Path(values["box"]), str(values["id"]), str(values["source"]))
-
-
-def _plain(pair: Pair) -> dict[str, str]:
-    return {name: str(value) for name, value in asdict(pair).items()}
-
-
-def boots(paths: Sequence[Path] = BOOTS) -> Path:
-    """The boot partition's folder for shows: the first of them that is there."""
-    return next((path for path in paths if path.is_dir()), paths[-1])
+    show, box = Path(values["show"]), Path(values["box"])
+    return Pair(show, box, str(values["id"]), str(values["source"]), bool(values["good"]))

@@ -1,0 +1,37 @@
+"""Can this show dance on this box? Checked in a process of its own: a broken network may crash it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from appliance.stage.realtime import prepare_environment
+
+prepare_environment()
+
+from appliance.commands.check import verified  # noqa: E402  (numpy must find the environment prepared)
+from appliance.outputs.runtime_folder import RuntimeFolderError  # noqa: E402
+from appliance.pose.bvh import BvhError  # noqa: E402
+from appliance.show.config_error import ConfigError  # noqa: E402
+from appliance.stage.stage_error import StageError  # noqa: E402
+
+
+def main(show: str, box: str) -> int:
+    """0: it dances; 1: it does not, and stderr says why.
+
+    Sensors without keys are no reason, they can be provisioned later; nor are iterations that the stage has
+    to lower: another program may have come between at the measurement. A network too slow for one is.
+    """
+    try:
+        _, verdict = verified(Path(show), Path(box))
+    except (BvhError, ConfigError, RuntimeFolderError, StageError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    if verdict.coding == 1 and verdict.one_ms > verdict.budget_ms:
+        print(verdict.sentence(), file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,62 @@
+"""Doing something that may never end, in a process that is given up after a while."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import time
+from collections.abc import Callable
+
+
+class GivenUpError(Exception):
+    """It gave nothing; the message says why."""
+
+
+def within(seconds: float, do: Callable[[], bytes]) -> bytes:
+    """What `do` gives, from a fork of this process; raises GivenUpError when it is late or has crashed.
+
+    Whoever hangs in the kernel, on a stick that does not answer, cannot be ended: nobody waits for it.
+    """
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        _answer(writing, do)
+    os.close(writing)
+    try:
+        return _answered(reading, time.monotonic() + seconds, seconds)
+    finally:
+        os.close(reading)
+        with contextlib.suppress(OSError):
+            os.killpg(child, signal.SIGKILL)
+        with contextlib.suppress(OSError):
+            os.waitpid(child, os.WNOHANG)
+
+
+def _answer(writing: int, do: Callable[[], bytes]) -> None:
+    """In the fork; does not return."""
+    status = 1
+    try:
+        os.setpgid(0, 0)  # what it starts is given up with it
+        with os.fdopen(writing, "wb") as stream:
+            stream.write(b"!" + do())
+        status = 0
+    finally:
+        os._exit(status)
+
+
+def _answered(reading: int, until: float, seconds: float) -> bytes:
+    poll = select.poll()
+    poll.register(reading, select.POLLIN)
+    answer = b""
+    while (left_s := until - time.monotonic()) > 0:
+        if not poll.poll(1000.0 * left_s):
+            break
+        part = os.read(reading, 1 << 16)
+        answer += part
+        if not part:
+            if answer.startswith(b"!"):
+                return answer[1:]
+            raise GivenUpError("what read it has crashed")
+    raise GivenUpError(f"not within {seconds:g} s")
