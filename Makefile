@@ -18,11 +18,14 @@ DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump 
     gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \
     qemu-system-arm:qemu-system-arm
 
+DEBIAN_FOR_SOAK := $(DEBIAN_FOR_GL) stress-ng:stress-ng rt-tests:cyclictest
+
 FUZZ_SECONDS ?= 30
+MINUTES ?= 60
 
 .DEFAULT_GOAL := help
-.PHONY: help run release studio firmware test firmware-test fuzz-corpus lint bench lock clean \
-    debian-for-firmware debian-for-tests
+.PHONY: help run release studio firmware test firmware-test fuzz-corpus lint bench lock clean soak \
+    debian-for-firmware debian-for-tests debian-for-soak
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -66,6 +69,9 @@ mkdir -p build && cmake -S firmware -B build/$(1) $(3) >build/$(1).log 2>&1 || {
 cmake --build build/$(1) --target $(2) --parallel 2 -- --silent --no-print-directory
 endef
 
+soak: $(VENV)/.ready-to-run debian-for-soak ## the whole box under load and trouble for MINUTES; figures and picture in out/soak
+	@exec $(BIN)/python -m hw_sim.soak --minutes $(MINUTES) --out out/soak
+
 lint: $(VENV)/.ready-to-test ## style, types and import contracts alone
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
@@ -100,6 +106,9 @@ endef
 
 debian-for-tests:
 	@$(call debian,$(DEBIAN_FOR_TESTS))
+
+debian-for-soak:
+	@$(call debian,$(DEBIAN_FOR_SOAK))
 
 debian-for-firmware:
 	@$(call debian,$(DEBIAN_FOR_FIRMWARE))

@@ -48,9 +48,10 @@ def _lateness(axes: Any, soak: Soak) -> None:
             label=f"{name}: worst of each second",
         )
     axes.axhline(LATE_MS, color=IVORY, linewidth=0.6)
-    axes.set(title=f"How late (line: {LATE_MS:g} ms, from there on a frame counts as late)", ylabel="ms")
+    axes.set_title(f"How late (line: {LATE_MS:g} ms, from there on a frame counts as late)", loc="left")
+    axes.set_ylabel("ms")
     axes.set_yscale("log")
-    axes.legend(frameon=False, loc="upper right")
+    axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, markerscale=3)
 
 
 def _memory(axes: Any, soak: Soak) -> None:
@@ -60,8 +61,9 @@ def _memory(axes: Any, soak: Soak) -> None:
         ]
         if seen:
             axes.plot(*zip(*seen, strict=True), color=_LINES[number % len(_LINES)], label=unit.name)
-    axes.set(title="Resident memory", ylabel="MB", ylim=(0.0, None))
-    axes.legend(frameon=False, loc="upper right", ncols=3)
+    axes.set_title("Resident memory", loc="left")
+    axes.set(ylabel="MB", ylim=(0.0, None))
+    axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(soak.box.units))
 
 
 def _handles(axes: Any, soak: Soak) -> None:
@@ -71,7 +73,8 @@ def _handles(axes: Any, soak: Soak) -> None:
         ]
         if seen:
             axes.plot(*zip(*seen, strict=True), color=_LINES[number % len(_LINES)], label=unit.name)
-    axes.set(title="Open handles", ylim=(0.0, None))
+    axes.set_title("Open handles", loc="left")
+    axes.set_ylim(0.0)
 
 
 def _shade_loads(axes: Any, soak: Soak) -> None:
