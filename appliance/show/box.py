@@ -17,6 +17,7 @@ from appliance.show.venue_lights import VenueLightsConfig
 from appliance.show.yaml_file import read_yaml
 
 Dialect = Literal["ai-toolbox", "joint", "vmc"]
+Resume = Literal["always", "after_crash", "never"]
 
 
 class UdpConfig(Section):
@@ -176,6 +177,11 @@ class BoxConfig(Section):
     realtime: RealtimeConfig = Field(default_factory=RealtimeConfig, description=str(RealtimeConfig.__doc__))
     phase_lock: bool = Field(
         default=True, description="Place each tick just after the primary sensor's usual arrival."
+    )
+    resume: Resume = Field(
+        default="always",
+        description="When a show goes on at the place of the phrase where it was: always (after a crash and "
+        "after a power cut), after_crash, or never. A show that was ended begins at the beginning.",
     )
     journal: JournalConfig = Field(default_factory=JournalConfig, description=str(JournalConfig.__doc__))
 

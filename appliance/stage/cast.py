@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -127,6 +127,21 @@ def assemble(
 
 def admission(cast: Cast, show: Show, box: BoxConfig) -> Admission:
     """Measure the show's iterations on this machine with the first window and all hands of the show."""
+    dance = _dance(cast)
+    dancer = show.config.dancer
+    with borrowed_priority(box.realtime.priority if box.realtime.enabled else None):
+        return admit(
+            dance, dancer.coding_iterations, dancer.interaction_iterations, box.limits.tick_budget_ms
+        )
+
+
+def warm_up(cast: Cast, admitted: Admission) -> None:
+    """Let the network run once as the first tick will: its first run takes several times as long."""
+    _dance(cast)(admitted.coding, admitted.interaction)
+
+
+def _dance(cast: Cast) -> Callable[[int, int], object]:
+    """Runs the puppet with the first window and all hands of the show; its poses go nowhere."""
     window = cast.puppet.select(cast.motion.window()).copy()
     mask, targets, weights = cast.hands.mask.copy(), cast.hands.targets, cast.hands.weights
     mask[cast.hand_places] = True
@@ -134,11 +149,7 @@ def admission(cast: Cast, show: Show, box: BoxConfig) -> Admission:
     def dance(coding: int, interaction: int) -> object:
         return cast.puppet.dance(window, mask, targets, weights, coding, interaction)
 
-    dancer = show.config.dancer
-    with borrowed_priority(box.realtime.priority if box.realtime.enabled else None):
-        return admit(
-            dance, dancer.coding_iterations, dancer.interaction_iterations, box.limits.tick_budget_ms
-        )
+    return dance
 
 
 def reach(cast: Cast, box: BoxConfig) -> list[str]:

@@ -13,8 +13,9 @@ from appliance.outputs.block import BlockReader, BlockWriter
 FILE, KIND = "place", "place"
 LARGEST = 4000  # bytes of a packed place; one slot on the disk is a page of 4096
 
-_NUMBERS = struct.Struct("<q9dHHBB")
+_NUMBERS = struct.Struct("<q9d4HBB")
 _ENDED = 1
+_MOST = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +25,8 @@ class Place:
     phrase, position_s: which pose comes next; excerpt: first and last second of the part that plays;
     rate: its speed; x, z (metres), heading (radians about +Y): where the phrase's root stands on the stage;
     strayed: how far grounding has moved the figure from there (metres); let_go: joints whose hands were told
-    to let go; boot: the machine's boot id; tick: of the last frame; ended: the show was ended as it should;
-    tries: starts from this place of which no frame has left.
+    to let go; boot: the machine's boot id; tick: of the last frame; restarts, power_cuts: how often the show went on
+    after one; ended: the show was ended as it should; tries: starts from here of which no frame has left.
     """
 
     show: str
@@ -43,6 +44,8 @@ class Place:
     let_go: tuple[str, ...] = ()
     boot: str = ""
     tick: int = 0
+    restarts: int = 0
+    power_cuts: int = 0
     ended: bool = False
     tries: int = 0
 
@@ -60,6 +63,8 @@ def packed(place: Place) -> bytes:
         *place.strayed,
         place.coding,
         place.interaction,
+        min(place.restarts, _MOST),
+        min(place.power_cuts, _MOST),
         _ENDED * place.ended,
         place.tries,
     )
@@ -92,8 +97,10 @@ def unpacked(payload: bytes) -> Place | None:
             tuple(str(joint) for joint in let_go),
             str(boot),
             tick,
-            bool(small[2] & _ENDED),
+            small[2],
             small[3],
+            bool(small[4] & _ENDED),
+            small[5],
         )
     except (struct.error, ValueError, TypeError):
         return None

@@ -22,6 +22,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
 FOLDER = ".prepared"  # in a show bundle: hidden, so it is no part of what was packed
+MEMORY = "prepared"  # in the folder where the box's processes meet
 SUFFIX = ".phrase"
 LARGEST = 64 * 2**20  # bytes: longer phrases are read anew, the folder may be one in memory
 

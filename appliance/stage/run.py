@@ -7,20 +7,24 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 
 from appliance.control.house import HouseReader
+from appliance.control.notify import Notifier
 from appliance.control.orders import Order, OrderInbox
 from appliance.sensor.link import SensorState
 from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
+from appliance.stage.admitted import admitted
 from appliance.stage.budget import Admission
-from appliance.stage.cast import Cast, admission, assemble
+from appliance.stage.cast import Cast, assemble
 from appliance.stage.clock import Slot, TickClock
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.journal import JUMPED, LATE, NOT_FINITE, Journal, JournalError
 from appliance.stage.obey import SENSOR_ORDERS, obey, obey_for_sensors, resume
 from appliance.stage.phase_lock import PhaseLock
+from appliance.stage.prepared import MEMORY
 from appliance.stage.realtime import enter_realtime, leave_realtime
+from appliance.stage.resuming import Resuming
 from appliance.stage.roster import roster_lines
 from appliance.stage.sharing import Sharing, facts_of
 from appliance.stage.stage_error import StageError
@@ -50,16 +54,24 @@ class Stage:
         with ExitStack() as opened:
             self.sharing = Sharing(box)
             opened.callback(self.sharing.close)
+            self.notifier = Notifier()
+            opened.callback(self.notifier.close)
+            self.resuming = Resuming(show.config.name, self.sharing.folder, box.state_folder, box.resume)
+            opened.callback(self.resuming.close)
             self.memory = SensorMemory(box.state_folder, say)
             opened.callback(self.memory.close)
-            self.cast: Cast = assemble(show, box, self.memory.profiles, box_file)
+            self.cast: Cast = assemble(
+                show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY
+            )
             opened.callback(self.cast.close)
             self.inbox = _open_inbox(self.sharing.folder)
             opened.callback(self.inbox.close)
             self.journal = self._open_journal(journal)
             if self.journal is not None:
                 opened.callback(self.journal.close)
-            self.admission: Admission = admission(self.cast, show, box)
+            self.admission: Admission = admitted(
+                self.sharing.folder, self.cast, show, box, self.resuming.comes_back
+            )
             self._closing = opened.pop_all()
         self.iterations = Iterations(
             self.admission.coding, self.admission.interaction, self.admission.most_coding
@@ -67,12 +79,12 @@ class Stage:
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
         self.wearing = Wearing(self.cast, self.memory, say)
+        self._resume()
         self.tick = Tick(self.cast, self.wearing, self.iterations, latest_start_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         self.lock = PhaseLock() if box.phase_lock and self.cast.primary else None
         self.watch = Watch(self.cast)
-        self._resume()
 
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
         """Tick until `stopped` says so or the seconds are over; this thread is the real-time one."""
@@ -100,6 +112,7 @@ class Stage:
         facts = facts_of(self.show, self.box_file, self.iterations, begun)
         self.sharing.begin(self.cast, facts, self.say)
         self._tell(begun)
+        self.resuming.begin(self.cast, self.iterations)
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self.tick.run(slot)
@@ -108,6 +121,8 @@ class Stage:
             shift_s = self._follow_sensor(slot)
             if self.health.is_due(slot.started):
                 self._report(slot.started)
+        self.resuming.end()
+        self.notifier.stopping()
 
     def _note(self, slot: Slot) -> None:
         """Count the tick and write it into the journal; the frame has left already."""
@@ -118,6 +133,10 @@ class Stage:
         health.late += late
         health.skipped += slot.skipped
         health.not_finite += tick.network_failed
+        if health.ticks == 1:
+            self.notifier.ready()
+        self.notifier.ping(slot.started)
+        self.resuming.note(self.cast, self.iterations, slot.tick)
         if self.journal is not None:
             flags = late * LATE | tick.network_failed * NOT_FINITE | self.cast.motion.jumped * JUMPED
             self._write(self.journal, slot, flags)
@@ -172,11 +191,13 @@ class Stage:
         return done, words
 
     def _resume(self) -> None:
-        """After a crash: go on in the cue that is in force."""
-        with closing(HouseReader(self.sharing.folder)) as house:
-            words = resume(house.read().cue, self.cast, self.iterations)
-        if words:
-            self.say(words)
+        """After a crash or a power cut: go on where the show was, or else in the cue that is in force."""
+        words = [self.resuming.complaint, self.resuming.go_on(self.cast, self.iterations)]
+        if not self.resuming.went_on:
+            with closing(HouseReader(self.sharing.folder)) as house:
+                words.append(resume(house.read().cue, self.cast, self.iterations))
+        for sentence in filter(None, words):
+            self.say(sentence)
 
     def _tell(self, now: float) -> list[SensorState]:
         """How the box is, for whoever reads the shared frame; gives how the sensors are."""
@@ -199,7 +220,9 @@ class Stage:
         """Once a second, after the frame has left."""
         times = self.iterations
         self.health.look(now)
-        self.say(self.health.line(times.coding, times.interaction, self._sensor_age_s(now), self._is_locked))
+        line = self.health.line(times.coding, times.interaction, self._sensor_age_s(now), self._is_locked)
+        self.notifier.status(line)
+        self.say(line)
         for sentence in self.watch.news(now, self._tell(now)):
             self.say(sentence)
         for imu_id, offsets in self.cast.link.take_profiles():
