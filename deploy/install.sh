@@ -4,24 +4,25 @@ set -euo pipefail
 
 usage() {
     cat <<'HELP'
-Usage: install.sh [FOLDER]         install the release in FOLDER (left out: the folder of this script) and start it
+Usage: install.sh [FOLDER]         install the release in FOLDER (left out: where this script lies) and start it
        install.sh --list           the releases on this box; * is the one that dances
        install.sh --rollback       back to the release before
        install.sh --use VERSION    to a release that --list names
-       install.sh --uninstall      take bunraku off this box; shows, keys and journal in /data stay
-       install.sh --uninstall --purge      the same, and /data/bunraku with all shows, keys and the journal
+       install.sh --uninstall      take bunraku off this box; shows, keys and the journal in /data/bunraku stay
+       install.sh --uninstall --purge      these too
 
   --root DIR             work on the root file system in DIR (an image) instead of this machine's
   --until-power-off      try the release although this root forgets everything when the power goes
   --help                 this text
 
-For Debian 13 and Raspberry Pi OS (amd64, arm64), as root:
+For Debian 13 and Raspberry Pi OS (amd64, arm64), as root, with the stick that `make release` is copied to:
   sudo bash /media/bunraku/bunraku/release/install.sh
+On a box that has a release already, the same script is the command bunraku-install.
 
-Nothing is switched before the new release is whole on the disk and has danced for a moment where nobody sees it.
-If it does not start, the box goes back to the release before. Pull the plug whenever you want: the box then has
-the old release or the new one. Two releases before the current one stay.
-Exit status: 0 done; 1 refused or gone back (the message says why), the box dances as before.
+Nothing is switched before the new release lies whole on the disk and has danced for a moment where nobody
+sees it. If it does not start then, the box goes back to the release before. Whenever the power fails, the
+box has the old release or the new one, whole. Two releases before the current one stay.
+Exit status: 0 done; 1 refused, or gone back to the release before: the message says why.
 HELP
 }
 
@@ -29,16 +30,20 @@ say() { echo "install: $*"; }
 fail() { echo "install: $*" >&2; exit 1; }
 
 KEPT=2
+STARTS_WITHIN_S=20
+STAYS_S=3
 home=/opt/bunraku
 data=/data/bunraku
-root='' action=install source='' chosen='' purge=no fleeting=no
+units=usr/lib/systemd/system
+users=system/usr/lib/sysusers.d/bunraku.conf
+root='' action=install source='' chosen='' purge=no fleeting=no part='' fresh=no
 
 read_options() {
     while [ $# -gt 0 ]; do
         case $1 in
         --root) root=$(cd "${2:?--root needs a folder}" && pwd) && shift ;;
         --list | --rollback | --uninstall) action=${1#--} ;;
-        --use) action=use chosen=${2:?--use needs a version; see --list} && shift ;;
+        --use) action=use chosen=${2:?"--use needs a version, see --list"} && shift ;;
         --purge) purge=yes ;;
         --until-power-off) fleeting=yes ;;
         -h | --help) usage && exit 0 ;;
@@ -52,12 +57,19 @@ read_options() {
     releases=$root$home/releases
 }
 
-in_root() { if [ -n "$root" ]; then chroot "$root" "$@"; else "$@"; fi; }
-runs_here() { [ -z "$root" ] && [ -d /run/systemd/system ]; }
-current() { basename "$(readlink "$root$home/current" 2>/dev/null)" 2>/dev/null; }
-fact() { sed -n "s/^$2 //p" "$1/release"; }
+# A root that does not run has no /proc of its own, and the packages ask it for the processor.
+in_root() {
+    # shellcheck disable=SC2016 # $0 and $@ belong to the inner shell
+    if [ -z "$root" ]; then "$@"; else
+        unshare --mount bash -c 'mount --rbind /proc "$0/proc" 2>/dev/null; exec chroot "$0" "$@"' "$root" "$@"
+    fi
+}
 
-# What --list shows: "number version", oldest first. The number says in which order they came, whatever the clock said.
+runs_here() { [ -z "$root" ] && [ -d /run/systemd/system ]; }
+fact() { sed -n "s/^$2 //p" "$1/release"; }
+current() { basename "$(readlink "$root$home/current" || true)"; }
+
+# Oldest first, as "number version": the number says in which order they came, whatever the clock said.
 installed() {
     local folder
     for folder in "$releases"/*/; do
@@ -65,37 +77,41 @@ installed() {
     done | sort -n
 }
 
+# One at a time; and whatever ends this script, no half release stays.
+begin() {
+    [ "$(id -u)" = 0 ] || fail "this needs root. Try again with sudo."
+    mkdir -p "$releases"
+    exec 9<"$releases"
+    flock --nonblock 9 || fail "another installation is running on this box. Wait for its end."
+    trap '[ -z "$part" ] || rm -rf "$part"' EXIT
+    umask 022
+}
+
 # ---- before anything is written
 
 check_source() {
-    [ -f "$source/release" ] && [ -f "$source/SHA256SUMS" ] ||
-        fail "no release in $source. Name the folder that 'make release' wrote, on a stick: bunraku/release."
+    [[ -f $source/release && -f $source/SHA256SUMS ]] ||
+        fail "no release in $source. Name the folder that 'make release' wrote; on a stick it is bunraku/release."
     version=$(fact "$source" version)
-    [[ $version =~ ^[0-9A-Za-z.+-]+$ ]] || fail "the release in $source has no version. Copy it to the stick anew."
+    [[ $version =~ ^[0-9A-Za-z.+]+$ ]] || fail "the release in $source has no version. Copy it to the stick anew."
 }
 
 check_machine() {
     local python arch have needs
-    [ "$(id -u)" = 0 ] || fail "this needs root. Try again with sudo."
-    arch=$(in_root dpkg --print-architecture) || fail "this is not Debian or Raspberry Pi OS."
+    arch=$(in_root dpkg --print-architecture) || fail "this is neither Debian nor Raspberry Pi OS."
     [ "$arch" = "$(fact "$source" architecture)" ] ||
         fail "this box is $arch, the release is for $(fact "$source" architecture). Take the release for $arch."
     python=$(fact "$source" python)
     in_root "/usr/bin/python$python" -c 'import venv' 2>/dev/null ||
         fail "Python $python is missing. Bunraku is made for Debian 13; there: apt-get install libpython3-stdlib"
-    mkdir -p "$releases"
     needs=$(fact "$source" needs-mb)
     have=$(df --output=avail -m "$releases" | tail -n 1 | tr -d ' ')
-    [ "$have" -ge "$needs" ] || fail "$have MB are free on $releases, $needs MB are needed." \
-        "Nothing was changed. Take an old release away (--list) or use a larger card."
-    check_memory_of_root
-}
-
-# An image's root lies under an overlay in memory: what is written there is gone with the power.
-check_memory_of_root() {
-    [ "$fleeting" = yes ] || [ "$(stat -f -c %T "$releases")" != overlayfs ] ||
-        fail "this box runs from a read-only image: an installation would be forgotten at power-off." \
-            "Write the new image to its card (shows and keys in /data stay), or try the release with --until-power-off."
+    [ "$have" -ge "$needs" ] || fail "$have MB are free in $releases, $needs MB are needed." \
+        "Nothing was changed. Make room, or use a larger card."
+    # An image's root lies under an overlay in memory.
+    [[ -n $root || $fleeting = yes || $(stat -f -c %T "$releases") != overlayfs ]] ||
+        fail "this box runs from a read-only image and would forget the installation at power-off." \
+            "Write the new image to its card (shows and keys in /data stay), or try the release: --until-power-off"
 }
 
 # ---- a release of its own beside the others
@@ -103,33 +119,32 @@ check_memory_of_root() {
 copy_and_verify() {
     local file
     mkdir -p "$part/source"
+    install -m 644 "$source/SHA256SUMS" "$source/release" "$part/source/"
     while read -r _ file; do
-        mkdir -p "$part/source/$(dirname "$file")"
-        cp "$source/$file" "$part/source/$file" ||
+        install -D -m 644 "$source/$file" "$part/source/$file" ||
             fail "$file could not be read from $source. Is the stick still in? The box dances as before."
-    done <"$source/SHA256SUMS"
-    cp "$source/SHA256SUMS" "$part/source/"
+    done <"$part/source/SHA256SUMS"
     (cd "$part/source" && sha256sum --check --strict --quiet SHA256SUMS >&2) ||
-        fail "files on the stick are damaged (named above). Copy the release to it anew. The box dances as before."
+        fail "files of the release are damaged (named above). Copy it to the stick anew. The box dances as before."
 }
 
 build() {
-    local inside=${part#"$root"} python=$part/bin/python
+    local inside=${part#"$root"} file
     in_root "/usr/bin/python$(fact "$part/source" python)" -m venv --without-pip "$inside"
-    in_root "$inside/bin/python" -I "$inside/source/pip.whl/pip" --isolated --quiet --disable-pip-version-check --no-cache-dir \
-        install --no-index --find-links "$inside/source/wheels" --no-deps --require-hashes --no-compile \
-        --no-warn-script-location --root-user-action ignore -r "$inside/source/requirements.txt" ||
+    in_root "$inside/bin/python" -I "$inside/source/pip.whl/pip" --isolated --quiet --disable-pip-version-check \
+        --no-cache-dir install --no-index --find-links "$inside/source/wheels" --no-deps --require-hashes \
+        --no-compile --no-warn-script-location --root-user-action ignore -r "$inside/source/requirements.txt" ||
         fail "the packages could not be unpacked (above). The box dances as before."
-    site=$(echo "$part"/lib/python3*/site-packages)
-    drop_unneeded
+    drop_unneeded "$part"/lib/python3*/site-packages
     write_command
     in_root "$inside/bin/python" -I -m compileall -q -j 0 -s "$inside" -p "$home/releases/$name" "$inside/lib"
-    cp -r "$part/source/system" "$part/source/release" "$part/source/SHA256SUMS" "$part/source/install.sh" "$part/"
-    rm -r "$part/source"
+    for file in system release SHA256SUMS install.sh; do mv "$part/source/$file" "$part/"; done
+    chmod 755 "$part/install.sh"
+    rm -r "$part/source" "$part/.gitignore" "$part/include"
 }
 
 drop_unneeded() {
-    local pattern
+    local pattern site=$1
     shopt -s globstar nullglob
     while read -r pattern; do
         # shellcheck disable=SC2086 # a pattern, not a path
@@ -138,7 +153,7 @@ drop_unneeded() {
     shopt -u globstar nullglob
 }
 
-# Built as VERSION.part and renamed when whole: scripts that name their folder get the final one.
+# Built as VERSION.part and renamed when whole, so the command names the final folder from the start.
 write_command() {
     find "$part/bin" -type f -delete
     printf '#!%s/bin/python -I\nimport sys\n\nfrom appliance.cli import main\n\nsys.exit(main())\n' \
@@ -146,12 +161,19 @@ write_command() {
     chmod 755 "$part/bin/bunraku"
 }
 
-preflight() {
-    local folder=$home/releases/$1
+# On the box it dances a moment out of sight; in an image, whose machine is another one, it loads every part.
+works() {
+    local python=$home/releases/$1/bin/python meeting result=0
     if [ -n "$root" ]; then
-        in_root "$folder/bin/python" -I -c 'import appliance.cli'
+        in_root "$python" -I -c 'import importlib, pkgutil, appliance
+for module in pkgutil.walk_packages(appliance.__path__, "appliance."):
+    if not module.name.startswith("appliance.studio"):
+        importlib.import_module(module.name)'
     else
-        "$folder/bin/python" -I -m appliance.cli preflight --check-release
+        meeting=$(mktemp -d)
+        RUNTIME_DIRECTORY=$meeting timeout 60 "$python" -I -m appliance.cli preflight --check-release || result=$?
+        rm -rf "$meeting"
+        return $result
     fi
 }
 
@@ -164,19 +186,19 @@ install_release() {
         name=$version-$(sha256sum <"$source/SHA256SUMS" | cut -c 1-8)
     fi
     if [ ! -d "$releases/$name" ]; then
-        part=$releases/$name.part
         rm -rf "$releases"/*.part
-        say "bunraku $version: reading and checking $source"
+        part=$releases/$name.part
+        say "bunraku $version: reading $source and checking every file"
         copy_and_verify
-        say "unpacking"
+        say "unpacking it beside the release that dances"
         build
         number=$(installed | tail -n 1 | cut -d ' ' -f 1)
         echo $((${number:-0} + 1)) >"$part/number"
         say "trying it"
-        preflight "$name.part" || { rm -rf "$part"; fail "this release does not work on this box (above)." \
-            "The box dances as before."; }
+        works "$name.part" || fail "bunraku $version does not work on this box (above). The box dances as before."
         sync -f "$part"
         mv "$part" "$releases/$name"
+        part='' fresh=yes
         sync -f "$releases"
     fi
     switch_or_go_back "$name"
@@ -185,39 +207,99 @@ install_release() {
 
 # ---- the switch
 
-# Everything that systemd and udev read points into `current`: renaming one link switches all of it at once.
-system_files() { (cd "$1/system" 2>/dev/null && find etc usr -type f 2>/dev/null) || true; }
+# System files under usr/ are links through `current`: renaming that one link switches all of them at once.
+# Those under etc/ are copies: other daemons may not read elsewhere, and a technician may change them.
+system_files() { (cd "$releases/$1/system" && find usr etc -type f 2>/dev/null) || true; }
 
 link() {
     mkdir -p "$(dirname "$2")"
-    ln -sfn "$1" "$2.new" && mv -T "$2.new" "$2"
+    ln -sfn "$1" "$2.new"
+    mv -T "$2.new" "$2"
 }
 
-link_system_files() {
-    local file
-    while read -r file; do link "$home/current/system/$file" "$root/$file"; done < <(system_files "$1")
-    link "$home/current/bin/bunraku" "$root/usr/local/bin/bunraku"
+# $1 the file, $2 the release before: what somebody changed on this box stays as it is.
+copy() {
+    local new=$releases/$name/system/$1 old=$releases/$2/system/$1 here=$root/$1
+    if [ -e "$here" ] && ! cmp -s "$here" "$new" && ! cmp -s "$here" "$old"; then
+        say "/$1 was changed on this box and stays; compare it with $home/current/system/$1"
+        return
+    fi
+    mkdir -p "$(dirname "$here")"
+    install -m "$(case $1 in *.nmconnection) echo 600 ;; *) echo 644 ;; esac)" "$new" "$here.new"
+    mv -T "$here.new" "$here"
+}
+
+# What one of the last lines of a unit says ([Install] WantedBy=), so that it starts with the box.
+enable() {
+    local target
+    sed -n 's/^WantedBy=//p' "$releases/$name/system/$1" | while read -r target; do
+        link "/$1" "$root/etc/systemd/system/$target.wants/$(basename "$1")"
+    done
+}
+
+# Links that the chosen release does not have any more.
+unlink_left_over() {
+    find "$root/etc" "$root/usr/lib" "$root/usr/local" -xdev -type l -lname "$home/current/*" -printf '%p %l\n' |
+        while read -r where to; do [[ -e $root$to && $where != *.new ]] || rm "$where"; done
+    find "$root/etc/systemd/system" -xtype l -lname "/$units/*" -printf '%p %l\n' 2>/dev/null |
+        while read -r where to; do [ -L "$root$to" ] || rm "$where"; done
 }
 
 switch_to() {
-    link_system_files "$releases/$1"
-    sync -f "$root/etc"
-    link "releases/$1" "$root$home/current"
+    local file before
+    name=$1 before=$(current)
+    while read -r file; do
+        case $file in
+        usr/*) link "$home/current/system/$file" "$root/$file" ;;
+        *) copy "$file" "$before" ;;
+        esac
+        case $file in "$units"/*) enable "$file" ;; esac
+    done < <(system_files "$name")
+    link "$home/current/bin/bunraku" "$root/usr/local/bin/bunraku"
+    link "$home/current/install.sh" "$root/usr/local/sbin/bunraku-install"
+    if [ -x "$root/usr/bin/systemd-sysusers" ]; then in_root systemd-sysusers "$home/releases/$name/$users"; fi
+    sync -f "$root/etc" "$root/usr"
+    link "releases/$name" "$root$home/current"
     sync -f "$root$home"
+    unlink_left_over
+}
+
+is_active() { [ "$(systemctl show --property ActiveState --value bunraku-stage)" = active ]; }
+main_pid() { systemctl show --property MainPID --value bunraku-stage; }
+
+# True when the stage dances and goes on dancing; in an image there is nothing to start.
+starts() {
+    local pid deadline=$((SECONDS + STARTS_WITHIN_S))
+    runs_here || return 0
+    systemctl daemon-reload
+    systemd-tmpfiles --create || true
+    udevadm control --reload || true
+    systemctl restart bunraku.target || return 1
+    until is_active; do
+        [ "$SECONDS" -lt "$deadline" ] || return 1
+        sleep 0.2
+    done
+    pid=$(main_pid)
+    sleep "$STAYS_S"
+    is_active && [ "$(main_pid)" = "$pid" ]
 }
 
 switch_or_go_back() {
     local before
     before=$(current)
     switch_to "$1"
-    if restart; then
-        say "bunraku $1 is installed"
-    else
-        fail "bunraku $1 did not start."
+    if starts; then
+        say "bunraku $1 is installed$(runs_here && echo ' and dances')"
+        return
     fi
+    journalctl --unit bunraku-stage --lines 15 --no-pager --output cat >&2 || true
+    [[ -n $before && $before != "$1" && -d $releases/$before ]] ||
+        fail "bunraku $1 did not start (above). There is no release before it on this box."
+    switch_to "$before"
+    [ "$fresh" = no ] || rm -rf "${releases:?}/$1"
+    starts || fail "bunraku $1 did not start (above), and $before does not start now either. Ask bunraku doctor."
+    fail "bunraku $1 did not start (above). Back on $before, which dances. Report what stands above."
 }
-
-restart() { if runs_here; then systemctl daemon-reload && systemctl restart bunraku.target; fi; }
 
 forget_old() {
     local folder
@@ -226,16 +308,55 @@ forget_old() {
     done
 }
 
+# ---- what else one can ask for
+
 list() {
-    local number name
-    installed | while read -r number name; do
+    local name
+    while read -r _ name; do
         if [ "$name" = "$(current)" ]; then echo "* $name"; else echo "  $name"; fi
-    done
+    done < <(installed)
 }
 
-read_options "$@"
-case $action in
-install) install_release ;;
-list) list ;;
-*) fail "--$action comes soon" ;;
-esac
+use() {
+    [ -f "$releases/$1/number" ] || fail "no release '$1' on this box. It has: $(installed | cut -d ' ' -f 2 | xargs)"
+    switch_or_go_back "$1"
+}
+
+rollback() {
+    local before
+    before=$(installed | cut -d ' ' -f 2 | grep -xF -B 1 "$(current)" | head -n 1) || true
+    [[ -n $before && $before != "$(current)" ]] || fail "no release before $(current) on this box."
+    use "$before"
+}
+
+uninstall() {
+    local file
+    if runs_here; then
+        systemctl stop bunraku.target 'bunraku-*' || true
+    fi
+    while read -r file; do
+        case $file in etc/*) cmp -s "$root/$file" "$releases/$(current)/system/$file" && rm "$root/$file" ;; esac
+    done < <(system_files "$(current)")
+    rm -f "$root$home/current"
+    unlink_left_over
+    find "$root/etc/systemd/system" -type l -lname "/$units/bunraku*" -delete
+    rm -rf "${root:?}$home"
+    runs_here && systemctl daemon-reload
+    say "bunraku is off this box"
+    if [ "$purge" = yes ]; then rm -rf "${root:?}$data" && say "and so are all shows, keys and the journal"; fi
+}
+
+main() {
+    read_options "$@"
+    [ "$action" = list ] || begin
+    case $action in
+    install) install_release ;;
+    list) list ;;
+    rollback) rollback ;;
+    use) use "$chosen" ;;
+    uninstall) uninstall ;;
+    esac
+    exit 0
+}
+
+main "$@"
