@@ -17,7 +17,9 @@ prepare_environment()
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
 
 from appliance.commands import sensor_commands  # noqa: E402
+from appliance.commands.chosen import ChosenFile, box_of, pair_of  # noqa: E402
 from appliance.lights import lights_commands  # noqa: E402
+from appliance.show import choice  # noqa: E402
 
 PLUG_INS = "bunraku.commands"
 REFUSED = 2
@@ -62,10 +64,12 @@ def play(
             help="A window where there is a display; at the end render what was danced into this PNG."
         ),
     ] = None,
+    chosen: ChosenFile = None,
 ) -> None:
     """Dance: sensors in, joints out, 50 times a second, until Ctrl-C."""
     from appliance.commands.play import play_show
 
+    show, box = pair_of(show, box, chosen)
     raise typer.Exit(play_show(show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse))
 
 
@@ -75,11 +79,12 @@ def control(
     socket_fd: Annotated[
         int | None, typer.Option(min=3, help="The control port's socket, where it was opened already.")
     ] = None,
+    chosen: ChosenFile = None,
 ) -> None:
     """Take commands by OSC (go, stop, panic, cues ...), also while the stage hangs or is not there."""
     from appliance.commands.control import control_box
 
-    control_box(box, socket_fd)
+    control_box(box_of(box, chosen), socket_fd)
 
 
 @app.command()
@@ -122,11 +127,13 @@ def project(
     wait: Annotated[
         bool, typer.Option("--wait", help="Without a display wait for one, and look each 10 s.")
     ] = False,
+    chosen: ChosenFile = None,
 ) -> None:
     """Show what the stage dances, on a projector: before it starts, while it dances and when it is back."""
     from appliance.projector.project_command import project_show, wish
 
-    raise typer.Exit(project_show(box, wish(window, fullscreen, offscreen, frames, seconds, info), wait))
+    wished = wish(window, fullscreen, offscreen, frames, seconds, info)
+    raise typer.Exit(project_show(box_of(box, chosen), wished, wait))
 
 
 @app.command()
@@ -148,6 +155,41 @@ def filmstrip(
 
     dance, out = danced(recording, metres_per_unit).part(start, seconds), out or recording.with_suffix(".png")
     typer.echo(drawn(dance, out) if look is None else rendered(dance, out, look, show))
+
+
+@app.command()
+def preflight(
+    boot: Annotated[
+        Path | None, typer.Option(help="The boot partition's folder with show/ and box.yaml.")
+    ] = None,
+    stick: Annotated[Path, typer.Option(help="The same on a stick.")] = choice.STICK,
+    data: Annotated[Path, typer.Option(help="What is kept over power-off.")] = choice.DATA,
+    run: Annotated[Path, typer.Option(help="In memory: where all processes look.")] = choice.RUN,
+    late: Annotated[bool, typer.Option("--late", help="A stick was plugged into a box that is on.")] = False,
+    check_release: Annotated[
+        bool, typer.Option("--check-release", help="Instead: can this release dance on this machine?")
+    ] = False,
+) -> None:
+    """Decide which show dances: a new one if it is sound, else the last good one."""
+    from appliance.commands import preflight
+
+    arguments = [f"--stick={stick}", f"--data={data}", f"--run={run}"]
+    arguments += [f"--boot={boot}"] * (boot is not None) + ["--late"] * late
+    raise typer.Exit(preflight.main([*arguments, *["--check-release"] * check_release]))
+
+
+@app.command()
+def firewall(
+    box: BoxFile = None,
+    chosen: ChosenFile = None,
+    access_point: Annotated[
+        list[str] | None, typer.Option(help="Network card whose access point the sensors join; several.")
+    ] = None,
+) -> None:
+    """Print rules for nft that let in what the box file opens, and nothing else."""
+    from appliance.commands.firewall import print_rules
+
+    print_rules(box_of(box, chosen), access_point or [])
 
 
 @app.command()

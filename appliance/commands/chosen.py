@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from appliance.show.choice import APPLIANCE_BOX, Choice
+from appliance.show.choice import box_of as box_of
+from appliance.show.choice import require_no
 
 ChosenFile = Annotated[
     Path | None,
@@ -17,11 +18,15 @@ ChosenFile = Annotated[
 ]
 
 
-def box_of(box: Path | None, chosen: Path | None) -> Path | None:
-    """The box file that a command means; raises typer.BadParameter when both ways are given."""
+def pair_of(show: Path | None, box: Path | None, chosen: Path | None) -> tuple[Path | None, Path | None]:
+    """The show and the box file that the stage means, whose start is counted. Raises ConfigError."""
     if chosen is None:
-        return box
-    if box is not None:
-        raise typer.BadParameter("Give --box or --chosen, not both.")
-    choice = Choice.read(chosen)
-    return choice.first.box if choice is not None else APPLIANCE_BOX
+        return show, box
+    require_no("--show", show, chosen)
+    require_no("--box", box, chosen)
+    import time
+
+    from appliance.commands.trying import pair_to_dance
+
+    pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
+    return pair.show, pair.box

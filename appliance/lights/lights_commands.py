@@ -7,10 +7,15 @@ from typing import Annotated
 
 import typer
 
+from appliance.show.choice import box_of
+
 ShowFolder = Annotated[
     Path | None, typer.Option(help="Show bundle; left out: the show that comes with the box.")
 ]
 BoxFile = Annotated[Path | None, typer.Option(help="box.yaml of the venue: its wires and places.")]
+ChosenFile = Annotated[
+    Path | None, typer.Option("--chosen", help="Instead of --box: as `bunraku preflight` chose.")
+]
 
 lights = typer.Typer(
     help="Light the rig by the dance; walk through it, look at it, convert fixture profiles.",
@@ -26,15 +31,16 @@ def light(
         Path | None, typer.Option(help="Show bundle; left out: the one that the stage dances.")
     ] = None,
     box: BoxFile = None,
+    chosen: ChosenFile = None,
 ) -> None:
     """Light the rig by the dance that `bunraku play` dances, until Ctrl-C; `play` starts this by itself."""
     if context.invoked_subcommand is not None:
-        if (show, box) != (None, None):
+        if (show, box, chosen) != (None, None, None):
             raise typer.BadParameter(f"write options behind '{context.invoked_subcommand}'")
         return
     from appliance.lights.run import light_up
 
-    light_up(show, box)
+    light_up(show, box_of(box, chosen))
 
 
 @lights.command("test")

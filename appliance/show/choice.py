@@ -129,6 +129,24 @@ class Choice(NamedTuple):
         return self._replace(pairs=(*pairs.values(), Pair(box=box, good=True)))
 
 
+def box_of(box: Path | None, chosen: Path | None) -> Path | None:
+    """The box file that a command means with `--box` or `--chosen`; raises ConfigError for both."""
+    if chosen is None:
+        return box
+    require_no("--box", box, chosen)
+    choice = Choice.read(chosen)
+    return choice.first.box if choice is not None else APPLIANCE_BOX
+
+
+def require_no(option: str, given: Path | None, chosen: Path) -> None:
+    """Raises ConfigError where a choice is given, and something else besides."""
+    if given is not None:
+        from appliance.show.config_error import ConfigError, Problem
+
+        message = f"This names a show and a box file, and {option} another one."
+        raise ConfigError([Problem(chosen, 0, message, f"Give {option} or --chosen, not both.")])
+
+
 def write_whole(path: Path, content: bytes) -> None:
     """A file and its name in the folder, on the disk when this returns; raises OSError: the old one stays."""
     temporary = path.with_name(f".{path.name}.new")

@@ -1,0 +1,73 @@
+"""`bunraku firewall`: rules for nft that let in what the box file opens to the network, and nothing else."""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from appliance.show.box import BoxConfig, load_box
+
+_RULES = """\
+#!/usr/sbin/nft -f
+# Written by `bunraku firewall`: what the box file opens is let in, and nothing else.
+table inet bunraku
+delete table inet bunraku
+table inet bunraku {{
+	chain input {{
+		type filter hook input priority filter; policy drop;
+		iif lo accept
+		ct state established,related accept
+		ct state invalid drop
+		meta l4proto {{ icmp, ipv6-icmp }} accept
+		udp dport 68 udp sport 67 accept comment "an address by DHCP"
+{rules}
+	}}
+	chain forward {{
+		type filter hook forward priority filter; policy drop;
+	}}
+}}
+"""
+
+
+def print_rules(box_file: Path | None, access_points: Sequence[str]) -> None:
+    """Rules for `nft -f -`; raises ConfigError for a box file that is not sound."""
+    print(rules(load_box(box_file), access_points), end="")
+
+
+def rules(box: BoxConfig, access_points: Sequence[str] = ()) -> str:
+    """One table of our own: what others have set up besides stays as it is."""
+    lines = [*_sensors(box), *_commands(box), *_own_network(access_points)]
+    return _RULES.format(rules="\n".join(f"\t\t{line}" for line in lines))
+
+
+def _sensors(box: BoxConfig) -> Iterator[str]:
+    udp = box.sensors.udp
+    if udp is not None and udp.port and not _is_loopback(udp.host):
+        yield f'{_to(udp.host)}udp dport {udp.port} accept comment "sensors"'
+
+
+def _commands(box: BoxConfig) -> Iterator[str]:
+    """From those who are listed; without a list from this machine alone, which needs no rule."""
+    control = box.control
+    if control is None or _is_loopback(control.host):
+        return
+    if senders := ", ".join(control.senders):
+        yield (
+            f'{_to(control.host)}ip saddr {{ {senders} }} udp dport {control.port} accept comment "commands"'
+        )
+
+
+def _own_network(access_points: Sequence[str]) -> Iterator[str]:
+    """Sensors on the box's own network ask it for addresses."""
+    for card in access_points:
+        yield f'iifname "{card}" udp dport 67 accept comment "addresses for sensors"'
+        yield f'iifname "{card}" udp dport 53 accept comment "names for sensors"'
+
+
+def _to(host: str) -> str:
+    return "" if host == "0.0.0.0" else f"ip daddr {host} "
+
+
+def _is_loopback(host: str) -> bool:
+    return ipaddress.IPv4Address(host).is_loopback
