@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from importlib.metadata import version as distribution_version
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 from appliance.control.lifeline import hold_lifeline
 from appliance.stage.realtime import prepare_environment
@@ -207,10 +207,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         app(given, prog_name="bunraku")
     except Exception as error:
-        if not _is_for_people(error):
-            raise
-        print(f"bunraku: {error}", file=sys.stderr)
-        sys.exit(getattr(error, "exit_status", REFUSED))
+        refuse(error)
+
+
+def refuse(error: Exception) -> NoReturn:
+    """End with one clear line, if the error is one that people can mend; others are raised."""
+    if not _is_for_people(error):
+        raise error
+    print(f"bunraku: {error}", file=sys.stderr)
+    sys.exit(getattr(error, "exit_status", REFUSED))
 
 
 def plug_in(onto: typer.Typer, found: Iterable[EntryPoint], say: Callable[[str], None]) -> None:

@@ -37,12 +37,12 @@ _REFUSALS = {
 
 
 def play_show(
-    directory: Path | None,
-    box_file: Path | None,
-    seconds: float | None,
-    emulate: bool,
-    journal: Path | None,
-    filmstrip: Path | None,
+    directory: Path | None = None,
+    box_file: Path | None = None,
+    seconds: float | None = None,
+    emulate: bool = False,
+    journal: Path | None = None,
+    filmstrip: Path | None = None,
     alone: bool = False,
     window: bool = False,
     rehearse: Path | None = None,

@@ -1,0 +1,93 @@
+"""The command `bunraku`: playing starts at once; other commands, and every mistake, go to the whole parser.
+
+A stage that was killed is black until its process is up again: the parser and what it loads take a tenth of
+a second of that, and playing has no use for them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from appliance.control.lifeline import hold_lifeline
+from appliance.stage.realtime import prepare_environment
+
+_PATHS = ("--show", "--box", "--journal", "--chosen")
+_SECONDS, _ALONE = "--seconds", "--alone"
+_FEWEST_SECONDS = 0.1
+_PARAMETERS = {"show": "directory", "box": "box_file"}
+
+Wishes = dict[str, Path | float | bool]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command; errors that people can mend are one clear line and exit status 2."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):  # no standard error to write to
+        faulthandler.enable()  # the watchdog's signal prints the line that hung
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    wishes = wishes_to_play(given)
+    if wishes is None:
+        from appliance.cli import main as any_command
+
+        any_command(given)
+        return
+    hold_lifeline()
+    prepare_environment()
+    try:
+        sys.exit(_play(wishes))
+    except Exception as error:
+        from appliance.cli import refuse
+
+        refuse(error)
+
+
+def wishes_to_play(given: Sequence[str]) -> Wishes | None:
+    """What the arguments of a plain `play` wish, by their names; None where the whole parser must look."""
+    if not given or given[0] != "play":
+        return None
+    wishes: Wishes = {}
+    rest = list(given[1:])
+    while rest:
+        option, separator, value = rest.pop(0).partition("=")
+        if option == _ALONE and not separator:
+            wishes["alone"] = True
+            continue
+        if not separator and rest:
+            value = rest.pop(0)
+        if not value or value.startswith("-"):
+            return None
+        if option in _PATHS:
+            wishes[option[2:]] = Path(value)
+        elif option == _SECONDS and (seconds := _number(value)) >= _FEWEST_SECONDS:
+            wishes["seconds"] = seconds
+        else:
+            return None
+    return None if "chosen" in wishes and {"show", "box"} & wishes.keys() else wishes
+
+
+def _play(wishes: Wishes) -> int:
+    from appliance.commands.play import play_show
+
+    chosen = wishes.pop("chosen", None)
+    if isinstance(chosen, Path):
+        from appliance.commands.trying import pair_to_dance
+
+        pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
+        wishes |= {"show": pair.show, "box": pair.box}
+    named = {_PARAMETERS.get(name, name): wish for name, wish in wishes.items()}
+    return play_show(**named)  # type: ignore[arg-type]  # wishes_to_play gives each name its type
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+if __name__ == "__main__":
+    main()
