@@ -1,0 +1,87 @@
+"""Fallbacks: what a process does instead when something goes wrong, each with a name, a counter and words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+RECENT_S = 5.0  # what happens at one moment counts as in force for so long
+
+
+class Fallback(NamedTuple):
+    """name: for desks and scripts; words: what happened, what the audience sees, what to do."""
+
+    name: str
+    words: str
+
+
+class Fallen(NamedTuple):
+    """How it is with one fallback. times: how often since the process began; active: it is in force now."""
+
+    name: str
+    times: int
+    active: bool
+    words: str
+
+
+class _Tally:
+    """The counter of one fallback; a tick touches it without making anything."""
+
+    __slots__ = ("active", "count", "fallback", "recent_until", "words")
+
+    def __init__(self, fallback: Fallback) -> None:
+        self.fallback, self.words = fallback, fallback.words
+        self.count, self.active, self.recent_until = 0, False, 0.0
+
+
+class Fallbacks:
+    """All fallbacks of one process. Names that it does not have raise KeyError: they are a programmer's."""
+
+    def __init__(self, known: Iterable[Fallback]) -> None:
+        self._tallies = {one.name: _Tally(one) for one in known}
+
+    def count(self, name: str, now: float, times: int = 1) -> None:
+        """It happened just now; monotonic seconds."""
+        tally = self._tallies[name]
+        tally.count += times
+        tally.recent_until = now + RECENT_S
+
+    def follow(self, name: str, total: int, now: float) -> None:
+        """The same for what somebody else counts."""
+        if (times := total - self._tallies[name].count) > 0:
+            self.count(name, now, times)
+
+    def set(self, name: str, active: bool, words: str = "") -> None:
+        """In force from now on, or over; `words`: more than the usual ones. Counts when it begins."""
+        tally = self._tallies[name]
+        tally.count += active and not tally.active
+        tally.active = active
+        if words:
+            tally.words = words
+
+    def hold(self, name: str, active: bool) -> None:
+        """Whether it is in force for longer than its moment; not counted again."""
+        self._tallies[name].active = active
+
+    def told(self, now: float) -> list[Fallen]:
+        """Those that ever happened, in their order."""
+        return [
+            Fallen(name, one.count, one.active or now < one.recent_until, one.words)
+            for name, one in self._tallies.items()
+            if one.count
+        ]
+
+    def line(self, now: float) -> str:
+        """The names of those in force, for the status line; "" on a good night."""
+        names = [one.name for one in self.told(now) if one.active]
+        return f"fallbacks: {', '.join(names)}" if names else ""
+
+
+def fallen(values: Any) -> tuple[Fallen, ...]:
+    """From JSON, as `told` gave them; what is none of ours is left out."""
+    found = []
+    for value in values if isinstance(values, list) else ():
+        if isinstance(value, list) and len(value) == len(Fallen._fields):
+            name, times, active, words = value
+            found.append(Fallen(str(name), int(times), bool(active), str(words)))
+    return tuple(found)
