@@ -101,6 +101,18 @@ def check(
 
 
 @app.command()
+def doctor(
+    box: BoxFile = None,
+    chosen: ChosenFile = None,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
+) -> None:
+    """Look at machine, venue and running box, and say what to do; status 1 when something is wrong."""
+    from appliance.commands.doctor.doctor_command import doctor as look_at
+
+    raise typer.Exit(look_at(box, chosen, as_json))
+
+
+@app.command()
 def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you changed.")]) -> None:
     """Verify a changed show bundle and vouch for its files with new checksums."""
     from appliance.commands.check import pack_show

@@ -1,0 +1,135 @@
+"""Disks and memory: is there room, can it be written, does a power cut hurt, is it worn out?"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from appliance.commands.doctor.finding import Finding, better, ok, wrong
+from appliance.commands.doctor.patient import Patient
+from appliance.show.choice import DATA, RUN, Choice
+
+LEAST_FREE_BYTES, LEAST_FREE_SHARE = 256 << 20, 0.10
+LEAST_MEMORY_KB = 200 << 10
+WORN = 8  # of ten steps of an eMMC's life
+_KEPT = "the journal, the place of the dance, what the box knows about sensors"
+
+
+def data_folders(patient: Patient) -> Iterator[Finding]:
+    """Where the box keeps what must survive a power cut."""
+    box = patient.box
+    wanted = {"state": box.state_folder, "journal": box.journal.folder}
+    folders = {folder for folder in wanted.values() if folder is not None}
+    if patient.at(DATA).is_dir():
+        folders.add(DATA)
+    if not folders:
+        yield better(
+            "data",
+            "The box file names neither `state` nor `journal: folder`: nothing survives a power cut.",
+            "Add both; the installed box has them under /data.",
+        )
+    for folder in sorted(folders):
+        yield _folder(patient, folder)
+
+
+def _folder(patient: Patient, folder: Path) -> Finding:
+    """One of them, or the nearest one above it that is there."""
+    what, there = f"data in {folder}", patient.at(folder)
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    try:
+        room = os.statvfs(there)
+    except OSError as error:
+        return wrong(
+            *(what, f"It cannot be read ({error.strerror}): {_KEPT} are lost at a power cut."),
+            "`dmesg | tail` says why; often the card or its contact.",
+        )
+    free, whole = room.f_bavail * room.f_frsize, room.f_blocks * room.f_frsize
+    words = f"{free / 1e6:,.0f} of {whole / 1e6:,.0f} MB are free."
+    if room.f_flag & os.ST_RDONLY:
+        return wrong(
+            *(what, f"It cannot be written: {_KEPT} are lost at a power cut. The audience sees nothing."),
+            "After an error Linux writes no more: `dmesg | tail`, then a new card or disk.",
+        )
+    if not os.access(there, os.W_OK):
+        return wrong(
+            what,
+            "This user may not write there.",
+            f"`sudo chown -R bunraku {folder}`, or run me as that user.",
+        )
+    if free < min(LEAST_FREE_BYTES, LEAST_FREE_SHARE * whole):
+        return better(
+            *(what, f"{words} The journal keeps less than it should. The audience sees nothing."),
+            "`journal: {minutes: 10}` in the box file, or remove what else lies there.",
+        )
+    return ok(what, words)
+
+
+def system_partition(patient: Patient) -> Iterator[Finding]:
+    """On an appliance a power cut finds nothing to damage."""
+    kind, options = patient.mounts().get("/", ("", ()))
+    if not kind:
+        return
+    if kind in ("overlay", "squashfs") or "ro" in options:
+        yield ok("system", "Its partition is read-only: a power cut cannot damage it.")
+    else:
+        yield better(
+            "system",
+            "Its partition is writable: a power cut may damage it.",
+            "For a tour: the image (`make image`), or a read-only root with an overlay.",
+        )
+
+
+def wear(patient: Patient) -> Iterator[Finding]:
+    """An eMMC tells how much of its life is over; SD cards do not."""
+    for device in patient.found("/sys/block/mmcblk*/device"):
+        name, kind = device.parent.name, patient.text(device / "type")
+        steps = [int(word, 0) for word in (patient.text(device / "life_time") or "").split()]
+        if steps and max(steps) >= WORN:
+            yield wrong(
+                *(f"wear of {name}", f"{10 * max(steps)} % of its life are over."),
+                "Replace it before the next city; docs/touring.md says how.",
+            )
+        elif steps and max(steps) > 0:
+            yield ok(f"wear of {name}", f"At most {10 * max(steps)} % of its life are over.")
+        elif kind == "SD":
+            yield ok(f"wear of {name}", "An SD card does not tell: a new industrial one each season.")
+
+
+def memory(patient: Patient) -> Iterator[Finding]:
+    """Room for the box, and nothing that is paged out."""
+    rows = dict(line.split(":", 1) for line in (patient.text("/proc/meminfo") or "").splitlines())
+    try:
+        free_kb = int(rows["MemAvailable"].split()[0])
+    except (KeyError, ValueError, IndexError):
+        return
+    words = f"{free_kb / 1024:,.0f} MiB are available."
+    if free_kb < LEAST_MEMORY_KB:
+        yield wrong("memory", f"{words} The kernel may end the projector.", "End other programs.")
+    else:
+        yield ok("memory", words)
+    swaps = [line.split()[0] for line in (patient.text("/proc/swaps") or "").splitlines()[1:]]
+    on_disk = [name for name in swaps if "zram" not in name]
+    if on_disk:
+        yield better(
+            *("swap", f"{', '.join(on_disk)}: a card wears out by it, and processes wait for it."),
+            "`sudo swapoff -a`, and take it out of /etc/fstab.",
+        )
+
+
+def choice(patient: Patient) -> Iterator[Finding]:
+    """Which show was chosen at power-on, and what was refused."""
+    chosen = Choice.read(patient.at(RUN / "chosen.json"))
+    if chosen is None:
+        return
+    yield ok("show", f"{chosen.first.show}, box file {chosen.first.box} ({chosen.first.source}).")
+    for refused in chosen.refused:
+        yield better(
+            "show", f"Refused, so the show before dances: {refused}", "Mend it, and plug it in anew."
+        )
+    for aside in chosen.aside:
+        yield better(
+            *("show", f"{aside} was put aside: it did not dance for 10 s in three starts."),
+            "`bunraku check` on your workstation says why; `journalctl -u bunraku-stage` what happened here.",
+        )
