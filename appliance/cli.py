@@ -250,7 +250,7 @@ def _is_for_people(error: Exception) -> bool:
     from appliance.outputs.runtime_folder import RuntimeFolderError
     from appliance.pose.bvh import BvhError
     from appliance.show.config_error import ConfigError
-    from appliance.stage.journal import JournalError
+    from appliance.stage.journal.journal_error import JournalError
     from appliance.stage.stage_error import StageError
 
     return isinstance(error, BvhError | ConfigError | JournalError | RuntimeFolderError | StageError)

@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
-from appliance.show.box import BoxConfig
-from appliance.stage.keeper import Carrier
+from appliance.control.notify import Notifier
+from appliance.control.speaker import Speaker
+from appliance.control.stop_signals import stop_signals
+from appliance.outputs.runtime_folder import Claim, runtime_folder
+from appliance.show.box import load_box
+from appliance.stage.keeper import carriers, keep_on
 
 
-def keep_box(box_file: Path | None, journal: Path | None = None) -> int:
-    """Keep until a signal comes; the exit status. `journal`: another folder than the box file's."""
-    raise NotImplementedError
+def keep_box(box_file: Path | None, journal: Path | None = None, minutes: float | None = None) -> int:
+    """Keep until a signal comes; the exit status. journal, minutes: others than the box file's.
 
+    Raises RuntimeFolderError where another keeper has this box already, ConfigError.
+    """
+    box = load_box(box_file)
+    runtime = runtime_folder(box)
+    with (
+        stop_signals() as stopped,
+        closing(Speaker()) as speaker,
+        closing(Claim(runtime, "keeper")),
+        closing(Notifier()) as notifier,
+    ):
+        kept = carriers(
+            box, runtime, journal or box.journal.folder, minutes or box.journal.minutes, speaker.say
+        )
+        notifier.ready("The journal and the place of the dance are kept.")
 
-def carriers(box: BoxConfig, runtime: Path, journal: Path | None) -> list[Carrier]:
-    """What this box keeps: its journal; its place is appended here."""
-    raise NotImplementedError
+        def after_turn(now: float) -> None:
+            notifier.ping(now)
+
+        keep_on(kept, stopped, after_turn)
+        notifier.stopping()
+    return 0

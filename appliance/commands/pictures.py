@@ -13,7 +13,7 @@ from appliance.projector.projector_error import ProjectorError
 from appliance.show.look import LookConfig, looks_by_name
 from appliance.show.show import load_show
 from appliance.stage.clock import TICK_S
-from appliance.stage.journal import read_journal
+from appliance.stage.journal.reading import read_journal
 from appliance.stage.stage_error import StageError
 
 

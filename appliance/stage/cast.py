@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from appliance.dancer.blending import Blending
 from appliance.dancer.grounding import Floor, Grounding, GroundingError
@@ -27,6 +28,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.sensor.keys import KeyFileError, SensorKey, load_keys, unknown_sensor
 from appliance.sensor.link import SensorLink, SensorReading, open_link
 from appliance.sensor.neutral import Mounting, joint_from_reading
+from appliance.sensor.state import restored_reading
 from appliance.sensor.ways.udp import PortError
 from appliance.show.box import BoxConfig, out_of_reach
 from appliance.show.config_error import ConfigError
@@ -73,6 +75,26 @@ class Cast:
             puppeteer.hear(reading.orientation, reading.arrival)
         if reading.sensor == self.primary:
             self.newest_primary = reading
+
+    def state(self) -> dict[str, Any]:
+        """What the dance to come depends on, for `restore`: plain values and copies of arrays."""
+        return {
+            "motion": self.motion.state(),
+            "blending": self.blending.state(),
+            "grounding": self.grounding.state(),
+            "hands": self.hands.state(),
+            "cue": self.cue,
+            "newest_primary": self.newest_primary,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the cast of the same show did that gave this state."""
+        self.motion.restore(state["motion"])
+        self.blending.restore(state["blending"])
+        self.grounding.restore(state["grounding"])
+        self.hands.restore(state["hands"])
+        self.cue = state["cue"]
+        self.newest_primary = restored_reading(state["newest_primary"])
 
     def close(self) -> None:
         """Free ports and sockets."""

@@ -1,39 +1,65 @@
 """The keeper: a process of its own that carries from memory to the disk what must survive a power cut.
 
-The stage touches no disk while it dances: a disk that is full, read-only, gone or hangs stops the keeper alone.
+The stage touches no disk while it dances: a disk that is full, read-only, gone or hangs stops this alone.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Protocol
 
+from appliance.show.box import BoxConfig
+from appliance.stage.journal.carrier import JournalCarrier
+from appliance.stage.place_file import PlaceCarrier
+
 TURN_S = 0.5
+_LOOK_S = 0.05  # how often it looks whether it is to end
 
 
 class Carrier(Protocol):
     """Carries one thing (the journal, the place) from the runtime folder to the disk.
 
-    complaint: what cannot be kept, in words for people, or "". Nothing here raises.
+    complaint: what cannot be kept, in words for people, or "".
     """
 
     complaint: str
 
-    def carry(self, now: float) -> None:
-        """Bring the disk up to date; called each TURN_S. `now`: seconds on the monotonic clock."""
+    def turn(self, now: float) -> None:
+        """Bring the disk up to date; monotonic seconds. Waits as long as the disk does. Never raises."""
 
-    def close(self) -> None:
-        """Let go of everything, after the last turn."""
+    def last_turn(self) -> None:
+        """Before the process ends: the rest. Never raises."""
+
+
+def carriers(
+    box: BoxConfig, runtime: Path, journal: Path | None, minutes: float, say: Callable[[str], None]
+) -> list[Carrier]:
+    """What this box keeps: its journal in a folder, if there is one, and its place in the state folder."""
+    kept: list[Carrier] = []
+    if journal is not None:
+        kept.append(JournalCarrier(runtime, journal, minutes, say))
+    if box.state_folder is not None:
+        kept.append(PlaceCarrier(runtime, box.state_folder, say))
+    return kept
 
 
 def keep_on(
     carriers: Sequence[Carrier],
     stopped: Callable[[], bool],
-    say: Callable[[str], None],
-    each_turn: Callable[[float], None] = lambda now: None,
+    after_turn: Callable[[float], None] = lambda now: None,
     monotonic: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> None:
-    """Turn by turn until `stopped`, then one last turn. `each_turn`: for watchdog and health."""
-    raise NotImplementedError
+    """Turn by turn until `stopped`, then one last turn; `after_turn`: for the watchdog."""
+    while not stopped():
+        now = monotonic()
+        for carrier in carriers:
+            carrier.turn(now)
+        after_turn(now)
+        until = now + TURN_S
+        while not stopped() and (rest_s := until - monotonic()) > 0.0:
+            sleep(min(rest_s, _LOOK_S))
+    for carrier in carriers:
+        carrier.last_turn()

@@ -17,9 +17,11 @@ from appliance.stage.admitted import admitted
 from appliance.stage.budget import Admission
 from appliance.stage.cast import Cast, assemble
 from appliance.stage.clock import Slot, TickClock
+from appliance.stage.fallback import StageFallbacks
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
-from appliance.stage.journal import JUMPED, LATE, NOT_FINITE, Journal, JournalError
+from appliance.stage.journal.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
+from appliance.stage.journal.recorder import Recorder
 from appliance.stage.obey import SENSOR_ORDERS, obey, obey_for_sensors, resume
 from appliance.stage.phase_lock import PhaseLock
 from appliance.stage.prepared import MEMORY
@@ -45,7 +47,6 @@ class Stage:
         self,
         show: Show,
         box: BoxConfig,
-        journal: Path | None,
         say: Callable[[str], None],
         box_file: Path | None = None,
     ) -> None:
@@ -66,9 +67,9 @@ class Stage:
             opened.callback(self.cast.close)
             self.inbox = _open_inbox(self.sharing.folder)
             opened.callback(self.inbox.close)
-            self.journal = self._open_journal(journal)
-            if self.journal is not None:
-                opened.callback(self.journal.close)
+            self.recorder = self._open_recorder()
+            if self.recorder is not None:
+                opened.callback(self.recorder.close)
             self.admission: Admission = admitted(
                 self.sharing.folder, self.cast, show, box, self.resuming.comes_back
             )
@@ -85,16 +86,17 @@ class Stage:
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         self.lock = PhaseLock() if box.phase_lock and self.cast.primary else None
         self.watch = Watch(self.cast)
+        self.fallbacks = StageFallbacks(self.cast, self.admission)
 
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
         """Tick until `stopped` says so or the seconds are over; this thread is the real-time one."""
         if not self.box.realtime.enabled:
             self._tick_on(seconds, stopped)
             return
-        for words in enter_realtime(self.box.realtime.priority):
+        missing = enter_realtime(self.box.realtime.priority)
+        for words in missing:
             self.say(words)
-        if self.journal is not None:
-            self.journal.unlock()
+        self.fallbacks.lack_rights(missing)
         try:
             self._tick_on(seconds, stopped)
         finally:
@@ -111,13 +113,18 @@ class Stage:
         self.health.begin(begun)
         facts = facts_of(self.show, self.box_file, self.iterations, begun)
         self.sharing.begin(self.cast, facts, self.say)
+        self.fallbacks.begin(begun, self.resuming, self.sharing.complaint, self.recorder is not None)
         self._tell(begun)
         self.resuming.begin(self.cast, self.iterations)
+        if self.recorder is not None:
+            self.recorder.keyframe(self.tick.state())
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self.tick.run(slot)
             self._note(slot)
             self._obey(slot.started)
+            if self.recorder is not None and self.recorder.wants_keyframe:
+                self.recorder.keyframe(self.tick.state())
             shift_s = self._follow_sensor(slot)
             if self.health.is_due(slot.started):
                 self._report(slot.started)
@@ -136,29 +143,11 @@ class Stage:
         if health.ticks == 1:
             self.notifier.ready()
         self.notifier.ping(slot.started)
+        self.fallbacks.watch(slot.started)
         self.resuming.note(self.cast, self.iterations, slot.tick)
-        if self.journal is not None:
-            flags = late * LATE | tick.network_failed * NOT_FINITE | self.cast.motion.jumped * JUMPED
-            self._write(self.journal, slot, flags)
-
-    def _write(self, journal: Journal, slot: Slot, flags: int) -> None:
-        frame, field, row = self.tick.frame, journal.field, journal.row
-        field["tick"][row] = slot.tick
-        field["frame_time"][row] = frame.frame_time
-        field["started"][row] = slot.started
-        field["sensor_sequence"][row] = frame.sensor_sequence
-        field["sensor_arrival"][row] = frame.sensor_arrival
-        field["flags"][row] = flags
-        field["skipped"][row] = slot.skipped
-        field["coding_iterations"][row] = self.iterations.coding
-        field["interaction_iterations"][row] = self.iterations.interaction
-        field["sections_ms"][row] = self.tick.sections_ms
-        for hand, place in enumerate(self.cast.hand_places):
-            field["targets"][row, hand] = self.cast.hands.targets[place]
-            field["weights"][row, hand] = self.cast.hands.weights[place]
-        field["root"][row] = frame.root
-        field["pose"][row] = frame.pose
-        journal.commit()
+        if self.recorder is not None:
+            flags = late * LATE | tick.frame.late * RESENT | tick.network_failed * NOT_FINITE
+            self.recorder.note_tick(slot, tick, flags | self.cast.motion.jumped * JUMPED)
 
     def _follow_sensor(self, slot: Slot) -> float:
         """The phase lock's correction to the next period, seconds."""
@@ -186,6 +175,9 @@ class Stage:
             done, words = obey_for_sensors(order, self.cast, self.wearing, now)
         else:
             done, words = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
+        if self.recorder is not None:
+            asked = {"name": order.name, "values": order.values, "text": order.text}
+            self.recorder.event(ORDER, now, order=asked, done=done, words=words)
         if words:
             self.say(words)
         return done, words
@@ -204,7 +196,8 @@ class Stage:
         states = self.cast.link.states(now)
         roster = roster_lines(states, self.wearing.neutral_of)
         age_s, locked = self._sensor_age_s(now), self._is_locked
-        self.sharing.tell(now, self.health, self.cast, self.iterations, age_s, locked, roster)
+        fallbacks = self.fallbacks.told(now)
+        self.sharing.tell(now, self.health, self.cast, self.iterations, age_s, locked, roster, fallbacks)
         return states
 
     def _sensor_age_s(self, now: float) -> float | None:
@@ -220,7 +213,9 @@ class Stage:
         """Once a second, after the frame has left."""
         times = self.iterations
         self.health.look(now)
+        self.fallbacks.look(now, self.health)
         line = self.health.line(times.coding, times.interaction, self._sensor_age_s(now), self._is_locked)
+        line = "  ".join(filter(None, (line, self.fallbacks.all.line(now))))
         self.notifier.status(line)
         self.say(line)
         for sentence in self.watch.news(now, self._tell(now)):
@@ -228,17 +223,15 @@ class Stage:
         for imu_id, offsets in self.cast.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)
 
-    def _open_journal(self, path: Path | None) -> Journal | None:
-        """The flight recorder, if one is wanted and can be had: a full disk does not stop the show."""
-        if path is None:
-            return None
-        hands = [
-            {"joint": hand.joint, "kind": hand.kind, "sensor": hand.sensor} for hand in self.show.config.hands
-        ]
+    def _open_recorder(self) -> Recorder | None:
+        """The flight recorder, unless there is no memory for it: that does not stop the show."""
         try:
-            return Journal(path, self.show.skeleton, hands, self.box.journal.minutes)
-        except JournalError as error:
-            self.say(str(error))
+            return Recorder(self.sharing.folder, facts_of_run(self.show, list(self.cast.worn)))
+        except OSError as error:
+            self.say(
+                f"{self.sharing.folder}: no journal can be noted there ({error.strerror}). The dance goes on "
+                "without one. Free memory there, or give another folder as `runtime:` in the box file."
+            )
             return None
 
 

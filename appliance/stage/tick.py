@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from appliance.outputs.joint_frame import JointFrame
+from appliance.sensor.link import SensorReading
 from appliance.stage.cast import Cast
 from appliance.stage.clock import Slot
 from appliance.stage.iterations import Iterations
-from appliance.stage.journal import SECTIONS
+from appliance.stage.journal.record import SECTIONS
 from appliance.stage.wearing import Wearing
 
+_STANDING = ("pose", "world", "positions", "root")  # arrays of a frame
 DRAIN, HANDS, MOTION, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
 
 
@@ -41,6 +44,7 @@ class Tick:
         self.frame = JointFrame(len(cast.skeleton))
         self.frame.pose[:] = cast.motion.window()[0]
         self.network_failed = False
+        self.readings: Sequence[SensorReading] = ()
         self.sections_ms: NDArray[np.float32] = np.zeros(len(SECTIONS), np.float32)
         self._section_ends = [0.0] * len(SECTIONS)
         self._monotonic = monotonic
@@ -52,7 +56,8 @@ class Tick:
         frame.tick, frame.frame_time = slot.tick, slot.deadline
         frame.late = slot.lateness_s > self.latest_start_s
 
-        for reading in cast.link.drain(slot.started):
+        self.readings = cast.link.drain(slot.started)
+        for reading in self.readings:
             self.wearing.hear(reading)
             cast.hear(reading)
         ends[DRAIN] = ends[HANDS] = ends[MOTION] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
@@ -100,6 +105,32 @@ class Tick:
             self.sections_ms[section] = 1000.0 * (end - begin)
             begin = end
         return 1000.0 * (begin - slot.started)
+
+    def state(self) -> dict[str, Any]:
+        """All that the frames to come depend on, beside readings and slots, for `restore`: plain values and
+        copies of arrays.
+        """
+        frame = self.frame
+        return {
+            "cast": self.cast.state(),
+            "wearing": self.wearing.state(),
+            "iterations": self.iterations.state(),
+            "latest_start_s": self.latest_start_s,
+            "network_failed": self.network_failed,
+            "frame": {name: getattr(frame, name).copy() for name in _STANDING},
+            "sensor": [frame.sensor_sequence, frame.sensor_arrival],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the tick of the same show did that gave this state."""
+        frame = self.frame
+        self.cast.restore(state["cast"])
+        self.wearing.restore(state["wearing"])
+        self.iterations.restore(state["iterations"])
+        self.latest_start_s, self.network_failed = state["latest_start_s"], state["network_failed"]
+        for name in _STANDING:
+            getattr(frame, name)[:] = state["frame"][name]
+        frame.sensor_sequence, frame.sensor_arrival = state["sensor"]
 
     def _regenerate(self, window: NDArray[np.float32]) -> None:
         """Let the puppet dance a window and blend it in; the frame names the reading that went into it."""

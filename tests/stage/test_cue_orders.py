@@ -208,7 +208,7 @@ def test_the_stage_asks_the_house_in_which_cue_it_was(show: Show, tmp_path: Path
         with closing(HouseWriter(runtime)) as house:
             house.write(House(cue=cue))
         said: list[str] = []
-        stage = Stage(show, box, None, said.append)
+        stage = Stage(show, box, said.append)
         with closing(stage):
             stage.dance(0.1, lambda: False)
             assert (stage.cast.cue, stage.cast.motion.phrase) == (cue, phrase)

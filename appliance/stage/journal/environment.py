@@ -1,0 +1,77 @@
+"""What bits of the dance depend on beside the journal: the processor, the libraries, the show's files."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+CPU_INFO = Path("/proc/cpuinfo")
+_UNKNOWN = "unknown"
+_WORDS = {
+    "machine": "the machine",
+    "cpu": "the processor",
+    "python": "Python",
+    "numpy": "numpy",
+    "onnxruntime": "onnxruntime",
+    "bunraku": "Bunraku",
+}
+
+
+def environment() -> dict[str, str]:
+    """Machine, processor and versions, here and now."""
+    return {
+        "machine": platform.machine(),
+        "cpu": _processor(),
+        "python": platform.python_version(),
+        **{name: _version(name) for name in ("numpy", "onnxruntime", "bunraku")},
+    }
+
+
+def fingerprints(directory: Path, names: Sequence[str]) -> dict[str, str]:
+    """SHA-256 of a show's files by their names; "" for one that cannot be read."""
+    return {name: _fingerprint(directory / name) for name in names}
+
+
+def differing_software(recorded: dict[str, Any], here: dict[str, str]) -> list[str]:
+    """What of machine and software is another one than in the recording, in words."""
+    return [
+        f"{words} ({recorded.get(name, _UNKNOWN)} then, {here[name]} here)"
+        for name, words in _WORDS.items()
+        if recorded.get(name) != here[name]
+    ]
+
+
+def differing_files(recorded: dict[str, str], directory: Path) -> list[str]:
+    """The show's files that are others than in the recording, by name."""
+    here = fingerprints(directory, list(recorded))
+    return [name for name, fingerprint in recorded.items() if here[name] != fingerprint]
+
+
+def _fingerprint(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
+
+
+def _version(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return _UNKNOWN
+
+
+def _processor() -> str:
+    """Its name as the kernel has it; on ARM its part number and the board's name."""
+    try:
+        lines = CPU_INFO.read_text(errors="replace").splitlines()
+    except OSError:
+        return _UNKNOWN
+    named = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in lines)}
+    parts = [named[name] for name in ("model name", "CPU part", "Model") if name in named]
+    return ", ".join(parts) or _UNKNOWN

@@ -1,0 +1,7 @@
+"""What may be wrong with a journal, in words for people."""
+
+from __future__ import annotations
+
+
+class JournalError(Exception):
+    """A journal that cannot be written, read or danced again; the message says why and what to do."""
