@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from appliance.control.lifeline import hold_lifeline
-from appliance.stage.realtime import prepare_environment
+from appliance.stage.realtime import prepare_environment, spare_the_collector
 
 _PATHS = ("--show", "--box", "--journal", "--chosen")
 _SECONDS, _ALONE = "--seconds", "--alone"
@@ -37,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     hold_lifeline()
     prepare_environment()
+    spare_the_collector()
     try:
         sys.exit(_play(wishes))
     except Exception as error:

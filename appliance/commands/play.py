@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import shutil
 import socket
 import sys
-import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, closing
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from appliance.commands.companions import Companion, Companions
-from appliance.commands.control import control_command, open_control_port
-from appliance.commands.emulation import Emulation
-from appliance.commands.rehearsal import PICTURED_S, has_display, rehearsal_picture
 from appliance.control.house import forget_house
 from appliance.control.speaker import Speaker
 from appliance.control.stop_signals import stop_signals
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
+from appliance.show.control import ControlConfig
 from appliance.show.show import Show, load_show
 from appliance.stage.cast import reach
 from appliance.stage.run import Stage
+
+if TYPE_CHECKING:
+    from appliance.commands.companions import Companion
 
 _NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
 # In a technician's words; what is not here goes by its name in docs/wire.md.
@@ -55,27 +54,23 @@ def play_show(
     show, box = load_show(directory or default_show_path()), load_box(box_file)
     with ExitStack() as opened:
         stopped = opened.enter_context(stop_signals())
-        scratch = Path(tempfile.mkdtemp(prefix="bunraku-"))
-        opened.callback(shutil.rmtree, scratch, ignore_errors=True)
-        if emulate:
-            emulation = opened.enter_context(Emulation(show, box, scratch))
-            box = emulation.box
+        scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
+        if emulate and scratch:
+            box = _emulated(show, box, scratch, opened)
         journal = journal or box.journal.folder
-        if (filmstrip or rehearse) is not None and journal is None:
+        if (filmstrip or rehearse) is not None and journal is None and scratch:
             journal = scratch / "dance.journal"
             box = _with_short_journal(box)
         speaker = Speaker()
         opened.callback(speaker.close)
-        shown = rehearse is not None and has_display()
-        control = None if alone or box.control is None else open_control_port(box.control)
-        if control is not None:
-            opened.callback(control.close)
-        stage = Stage(show, box, journal, speaker.say, box_file)
+        shown = rehearse is not None and _has_display()
+        control = None if alone or box.control is None else _opened(box.control, opened)
+        stage = Stage(show, box, speaker.say, box_file)
         with closing(stage):
             for line in _introduction(stage, emulate, control):
                 speaker.say(line)
             company = () if alone else tuple(_company(show, box, box_file, control, window or shown))
-            with Companions(company, speaker.say, lambda: stage.health.ticks > 0):
+            with _accompanied(company, speaker, stage):
                 stage.dance(seconds, stopped)
         if not alone:
             forget_house(stage.sharing.folder)
@@ -83,19 +78,67 @@ def play_show(
             speaker.say(line)
         if filmstrip is not None and journal is not None:
             from appliance.commands.pictures import danced, drawn
+            from appliance.commands.rehearsal import PICTURED_S
 
             picture = drawn(danced(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
             speaker.say(f"What was just danced, held joints highlighted: {picture}")
         if rehearse is not None and journal is not None:
+            from appliance.commands.rehearsal import rehearsal_picture
+
             for line in rehearsal_picture(journal, rehearse, show):
                 speaker.say(line)
     return 0
+
+
+def _scratch(opened: ExitStack) -> Path:
+    """A folder that goes with this process."""
+    import shutil
+    import tempfile
+
+    folder = Path(tempfile.mkdtemp(prefix="bunraku-"))
+    opened.callback(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _emulated(show: Show, box: BoxConfig, scratch: Path, opened: ExitStack) -> BoxConfig:
+    """The box as emulated sensors find it, which run from now on."""
+    from appliance.commands.emulation import Emulation
+
+    return opened.enter_context(Emulation(show, box, scratch)).box
+
+
+def _has_display() -> bool:
+    from appliance.commands.rehearsal import has_display
+
+    return has_display()
+
+
+def _opened(control: ControlConfig, opened: ExitStack) -> socket.socket:
+    from appliance.commands.control import open_control_port
+
+    port = open_control_port(control)
+    opened.callback(port.close)
+    return port
+
+
+def _accompanied(
+    company: tuple[Companion, ...], speaker: Speaker, stage: Stage
+) -> AbstractContextManager[object]:
+    """While inside, they run; without any, nothing is loaded for them: a stage that is back is in a hurry."""
+    if not company:
+        return nullcontext()
+    from appliance.commands.companions import Companions
+
+    return Companions(company, speaker.say, lambda: stage.health.ticks > 0)
 
 
 def _company(
     show: Show, box: BoxConfig, box_file: Path | None, control: socket.socket | None, window: bool
 ) -> Iterator[Companion]:
     """Who accompanies the stage."""
+    from appliance.commands.companions import Companion
+    from appliance.commands.control import control_command
+
     if control is not None:
         yield Companion(
             "Show control",

@@ -91,6 +91,7 @@ class Stage:
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
         """Tick until `stopped` says so or the seconds are over; this thread is the real-time one."""
         if not self.box.realtime.enabled:
+            leave_realtime()
             self._tick_on(seconds, stopped)
             return
         missing = enter_realtime(self.box.realtime.priority)
