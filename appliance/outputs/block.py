@@ -48,6 +48,10 @@ class BlockReader:
         """Why nothing is read although there is a file, in a sentence; else empty."""
         return self._file.complaint
 
+    def writer_lives(self) -> bool:
+        """Whether the process that wrote what was read last still has the file."""
+        return self._file.writer_lives()
+
     def read(self) -> bytes | None:
         """The newest whole payload; None before the first one. Never waits, never raises."""
         self._file.look()

@@ -25,8 +25,8 @@ class Place:
     phrase, position_s: which pose comes next; excerpt: first and last second of the part that plays;
     rate: its speed; x, z (metres), heading (radians about +Y): where the phrase's root stands on the stage;
     strayed: how far grounding has moved the figure from there (metres); let_go: joints whose hands were told
-    to let go; boot: the machine's boot id; tick: of the last frame; restarts, power_cuts: how often the show went on
-    after one; ended: the show was ended as it should; tries: starts from here of which no frame has left.
+    to let go; boot: the machine's boot id; tick: of the last frame; restarts, power_cuts: how often the show
+    went on after one; ended: the show was ended as it should; tries: starts from here of which no frame left.
     """
 
     show: str
@@ -136,6 +136,10 @@ class PlaceReader:
         """The newest place; None where none was written. Never waits, never raises."""
         payload = self._block.read()
         return None if payload is None else unpacked(payload)
+
+    def stage_lives(self) -> bool:
+        """Whether the stage that wrote what was read last is still there."""
+        return self._block.writer_lives()
 
     def close(self) -> None:
         """Let go of the file."""
