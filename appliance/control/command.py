@@ -80,6 +80,7 @@ FORMS: dict[str, Form] = {
     "/phrases": Form(),
     "/looks": Form(),
     "/hands": Form(),
+    "/fallbacks": Form(),
     "/projector/corner": Form(numbers=(_CORNER, *_PLACE)),
     "/projector/corners": Form(numbers=_PLACE * 4),
     "/projector/corners/reset": Form(),

@@ -26,7 +26,7 @@ REPLY, SENSORS_REPLY, PONG = "/reply", "/sensors/reply", "/pong"
 PHRASE_FADE_S = 2.0
 # What a box sends is never answered: two boxes would go on answering each other for ever.
 _ANSWERS = frozenset((REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END))
-_LISTED = ("/cues/", "/phrases/", "/looks/", "/hands/")
+_LISTED = ("/cues/", "/phrases/", "/looks/", "/hands/", "/fallbacks/")
 _ONCE_A_BUNDLE = frozenset((*QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
 _STREAMS = ("/player/", "/mocap/")  # answered only when refused
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
@@ -127,7 +127,7 @@ class Desk:
         elif address in CHANGES:
             self._change(order, asker, now)
         elif address in QUESTIONS:
-            for message in told(address, self.house, self._sight, self.status(0, now)):
+            for message in told(address, self.house, self._sight, self.status(0, now), now):
                 self._tell(asker, message)
         elif address == "/sensors/list":
             self._tell_roster(asker, now)

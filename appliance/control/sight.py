@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
+from appliance.control.company import STAGE_HUNG, Company
+from appliance.control.fallback import Fallbacks, Fallen, fallen
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
 
@@ -16,13 +18,17 @@ class StageSight:
 
     def __init__(self, folder: Path) -> None:
         self._reader = FrameReader(folder)
+        self._company = Company(folder)
+        self._seen = Fallbacks((STAGE_HUNG,))
 
     def state(self, now: float) -> StageState:
         """hung: the process lives, but no frame came for half a second; absent: no process, or none yet."""
         frames = self._reader.state(now)
+        is_hung = frames == "stale" and self._reader.is_alive(now)
+        self._seen.set(STAGE_HUNG.name, is_hung)
         if frames == "fresh":
             return "stopped" if self.health().get("state") == "stopped" else "dancing"
-        return "hung" if frames == "stale" and self._reader.is_alive(now) else "absent"
+        return "hung" if is_hung else "absent"
 
     def lives(self, now: float) -> bool:
         """Whether there is a stage at all: one that dances, hangs, or is about to begin."""
@@ -31,6 +37,12 @@ class StageSight:
     def health(self) -> dict[str, Any]:
         """What the stage last said about itself; empty before it did."""
         return self._reader.health() or {}
+
+    def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
+        """Process and fallback, of all processes of the box, as far as they ever happened."""
+        own = [("control", one) for one in self._seen.told(now)]
+        stage = fallen(self.health().get("fallbacks")) if self.state(now) != "absent" else ()
+        return [*(("stage", one) for one in stage), *own, *self._company.fallbacks(now)]
 
     @property
     def facts(self) -> Facts | None:
@@ -45,3 +57,4 @@ class StageSight:
     def close(self) -> None:
         """Let go of the shared frame."""
         self._reader.close()
+        self._company.close()

@@ -10,8 +10,9 @@ from appliance.control.packet import Message
 from appliance.control.sight import StageSight
 
 STATUS, END = "/bunraku/status", "/end"
-QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/hands")
+QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/hands", "/fallbacks")
 UNKNOWN = -1.0
+_LONGEST_WORDS = 1000  # of a sentence in an answer
 
 
 class Status(NamedTuple):
@@ -39,6 +40,7 @@ class Status(NamedTuple):
     uptime_s: float
     refused: int
     strangers: int
+    fallbacks: int
 
 
 def status(house: House, sight: StageSight, refused: int, strangers: int, now: float) -> Status:
@@ -69,35 +71,36 @@ def status(house: House, sight: StageSight, refused: int, strangers: int, now: f
         uptime_s=_known(health.get("uptime_s")),
         refused=refused,
         strangers=strangers,
+        fallbacks=sum(one.active for _, one in sight.fallbacks(now)),
     )
 
 
-def told(question: str, house: House, sight: StageSight, now_status: Status) -> Iterator[Message]:
+def told(question: str, house: House, sight: StageSight, now_status: Status, now: float) -> Iterator[Message]:
     """The answer to one of QUESTIONS: a message for each thing, and one to end with."""
     if question == "/status":
         answers: list[Message] = [(STATUS, *now_status)]
     else:
-        answers = list(_LISTS[question](now_status, sight))
+        answers = list(_LISTS[question](now_status, sight, now))
     yield from answers
     yield END, question, len(answers)
 
 
-def _cues(status: Status, sight: StageSight) -> Iterator[Message]:
+def _cues(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
     for cue in sight.facts.cues if sight.facts else ():
         yield "/cues/cue", str(cue["name"]), int(cue["name"] == status.cue)
 
 
-def _phrases(status: Status, sight: StageSight) -> Iterator[Message]:
+def _phrases(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
     for name in sight.facts.phrases if sight.facts else ():
         yield "/phrases/phrase", name, int(name == status.phrase)
 
 
-def _looks(status: Status, sight: StageSight) -> Iterator[Message]:
+def _looks(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
     for name in sight.facts.looks if sight.facts else ():
         yield "/looks/look", name, int(name == status.look)
 
 
-def _hands(status: Status, sight: StageSight) -> Iterator[Message]:
+def _hands(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
     facts = sight.facts
     if facts is None:
         return
@@ -107,7 +110,18 @@ def _hands(status: Status, sight: StageSight) -> Iterator[Message]:
         yield "/hands/hand", name, who, int(name not in let_go)
 
 
-_LISTS = {"/cues": _cues, "/phrases": _phrases, "/looks": _looks, "/hands": _hands}
+def _fallbacks(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+    for who, one in sight.fallbacks(now):
+        yield "/fallbacks/fallback", one.name, who, one.times, int(one.active), one.words[:_LONGEST_WORDS]
+
+
+_LISTS = {
+    "/cues": _cues,
+    "/phrases": _phrases,
+    "/looks": _looks,
+    "/hands": _hands,
+    "/fallbacks": _fallbacks,
+}
 
 
 def _state(stage: str, house: House) -> str:

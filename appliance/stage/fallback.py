@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from appliance.control.fallback import Fallback, Fallbacks, Fallen
 from appliance.dancer.puppeteers import HOLD_S
 from appliance.stage.budget import Admission
 from appliance.stage.cast import Cast
 from appliance.stage.health import Health
+from appliance.stage.resuming import Resuming
 
 SENSOR_SILENT = Fallback(
     "sensor-silent",
@@ -118,14 +119,20 @@ class StageFallbacks:
                 if silent:
                     self.all.count(SENSOR_SILENT.name, now)
 
-    def begin(
-        self, now: float, restarts: int, power_cuts: int, complaints: Iterable[tuple[Fallback, str]]
-    ) -> None:
-        """Before the first tick: how it came to this start, and what the stage could not get (or "")."""
-        self.all.follow(STAGE_RESTARTED.name, restarts, now)
-        self.all.follow(POWER_CUT.name, power_cuts, now)
-        for fallback, words in complaints:
-            self.all.set(fallback.name, bool(words), words)
+    def begin(self, now: float, resuming: Resuming, not_shared: str, is_recorded: bool) -> None:
+        """Right before the first tick: how it came to this start, and what the stage could not get.
+
+        `not_shared`: why no frames can be shared, else "".
+        """
+        self.all.follow(STAGE_RESTARTED.name, resuming.restarts, now)
+        self.all.follow(POWER_CUT.name, resuming.power_cuts, now)
+        self.all.set(PLACE_NOT_NOTED.name, bool(resuming.complaint), resuming.complaint)
+        self.all.set(NOT_SHARED.name, bool(not_shared), not_shared)
+        self.all.set(NOT_RECORDED.name, not is_recorded)
+
+    def lack_rights(self, missing: Sequence[str]) -> None:
+        """Which real-time rights the stage did not get, sentences."""
+        self.all.set(NOT_REALTIME.name, bool(missing), " ".join(missing))
 
     def look(self, now: float, health: Health) -> None:
         """Once a second: what others have counted."""

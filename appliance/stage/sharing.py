@@ -73,10 +73,12 @@ class Sharing:
         sensor_age_s: float | None,
         locked: bool,
         sensors: Sequence[Sequence[Any]],
+        fallbacks: Sequence[Sequence[Any]] = (),
     ) -> None:
         """How the box is, after the frame has left; docs/outputs.md lists the keys.
 
-        `sensors`: a line of the roster for each. `sensor_age_s`: None without a sensor, infinite if unheard.
+        `sensors`: a line of the roster for each; `fallbacks`: those that ever happened; `sensor_age_s`: None
+        without a sensor, infinite if unheard.
         """
         told = health.snapshot(now)
         told |= {
@@ -97,6 +99,7 @@ class Sharing:
                 for one in cast.outputs.receivers
             ],
             "complaints": cast.complaints,
+            "fallbacks": fallbacks,
         }
         cast.outputs.tell(told)
 
