@@ -33,11 +33,10 @@ def stage(patient: Patient) -> Iterator[Finding]:
     else:
         yield ok("stage", words)
     for complaint in health.get("complaints") or []:
-        yield better("stage", str(complaint), "docs/technician.md lists what to do.")
-    for fallback in health.get("fallbacks") or []:
-        if isinstance(fallback, dict) and fallback.get("active"):
-            words = str(fallback.get("words") or fallback.get("sentence") or fallback.get("name"))
-            yield better("fallback", words, "docs/technician.md lists what to do.")
+        yield better("stage", str(complaint), "docs/technician.md has more.")
+    for whose, fallback in patient.stage.fallbacks:
+        if fallback.active and whose != "preflight":  # what that one refused stands beside the show
+            yield better(f"{whose}: {fallback.name}", fallback.words, "docs/technician.md has more.")
 
 
 def units(patient: Patient) -> Iterator[Finding]:

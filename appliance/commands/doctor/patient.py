@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from appliance.control.company import Company
+from appliance.control.fallback import Fallen, fallen
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.show.box import BoxConfig
@@ -21,6 +23,7 @@ class LivingStage:
 
     pid: int
     health: dict[str, Any]
+    fallbacks: tuple[tuple[str, Fallen], ...] = ()  # of all processes of the box: whose, and which
 
 
 @dataclass(frozen=True)
@@ -85,4 +88,7 @@ def living_stage(box: BoxConfig) -> LivingStage | None:
     with contextlib.closing(FrameReader(folder)) as reader:
         if not reader.is_alive(time.monotonic()) or reader.facts is None:
             return None
-        return LivingStage(reader.facts.pid, reader.health() or {})
+        health, now = reader.health() or {}, time.monotonic()
+        with contextlib.closing(Company(folder)) as company:
+            told = [("stage", one) for one in fallen(health.get("fallbacks"))] + company.fallbacks(now)
+        return LivingStage(reader.facts.pid, health, tuple(told))

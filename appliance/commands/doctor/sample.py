@@ -30,7 +30,7 @@ class Sample:
 
 
 def sample(priority: int, ours: frozenset[int]) -> Sample:
-    """Look for a second. `priority`: the stage's. `ours`: the box's processes, which may use what they use."""
+    """Look for a second. `priority`: the stage's. `ours`: the box's processes: they may use what they use."""
     cores = os.cpu_count() or 1
     begun, before, all_before = time.monotonic(), _used(), _machine()
     late_ms = _wake_ups(max(1, priority - _BELOW))

@@ -46,8 +46,8 @@ def ports(patient: Patient) -> Iterator[Finding]:
 
 def _holders(patient: Patient, port: int) -> list[tuple[str, str]]:
     """(name, command line) of each process that has this UDP port."""
-    rows = [line.split() for line in (patient.text("/proc/net/udp") or "").splitlines()[1:]]
-    inodes = {f"socket:[{row[9]}]" for row in rows if int(row[1].partition(":")[2], 16) == port}
+    rows = [line.split() for line in (patient.text("/proc/net/udp") or "").splitlines()]
+    inodes = {f"socket:[{row[9]}]" for row in rows if len(row) > 9 and row[1].endswith(f":{port:04X}")}
     found = []
     for folder in patient.found("/proc/[0-9]*") if inodes else []:
         try:
