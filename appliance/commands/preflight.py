@@ -36,7 +36,8 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
     """Write chosen.json into the run folder: 0 when it stands there, 1 when the folder does not take it."""
     places = Places(options.data, options.run)
     if options.late:
-        os.nice(19)
+        with contextlib.suppress(OSError):  # its unit has said so already, and allows no more
+            os.nice(19)
     with _alone(options.data), _alone(options.run):
         outcome = _found(options, places)
         for words in outcome.words:
