@@ -19,21 +19,6 @@ from hw_sim.soak.unit import Unit
 STAGE, EMULATOR, LOAD = "stage", "sensors", "load"
 JOURNAL_MINUTES = 10  # shorter than the soak, so that old segments have to go
 LATE_MS = 15.0  # limits: late_ms: of the box file, as it is by default
-_RIG = {
-    "fixtures": [
-        {"name": "head", "profile": "moving-wash", "address": 1, "place": [1.5, 3.5, 1.0]},
-        {"name": "par", "profile": "led-par", "address": 21, "place": [-2.0, 3.5, 0.0]},
-    ],
-    "mappings": [
-        {
-            "name": "warm",
-            "rules": [
-                {"reads": "place", "joint": "head", "drives": "aim"},
-                {"reads": "steady", "drives": "dimmer"},
-            ],
-        }
-    ],
-}
 _PICTURE = "320x180"  # the projector's: without a graphics card the processor draws, which is load enough
 
 
@@ -138,8 +123,24 @@ def _with_lamps(show: Path, copy: Path) -> Path:
     shutil.copytree(show, copy)
     config = _plain(copy / "show.yaml")
     if not (config.get("lights") or {}).get("fixtures"):
-        (copy / "show.yaml").write_text(yaml.safe_dump({**config, "lights": _RIG}))
+        lights = _rig(config["hands"][0]["joint"])
+        (copy / "show.yaml").write_text(yaml.safe_dump({**config, "lights": lights}))
     return copy
+
+
+def _rig(joint: str) -> dict[str, Any]:
+    """A head that follows this joint, and a lamp that is on."""
+    rules = [
+        {"reads": "place", "joint": joint, "drives": "aim"},
+        {"reads": "steady", "drives": "dimmer"},
+    ]
+    return {
+        "fixtures": [
+            {"name": "head", "profile": "moving-wash", "address": 1, "place": [1.5, 3.5, 1.0]},
+            {"name": "par", "profile": "led-par", "address": 21, "place": [-2.0, 3.5, 0.0]},
+        ],
+        "mappings": [{"name": "warm", "rules": rules}],
+    }
 
 
 def _plain(path: Path) -> dict[str, Any]:

@@ -1,0 +1,228 @@
+"""The soak: what it counts, when things happen, how it judges; and a short one with the whole box."""
+
+from __future__ import annotations
+
+import csv
+import json
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from hw_sim.peers import HOST
+from hw_sim.soak.delays import Delays
+from hw_sim.soak.figures import growth
+from hw_sim.soak.frames import FrameWatch
+from hw_sim.soak.script import KILLS_UNTIL, script
+from hw_sim.soak.unit import PAUSE_S, Unit
+from hw_sim.soak.vitals import Vitals
+from tests.stage.bundles import write_show
+from tests.system.box import PATIENCE_S
+
+LATE_MS = 15.0
+
+
+def frame(tick: int, deadline: float, late: bool = False) -> bytes:
+    """`/bunraku/frame ,hdhi` by hand."""
+    return b"/bunraku/frame\0\0,hdhi\0\0\0" + struct.pack(">qdqi", tick, deadline, -1, late)
+
+
+class Stage:
+    """Sends frames as a stage does."""
+
+    def __init__(self, watch: FrameWatch) -> None:
+        self._port = watch.port
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def send(self, tick: int, before_s: float = 0.0, late: bool = False) -> None:
+        """A frame whose deadline was `before_s` ago."""
+        self._socket.sendto(frame(tick, time.monotonic() - before_s, late), (HOST, self._port))
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+@pytest.fixture
+def watch() -> FrameWatch:
+    return FrameWatch(LATE_MS)
+
+
+@pytest.fixture
+def stage(watch: FrameWatch) -> Stage:
+    return Stage(watch)
+
+
+def test_delays_are_counted_in_steps_and_long_ones_cost_whole_slots() -> None:
+    delays = Delays()
+    assert delays.percentile(50) is None
+    for delay_ms in (0.04, 1.0, 1.04, 14.9, 15.1, 47.0, -3.0, 1e9):
+        delays.add(delay_ms)
+    assert delays.count == 8
+    assert delays.later_than(15.0) == 3
+    assert delays.whole_slots() == 2 + 100  # of 47 ms two, of the endless one as many as are counted at all
+    assert delays.percentile(50) == pytest.approx(1.0)
+    assert delays.worst_ms == 1e9
+
+
+def test_frames_are_counted_by_their_ticks_and_their_deadlines(watch: FrameWatch, stage: Stage) -> None:
+    watch.begin(time.monotonic())
+    stage.send(10)
+    stage.send(11, before_s=0.016)
+    stage.send(12, late=True)
+    stage.send(15, before_s=0.002)
+    watch.poll(1.0)
+    assert (watch.heard, watch.late, watch.missing) == (4, 2, 2)
+    assert watch.delays.worst_ms == pytest.approx(16.0, abs=5.0)
+    assert sum(watch.seconds.bad.values()) == 4
+    stage.close()
+    watch.close()
+
+
+def test_a_frame_s_arrival_is_the_kernel_s_and_not_the_reader_s(watch: FrameWatch, stage: Stage) -> None:
+    watch.begin(time.monotonic())
+    stage.send(1)
+    time.sleep(0.1)  # nobody reads
+    watch.poll(1.0)
+    assert watch.delays.worst_ms < 50.0
+    assert watch.late == 0
+    stage.close()
+    watch.close()
+
+
+def test_a_stage_that_stopped_is_missing_at_the_end(watch: FrameWatch, stage: Stage) -> None:
+    now = time.monotonic()
+    watch.begin(now)
+    stage.send(1)
+    watch.poll(1.0)
+    watch.end(now + 2.0)
+    assert watch.missing == pytest.approx(100, abs=3)
+    assert watch.longest_gap_s == pytest.approx(2.0, abs=0.1)
+    stage.close()
+    watch.close()
+
+
+def test_a_stage_that_begins_anew_is_counted_with_its_pause(watch: FrameWatch, stage: Stage) -> None:
+    watch.begin(time.monotonic())
+    stage.send(500)
+    time.sleep(0.1)
+    stage.send(0)
+    watch.poll(1.0)
+    assert watch.stage_starts == 1
+    assert watch.missing >= 4
+    stage.close()
+    watch.close()
+
+
+def test_nobody_is_killed_in_the_second_half_and_everything_happens() -> None:
+    acts = script(3600.0, ["control", "keeper", "lights"], 3, seed=1, load=True)
+    kinds = Counter(act.kind for act in acts)
+    assert set(kinds) == {"load", "network", "outage", "back", "guest", "command", "kill"}
+    assert kinds["outage"] == kinds["back"]
+    assert [act.at for act in acts] == sorted(act.at for act in acts)
+    assert max(act.at for act in acts if act.kind == "kill") < KILLS_UNTIL * 3600.0
+    assert {act.which for act in acts if act.kind == "kill"} == {"control", "keeper", "lights"}
+    assert acts == script(3600.0, ["control", "keeper", "lights"], 3, seed=1, load=True)
+    assert acts != script(3600.0, ["control", "keeper", "lights"], 3, seed=2, load=True)
+
+
+def test_a_short_soak_has_the_same_acts_sooner() -> None:
+    acts = script(30.0, ["control"], 3, seed=1, load=True)
+    assert {act.kind for act in acts} >= {"load", "network", "outage", "guest", "command", "kill"}
+
+
+def lived(tmp_path: Path, megabytes: list[float], handles: list[int]) -> Unit:
+    unit = Unit("one", ("true",), tmp_path / "words")
+    unit.history = [
+        (float(second), Vitals(mb, mb / 2, count, 3))
+        for second, (mb, count) in enumerate(zip(megabytes, handles, strict=True))
+    ]
+    return unit
+
+
+def test_growth_counts_from_the_first_minute_on(tmp_path: Path) -> None:
+    start = [50.0 + second for second in range(60)]
+    unit = lived(tmp_path, [*start, *[110.0] * 240, *[110.7] * 20], [9] * 320)
+    grown = growth(unit, 320.0)
+    assert grown is not None
+    assert grown.rss_mb == pytest.approx(0.7)
+    assert grown.handles == 0
+
+
+def test_handles_that_come_and_go_are_no_leak_and_more_each_time_are(tmp_path: Path) -> None:
+    breathing = [9 + second // 10 % 3 for second in range(400)]
+    steady = growth(lived(tmp_path, [50.0] * 400, breathing), 400.0)
+    leaking = growth(lived(tmp_path, [50.0] * 400, [b + s // 130 for s, b in enumerate(breathing)]), 400.0)
+    assert steady is not None
+    assert leaking is not None
+    assert steady.handles == 0
+    assert leaking.handles > 0
+
+
+def test_a_life_that_was_too_short_is_not_judged(tmp_path: Path) -> None:
+    assert growth(lived(tmp_path, [50.0] * 65, [9] * 65), 3600.0) is None
+    assert growth(lived(tmp_path, [], []), 3600.0) is None
+
+
+def test_a_unit_is_started_again_and_only_unasked_ends_are_deaths(tmp_path: Path) -> None:
+    unit = Unit("one", (sys.executable, "-c", "import time; time.sleep(60)"), tmp_path / "words")
+    unit.look(0.0)
+    first = unit.pid
+    unit.kill()
+    now, until = 1.0, time.monotonic() + PATIENCE_S
+    while unit.starts < 2:
+        assert time.monotonic() < until
+        unit.look(now := now + PAUSE_S)
+    assert unit.pid != first
+    assert (unit.kills, unit.deaths) == (1, 0)
+    unit.kill(signal.SIGINT)  # as if it fell by itself
+    while unit.starts < 3:
+        assert time.monotonic() < until
+        unit.look(now := now + PAUSE_S)
+    assert (unit.kills, unit.deaths) == (1, 1)
+    unit.end(5.0)
+    assert unit.pid is None
+
+
+@pytest.mark.realtime
+def test_ended_early_it_gives_figures_verdict_picture_and_leaves_nobody_behind(tmp_path: Path) -> None:
+    out, words = tmp_path / "out", tmp_path / "words.txt"
+    show = write_show(tmp_path / "show")
+    command = [sys.executable, "-m", "hw_sim.soak", "--minutes", "1", "--out", str(out), "--show", str(show)]
+    with words.open("wb") as file:
+        running = subprocess.Popen([*command, "--no-load"], stdout=file, stderr=subprocess.STDOUT)
+    until = time.monotonic() + PATIENCE_S
+    while b"ticks" not in words.read_bytes():
+        assert time.monotonic() < until and running.poll() is None, words.read_text()
+        time.sleep(0.05)
+    time.sleep(4.0)
+    running.send_signal(signal.SIGTERM)
+    status = running.wait(PATIENCE_S)
+    said = words.read_text()
+    assert status in (0, 1), said  # 1: what is too short to tell does not hold
+    assert "Verdict:" in said
+    figures = json.loads((out / "soak.json").read_text())
+    assert figures["is_over"]
+    assert figures["planned_s"] == 60.0
+    assert figures["frames"] > 100
+    assert figures["slots"] == figures["frames"] + figures["missing"]
+    assert figures["commands"]["done"] > 0
+    assert figures["universes_of_light"] > 0
+    assert figures["processes"]["stage"]["starts"] == 1
+    assert all(limit["holds"] for limit in figures["limits"]) == (status == 0)
+    machine = figures["cyclictest"]
+    assert machine["complaint"] or machine["slots"] > 50
+    with (out / "soak.csv").open() as file:
+        seconds = list(csv.DictReader(file))
+    assert len(seconds) >= 4
+    assert float(seconds[-1]["stage_rss_mb"]) > 20.0
+    assert (out / "soak.png").read_bytes().startswith(b"\x89PNG")
+    left = subprocess.run(
+        ["pgrep", "-f", str(out)], capture_output=True, text=True, check=False
+    ).stdout.split()
+    assert not left, left
