@@ -14,7 +14,7 @@ Builds the root file system of a box into OUT: a tar where OUT ends with .tar, e
 
   --arch ARCH        amd64 (default) or arm64. A foreign one needs qemu-user-static and binfmt_misc.
   --without-kernel   no kernel, no firmware: for systemd-nspawn, or for a Raspberry Pi's own boot partition
-  --release FOLDER   what `make release` made; left out: the newest in out/, else from the working tree
+  --release FOLDER   what `make release` made; left out: one made now from the working tree
   --debian TAR       keeps Debian's part in TAR, and takes it from there the next time
 
 Must run as root, with mmdebstrap. Debian packages come from where this machine's own come from
@@ -75,7 +75,7 @@ mkdir -p "$(dirname "$out")"
 if [[ $out == *.tar ]]; then root=$work/root; else root=$out; fi
 
 debian() {
-    local options=() pattern packages
+    local options=() hooks=() pattern packages
     while read -r pattern; do
         case $pattern in
             +*) options+=(--dpkgopt="path-include=${pattern#+}") ;;
@@ -83,13 +83,16 @@ debian() {
         esac
     done < <(listed drop-files.txt)
     packages=$(listed packages-box.txt)
-    if [ "$kernel" = yes ]; then packages+=$'\n'$(listed packages-pc.txt); fi
+    if [ "$kernel" = yes ]; then
+        packages+=$'\n'$(listed packages-pc.txt)
+        # Before the kernel comes: its start image is made from these files.
+        hooks=(--essential-hook="cp -a --no-preserve=ownership '$here/tree/.' \"\$1/\"")
+    fi
     echo "Debian 13 for $arch into $root"
     sources | mmdebstrap --quiet --variant=apt --architectures="$arch" "${options[@]}" \
         --aptopt='Acquire::Languages "none"' --aptopt='APT::Install-Recommends "false"' \
-        --include="$(tr '\n' ',' <<<"$packages" | sed 's/,$//')" \
-        --essential-hook='mkdir -p "$1/etc/initramfs-tools/conf.d"; echo "MODULES=list" > "$1/etc/initramfs-tools/conf.d/bunraku"' \
-        trixie "$root" - >"$work/debian.log" 2>&1 ||
+        --dpkgopt=force-confold --include="$(tr '\n' ',' <<<"$packages" | sed 's/,$//')" \
+        "${hooks[@]}" trixie "$root" - >"$work/debian.log" 2>&1 ||
         { tail -n 30 "$work/debian.log" >&2; fail "Debian could not be installed; the lines above say why."; }
 }
 
@@ -106,47 +109,13 @@ debian_kept() {
     fi
 }
 
-# What install.sh does not: it is made for a machine that runs. A release, by hand, from the working tree.
-release_by_hand() {
-    local version folder site
-    version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$repository/pyproject.toml")
-    folder=/opt/bunraku/releases/$version
-    echo "bunraku $version from the working tree"
-    mkdir -p "$root/opt/bunraku/releases"
-    chroot "$root" python3 -m venv --without-pip "$folder"
-    site=$root$folder/lib/python3.13/site-packages
-    python=$repository/.venv/bin/python
-    [ -x "$python" ] || python=python3
-    grep -v -i -E '^(contourpy|cycler|fonttools|kiwisolver|matplotlib|pillow|pyparsing|python-dateutil|setuptools|tzdata)=' \
-        "$repository/requirements.txt" >"$work/requirements.txt"
-    "$python" -m pip install -qq --disable-pip-version-check --no-deps --no-compile --target "$site" \
-        --only-binary :all: --implementation cp --python-version 3.13 --platform "manylinux_2_28_$machine" \
-        --platform "manylinux_2_27_$machine" --platform "manylinux2014_$machine" \
-        -r "$work/requirements.txt" || fail "pip could not bring the Python packages."
-    cp -a "$repository/appliance" "$repository/hw_sim" "$site/"
-    printf '#!%s/bin/python\nfrom appliance.cli import main\n\nmain()\n' "$folder" >"$root$folder/bin/bunraku"
-    chmod 755 "$root$folder/bin/bunraku"
-    ln -sfn "releases/$version" "$root/opt/bunraku/current"
-    ln -sfn /opt/bunraku/current/bin/bunraku "$root/usr/local/bin/bunraku"
-    chroot "$root" "$folder/bin/python" -m compileall -q "$folder/lib" || true
-}
-
-newest_release() {
-    local folder newest=''
-    for folder in "$repository"/out/bunraku-*-"$arch"; do
-        if [ -d "$folder" ] && { [ -z "$newest" ] || [ "$folder" -nt "$newest" ]; }; then newest=$folder; fi
-    done
-    printf '%s' "$newest"
-}
-
+# The release as it would be installed from a stick, made now from the working tree unless one was named.
 install_release() {
-    [ -n "$release" ] || release=$(newest_release)
-    if [ -n "$release" ] && [ -x "$repository/deploy/install.sh" ]; then
-        echo "bunraku from $release"
-        "$repository/deploy/install.sh" --root "$root" "$release"
-    else
-        release_by_hand
+    if [ -z "$release" ]; then
+        release=$work/release
+        "$repository/deploy/release/make-release" --arch "$arch" --out "$release"
     fi
+    "$repository/deploy/install.sh" --root "$root" "$release"
 }
 
 settle() {
