@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import Annotated, NoReturn
 
 from appliance.control.lifeline import hold_lifeline
+from appliance.control.notify import Notifier
 from appliance.stage.realtime import prepare_environment
 
 prepare_environment()
 
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
 
+from appliance.commands import journal as journal_commands  # noqa: E402
 from appliance.commands import sensor_commands  # noqa: E402
 from appliance.commands.chosen import ChosenFile, box_of, pair_of  # noqa: E402
 from appliance.lights import lights_commands  # noqa: E402
@@ -50,7 +52,9 @@ def play(
     emulate: Annotated[
         bool, typer.Option("--emulate", help="Start emulated sensors, over real sockets.")
     ] = False,
-    journal: Annotated[Path | None, typer.Option(help="Write the flight recorder here.")] = None,
+    journal: Annotated[
+        Path | None, typer.Option(help="Folder for the flight recorder; left out: the box file's.")
+    ] = None,
     filmstrip: Annotated[
         Path | None, typer.Option(help="At the end draw what was danced into this PNG.")
     ] = None,
@@ -85,6 +89,37 @@ def control(
     from appliance.commands.control import control_box
 
     control_box(box_of(box, chosen), socket_fd)
+
+
+@app.command()
+def keep(
+    box: BoxFile = None,
+    journal: Annotated[Path | None, typer.Option(help="Another folder than the box file's.")] = None,
+    minutes: Annotated[float | None, typer.Option(min=0.1, help="How much of it is kept.")] = None,
+    chosen: ChosenFile = None,
+) -> None:
+    """Carry the journal and the place of the dance from memory to the disk, which may be slow or broken."""
+    from appliance.commands.keep import keep_box
+
+    raise typer.Exit(keep_box(box_of(box, chosen), journal, minutes, chosen))
+
+
+@app.command()
+def replay(
+    journal: Annotated[
+        Path, typer.Argument(help="Folder of a journal, a segment in it, or an exported file.")
+    ],
+    show: Annotated[Path | None, typer.Option(help="Show bundle; left out: where it was then.")] = None,
+    from_s: Annotated[float, typer.Option("--from", min=0.0, help="Second of a run to begin at.")] = 0.0,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Degrees that a joint may be off; 0: every bit must be the same."),
+    ] = None,
+) -> None:
+    """Dance a journal again through the same tick, and say which is the first that differs."""
+    from appliance.commands.replay import replay_journal
+
+    raise typer.Exit(replay_journal(journal, show, from_s, tolerance))
 
 
 @app.command()
@@ -123,6 +158,7 @@ def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you cha
 app.command()(sensor_commands.provision)
 app.add_typer(sensor_commands.sensors, name="sensors")
 app.add_typer(lights_commands.lights, name="lights")
+app.add_typer(journal_commands.journal, name="journal")
 
 
 @app.command()
@@ -227,7 +263,10 @@ def refuse(error: Exception) -> NoReturn:
     if not _is_for_people(error):
         raise error
     print(f"bunraku: {error}", file=sys.stderr)
-    sys.exit(getattr(error, "exit_status", REFUSED))
+    status = getattr(error, "exit_status", REFUSED)
+    if status != REFUSED:
+        Notifier().ready(str(error))  # for systemd this is no failed start
+    sys.exit(status)
 
 
 def plug_in(onto: typer.Typer, found: Iterable[EntryPoint], say: Callable[[str], None]) -> None:

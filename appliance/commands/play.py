@@ -18,10 +18,12 @@ from appliance.show.control import ControlConfig
 from appliance.show.show import Show, load_show
 from appliance.stage.cast import reach
 from appliance.stage.run import Stage
+from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:
     from appliance.commands.companions import Companion
 
+PICTURED_MINUTES = 0.5  # a journal that only serves the picture at the end keeps little more than is drawn
 _NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
 # In a technician's words; what is not here goes by its name in docs/wire.md.
 _REFUSALS = {
@@ -57,10 +59,13 @@ def play_show(
         scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
         if emulate and scratch:
             box = _emulated(show, box, scratch, opened)
+        keeper = None if journal is None else _keeper(box_file, _new_folder(journal), box.journal.minutes)
         journal = journal or box.journal.folder
-        if (filmstrip or rehearse) is not None and journal is None and scratch:
+        if (filmstrip or rehearse) is not None and scratch and (alone or journal is None):
             journal = scratch / "dance.journal"
-            box = _with_short_journal(box)
+            keeper = _keeper(box_file, journal, PICTURED_MINUTES)
+        elif keeper is None and journal is not None and not alone:
+            keeper = _keeper(box_file, journal, box.journal.minutes)
         speaker = Speaker()
         opened.callback(speaker.close)
         shown = rehearse is not None and _has_display()
@@ -70,6 +75,7 @@ def play_show(
             for line in _introduction(stage, emulate, control):
                 speaker.say(line)
             company = () if alone else tuple(_company(show, box, box_file, control, window or shown))
+            company += () if keeper is None else (keeper,)
             with _accompanied(company, speaker, stage):
                 stage.dance(seconds, stopped)
         if not alone:
@@ -163,6 +169,29 @@ def _company(
         )
 
 
+def _keeper(box_file: Path | None, journal: Path, minutes: float) -> Companion:
+    """Who carries the journal to the disk."""
+    from appliance.commands.companions import Companion
+
+    named = () if box_file is None else ("--box", str(box_file))
+    kept = ("--journal", str(journal), "--minutes", str(minutes))
+    return Companion(
+        "The keeper of the journal",
+        (sys.executable, "-m", "appliance.cli", "keep", *named, *kept),
+        "What is danced meanwhile waits in memory.",
+    )
+
+
+def _new_folder(journal: Path) -> Path:
+    """Refuse a file in its place: a journal is a folder."""
+    if journal.is_file():
+        raise StageError(
+            f"{journal} is a file, and a journal is a folder. Nothing is danced. Name another place, or "
+            "remove the file."
+        )
+    return journal
+
+
 def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) -> list[str]:
     show = stage.show
     hands = ", ".join(f"{hand.sensor or hand.kind} holds {hand.joint}" for hand in show.config.hands)
@@ -212,8 +241,3 @@ def _readings(counts: dict[str, int]) -> str:
     lost = f", {counts['lost']} lost on the way" if counts["lost"] else ""
     reasons = ", ".join(f"{count} {said}" for said, count in refused.items())
     return f"Readings: {accepted} accepted{lost}" + (f"; refused: {reasons}." if refused else ".")
-
-
-def _with_short_journal(box: BoxConfig) -> BoxConfig:
-    """A journal that only serves the picture at the end keeps little more than what is drawn."""
-    return box.model_copy(update={"journal": box.journal.model_copy(update={"minutes": 0.5})})

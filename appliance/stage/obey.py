@@ -18,6 +18,15 @@ STROBE_S = 10.0
 Outcome = tuple[bool, str]
 
 
+def carry_out(
+    order: Order, cast: Cast, iterations: Iterations, wearing: Wearing, usual_rate: float, now: float
+) -> Outcome:
+    """Carry out any order: whether it was done, and a sentence where there is something to say about it."""
+    if order.name in SENSOR_ORDERS:
+        return obey_for_sensors(order, cast, wearing, now)
+    return obey(order, cast, iterations, usual_rate)
+
+
 def obey(order: Order, cast: Cast, iterations: Iterations, usual_rate: float) -> Outcome:
     """Carry out one order: whether it was done, and a sentence where there is something to say about it."""
     try:

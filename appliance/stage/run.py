@@ -22,7 +22,7 @@ from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.journal.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
 from appliance.stage.journal.recorder import Recorder
-from appliance.stage.obey import SENSOR_ORDERS, obey, obey_for_sensors, resume
+from appliance.stage.obey import carry_out, resume
 from appliance.stage.phase_lock import PhaseLock
 from appliance.stage.prepared import MEMORY
 from appliance.stage.realtime import enter_realtime, leave_realtime
@@ -172,10 +172,8 @@ class Stage:
             self.inbox.answer(*answer)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
-        if order.name in SENSOR_ORDERS:
-            done, words = obey_for_sensors(order, self.cast, self.wearing, now)
-        else:
-            done, words = obey(order, self.cast, self.iterations, self.show.config.motion.rate)
+        usual_rate = self.show.config.motion.rate
+        done, words = carry_out(order, self.cast, self.iterations, self.wearing, usual_rate, now)
         if self.recorder is not None:
             asked = {"name": order.name, "values": order.values, "text": order.text}
             self.recorder.event(ORDER, now, order=asked, done=done, words=words)

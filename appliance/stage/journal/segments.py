@@ -8,6 +8,7 @@ import os
 from collections import deque
 from pathlib import Path
 
+from appliance.show.choice import sync_folder
 from appliance.stage.journal.chunks import count_ticks
 
 SUFFIX = ".segment"
@@ -61,7 +62,7 @@ class Segments:
             self._older = None  # another keeper writes here: look anew
             raise
         self._path = path
-        _sync_folder(self._folder)
+        sync_folder(self._folder)
 
     def append(self, data: bytes, ticks: int) -> None:
         """Write it behind the rest, and wait until it is on the disk."""
@@ -122,11 +123,3 @@ class Segments:
 def _number(name: str) -> int | None:
     stem = name.removesuffix(SUFFIX)
     return int(stem) if stem.isdecimal() else None
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -1,0 +1,181 @@
+"""Dances a run of a journal again: its slots, readings and orders through the same tick, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from appliance.control.orders import Order
+from appliance.dancer.puppet import Puppet
+from appliance.dancer.slerp import FloatArray
+from appliance.sensor.link import SensorLink, SensorReading, SensorState
+from appliance.sensor.memory import SensorMemory
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.show import Show
+from appliance.stage.cast import assemble
+from appliance.stage.clock import Slot
+from appliance.stage.iterations import Iterations
+from appliance.stage.journal.comparison import Comparison
+from appliance.stage.journal.journal_error import JournalError
+from appliance.stage.journal.keyframe import unpacked
+from appliance.stage.journal.reading import Run
+from appliance.stage.journal.record import NOT_FINITE, ORDER
+from appliance.stage.obey import carry_out
+from appliance.stage.tick import Tick
+from appliance.stage.wearing import Wearing
+
+_NO_PORTS = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]), control=None)
+
+
+class Replay:
+    """A run and the tick of its show; nothing is heard but what was recorded, and nothing is sent.
+
+    skipped: ticks that could not be run: before the first keyframe, or around a gap. forced: ticks whose
+    network failed then and not here; the failure was taken from the journal.
+    Raises JournalError where the show is not the recorded one, StageError, ConfigError.
+    """
+
+    def __init__(self, run: Run, show: Show) -> None:
+        self.skipped = 0
+        self._run, self._usual_rate = run, show.config.motion.rate
+        cast = assemble(show, _NO_PORTS)
+        hands = [hand["joint"] for hand in run.header["hands"]]
+        if cast.skeleton.names != run.skeleton.names or hands != [hand.joint for hand in show.config.hands]:
+            raise JournalError(
+                f"{show.directory}: this show has another figure or other hands than the recorded one "
+                f"('{run.header['show']}'). Name its bundle: --show DIR."
+            )
+        cast.link = self._link = _RecordedLink(run)
+        cast.puppet = self._puppet = _RecordedPuppet(show)
+        self._wearing = Wearing(cast, SensorMemory(None, _nobody), _nobody)
+        self.tick = Tick(cast, self._wearing, Iterations(1, 0, 1), 0.0)
+
+    @property
+    def forced(self) -> int:
+        """Ticks whose network failed then and not here."""
+        return self._puppet.forced
+
+    def dance(self, comparison: Comparison, from_s: float = 0.0) -> Iterator[int]:
+        """Run what was recorded, from the last keyframe before a second of the run on; tells `comparison` of
+        each tick, and gives how many have been run.
+        """
+        run, keyframes, rows = self._run, dict(self._run.keyframes), self._rows()
+        events, danced, before = dict(run.events), 0, -1
+        first = self._first(from_s)
+        for number in sorted({*rows, *events}):
+            if number <= first:
+                continue
+            if number != before + 1:
+                if number - 1 not in keyframes:
+                    self.skipped += number in rows
+                    continue
+                self.tick.restore(unpacked(keyframes[number - 1]))
+            before = number
+            if number in rows:
+                self._dance_row(rows[number], comparison)
+                danced += 1
+                yield danced
+            elif events[number]["kind"] == ORDER:
+                self._obey(events[number], comparison)
+
+    def _rows(self) -> dict[int, int]:
+        return {int(number): row for row, number in enumerate(self._run.tick_numbers)}
+
+    def _first(self, from_s: float) -> int:
+        """How many entries of the log lie before the keyframe to start from."""
+        run = self._run
+        begun = run.ticks["frame_time"][0] + from_s
+        positions = [position for position, _ in run.keyframes]
+        if not positions:
+            raise JournalError("No keyframe of this run was kept: it can be drawn, but not danced again.")
+        rows = np.searchsorted(run.tick_numbers, positions, side="right")
+        times = [run.ticks["frame_time"][row] if row < len(run.ticks) else np.inf for row in rows]
+        early = [position for position, time in zip(positions, times, strict=True) if time <= begun]
+        return early[-1] if from_s > 0.0 and early else 0
+
+    def _dance_row(self, row: int, comparison: Comparison) -> None:
+        recorded = self._run.ticks[row]
+        self._link.row = row
+        self._puppet.fails = bool(recorded["flags"] & NOT_FINITE)
+        slot = Slot(
+            int(recorded["tick"]),
+            float(recorded["frame_time"]),
+            float(recorded["started"]),
+            int(recorded["skipped"]),
+        )
+        self.tick.run(slot)
+        self.tick.after(slot)
+        comparison.look(recorded, self.tick)
+
+    def _obey(self, event: dict[str, Any], comparison: Comparison) -> None:
+        asked, cast = event["order"], self.tick.cast
+        order = Order(asked["name"], tuple(asked["values"]), asked["text"])
+        self._link.answers(order.text, event["done"])
+        done, _ = carry_out(order, cast, self.tick.iterations, self._wearing, self._usual_rate, event["now"])
+        comparison.note_order(order.name, event["done"], done)
+
+
+class _RecordedPuppet(Puppet):
+    """The show's network; where it failed then, it fails here too."""
+
+    def __init__(self, show: Show) -> None:
+        super().__init__(show.network, show.skeleton)
+        self.fails = False
+        self.forced = 0
+
+    def dance(
+        self,
+        window: FloatArray,
+        mask: np.ndarray[Any, np.dtype[np.bool_]],
+        targets: FloatArray,
+        weights: FloatArray,
+        coding_iterations: int,
+        interaction_iterations: int,
+    ) -> FloatArray:
+        poses = super().dance(window, mask, targets, weights, coding_iterations, interaction_iterations)
+        if self.fails and not self.is_broken:
+            self.forced += 1
+            self.is_broken = True
+        return poses
+
+
+class _RecordedLink(SensorLink):
+    """Gives the readings of the row that is at hand."""
+
+    def __init__(self, run: Run) -> None:
+        super().__init__({}, ())
+        self.row = 0
+        self._ticks, self._sensors = run.ticks, run.header["sensors"]
+        self._asked: tuple[set[str], bool] = set(), False
+
+    def answers(self, sensor: str | int, done: bool) -> None:
+        """Whether the sensors were there when a person asked for something."""
+        self._asked = {*self._sensors, str(sensor)} - {""}, done
+
+    def drain(self, now: float) -> Sequence[SensorReading]:
+        here = self._ticks["reading_here"][self.row]
+        return [self._reading(place, name) for place, name in enumerate(self._sensors) if here[place]]
+
+    def states(self, now: float) -> list[SensorState]:
+        names, are_here = self._asked
+        state = "linked" if are_here else "absent"
+        return [
+            SensorState(name, 0, state, "", 0.0, 0.0, None, None, 255, 0, "", "", 0, 0, "")
+            for name in sorted(names)
+        ]
+
+    def _reading(self, place: int, name: str) -> SensorReading:
+        w, x, y, z = self._ticks["reading_orientation"][self.row, place].tolist()
+        measured_at, arrival, trip_s = self._ticks["reading_times"][self.row, place].tolist()
+        numbers = self._ticks["reading_numbers"][self.row, place].tolist()
+        sequence, time_us, battery, calibration, boot_nonce, taps, recoveries, flags = numbers
+        return SensorReading(
+            *(name, (w, x, y, z), sequence, time_us, measured_at, arrival, battery, calibration),
+            *(boot_nonce, taps, recoveries, flags, None if trip_s != trip_s else trip_s),
+        )
+
+
+def _nobody(words: str) -> None:
+    """Who replays hears what was said then from the events."""
