@@ -1,7 +1,7 @@
-"""The command `bunraku`: playing starts at once; other commands, and every mistake, go to the whole parser.
+"""The command `bunraku`: play and preflight start at once; all else, and every mistake, goes to the parser.
 
-A stage that was killed is black until its process is up again: the parser and what it loads take a tenth of
-a second of that, and playing has no use for them.
+A stage that was killed is black until its process is up again, a box that is switched on until the preflight
+has ended: the parser and what it loads take a tenth of a second of that, and neither has a use for them.
 """
 
 from __future__ import annotations
@@ -29,6 +29,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with contextlib.suppress(OSError, ValueError, AttributeError):  # no standard error to write to
         faulthandler.enable()  # the watchdog's signal prints the line that hung
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if given[:1] == ["preflight"] and "--help" not in given:
+        from appliance.commands.preflight import main as preflight
+
+        sys.exit(preflight(given[1:]))
     wishes = wishes_to_play(given)
     if wishes is None:
         from appliance.cli import main as any_command

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import closing
 from pathlib import Path
 
+from appliance.commands.proof import Proof
 from appliance.control.notify import Notifier
 from appliance.control.speaker import Speaker
 from appliance.control.stop_signals import stop_signals
 from appliance.outputs.runtime_folder import Claim, runtime_folder
 from appliance.show.box import load_box
 from appliance.stage.keeper import carriers, keep_on
+from appliance.stage.keeper_health import KeeperHealth
 
 
-def keep_box(box_file: Path | None, journal: Path | None = None, minutes: float | None = None) -> int:
+def keep_box(
+    box_file: Path | None,
+    journal: Path | None = None,
+    minutes: float | None = None,
+    chosen: Path | None = None,
+) -> int:
     """Keep until a signal comes; the exit status. journal, minutes: others than the box file's.
+
+    chosen: what the preflight chose; that it dances is kept, too.
 
     Raises RuntimeFolderError where another keeper has this box already, ConfigError.
     """
@@ -29,11 +39,16 @@ def keep_box(box_file: Path | None, journal: Path | None = None, minutes: float 
         kept = carriers(
             box, runtime, journal or box.journal.folder, minutes or box.journal.minutes, speaker.say
         )
+        if chosen is not None:
+            kept.append(Proof(runtime, chosen))
+        health = KeeperHealth(runtime)
         notifier.ready("The journal and the place of the dance are kept.")
 
         def after_turn(now: float) -> None:
             notifier.ping(now)
+            health.tell(kept, now)
 
         keep_on(kept, stopped, after_turn)
         notifier.stopping()
+        health.close(time.monotonic())
     return 0

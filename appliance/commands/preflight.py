@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from appliance.commands.giving_up import GivenUpError, within
 from appliance.show.arrivals import look
-from appliance.show.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice
+from appliance.show.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice, alone_in
 from appliance.show.choosing import Outcome, Places, built_in_box, choose
 
 ANEW = "anew"  # touched when units have to start anew, for another show or box file dances
@@ -38,7 +37,7 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
     if options.late:
         with contextlib.suppress(OSError):  # its unit has said so already, and allows no more
             os.nice(19)
-    with _alone(options.data), _alone(options.run):
+    with alone_in(options.data), alone_in(options.run):
         outcome = _found(options, places)
         for words in outcome.words:
             say(words)
@@ -82,7 +81,7 @@ def _publish(
         if outcome.taken:
             say("The running show goes on. The new one dances after the next power-on.")
         return
-    outcome.choice.complete(built_in_box(places)).write(path)
+    outcome.choice.complete(built_in_box(places))._replace(data=places.data).write(path)
     if before is not None:
         (places.run / ANEW).touch()
         say("The box was switched on only just now: the new show dances at once.")
@@ -105,21 +104,6 @@ def candidate_problems(show: Path, box: Path) -> list[str]:
     if done.returncode < 0 or not lines:
         return [f"{show}: its check crashed (signal {-done.returncode}). Export the network again."]
     return lines[-40:]
-
-
-@contextlib.contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """One at a time in a folder, read-only ones included; where there is none, there is nothing to guard."""
-    try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    except OSError:
-        yield
-        return
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def parsed(arguments: Sequence[str]) -> Options:

@@ -82,7 +82,9 @@ def _put_aside(chosen: Path, choice: Choice, starts: int, say: Callable[[str], N
         f"that {_source(after)}. Run bunraku check on it, mend it, and bring it again."
     )
     say(words)
-    left = Choice(choice.pairs[1:], (*choice.refused, words), (*choice.aside, before.id))
+    left = choice._replace(
+        pairs=choice.pairs[1:], refused=(*choice.refused, words), aside=(*choice.aside, before.id)
+    )
     with contextlib.suppress(OSError):
         left.write(chosen)
         if before.box != after.box:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -56,12 +58,14 @@ class Pair(NamedTuple):
 class Choice(NamedTuple):
     """pairs: in the order in which they are tried, never empty in a file that a stage reads.
 
-    refused: what was found and is not danced, sentences for people; aside: ids of pairs that did not dance.
+    refused: what was found and is not danced, sentences for people, those about pairs that did not dance at
+    the end; aside: ids of these pairs; data: the folder in which it is kept over power-off.
     """
 
     pairs: tuple[Pair, ...] = (Pair(good=True),)
     refused: tuple[str, ...] = ()
     aside: tuple[str, ...] = ()
+    data: Path = DATA
 
     @property
     def first(self) -> Pair:
@@ -82,14 +86,16 @@ class Choice(NamedTuple):
         """From plain values; raises ValueError."""
         try:
             refused, aside = (tuple(map(str, values[name])) for name in ("refused", "aside"))
-            return Choice(tuple(_pair(one) for one in values["pairs"]), refused, aside)
+            pairs = tuple(_pair(one) for one in values["pairs"])
+            return Choice(pairs, refused, aside, Path(values["data"]))
         except (KeyError, TypeError) as error:
             raise ValueError(f"This is no choice of a show ({error}).") from error
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
         pairs = [pair._asdict() | {"show": str(pair.show), "box": str(pair.box)} for pair in self.pairs]
-        return {"pairs": pairs, "refused": list(self.refused), "aside": list(self.aside)}
+        lists = {"pairs": pairs, "refused": list(self.refused), "aside": list(self.aside)}
+        return lists | {"data": str(self.data)}
 
     def write(self, path: Path) -> None:
         """As a whole or not at all, also when the power is cut; what dances stands at the top as well.
@@ -111,10 +117,15 @@ class Choice(NamedTuple):
             pairs=tuple(one._replace(good=True) if one.id == identity else one for one in self.pairs)
         )
 
-    def without(self, aside: tuple[str, ...]) -> Choice:
-        """Without pairs that did not dance; what comes with the box stays."""
-        pairs = tuple(one for one in self.pairs if not one.id or one.id not in aside)
-        return self._replace(pairs=pairs)
+    def without(self, other: Choice) -> Choice:
+        """Without pairs that did not dance, as another choice tells; what comes with the box stays."""
+        pairs = tuple(one for one in self.pairs if not one.id or one.id not in other.aside)
+        return self._replace(pairs=pairs or (Pair(good=True),), refused=other.put_aside, aside=other.aside)
+
+    @property
+    def put_aside(self) -> tuple[str, ...]:
+        """The sentences about pairs that did not dance."""
+        return self.refused[len(self.refused) - len(self.aside) :]
 
     def complete(self, box: Path = APPLIANCE_BOX) -> Choice:
         """With what comes with the box at the end, on the venue's box files first: never nothing on stage.
@@ -145,6 +156,29 @@ def require_no(option: str, given: Path | None, chosen: Path) -> None:
 
         message = f"This names a show and a box file, and {option} another one."
         raise ConfigError([Problem(chosen, 0, message, f"Give {option} or --chosen, not both.")])
+
+
+def appliance_box(places: dict[str, str]) -> str:
+    """The box file that comes with the box, with folders other than the usual ones."""
+    text = APPLIANCE_BOX.read_text(encoding="utf-8")
+    for usual, place in places.items():
+        text = text.replace(usual, place)
+    return text
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """One process at a time in a folder, also in a read-only one; without one there is nothing to guard."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except OSError:
+        yield
+        return
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def write_whole(path: Path, content: bytes) -> None:

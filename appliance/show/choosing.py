@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from appliance.show.arrivals import Arrival
-from appliance.show.choice import APPLIANCE_BOX, CHOSEN, DATA, RUN, Choice, Pair, write_whole
+from appliance.show.choice import APPLIANCE_BOX, CHOSEN, DATA, RUN, Choice, Pair, appliance_box, write_whole
 
 if TYPE_CHECKING:
     from appliance.show.shelf import Shelf
@@ -56,7 +56,7 @@ def remembered(data: Path) -> Choice:
     """What was chosen last, as far as it is still there; nothing (what comes with the box) without it."""
     choice = Choice.read(data / CHOSEN) or Choice(pairs=())
     pairs = (one.here() for one in choice.pairs if one.id)
-    return Choice(tuple(one for one in pairs if one.is_there))
+    return choice._replace(pairs=tuple(one for one in pairs if one.is_there))
 
 
 def choose(places: Places, arrivals: list[Arrival], check: Check) -> Outcome:
@@ -67,7 +67,7 @@ def choose(places: Places, arrivals: list[Arrival], check: Check) -> Outcome:
         words for one in arrivals if one.listing and one not in fresh for words in seen[one.source]["refused"]
     ]
     if not fresh:
-        return Outcome(before._replace(refused=tuple(refused)), False, ())
+        return Outcome(before._replace(refused=(*refused, *before.put_aside)), False, ())
     choice, taken, said = before, False, []
     for arrival in fresh:
         if taken:
@@ -82,7 +82,7 @@ def choose(places: Places, arrivals: list[Arrival], check: Check) -> Outcome:
             choice, taken = choice.with_newest(newest), newest.id != (choice.pairs or (Pair(),))[0].id
             said.append(f"{newest.source[0].upper()}{newest.source[1:]}: its show is checked and dances.")
     said += _remember(places.data, choice, seen)
-    return Outcome(choice._replace(refused=tuple(refused)), taken, tuple(said))
+    return Outcome(choice._replace(refused=(*refused, *choice.put_aside)), taken, tuple(said))
 
 
 def _take(
@@ -156,7 +156,7 @@ def _as_on_the_stick(words: str, copies: dict[str, str]) -> str:
 def _remember(data: Path, choice: Choice, seen: dict[str, Any]) -> list[str]:
     try:
         if choice.pairs:
-            Choice(choice.pairs).write(data / CHOSEN)
+            choice._replace(refused=choice.put_aside, data=data).write(data / CHOSEN)
         write_whole(data / SEEN, json.dumps(seen).encode())
         _write_refusals(data / "refusals", seen)
     except OSError as error:
@@ -202,8 +202,6 @@ def built_in_box(places: Places) -> Path:
     """The box file for a box without one: as it comes, or with its folders elsewhere. Raises OSError."""
     if not places.moved:
         return APPLIANCE_BOX
-    from appliance.show.shelf import appliance_box
-
     path = places.run / "box.yaml"
     write_whole(path, appliance_box(places.moved).encode())
     return path

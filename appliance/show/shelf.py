@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 from appliance.show.arrivals import SHOW, Arrival
 from appliance.show.bundle import WORKSHOP
-from appliance.show.choice import APPLIANCE_BOX, Choice, sync_folder, write_whole
+from appliance.show.choice import Choice, appliance_box, sync_folder, write_whole
 
 _CHUNK = 1 << 18
 _LARGEST_BYTES = 400_000_000
@@ -107,14 +107,6 @@ class Shelf:
         free = os.statvfs(folder)
         if free.f_bavail * free.f_frsize < needed + self._reserve_bytes:
             raise NoRoomError(f"{folder}: {needed / 1e6:.1f} MB do not fit there")
-
-
-def appliance_box(places: dict[str, str]) -> str:
-    """The box file that comes with the box, with folders other than the usual ones."""
-    text = APPLIANCE_BOX.read_text(encoding="utf-8")
-    for usual, place in places.items():
-        text = text.replace(usual, place)
-    return text
 
 
 def _copy_files(source: Path, target: Path, names: list[tuple[str, int]]) -> str:

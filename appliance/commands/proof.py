@@ -1,0 +1,59 @@
+"""The proof: a chosen show that has danced is a good one, and so it is kept; one that has not is let go."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from appliance.commands.trying import PROVEN_S
+from appliance.outputs.frame_reader import FrameReader
+from appliance.show.choice import CHOSEN, Choice, alone_in
+
+_AGAIN_S = 10.0  # a disk that took nothing is tried again
+
+
+class Proof:
+    """A carrier of the keeper: notes once in a stage's life, after PROVEN_S of dancing, what became of it."""
+
+    def __init__(self, runtime: Path, chosen: Path) -> None:
+        self.complaint = ""
+        self._frames = FrameReader(runtime)
+        self._chosen = chosen
+        self._proven: tuple[int, str] | None = None
+        self._again_at = 0.0
+
+    def turn(self, now: float) -> None:
+        """Look whether the stage has danced for long enough; monotonic seconds."""
+        newest, facts = self._frames.newest(now), self._frames.facts
+        if newest is None or facts is None or now < self._again_at:
+            return
+        if newest.left - facts.started < PROVEN_S:
+            return
+        choice = Choice.read(self._chosen)
+        if choice is None or facts.show_directory != choice.first.show.resolve():
+            return
+        if self._proven != (facts.pid, choice.first.id):
+            self._note(choice, now)
+            if not self.complaint:
+                self._proven = (facts.pid, choice.first.id)
+
+    def last_turn(self) -> None:
+        """Nothing waits."""
+        self._frames.close()
+
+    def _note(self, choice: Choice, now: float) -> None:
+        self.complaint, self._again_at = "", 0.0
+        try:
+            with alone_in(self._chosen.parent):
+                choice.with_good(choice.first.id).write(self._chosen)
+            with alone_in(choice.data):
+                kept = Choice.read(choice.data / CHOSEN)
+                noted = None if kept is None else kept.with_good(choice.first.id).without(choice)
+                if noted is not None and noted != kept:
+                    noted.write(choice.data / CHOSEN)
+        except OSError as error:
+            self._again_at = now + _AGAIN_S
+            self.complaint = (
+                f"{choice.data}: that the show has danced cannot be kept ({os.strerror(error.errno or 0)}). "
+                "The dance goes on; after the next power-on it is tried anew. Look at the data partition."
+            )
