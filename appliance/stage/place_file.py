@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import struct
 import time
@@ -46,7 +47,7 @@ class PlaceFile:
             slot = _slot(self._newest + 1, packed(place))
             at = (self._newest + 1) % SLOTS * SLOT_BYTES
             if os.pwrite(self._descriptor, slot, at) != len(slot):
-                raise OSError(5, "the disk took a part of it only")
+                raise _no_space()
             os.fdatasync(self._descriptor)
         except OSError:
             self.close()  # the next try looks at what is really there
@@ -167,7 +168,7 @@ def _make(path: Path) -> None:
         try:
             empty = bytes(SLOTS * SLOT_BYTES)
             if os.write(descriptor, empty) != len(empty):
-                raise OSError(28, "the disk is full")
+                raise _no_space()
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
@@ -186,6 +187,11 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def _no_space() -> OSError:
+    """For a disk that took a part and told no error."""
+    return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _slot(number: int, payload: bytes) -> bytes:

@@ -1,0 +1,63 @@
+"""Real file systems for tests: small ones in memory, read-only ones, and disks whose power is cut."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+_SHUTDOWN = 0x8004587D  # FS_IOC_SHUTDOWN
+_NO_LOG_FLUSH = 2
+
+
+def why_not() -> str | None:
+    """Why this test run cannot mount anything; None when it can."""
+    if os.geteuid() != 0:
+        return "mounting a file system needs the rights of an administrator (run the tests as root)"
+    tried = subprocess.run(["unshare", "--mount", "true"], capture_output=True, check=False)
+    return None if tried.returncode == 0 else "this machine lets nobody mount a file system"
+
+
+@contextlib.contextmanager
+def mounted(folder: Path, *how: str) -> Iterator[Path]:
+    """A file system at a folder, by `mount` with these arguments; skips where it cannot be had."""
+    import pytest
+
+    folder.mkdir(exist_ok=True)
+    tried = subprocess.run(["mount", *how, str(folder)], capture_output=True, text=True, check=False)
+    if tried.returncode != 0:
+        pytest.skip(f"this machine does not mount it: {tried.stderr.strip()}")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+def tiny(folder: Path, size: str) -> contextlib.AbstractContextManager[Path]:
+    """A file system in memory that holds so much."""
+    return mounted(folder, "-t", "tmpfs", "-o", f"size={size}", "tmpfs")
+
+
+def made_image(path: Path, megabytes: int = 8) -> Path:
+    """A disk with an ext4 file system, as a file."""
+    with path.open("wb") as stream:
+        stream.truncate(megabytes * 2**20)
+    subprocess.run(["mkfs.ext4", "-q", "-F", str(path)], check=True)
+    return path
+
+
+def disk(image: Path, folder: Path, how: str = "rw") -> contextlib.AbstractContextManager[Path]:
+    """The disk of an image, mounted rw or ro."""
+    return mounted(folder, "-o", f"loop,{how}", str(image))
+
+
+def cut_power(folder: Path) -> None:
+    """From now on nothing reaches the disk of this folder, and what was not synced is lost."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.ioctl(descriptor, _SHUTDOWN, _NO_LOG_FLUSH.to_bytes(4, "little"))
+    finally:
+        os.close(descriptor)

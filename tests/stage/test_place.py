@@ -1,0 +1,158 @@
+"""The place in memory: written at each tick, read whole or not at all, whatever happens to its writer."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from appliance.stage.place import FILE, LARGEST, Place, PlaceReader, PlaceWriter, boot_id, packed, unpacked
+
+PLACE = Place(
+    "Évora, night",
+    "second",
+    12.34,
+    (1.0, 40.0),
+    -0.5,
+    0.25,
+    -1.5,
+    3.0,
+    (0.01, -0.2),
+    10,
+    9,
+    "storm",
+    ("lShldr", "rShldr"),
+    "boot",
+    123_456_789,
+    3,
+    1,
+    False,
+    2,
+)
+_finite = st.floats(allow_nan=False, allow_infinity=False)
+_names = st.text(max_size=60)
+
+
+@given(
+    st.builds(
+        Place,
+        show=_names,
+        phrase=_names,
+        position_s=_finite,
+        excerpt=st.tuples(_finite, _finite),
+        rate=_finite,
+        x=_finite,
+        strayed=st.tuples(_finite, _finite),
+        coding=st.integers(1, 64),
+        cue=_names,
+        let_go=st.lists(_names, max_size=8).map(tuple),
+        tick=st.integers(-1, 2**62),
+        restarts=st.integers(0, 65535),
+        ended=st.booleans(),
+        tries=st.integers(0, 255),
+    )
+)
+def test_comes_back_as_it_was(place: Place) -> None:
+    assert unpacked(packed(place)) == place
+
+
+def test_numbers_that_are_none_are_no_place() -> None:
+    assert unpacked(packed(replace(PLACE, position_s=math.nan))) is None
+    assert unpacked(packed(replace(PLACE, strayed=(0.0, math.inf)))) is None
+
+
+@pytest.mark.parametrize("length", range(len(packed(PLACE))))
+def test_a_part_of_it_is_no_place(length: int) -> None:
+    assert unpacked(packed(PLACE)[:length]) is None
+
+
+def test_counts_that_grow_for_years_still_fit() -> None:
+    place = unpacked(packed(replace(PLACE, restarts=10**6)))
+    assert place is not None and place.restarts == 65535
+
+
+def test_names_that_are_too_long_are_refused() -> None:
+    with pytest.raises(ValueError, match=str(LARGEST)):
+        packed(replace(PLACE, cue="x" * LARGEST))
+
+
+def test_outlives_its_writer_and_is_written_on_by_the_next(tmp_path: Path) -> None:
+    reader = PlaceReader(tmp_path)
+    assert reader.read() is None
+    for tick in (1, 2, 3):
+        writer = PlaceWriter(tmp_path)
+        writer.write(replace(PLACE, tick=tick))
+        assert reader.stage_lives() is (tick > 1)  # the reader has looked at the file once it was there
+        assert reader.read() == replace(PLACE, tick=tick)
+        assert reader.stage_lives()
+        writer.close()
+        assert reader.read() == replace(PLACE, tick=tick)
+        assert not reader.stage_lives()
+    reader.close()
+
+
+WRITER = """
+import sys
+from dataclasses import replace
+from pathlib import Path
+from appliance.stage.place import PlaceWriter, unpacked
+PLACE = unpacked(bytes.fromhex(sys.argv[3]))
+writer, tick = PlaceWriter(Path(sys.argv[1])), int(sys.argv[2])
+while True:
+    tick += 1
+    writer.write(replace(PLACE, tick=tick))
+    if tick % 1000 == 0:
+        print(tick, flush=True)
+"""
+
+
+def test_a_writer_killed_in_the_middle_leaves_the_newest_whole_place(tmp_path: Path) -> None:
+    newest = 0
+    for _ in range(4):
+        command = [sys.executable, "-c", WRITER, str(tmp_path), str(newest), packed(PLACE).hex()]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:
+            assert writer.stdout is not None
+            told = int(writer.stdout.readline())
+            writer.send_signal(signal.SIGKILL)
+        reader = PlaceReader(tmp_path)
+        place = reader.read()
+        reader.close()
+        assert place is not None and place.tick >= told > newest
+        assert place == replace(PLACE, tick=place.tick)
+        newest = place.tick
+
+
+def test_every_byte_of_the_file_may_be_wrong(tmp_path: Path) -> None:
+    """Whichever byte is: what is read is one of the two newest places, or none; and it can be written on."""
+    writer = PlaceWriter(tmp_path)
+    places = [replace(PLACE, tick=tick) for tick in (1, 2)]
+    for place in places:
+        writer.write(place)
+    writer.close()
+    path = tmp_path / FILE
+    whole = path.read_bytes()
+    for at in range(0, len(whole), 31):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
+        reader = PlaceReader(tmp_path)
+        assert reader.read() in (*places, None)
+        reader.close()
+    os.truncate(path, 100)
+    writer = PlaceWriter(tmp_path)
+    writer.write(PLACE)
+    writer.close()
+    reader = PlaceReader(tmp_path)
+    assert reader.read() == PLACE
+    reader.close()
+
+
+def test_the_kernel_names_this_start_of_the_machine() -> None:
+    assert len(boot_id()) == 36
+    assert boot_id() == boot_id()

@@ -1,0 +1,285 @@
+"""The place on the disk: torn, damaged, full, read-only, gone, cut off: one place is always whole."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from appliance.stage.place import FILE, Place, PlaceWriter, packed
+from appliance.stage.place_file import (
+    EVERY_S,
+    RETRY_S,
+    SLOT_BYTES,
+    SLOTS,
+    PlaceCarrier,
+    PlaceFile,
+    read_place,
+)
+from tests.stage import disks
+
+HEAD_BYTES = 24  # of a slot
+PLACE = Place("A show", "main", 1.5, (0.0, 30.0), let_go=("lShldr",), boot="here")
+
+needs_mounts = pytest.mark.skipif(disks.why_not() is not None, reason=str(disks.why_not()))
+
+
+def at(tick: int) -> Place:
+    return replace(PLACE, tick=tick)
+
+
+def written(path: Path, *ticks: int) -> None:
+    file = PlaceFile(path)
+    for tick in ticks:
+        file.write(at(tick))
+    file.close()
+
+
+class Carried:
+    """A carrier with its folders, a stage's end of the place, and what was said."""
+
+    def __init__(self, runtime: Path, state: Path) -> None:
+        runtime.mkdir(exist_ok=True)
+        self.said: list[str] = []
+        self.stage = PlaceWriter(runtime)
+        self.state = state
+        self.carrier = PlaceCarrier(runtime, state, self.said.append)
+
+    @property
+    def on_disk(self) -> Place | None:
+        return read_place(self.state / FILE)
+
+
+@pytest.fixture
+def carried(tmp_path: Path) -> Iterator[Carried]:
+    one = Carried(tmp_path / "runtime", tmp_path / "state")
+    yield one
+    one.stage.close()
+
+
+def test_the_newest_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "state" / FILE
+    for newest in range(1, 6):
+        written(path, newest)
+        assert read_place(path) == at(newest)
+    assert path.stat().st_size == SLOTS * SLOT_BYTES
+    assert [one.name for one in path.parent.iterdir()] == [FILE]
+
+
+def test_no_file_a_folder_and_rubbish_are_no_place(tmp_path: Path) -> None:
+    assert read_place(tmp_path / FILE) is None
+    (tmp_path / FILE).mkdir()
+    assert read_place(tmp_path / FILE) is None
+    (tmp_path / FILE).rmdir()
+    for rubbish in (b"", b"x" * 100, bytes(8192), os.urandom(8192), os.urandom(20000)):
+        (tmp_path / FILE).write_bytes(rubbish)
+        assert read_place(tmp_path / FILE) is None
+        written(tmp_path / FILE, 7)
+        assert read_place(tmp_path / FILE) == at(7)
+
+
+@pytest.mark.parametrize("newest", [8, 9])
+def test_whichever_byte_is_damaged_one_of_the_two_newest_is_taken(tmp_path: Path, newest: int) -> None:
+    path = tmp_path / FILE
+    written(path, *range(1, newest + 1))
+    whole = path.read_bytes()
+    slot = newest % SLOTS * SLOT_BYTES
+    says_something = range(slot, slot + HEAD_BYTES + len(packed(at(newest))))
+    for place in [*says_something, *range(0, len(whole), 61)]:
+        damaged = bytearray(whole)
+        damaged[place] ^= 0xFF
+        path.write_bytes(damaged)
+        assert read_place(path) == at(newest - 1 if place in says_something else newest)
+
+
+def test_a_write_torn_at_any_byte_leaves_the_place_before(tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    written(path, 1, 2)
+    before = path.read_bytes()
+    written(path, 3)
+    after = path.read_bytes()
+    for torn in range(0, len(after), 97):
+        path.write_bytes(after[:torn] + before[torn:])
+        assert read_place(path) in (at(2), at(3))
+        written(path, 4)  # and over a torn slot, never over the whole one
+        assert read_place(path) == at(4)
+        path.write_bytes(before)
+
+
+def test_the_older_slot_is_the_one_that_is_written(tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    written(path, 1, 2)
+    slots = [path.read_bytes()[slot * SLOT_BYTES :][:SLOT_BYTES] for slot in range(SLOTS)]
+    newest = next(slot for slot in range(SLOTS) if _alone(tmp_path / "one", slots, slot) == at(2))
+    written(path, 3)
+    assert path.read_bytes()[newest * SLOT_BYTES :][:SLOT_BYTES] == slots[newest]
+
+
+def _alone(path: Path, slots: list[bytes], slot: int) -> Place | None:
+    path.write_bytes(b"".join(one if place == slot else bytes(SLOT_BYTES) for place, one in enumerate(slots)))
+    return read_place(path)
+
+
+def test_a_file_that_another_disk_covers_is_left(tmp_path: Path) -> None:
+    """A data partition that is mounted late lies over the folder in which the file was made."""
+    file = PlaceFile(tmp_path / "state" / FILE)
+    file.write(at(1))
+    (tmp_path / "state").rename(tmp_path / "covered")
+    file.write(at(2))
+    file.close()
+    assert read_place(tmp_path / "covered" / FILE) == at(1)
+    assert read_place(tmp_path / "state" / FILE) == at(2)
+
+
+def test_carried_once_in_each_turn_and_only_what_is_new(carried: Carried) -> None:
+    carried.carrier.turn(100.0)
+    assert not carried.state.exists()
+    carried.stage.write(at(1))
+    carried.carrier.turn(100.1)
+    assert carried.on_disk is None  # not its turn yet
+    carried.carrier.turn(100.0 + EVERY_S)
+    assert carried.on_disk == at(1)
+    before = (carried.state / FILE).read_bytes()
+    carried.stage.write(at(2))  # a show that stands: only its ticks go on
+    carried.carrier.turn(110.0)
+    assert (carried.state / FILE).read_bytes() == before
+    carried.stage.write(replace(PLACE, position_s=2.0))
+    carried.carrier.turn(120.0)
+    assert carried.on_disk == replace(PLACE, position_s=2.0)
+    assert carried.said == []
+
+
+def test_the_last_turn_carries_what_is_newest(carried: Carried) -> None:
+    carried.stage.write(at(1))
+    carried.carrier.turn(100.0)
+    carried.stage.write(replace(PLACE, position_s=2.0, ended=True))
+    carried.carrier.last_turn()
+    assert carried.on_disk == replace(PLACE, position_s=2.0, ended=True)
+
+
+def test_the_last_turn_of_a_dead_stage_does_not_wait(carried: Carried) -> None:
+    carried.stage.write(at(5))
+    carried.stage.close()
+    begun = time.process_time()
+    carried.carrier.last_turn()
+    assert carried.on_disk == at(5)
+    assert time.process_time() - begun < 5.0
+
+
+def test_a_folder_that_is_a_file_is_said_once_and_tried_again(carried: Carried) -> None:
+    carried.state.write_bytes(b"")
+    carried.stage.write(at(1))
+    for turn in range(4):
+        carried.carrier.turn(100.0 + RETRY_S * turn)
+    assert carried.carrier.failed == 4
+    assert len(carried.said) == 1
+    assert "cannot be written" in carried.said[0] and "`state:`" in carried.said[0]
+    assert carried.carrier.complaint == carried.said[0]
+    carried.state.unlink()
+    carried.carrier.turn(200.0)
+    assert carried.on_disk == at(1)
+    assert carried.carrier.complaint == ""
+    assert "again" in carried.said[1]
+
+
+@needs_mounts
+def test_a_full_disk_is_survived(carried: Carried) -> None:
+    with disks.tiny(carried.state, "4k"):  # one of the two slots fits
+        carried.stage.write(at(1))
+        carried.carrier.turn(100.0)
+        assert carried.on_disk is None
+        assert len(carried.said) == 1 and "No space left" in carried.said[0]
+        assert list(carried.state.iterdir()) == []  # nothing half-written is left
+    with disks.tiny(carried.state, "8k"):
+        carried.carrier.turn(110.0)
+        assert carried.on_disk == at(1)
+
+
+@needs_mounts
+def test_a_disk_that_fills_up_later_takes_the_place_all_the_same(carried: Carried) -> None:
+    """All the room that it will ever need was taken when the file was made."""
+    with disks.tiny(carried.state, "64k"):
+        carried.stage.write(at(1))
+        carried.carrier.turn(100.0)
+        with pytest.raises(OSError, match="No space"), (carried.state / "film").open("wb", 0) as film:
+            while True:
+                film.write(bytes(4096))
+        for turn in range(1, 5):
+            carried.stage.write(replace(PLACE, position_s=float(turn)))
+            carried.carrier.turn(100.0 + turn)
+            assert carried.on_disk == replace(PLACE, position_s=float(turn))
+        assert carried.said == []
+
+
+@needs_mounts
+def test_a_read_only_disk_is_survived_and_taken_when_it_is_writable(tmp_path: Path, carried: Carried) -> None:
+    image = disks.made_image(tmp_path / "image")
+    with disks.disk(image, carried.state):
+        written(carried.state / FILE, 1)
+    carried.stage.write(replace(PLACE, position_s=2.0))
+    with disks.disk(image, carried.state, "ro"):
+        for turn in range(3):
+            carried.carrier.turn(100.0 + RETRY_S * turn)
+        assert carried.on_disk == at(1)  # it can still be read
+        assert len(carried.said) == 1 and "Read-only" in carried.said[0]
+    with disks.disk(image, carried.state):
+        carried.carrier.turn(200.0)
+        assert carried.on_disk == replace(PLACE, position_s=2.0)
+
+
+@needs_mounts
+def test_a_disk_that_fails_in_the_middle(tmp_path: Path, carried: Carried) -> None:
+    """Every write gives an input/output error from one moment on: the keeper goes on, and says so once."""
+    image = disks.made_image(tmp_path / "image")
+    with disks.disk(image, carried.state):
+        carried.stage.write(at(1))
+        carried.carrier.turn(100.0)
+        disks.cut_power(carried.state)
+        carried.stage.write(replace(PLACE, position_s=2.0))
+        for turn in range(3):
+            carried.carrier.turn(110.0 + RETRY_S * turn)
+        assert carried.carrier.failed == 3 and len(carried.said) == 1
+    with disks.disk(image, carried.state):
+        assert carried.on_disk == at(1)
+        carried.carrier.turn(200.0)  # the same process finds the disk that is back
+        assert carried.on_disk == replace(PLACE, position_s=2.0)
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from appliance.stage.place import Place
+from appliance.stage.place_file import PlaceFile
+file, tick = PlaceFile(Path(sys.argv[1])), int(sys.argv[2])
+while True:
+    tick += 1
+    try:
+        file.write(Place("A show", "main", 1.5, (0.0, 30.0), tick=tick))
+    except OSError:
+        break
+    print(tick, flush=True)
+"""
+
+
+@needs_mounts
+def test_power_cuts_at_any_moment_lose_nothing_that_was_synced(tmp_path: Path) -> None:
+    """A real ext4 on a real (loop) device, whose power goes while places are written as fast as it takes."""
+    image, folder = disks.made_image(tmp_path / "image"), tmp_path / "disk"
+    newest = 0
+    for cut in range(10):
+        with disks.disk(image, folder):
+            before = read_place(folder / "state" / FILE)
+            assert cut == 0 or (before is not None and before.tick >= newest)
+            command = [sys.executable, "-c", WRITER, str(folder / "state" / FILE), str(newest)]
+            with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:
+                assert writer.stdout is not None
+                for _ in range(1 + cut * cut):
+                    newest = int(writer.stdout.readline())
+                disks.cut_power(folder)
+                newest = max([newest, *map(int, writer.stdout.read().split())])
