@@ -131,6 +131,15 @@ settle() {
         NetworkManager-wait-online.service >/dev/null 2>&1
     chroot "$root" dpkg-query --show --showformat '${Package} ${Version} ${Installed-Size}\n' >"$root/etc/bunraku-packages"
     rm -rf "$root"/var/lib/apt/lists/* "$root"/var/cache/* "$root"/var/log/* "$root"/tmp/*
+    first_start_done
+}
+
+# What systemd does once after a change of /usr takes a second; a root that forgets would do it at each start.
+first_start_done() {
+    chroot "$root" systemd-sysusers
+    chroot "$root" journalctl --quiet --update-catalog
+    chroot "$root" ldconfig
+    chroot "$root" /usr/lib/systemd/systemd-update-done
 }
 
 debian_kept
