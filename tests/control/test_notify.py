@@ -1,0 +1,99 @@
+"""What the box tells systemd: a real socket hears it; without one, or with a deaf one, nothing happens."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from appliance.control.notify import Notifier
+
+
+class Supervisor:
+    """systemd's end: a datagram socket in the file system or in the abstract space."""
+
+    def __init__(self, address: str) -> None:
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.bind("\0" + address[1:] if address.startswith("@") else address)
+        self.socket.settimeout(5.0)
+        self.environ = {
+            "NOTIFY_SOCKET": address,
+            "WATCHDOG_USEC": "1000000",
+            "WATCHDOG_PID": str(os.getpid()),
+        }
+
+    def heard(self) -> list[str]:
+        """All that came until now, one entry a datagram."""
+        self.socket.setblocking(False)
+        words = []
+        while True:
+            try:
+                words.append(self.socket.recv(4096).decode())
+            except BlockingIOError:
+                return words
+
+
+@pytest.fixture(params=["path", "abstract"])
+def supervisor(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Supervisor]:
+    address = str(tmp_path / "notify") if request.param == "path" else f"@bunraku-test-{os.getpid()}"
+    made = Supervisor(address)
+    yield made
+    made.socket.close()
+
+
+def test_it_says_that_it_works_how_it_is_and_that_it_ends(supervisor: Supervisor) -> None:
+    notifier = Notifier(supervisor.environ)
+    notifier.ready("50.0 Hz\nlate 0")
+    notifier.status("49.9 Hz")
+    notifier.stopping()
+    notifier.close()
+    assert supervisor.heard() == ["READY=1\nSTATUS=50.0 Hz late 0", "STATUS=49.9 Hz", "STOPPING=1"]
+
+
+def test_four_pings_a_period_however_often_it_is_called(supervisor: Supervisor) -> None:
+    notifier = Notifier(supervisor.environ)
+    for tick in range(100):
+        notifier.ping(1000.0 + 0.02 * tick)
+    notifier.close()
+    assert supervisor.heard() == ["WATCHDOG=1"] * 8
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"WATCHDOG_USEC": ""},
+        {"WATCHDOG_USEC": "0"},
+        {"WATCHDOG_USEC": "soon"},
+        {"WATCHDOG_PID": "1"},
+    ],
+)
+def test_without_a_watchdog_of_its_own_it_does_not_ping(
+    supervisor: Supervisor, changed: dict[str, str]
+) -> None:
+    notifier = Notifier({**supervisor.environ, **changed})
+    notifier.ping(1000.0)
+    notifier.close()
+    assert supervisor.heard() == []
+
+
+def test_a_supervisor_that_takes_nothing_holds_up_nobody(supervisor: Supervisor) -> None:
+    notifier = Notifier(supervisor.environ)
+    for tick in range(5000):  # far more than its socket holds; nobody reads
+        notifier.ping(1000.0 + tick)
+    assert 0 < len(supervisor.heard()) < 5000
+    notifier.ping(9000.0)
+    notifier.close()
+    assert supervisor.heard() == ["WATCHDOG=1"], "and it is heard again when there is room"
+
+
+@pytest.mark.parametrize("address", ["", "/nowhere/at/all", "x" * 200])
+def test_where_nobody_listens_it_is_silent(address: str) -> None:
+    notifier = Notifier({"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "1000000"})
+    notifier.ready()
+    notifier.ping(1.0)
+    notifier.stopping()
+    notifier.close()
+    notifier.ping(100.0)
