@@ -50,5 +50,5 @@ def keep_box(
 
         keep_on(kept, stopped, after_turn)
         notifier.stopping()
-        health.close(time.monotonic())
+        health.end(time.monotonic())
     return 0

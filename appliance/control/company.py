@@ -12,7 +12,7 @@ from appliance.control.fallback import Fallback, Fallbacks, Fallen, fallen
 from appliance.outputs.block import BlockReader, BlockWriter
 
 WHO = ("lights", "projector", "keeper")
-BEAT_S, LATE_S = 1.0, 3.0
+BEAT_S, LATE_S = 1.0, 5.0
 _KIND, _LARGEST = "company", 8192
 _CHOSEN = "chosen.json"
 
@@ -66,9 +66,12 @@ class CompanyWriter:
             self._due = now + BEAT_S
             self._write(now, ended=False)
 
-    def close(self, now: float) -> None:
-        """It ends as it should."""
+    def end(self, now: float) -> None:
+        """It ends as it should: who only closes, as an error passes by, will have died."""
         self._write(now, ended=True)
+
+    def close(self) -> None:
+        """Let go of the block."""
         if self._block is not None:
             self._block.close()
             self._block = None

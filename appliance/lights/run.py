@@ -9,11 +9,14 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
+from appliance.control.company import CompanyWriter
+from appliance.control.fallback import Fallbacks
 from appliance.control.house import HouseReader
 from appliance.control.notify import Notifier
 from appliance.control.speaker import Speaker
 from appliance.control.stop_signals import stop_signals
 from appliance.lights.bill import Bill
+from appliance.lights.fallback import DMX_AWAY, OF_THE_LIGHTS, STAGE_UNSEEN
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
 from appliance.outputs.dmx.open_wire import open_universes
@@ -42,13 +45,14 @@ class Lights:
         stage: FrameReader,
         house: HouseReader,
         say: Callable[[str], None],
+        fallbacks: Fallbacks,
     ) -> None:
         config = rig_here(show, box, box_file)
         patch = Patch(config.fixtures, show.directory)
         self.show, self.box = show, box
         self.rig = Rig(config, patch, show.skeleton)
         self.universes = wired(patch, box)
-        self._stage, self._house, self._say = stage, house, say
+        self._stage, self._house, self._say, self._fallbacks = stage, house, say, fallbacks
         self._stranger: int | None = None
         self._was_lost = True
         self._troubles: dict[str, str] = {}
@@ -62,14 +66,17 @@ class Lights:
         for sentence in unwired(self.show, self.box):
             self._say(sentence)
 
-    def shine(self, stopped: Callable[[], bool], notifier: Notifier) -> None:
-        """Pass after pass on a grid of absolute deadlines until `stopped`; then fade to the safe look."""
+    def shine(self, stopped: Callable[[], bool], pulse: Callable[[float], None]) -> None:
+        """Pass after pass on a grid of absolute deadlines until `stopped`; then fade to the safe look.
+
+        `pulse`: called in each, that it is well; monotonic seconds.
+        """
         period_s = 1.0 / self.box.lights.rate_hz
         deadline = time.monotonic()
         report_at = deadline + _REPORT_S
         while not stopped():
             now = self._next_pass()
-            notifier.ping(now)
+            pulse(now)
             if now >= report_at:
                 report_at = now + _REPORT_S
                 self._report(now)
@@ -112,11 +119,13 @@ class Lights:
         """Once a second: what has changed with the stage and the wires."""
         lost = self.rig.is_lost(now)
         if lost and not self._was_lost:
+            self._fallbacks.set(STAGE_UNSEEN.name, True)
             self._say(
                 f"No frame from the stage for {LOST_S:g} s. The lights fade to their safe look; they dance "
                 "again as soon as the stage does. Look what `bunraku play` says."
             )
         elif self._was_lost and not lost:
+            self._fallbacks.set(STAGE_UNSEEN.name, False)
             self._say("The stage dances, and the lights with it.")
         self._was_lost = lost
         for universe in self.universes:
@@ -124,6 +133,8 @@ class Lights:
             if trouble != self._troubles.get(name, ""):
                 self._say(trouble or f"{name} is well again.")
             self._troubles[name] = trouble
+        troubles = " ".join(filter(None, self._troubles.values()))
+        self._fallbacks.set(DMX_AWAY.name, bool(troubles), troubles)
 
 
 def rig_problems(show: Show, box: BoxConfig, box_file: Path | None) -> list[Problem]:
@@ -170,31 +181,41 @@ def light_up(directory: Path | None, box_file: Path | None) -> None:
         opened.callback(Claim(folder, "lights").close)
         notifier, stage, house = Notifier(), FrameReader(folder), HouseReader(folder)
         opened.callback(notifier.close)
+        fallbacks = Fallbacks(OF_THE_LIGHTS)
+        company = CompanyWriter(folder, "lights", fallbacks)
+        opened.callback(company.close)
         opened.callback(stage.close)
         opened.callback(house.close)
+
+        def pulse(now: float) -> None:
+            notifier.ping(now)
+            company.tell(now)
+
         if directory is not None:
-            lights = Lights(load_show(directory), box, box_file, stage, house, speaker.say)
+            lights = Lights(load_show(directory), box, box_file, stage, house, speaker.say, fallbacks)
             notifier.ready("The lights dance.")
-            _light(lights, stopped, notifier)
+            _light(lights, stopped, pulse)
+            company.end(time.monotonic())
             return
         notifier.ready("The lights follow the stage.")
         bill = Bill(stage)
         while not stopped():
             if bill.is_new(time.monotonic()):
                 try:
-                    lights = Lights(bill.take(), box, box_file, stage, house, speaker.say)
+                    lights = Lights(bill.take(), box, box_file, stage, house, speaker.say, fallbacks)
                 except ConfigError as error:
                     speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
                 else:
-                    _light(lights, lambda: stopped() or bill.is_new(time.monotonic()), notifier)
-            notifier.ping(time.monotonic())
+                    _light(lights, lambda: stopped() or bill.is_new(time.monotonic()), pulse)
+            pulse(time.monotonic())
             time.sleep(_LOOK_S)
+        company.end(time.monotonic())
 
 
-def _light(lights: Lights, stopped: Callable[[], bool], notifier: Notifier) -> None:
+def _light(lights: Lights, stopped: Callable[[], bool], pulse: Callable[[float], None]) -> None:
     try:
         lights.introduce()
-        lights.shine(stopped, notifier)
+        lights.shine(stopped, pulse)
     finally:
         lights.close()
 

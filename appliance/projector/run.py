@@ -10,6 +10,8 @@ from pathlib import Path
 
 import moderngl
 
+from appliance.control.company import CompanyWriter
+from appliance.control.fallback import Fallbacks
 from appliance.control.house import HouseReader
 from appliance.control.notify import Notifier
 from appliance.control.orders import OrderInbox
@@ -18,6 +20,7 @@ from appliance.outputs.runtime_folder import AlreadyHereError, Claim, runtime_fo
 from appliance.projector.alignment import AlignmentFile, alignment_folder
 from appliance.projector.context import GlContext
 from appliance.projector.controls import Controls
+from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
 from appliance.projector.info import Figures, Meter
 from appliance.projector.keys import press
 from appliance.projector.loop import Projector
@@ -64,6 +67,9 @@ class Run:
             opened.callback(self._file.close)
             self._controls = Controls(self._file.alignment, self._file.keep, wish.shows_info)
             self._inbox = _inbox(folder, opened, say)
+            self._fallbacks = Fallbacks(OF_THE_PROJECTOR)
+            self._company = CompanyWriter(folder, "projector", self._fallbacks)
+            opened.callback(self._company.close)
             self._reader = FrameReader(folder)
             opened.callback(self._reader.close)
             self._house = HouseReader(folder)
@@ -108,6 +114,7 @@ class Run:
                 self._patience, lambda: self._projector.is_preparing, end_process, is_well=notifier.ping
             ):
                 self._show_on(stopped, notifier)
+            self._company.end(time.monotonic())
         except moderngl.Error as error:
             self._check_context()
             raise ProjectorError(
@@ -198,6 +205,7 @@ class Run:
         state = self._reader.state(now)
         width, height = self._window.size
         share = self._resolution.share
+        self._tell(now, state, share)
         drawn_at = "" if share == 1.0 else f" at {share:.0%}"
         age = "-" if figures.age_p50_ms is None else f"{figures.age_p50_ms:.0f} / {figures.age_p99_ms:.0f} ms"
         self._lines = (
@@ -212,6 +220,13 @@ class Run:
         if not self._warned and figures.dances >= _JUDGED_AFTER:
             self._warned = True
             self._say(_about_software(figures.rate, 1.0 / self._pacing.period_s, self._context.renderer))
+
+    def _tell(self, now: float, stage: str, share: float) -> None:
+        """For the box's other processes; a stage that was never seen is none that is away."""
+        if self._reader.facts is not None:
+            self._fallbacks.set(STAGE_UNSEEN.name, stage != "fresh")
+        self._fallbacks.set(PICTURES_SMALLER.name, share < 1.0)
+        self._company.tell(now)
 
     def _check_context(self) -> None:
         if self._context.is_lost:

@@ -44,6 +44,7 @@ class KeeperHealth:
             self._fallbacks.set(row.name, bool(carrier.complaint), carrier.complaint)
         self._block.tell(now)
 
-    def close(self, now: float) -> None:
+    def end(self, now: float) -> None:
         """The keeper ends as it should."""
-        self._block.close(now)
+        self._block.end(now)
+        self._block.close()
