@@ -20,6 +20,7 @@ from appliance.control.standstill import Standstill
 from appliance.control.tellings import END, QUESTIONS, STATUS, Status, status, told
 
 if TYPE_CHECKING:
+    from appliance.outputs.shared_frame import Facts
     from appliance.sensor.keys import SensorKey
 
 REPLY, SENSORS_REPLY, PONG = "/reply", "/sensors/reply", "/pong"
@@ -79,6 +80,7 @@ class Desk:
         self._tell, self._publish = tell, publish
         self._standstill = Standstill(sight, errands)
         self._generation = -1
+        self._is_new_stage = False
         self._heard = 0
         self._set_by = dict.fromkeys(PARTS, 0)  # the newest command that has set it
 
@@ -110,11 +112,25 @@ class Desk:
         if facts is not None and self._sight.generation != self._generation:
             self._generation = self._sight.generation
             self._set(of_this_show(self.house, facts))
+            self._is_new_stage = True
+        if self._is_new_stage and facts is not None and (health := self._sight.health()):
+            self._is_new_stage = False
+            self._come_back(facts, str(health.get("cue", "")), now)
         self._standstill.look(self.house, now)
 
     def status(self, strangers: int, now: float) -> Status:
         """How the box is."""
         return status(self.house, self._sight, self.refused, strangers, now)
+
+    def _come_back(self, facts: Facts, name: str, now: float) -> None:
+        """After a power cut the stage goes on in its cue: so do picture and lights, if nobody said another.
+
+        Its master stays aside: whoever switches the box on wants to see something.
+        """
+        cue = next((cue for cue in facts.cues if cue["name"] == name), None)
+        if cue is not None and not self.house.cue:
+            parts = [part for part in ("look", "lights") if not self._set_by[part]]
+            self._set(in_cue(self.house, {**cue, "fade_s": 0.0}, parts, now))
 
     def _carry_out(self, order: Command, asker: Address, now: float) -> None:
         """Raises ValueError for what cannot be done."""

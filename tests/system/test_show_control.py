@@ -219,7 +219,7 @@ def test_a_killed_box_leaves_nobody_behind_and_panic_is_in_force_when_it_comes_b
         box.kill_and_restart()
         with asking(box) as asker:
             box.await_words("Still from before: Panic is in force")
-            box.await_words("The show goes on in the cue 'storm'.")
+            box.await_words("the show goes on in the cue 'storm'")
             assert status(asker)["panic"] == 1
             assert asker.ask("/go")[2] == 1
             until(lambda: status(asker)["state"] == "dancing")
