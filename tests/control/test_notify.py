@@ -3,45 +3,22 @@
 from __future__ import annotations
 
 import os
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from appliance.control.notify import Notifier
-
-
-class Supervisor:
-    """systemd's end: a datagram socket in the file system or in the abstract space."""
-
-    def __init__(self, address: str) -> None:
-        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self.socket.bind("\0" + address[1:] if address.startswith("@") else address)
-        self.socket.settimeout(5.0)
-        self.environ = {
-            "NOTIFY_SOCKET": address,
-            "WATCHDOG_USEC": "1000000",
-            "WATCHDOG_PID": str(os.getpid()),
-        }
-
-    def heard(self) -> list[str]:
-        """All that came until now, one entry a datagram."""
-        self.socket.setblocking(False)
-        words = []
-        while True:
-            try:
-                words.append(self.socket.recv(4096).decode())
-            except BlockingIOError:
-                return words
+from tests.control.supervisor import Supervisor
 
 
 @pytest.fixture(params=["path", "abstract"])
 def supervisor(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Supervisor]:
     address = str(tmp_path / "notify") if request.param == "path" else f"@bunraku-test-{os.getpid()}"
     made = Supervisor(address)
+    made.environ["WATCHDOG_PID"] = str(os.getpid())
     yield made
-    made.socket.close()
+    made.close()
 
 
 def test_it_says_that_it_works_how_it_is_and_that_it_ends(supervisor: Supervisor) -> None:
