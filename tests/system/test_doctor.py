@@ -241,7 +241,7 @@ def test_radios(tmp_path: Path) -> None:
     lay(tmp_path, "/sys/drivers/brcmfmac/name")
     (tmp_path / "sys/class/net/wlan0/device").mkdir()
     (tmp_path / "sys/class/net/wlan0/device/driver").symlink_to(tmp_path / "sys/drivers/brcmfmac")
-    lay(tmp_path, "/etc/NetworkManager/system-connections/bunraku.nmconnection")
+    lay(tmp_path, "/data/network/sensors.nmconnection")
     assert verdicts(venue.radios(Patient(tmp_path))) == [("bluetooth", "better"), ("wi-fi", "better")]
 
 

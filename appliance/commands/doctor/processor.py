@@ -136,8 +136,8 @@ def governor(patient: Patient) -> Iterator[Finding]:
         yield better(
             what,
             f"It is set by '{', '.join(sorted(names))}': ticks after a pause take longer.",
-            "`echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor`; "
-            "the installed box does that by itself.",
+            "`echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor`, at each "
+            "power-on.",
         )
 
 

@@ -98,7 +98,7 @@ def radios(patient: Patient) -> Iterator[Finding]:
             )
     for card in (path.parent for path in patient.found("/sys/class/net/*/phy80211")):
         driver = patient.at(card / "device/driver").resolve().name
-        if driver.startswith("brcmf") and patient.found("/etc/NetworkManager/system-connections/bunraku*"):
+        if driver.startswith("brcmf") and _is_access_point(patient):
             yield better(
                 *(
                     "wi-fi",
@@ -111,6 +111,11 @@ def radios(patient: Patient) -> Iterator[Finding]:
                 *("wi-fi", f"{card.name} saves power: readings wait for up to 100 ms."),
                 f"`sudo iw dev {card.name} set power_save off`, or wifi.powersave=2 for NetworkManager.",
             )
+
+
+def _is_access_point(patient: Patient) -> bool:
+    """As `bunraku-access-point` makes it."""
+    return bool(patient.found("/data/network/sensors.nmconnection"))
 
 
 def _asked(*command: str) -> str:
