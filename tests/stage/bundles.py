@@ -34,7 +34,7 @@ WINDOW = 8
 
 def write_show(folder: Path, hands: list[dict[str, object]] | None = None, network: str = "plain") -> Path:
     """A bundle with a phrase of three seconds. Networks: plain (shows the targets), broken
-    (not a number), heavy (takes milliseconds)."""
+    (not a number), fragile (not a number at seven coding iterations), heavy (takes milliseconds)."""
     folder.mkdir(parents=True, exist_ok=True)
     phrase = swaying_phrase()
     write_bvh(folder / "phrase.bvh", phrase)
@@ -78,7 +78,8 @@ def _network(kind: str) -> onnx.ModelProto:
         helper.make_tensor("last", TensorProto.INT64, [1], last),
         helper.make_tensor("one", TensorProto.INT64, [1], one),
         helper.make_tensor("half", TensorProto.FLOAT, [], [0.5]),
-        helper.make_tensor("scale", TensorProto.FLOAT, [], [0.0 if kind == "broken" else 1.0]),
+        helper.make_tensor("seven", TensorProto.FLOAT, [], [7.0]),
+        helper.make_tensor("all", TensorProto.FLOAT, [], [0.0 if kind == "broken" else 1.0]),
     ]
     nodes = [
         helper.make_node("Unsqueeze", ["mask", "last"], ["mask_column"]),
@@ -86,9 +87,11 @@ def _network(kind: str) -> onnx.ModelProto:
         helper.make_node("Greater", ["weight_column", "half"], ["firm"]),
         helper.make_node("And", ["mask_column", "firm"], ["held"]),
         helper.make_node("Where", ["held", "targets", "window"], ["shown"]),
+        helper.make_node("Cast", ["coding_iterations"], ["coding"], to=TensorProto.FLOAT),
+        helper.make_node("Sub", ["coding", "seven"], ["from_seven"]),
+        helper.make_node("Identity", ["from_seven" if kind == "fragile" else "all"], ["scale"]),
         helper.make_node("Mul", ["shown", "scale"], ["scaled"]),
         helper.make_node("Div", ["scaled", "scale"], ["poses"]),
-        helper.make_node("Cast", ["coding_iterations"], ["coding"], to=TensorProto.FLOAT),
         helper.make_node("Cast", ["interaction_iterations"], ["interaction"], to=TensorProto.FLOAT),
         helper.make_node("Add", ["coding", "interaction"], ["sum"]),
         helper.make_node("Reshape", ["sum", "one"], ["latent" if kind != "heavy" else "light"]),

@@ -16,6 +16,7 @@ from appliance.stage.journal.recorder import (
     ENTRY,
     FACTS,
     FORMAT,
+    KEYFRAME_SLOTS,
     KEYFRAMES,
     KIND,
     LOG,
@@ -103,7 +104,7 @@ class RunMemory:
     def _keyframes(self) -> Iterator[Keyframe]:
         ring = self._reader.rings[KEYFRAMES]
         newest = ring.newest_sequence()
-        for sequence in range(max(1, newest - 1), newest + 1):
+        for sequence in range(max(1, newest - KEYFRAME_SLOTS + 1), newest + 1):
             found = ring.payload(sequence)
             if found is not None:
                 yield Keyframe(POSITION.unpack_from(found)[0], found[POSITION.size :])

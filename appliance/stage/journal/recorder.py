@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 FILE, KIND, FORMAT = "journal", "journal", 1  # in the runtime folder
 FACTS, LOG, KEYFRAMES = range(3)  # the file's rings
 LOG_SLOTS = 4096  # 80 s: so long the disk may hang before a tick is missing in the journal
-KEYFRAME_SLOTS, KEYFRAME_BYTES = 2, 1 << 17
 KEYFRAME_TICKS = 500  # from one keyframe to the next
+KEYFRAME_SLOTS = 1 + LOG_SLOTS // KEYFRAME_TICKS
+KEYFRAME_BYTES, KEYFRAME_JOINT_BYTES = 1 << 14, 1 << 9  # and so many more for each joint
 EVENT_BYTES = 1024
 ENTRY = struct.Struct("<Q")  # kind of an entry of the log; then the tick's record, or the event as JSON
 
@@ -38,7 +39,8 @@ class Recorder:
         """facts: of this run, as record.facts_of_run gives them."""
         said, layout = json.dumps(facts).encode(), layout_of(facts)
         entry_bytes = ENTRY.size + max(layout.itemsize, EVENT_BYTES)
-        shapes = [(1, len(said)), (LOG_SLOTS, entry_bytes), (KEYFRAME_SLOTS, KEYFRAME_BYTES)]
+        keyframe_bytes = KEYFRAME_BYTES + KEYFRAME_JOINT_BYTES * len(facts["joints"])
+        shapes = [(1, len(said)), (LOG_SLOTS, entry_bytes), (KEYFRAME_SLOTS, keyframe_bytes)]
         self.lost = 0
         self._file = RingFileWriter.new(folder / FILE, KIND, FORMAT, shapes)
         self._file.rings[FACTS].write(said)

@@ -1,0 +1,97 @@
+"""A night of dancing under the test's clock: a real tick, a real recorder, a real carrier to a real folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from appliance.control.orders import Order
+from appliance.sensor.link import SensorLink, SensorReading, SensorState
+from appliance.sensor.memory import SensorMemory
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.show import load_show
+from appliance.stage.cast import assemble
+from appliance.stage.clock import TICK_S, Slot
+from appliance.stage.iterations import Iterations
+from appliance.stage.journal.carrier import JournalCarrier
+from appliance.stage.journal.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
+from appliance.stage.journal.recorder import Recorder
+from appliance.stage.obey import carry_out
+from appliance.stage.tick import Tick
+from appliance.stage.wearing import Wearing
+
+BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+LATEST_START_S = 0.005
+
+
+class Night:
+    """One start of the stage. `say`: what the keeper and the wearing said."""
+
+    def __init__(self, show: Path, runtime: Path, begins_at: float = 1000.0) -> None:
+        runtime.mkdir(mode=0o700, exist_ok=True, parents=True)
+        self.runtime, self.show, self.said = runtime, load_show(show), list[str]()
+        self.cast = assemble(self.show, BOX)
+        self.heard = self.cast.link = _Heard()
+        self.wearing = Wearing(self.cast, SensorMemory(None, self.said.append), self.said.append)
+        self.tick = Tick(self.cast, self.wearing, Iterations(3, 2, 10), LATEST_START_S)
+        self.recorder = Recorder(runtime, facts_of_run(self.show, list(self.cast.worn)))
+        self.slot = Slot(-1, begins_at, begins_at)
+        self.recorder.keyframe(self.tick.state())
+
+    def dance(self, ticks: int, reading: SensorReading | None = None, late_s: float = 0.0) -> None:
+        """So many ticks, each with this reading, anew."""
+        for _ in range(ticks):
+            self.slot.tick += 1
+            self.slot.deadline += TICK_S
+            self.slot.started = self.slot.deadline + late_s
+            sequence = self.slot.tick
+            arrival = self.slot.started - 0.001
+            came = None if reading is None else reading._replace(sequence=sequence, arrival=arrival)
+            self.heard.coming = [] if came is None else [came]
+            self.tick.run(self.slot)
+            self.tick.after(self.slot)
+            self.recorder.note_tick(self.slot, self.tick, self._flags())
+            if self.recorder.wants_keyframe:
+                self.recorder.keyframe(self.tick.state())
+
+    def order(self, name: str, *values: float, text: str = "") -> tuple[bool, str]:
+        """What show control asks for, after the last tick."""
+        now, rate = self.slot.started, self.show.config.motion.rate
+        order = Order(name, tuple(values), text)
+        done, words = carry_out(order, self.cast, self.tick.iterations, self.wearing, rate, now)
+        asked = {"name": name, "values": order.values, "text": text}
+        self.recorder.event(ORDER, now, order=asked, done=done, words=words)
+        return done, words
+
+    def carrier(self, folder: Path, minutes: float = 30.0) -> JournalCarrier:
+        """Who keeps this night in a folder."""
+        return JournalCarrier(self.runtime, folder, minutes, self.said.append, lambda: 1.8e9)
+
+    def kept(self, folder: Path) -> Path:
+        """The folder, once all that was noted is in it."""
+        self.carrier(folder).last_turn()
+        return folder
+
+    def _flags(self) -> int:
+        flags = self.tick.frame.late * (LATE | RESENT) | self.tick.network_failed * NOT_FINITE
+        return flags | self.cast.motion.jumped * JUMPED
+
+
+def reading(orientation: Sequence[float], boot_nonce: int = 1, taps: int = 0) -> SensorReading:
+    """Of the left wrist."""
+    w, x, y, z = orientation
+    return SensorReading("left-wrist", (w, x, y, z), 0, 0, 0.0, 0.0, 90, 255, boot_nonce, taps)
+
+
+class _Heard(SensorLink):
+    """A link that gives what the test lets come; the sensor is there whenever somebody asks."""
+
+    def __init__(self) -> None:
+        super().__init__({}, ())
+        self.coming: list[SensorReading] = []
+
+    def drain(self, now: float) -> Sequence[SensorReading]:
+        return self.coming
+
+    def states(self, now: float) -> list[SensorState]:
+        return [SensorState("left-wrist", 0, "linked", "", 50.0, 0, None, 0.0, 90, 255, "", "", 0, 1, "")]
