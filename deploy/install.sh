@@ -128,23 +128,27 @@ copy_and_verify() {
         fail "files of the release are damaged (named above). Copy it to the stick anew. The box dances as before."
 }
 
+# A wheel is an archive of what lies in site-packages; each was checked against its sum before.
+UNPACK='import sys, zipfile
+for wheel in sys.argv[2:]:
+    zipfile.ZipFile(wheel).extractall(sys.argv[1])'
+
 build() {
-    local inside=${part#"$root"} file
+    local inside=${part#"$root"} file wheels=("$part"/source/wheels/*.whl)
     in_root "/usr/bin/python$(fact "$part/source" python)" -m venv --without-pip "$inside"
-    in_root "$inside/bin/python" -I "$inside/source/pip.whl/pip" --isolated --quiet --disable-pip-version-check \
-        --no-cache-dir install --no-index --find-links "$inside/source/wheels" --no-deps --require-hashes \
-        --no-compile --no-warn-script-location --root-user-action ignore -r "$inside/source/requirements.txt" ||
+    site=$(echo "$part"/lib/python3*/site-packages)
+    in_root "$inside/bin/python" -I -c "$UNPACK" "${site#"$root"}" "${wheels[@]#"$root"}" ||
         fail "the packages could not be unpacked (above). The box dances as before."
-    drop_unneeded "$part"/lib/python3*/site-packages
+    drop_unneeded
     write_command
     in_root "$inside/bin/python" -I -m compileall -q -j 0 -s "$inside" -p "$home/releases/$name" "$inside/lib"
     for file in system release SHA256SUMS install.sh; do mv "$part/source/$file" "$part/"; done
     chmod 755 "$part/install.sh"
-    rm -r "$part/source" "$part/.gitignore" "$part/include"
+    rm -rf "$part/source" "$part/.gitignore" "$part/include"
 }
 
 drop_unneeded() {
-    local pattern site=$1
+    local pattern
     shopt -s globstar nullglob
     while read -r pattern; do
         # shellcheck disable=SC2086 # a pattern, not a path
@@ -156,7 +160,7 @@ drop_unneeded() {
 # Built as VERSION.part and renamed when whole, so the command names the final folder from the start.
 write_command() {
     find "$part/bin" -type f -delete
-    printf '#!%s/bin/python -I\nimport sys\n\nfrom appliance.cli import main\n\nsys.exit(main())\n' \
+    printf '#!%s/bin/python -I\nimport sys\n\nfrom appliance.start import main\n\nsys.exit(main())\n' \
         "$home/releases/$name" >"$part/bin/bunraku"
     chmod 755 "$part/bin/bunraku"
 }
@@ -237,12 +241,22 @@ enable() {
     done
 }
 
-# Links that the chosen release does not have any more.
+# Every folder in which a release of this box has a link.
+folders_of_links() {
+    local file
+    { echo usr/local/bin/x && echo usr/local/sbin/x
+      for file in "$releases"/*/; do system_files "$(basename "$file")"; done; } |
+        sed 's|/[^/]*$||' | sort -u
+}
+
+# Links that the chosen release does not have any more, and what a power cut left.
 unlink_left_over() {
-    find "$root/etc" "$root/usr/lib" "$root/usr/local" -xdev -type l -lname "$home/current/*" -printf '%p %l\n' |
-        while read -r where to; do [[ -e $root$to && $where != *.new ]] || rm "$where"; done
-    find "$root/etc/systemd/system" -xtype l -lname "/$units/*" -printf '%p %l\n' 2>/dev/null |
-        while read -r where to; do [ -L "$root$to" ] || rm "$where"; done
+    local folder where to
+    while read -r folder; do
+        [ ! -d "$root/$folder" ] || find "$root/$folder" -maxdepth 1 -type l -lname "$home/current/*" -printf '%p %l\n'
+    done < <(folders_of_links) | while read -r where to; do [[ -e $root$to && $where != *.new ]] || rm "$where"; done
+    find "$root/etc/systemd/system" -type l -lname "/$units/*" -printf '%p %l\n' |
+        while read -r where to; do [[ -L $root$to || -e $root$to ]] || rm "$where"; done
 }
 
 switch_to() {
@@ -257,7 +271,9 @@ switch_to() {
     done < <(system_files "$name")
     link "$home/current/bin/bunraku" "$root/usr/local/bin/bunraku"
     link "$home/current/install.sh" "$root/usr/local/sbin/bunraku-install"
-    if [ -x "$root/usr/bin/systemd-sysusers" ]; then in_root systemd-sysusers "$home/releases/$name/$users"; fi
+    if [[ -f $releases/$name/$users && -x $root/usr/bin/systemd-sysusers ]]; then
+        in_root systemd-sysusers "$home/releases/$name/$users"
+    fi
     sync -f "$root/etc" "$root/usr"
     link "releases/$name" "$root$home/current"
     sync -f "$root$home"
@@ -274,7 +290,7 @@ starts() {
     systemctl daemon-reload
     systemd-tmpfiles --create || true
     udevadm control --reload || true
-    systemctl restart bunraku.target || return 1
+    timeout "$STARTS_WITHIN_S" systemctl restart bunraku.target || true
     until is_active; do
         [ "$SECONDS" -lt "$deadline" ] || return 1
         sleep 0.2
@@ -339,7 +355,6 @@ uninstall() {
     done < <(system_files "$(current)")
     rm -f "$root$home/current"
     unlink_left_over
-    find "$root/etc/systemd/system" -type l -lname "/$units/bunraku*" -delete
     rm -rf "${root:?}$home"
     runs_here && systemctl daemon-reload
     say "bunraku is off this box"

@@ -1,0 +1,1 @@
+"""Tests of installation and of the files for systemd, udev and the network."""

@@ -1,0 +1,129 @@
+"""Roots to install into: this machine's own root below, what a test writes above, on a disk that can be cut off."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import struct
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.deploy.small_release import INSTALL
+
+_SHUTDOWN, _WITHOUT_FLUSHING = 0x8004587D, 2  # FS_IOC_SHUTDOWN, GOING_FLAGS_NOLOGFLUSH
+_SIZE_MB = 64
+
+
+def why_not() -> str | None:
+    """Why nothing can be installed into a root here; None when it can."""
+    if os.geteuid() != 0:
+        return "installing into a root of its own needs root (run the tests as root)"
+    for command, package in (("mke2fs", "e2fsprogs"), ("unshare", "util-linux"), ("dpkg", "dpkg")):
+        if shutil.which(command) is None:
+            return f"the command {command} (Debian package {package}) is missing"
+    if python() is None:
+        return "there is no /usr/bin/python3.x in this machine's root"
+    for kind in ("overlay", "ext4"):
+        if kind not in Path("/proc/filesystems").read_text().split():
+            return f"the kernel has no {kind}"
+    if not Path("/dev/loop-control").exists():
+        return "there are no loop devices (/dev/loop-control)"
+    tried = subprocess.run(["unshare", "--mount", "--net", "true"], capture_output=True, text=True)
+    return None if tried.returncode == 0 else f"namespaces are not allowed here ({tried.stderr.strip()})"
+
+
+def python() -> str | None:
+    """The version of the Python that every root here has, as 3.11."""
+    found = sorted(path.name.removeprefix("python") for path in Path("/usr/bin").glob("python3.?[0-9]"))
+    return found[-1] if found else None
+
+
+@dataclass(frozen=True)
+class BoxRoot:
+    """A root file system whose written half lies on a small ext4 disk in `folder`."""
+
+    folder: Path
+
+    @property
+    def path(self) -> Path:
+        return self.folder / "root"
+
+    @property
+    def disk(self) -> Path:
+        return self.folder / "disk.ext4"
+
+    @property
+    def _written(self) -> Path:
+        return self.folder / "written"
+
+    @property
+    def releases(self) -> Path:
+        return self.path / "opt/bunraku/releases"
+
+    @property
+    def current(self) -> str | None:
+        """The version that dances; None when there is none."""
+        link = self.path / "opt/bunraku/current"
+        return link.readlink().name if link.is_symlink() else None
+
+    def make(self) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with self.disk.open("wb") as disk:
+            disk.truncate(_SIZE_MB << 20)
+        _run("mke2fs", "-q", "-t", "ext4", str(self.disk))
+        self.switch_on()
+
+    def switch_on(self) -> None:
+        """Mount it, as a boot does: the disk's journal is played back first."""
+        self._written.mkdir(exist_ok=True)
+        self.path.mkdir(exist_ok=True)
+        _run("mount", "-o", "loop,noatime", str(self.disk), str(self._written))
+        for name in ("upper", "work"):
+            (self._written / name).mkdir(exist_ok=True)
+        above = f"lowerdir=/,upperdir={self._written}/upper,workdir={self._written}/work"
+        _run("mount", "-t", "overlay", "-o", above, "overlay", str(self.path))
+
+    def switch_off(self) -> None:
+        for mounted in (self.path, self._written):
+            subprocess.run(["umount", str(mounted)], capture_output=True)
+
+    def copy_of(self, other: BoxRoot) -> BoxRoot:
+        """The same disk as `other`'s, which must be off; it is on afterwards."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        _run("cp", "--sparse=always", str(other.disk), str(self.disk))
+        self.switch_on()
+        return self
+
+    def cut_power(self) -> None:
+        """What no sync has brought to the disk is lost."""
+        handle = os.open(self._written, os.O_RDONLY)
+        try:
+            fcntl.ioctl(handle, _SHUTDOWN, struct.pack("I", _WITHOUT_FLUSHING))
+        finally:
+            os.close(handle)
+        self.switch_off()
+
+    def check_disk(self) -> int:
+        """e2fsck, as the boot runs it; 0 and 1 (repaired) are sound."""
+        return subprocess.run(["e2fsck", "-p", str(self.disk)], capture_output=True).returncode
+
+    def install(
+        self, *words: str | Path, env: dict[str, str] | None = None
+    ) -> subprocess.CompletedProcess[str]:
+        """install.sh, without a network."""
+        command = ["unshare", "--net", "bash", str(INSTALL), "--root", str(self.path), *map(str, words)]
+        return subprocess.run(command, capture_output=True, text=True, env={**os.environ, **(env or {})})
+
+    def run(self, *words: str) -> str:
+        """What a command in this root prints."""
+        return subprocess.check_output(
+            ["chroot", str(self.path), *words], text=True, stderr=subprocess.STDOUT
+        )
+
+
+def _run(*words: str) -> None:
+    done = subprocess.run(words, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(words)}: {done.stderr}")

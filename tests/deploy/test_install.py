@@ -1,0 +1,168 @@
+"""install.sh: side by side, one switch, back again; without a network and into a root of the test's own."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.deploy.box_root import BoxRoot, python
+from tests.deploy.small_release import write_facts
+
+MakeRelease = Callable[..., Path]
+UNITS = "usr/lib/systemd/system"
+CLOCK = "etc/chrony/conf.d/bunraku.conf"
+
+
+def test_a_release_is_unpacked_beside_the_one_before_and_switched_to(
+    box: BoxRoot, make_release: MakeRelease
+) -> None:
+    done = box.install(make_release("1.1.0"))
+    assert done.returncode == 0, done.stderr
+    assert box.run("/usr/local/bin/bunraku") == "bunraku 1.1.0\n"
+    assert box.install("--list").stdout == "  1.0.0\n* 1.1.0\n"
+    assert "version 1.1.0" in box.run("cat", f"/{UNITS}/bunraku.target")
+    assert (box.path / CLOCK).read_text() == "# of 1.1.0\n"
+
+
+def test_it_brings_bytecode_that_names_the_final_folder_and_leaves_out_what_nobody_loads(
+    box: BoxRoot,
+) -> None:
+    packages = next((box.releases / "1.0.0/lib").glob("python3*")) / "site-packages"
+    assert not (packages / "appliance/unneeded").exists()
+    compiled = next((packages / "appliance/__pycache__").glob("start.*.pyc")).read_bytes()
+    assert str(packages).removeprefix(str(box.path)).encode() in compiled
+    assert b".part" not in compiled
+
+
+def test_the_box_starts_with_the_machine(box: BoxRoot) -> None:
+    wanted = box.path / "etc/systemd/system/multi-user.target.wants/bunraku.target"
+    assert wanted.readlink() == Path(f"/{UNITS}/bunraku.target")
+
+
+def test_system_files_come_and_go_with_the_release(box: BoxRoot, make_release: MakeRelease) -> None:
+    old = box.path / UNITS / "bunraku-old.service"
+    assert old.is_symlink()
+    assert box.install(make_release("1.1.0", extra_unit="bunraku-new.service")).returncode == 0
+    assert not old.is_symlink()
+    assert "Only in this" in box.run("cat", f"/{UNITS}/bunraku-new.service")
+    assert box.install("--rollback").returncode == 0
+    assert "Only in this" in box.run("cat", f"/{UNITS}/bunraku-old.service")
+    assert not (box.path / UNITS / "bunraku-new.service").is_symlink()
+    assert (box.path / CLOCK).read_text() == "# of 1.0.0\n"
+
+
+def test_what_a_technician_changed_stays(box: BoxRoot, make_release: MakeRelease) -> None:
+    (box.path / CLOCK).write_text("# mine\n")
+    done = box.install(make_release("1.1.0"))
+    assert done.returncode == 0
+    assert f"/{CLOCK} was changed on this box and stays" in done.stdout
+    assert (box.path / CLOCK).read_text() == "# mine\n"
+
+
+def test_two_releases_before_the_current_one_stay_and_each_can_be_used(
+    box: BoxRoot, make_release: MakeRelease
+) -> None:
+    for version in ("0.9.0", "1.2.0", "1.10.0"):  # the order of installation counts, not the number
+        assert box.install(make_release(version)).returncode == 0
+    assert box.install("--list").stdout == "  0.9.0\n  1.2.0\n* 1.10.0\n"
+    assert box.install("--rollback").returncode == 0
+    assert box.current == "1.2.0"
+    assert box.install("--use", "0.9.0").returncode == 0
+    assert box.run("/usr/local/bin/bunraku") == "bunraku 0.9.0\n"
+    refused = box.install("--rollback")
+    assert refused.returncode == 1
+    assert "no release before 0.9.0" in refused.stderr
+    assert "It has: 0.9.0 1.2.0 1.10.0" in box.install("--use", "7.0.0").stderr
+
+
+def test_the_same_version_with_another_content_lies_beside_it(
+    box: BoxRoot, make_release: MakeRelease
+) -> None:
+    other = make_release("1.0.0", extra_unit="bunraku-new.service")
+    assert box.install(other).returncode == 0
+    assert box.current is not None and box.current.startswith("1.0.0-")
+    before = sorted(path.name for path in box.releases.iterdir())
+    assert box.install(other).returncode == 0, "once more: nothing new to unpack"
+    assert sorted(path.name for path in box.releases.iterdir()) == before
+
+
+def test_a_damaged_file_on_the_stick_is_refused(box: BoxRoot, make_release: MakeRelease) -> None:
+    release = make_release("1.1.0")
+    wheel = next((release / "wheels").iterdir())
+    content = bytearray(wheel.read_bytes())
+    content[100] ^= 1
+    wheel.write_bytes(content)
+    done = box.install(release)
+    assert done.returncode == 1
+    assert wheel.name in done.stderr and "damaged" in done.stderr
+    _is_untouched(box)
+
+
+def test_a_stick_that_is_pulled_is_said(box: BoxRoot, make_release: MakeRelease) -> None:
+    release = make_release("1.1.0")
+    shutil.rmtree(release / "wheels")
+    done = box.install(release)
+    assert done.returncode == 1
+    assert "Is the stick still in?" in done.stderr
+    _is_untouched(box)
+
+
+def test_a_release_that_does_not_work_is_refused(box: BoxRoot, make_release: MakeRelease) -> None:
+    done = box.install(make_release("1.1.0", broken=True))
+    assert done.returncode == 1
+    assert "a part is missing" in done.stderr
+    assert "bunraku 1.1.0 does not work on this box (above). The box dances as before." in done.stderr
+    _is_untouched(box)
+
+
+@pytest.mark.parametrize(
+    ("facts", "words"),
+    [
+        ({"arch": "s390x"}, "the release is for s390x. Take the release for"),
+        ({"python": "3.99"}, "Python 3.99 is missing. Bunraku is made for Debian 13"),
+        ({"needs_mb": 999_999_999}, "999999999 MB are needed. Nothing was changed."),
+    ],
+)
+def test_a_machine_that_does_not_fit_is_refused(
+    box: BoxRoot, make_release: MakeRelease, facts: dict[str, str], words: str
+) -> None:
+    release = make_release("1.1.0")
+    write_facts(release, **{"version": "1.1.0", "python": str(python()), **facts})  # type: ignore[arg-type]
+    done = box.install(release)
+    assert done.returncode == 1
+    assert words in done.stderr
+    _is_untouched(box)
+
+
+def test_a_folder_without_a_release_is_said(box: BoxRoot, tmp_path: Path) -> None:
+    done = box.install(tmp_path)
+    assert done.returncode == 1
+    assert f"no release in {tmp_path}" in done.stderr
+    assert "unknown option '--again'. See install.sh --help." in box.install("--again").stderr
+
+
+def test_uninstalled_nothing_points_to_it_and_shows_stay_until_purged(box: BoxRoot) -> None:
+    show = box.path / "data/bunraku/shows/tonight/show.yaml"
+    show.parent.mkdir(parents=True)
+    show.write_text("name: tonight\n")
+    assert box.install("--uninstall").returncode == 0
+    assert not (box.path / "opt/bunraku").exists()
+    assert not (box.path / CLOCK).exists()
+    left = [
+        path
+        for top in ("etc", "usr/lib/systemd", "usr/local")
+        for path in (box.path / top).rglob("*bunraku*")
+    ]
+    assert left == []
+    assert show.exists()
+    done = box.install("--uninstall", "--purge")
+    assert done.returncode == 0, done.stderr
+    assert not (box.path / "data/bunraku").exists()
+
+
+def _is_untouched(box: BoxRoot) -> None:
+    assert box.run("/usr/local/bin/bunraku") == "bunraku 1.0.0\n"
+    assert [path.name for path in box.releases.iterdir()] == ["1.0.0"]
