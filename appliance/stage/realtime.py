@@ -75,9 +75,9 @@ def _is_realtime() -> bool:
 
 
 def _take_priority(priority: int) -> str:
+    if _is_realtime():
+        return ""
     try:
-        if _is_realtime() and os.sched_getparam(0).sched_priority == priority:
-            return ""
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except (OSError, AttributeError) as error:
         return (
