@@ -20,6 +20,7 @@ _libc = ctypes.CDLL(None)
 
 class Unit:
     """`deaths`: nobody killed it, and it ended. `history`: (monotonic seconds, what it held), this life only.
+    `longest`: the same of the longest life before this one.
 
     `is_away`: it says that what it needs is not here. `priority`: real-time, where it can be had.
     """
@@ -36,6 +37,7 @@ class Unit:
         self.starts = self.kills = self.deaths = 0
         self.is_away = False
         self.history: list[tuple[float, Vitals]] = []
+        self.longest: list[tuple[float, Vitals]] = []
         self._environment = {**environment, "PYTHONUNBUFFERED": "1"}
         self._priority = priority
         self._process: subprocess.Popen[bytes] | None = None
@@ -92,7 +94,7 @@ class Unit:
 
     def _start(self) -> None:
         self.starts += 1
-        self.history.clear()
+        self.longest, self.history = max(self.longest, self.history, key=len), []
         with self.words.open("ab") as words:
             self._process = subprocess.Popen(
                 self.command,

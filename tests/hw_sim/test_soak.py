@@ -164,6 +164,14 @@ def test_handles_that_come_and_go_are_no_leak_and_more_each_time_are(tmp_path: P
     assert leaking.handles > 0
 
 
+def test_the_longest_life_is_judged(tmp_path: Path) -> None:
+    unit = lived(tmp_path, [50.0] * 200 + [53.0] * 200, [9] * 400)
+    unit.longest, unit.history = unit.history, unit.history[:5]
+    grown = growth(unit, 400.0)
+    assert grown is not None
+    assert grown.rss_mb == pytest.approx(3.0)
+
+
 def test_a_life_that_was_too_short_is_not_judged(tmp_path: Path) -> None:
     assert growth(lived(tmp_path, [50.0] * 65, [9] * 65), 3600.0) is None
     assert growth(lived(tmp_path, [], []), 3600.0) is None
