@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import platform
-from dataclasses import dataclass
-from statistics import median
 from typing import Any, NamedTuple
 
 from hw_sim.soak.box import LATE_MS
+from hw_sim.soak.growth import growth
 from hw_sim.soak.run import Soak
 from hw_sim.soak.unit import Unit
-from hw_sim.soak.vitals import Vitals
 
 METHOD = (
     "A tick of the box is late when its frame left more than late_ms after the deadline that it names, "
@@ -23,9 +21,6 @@ METHOD = (
 )
 MOST_LATE_BEYOND = 0.001  # of all slots, beyond what cyclictest shows of the machine
 MOST_GROWTH_MB = 1.0
-FIRST_MINUTE_S = 60.0
-WINDOW_S = 10.0  # figures of memory are medians over so long
-_SHORTEST_LIFE_S = 3.0
 
 
 class Limit(NamedTuple):
@@ -35,55 +30,6 @@ class Limit(NamedTuple):
     found: str
     demanded: str
     holds: bool
-
-
-@dataclass(frozen=True)
-class Growth:
-    """What one process held after its first minute, and at the end; it has lived for `lived_s`.
-
-    Memory is a median over some seconds. Handles and threads come and go with receivers and fades: their most
-    in the first half is compared with their most in the last quarter.
-    """
-
-    name: str
-    lived_s: float
-    first: Vitals
-    last: Vitals
-
-    @property
-    def rss_mb(self) -> float:
-        return self.last.rss_mb - self.first.rss_mb
-
-    @property
-    def handles(self) -> int:
-        return self.last.handles - self.first.handles
-
-    @property
-    def threads(self) -> int:
-        return self.last.threads - self.first.threads
-
-
-def growth(unit: Unit, run_s: float) -> Growth | None:
-    """Of its longest life. None when that was too short to tell.
-
-    In a run of less than four minutes the first minute is a quarter of the run.
-    """
-    history = max(unit.history, unit.longest, key=len)
-    if not history:
-        return None
-    first_at = history[0][0] + min(FIRST_MINUTE_S, run_s / 4.0)
-    window_s = min(WINDOW_S, run_s / 8.0)
-    last_at = history[-1][0] - window_s
-    early = [held for at, held in history if first_at <= at <= first_at + window_s]
-    late = [held for at, held in history if at >= last_at]
-    if not early or last_at < first_at + _SHORTEST_LIFE_S:
-        return None
-    after = [held for at, held in history if at >= first_at]
-    half, quarter = len(after) // 2 + 1, len(after) // 4 + 1
-    return Growth(
-        *(unit.name, history[-1][0] - history[0][0]),
-        *(_summary(early, after[:half]), _summary(late, after[-quarter:])),
-    )
 
 
 def figures_of(soak: Soak) -> dict[str, Any]:
@@ -242,16 +188,6 @@ def _process(unit: Unit, run_s: float) -> dict[str, Any]:
         "at_the_end": None if grown is None else vars(grown.last),
         "lived_s": 0.0 if grown is None else round(grown.lived_s, 1),
     }
-
-
-def _summary(window: list[Vitals], while_: list[Vitals]) -> Vitals:
-    """Usual memory in the window, most handles and threads in a longer while."""
-    return Vitals(
-        round(median(one.rss_mb for one in window), 3),
-        round(median(one.anonymous_mb for one in window), 3),
-        max(one.handles for one in while_),
-        max(one.threads for one in while_),
-    )
 
 
 def _share(part: int, whole: int) -> float:

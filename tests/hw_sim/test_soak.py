@@ -17,8 +17,8 @@ import pytest
 
 from hw_sim.peers import HOST
 from hw_sim.soak.delays import Delays
-from hw_sim.soak.figures import growth
 from hw_sim.soak.frames import FrameWatch
+from hw_sim.soak.growth import growth
 from hw_sim.soak.script import KILLS_UNTIL, script
 from hw_sim.soak.unit import PAUSE_S, Unit
 from hw_sim.soak.vitals import Vitals
