@@ -16,7 +16,7 @@ DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump 
     doctest-dev:/usr/include/doctest/doctest.h cppcheck:cppcheck clang-14:clang++-14 \
     libclang-rt-14-dev:/usr/lib/llvm-14/lib/clang/*/lib/linux/libclang_rt.fuzzer-* \
     gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \
-    qemu-system-arm:qemu-system-arm
+    qemu-system-arm:qemu-system-arm systemd:systemd-analyze shellcheck:shellcheck
 
 DEBIAN_FOR_SOAK := $(DEBIAN_FOR_GL) stress-ng:stress-ng rt-tests:cyclictest
 
