@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
-import struct
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.deploy.cut import cut_off
 from tests.deploy.small_release import INSTALL
 
-_SHUTDOWN, _WITHOUT_FLUSHING = 0x8004587D, 2  # FS_IOC_SHUTDOWN, GOING_FLAGS_NOLOGFLUSH
 _SIZE_MB = 64
 
 
@@ -55,7 +53,7 @@ class BoxRoot:
         return self.folder / "disk.ext4"
 
     @property
-    def _written(self) -> Path:
+    def written(self) -> Path:
         return self.folder / "written"
 
     @property
@@ -77,16 +75,16 @@ class BoxRoot:
 
     def switch_on(self) -> None:
         """Mount it, as a boot does: the disk's journal is played back first."""
-        self._written.mkdir(exist_ok=True)
+        self.written.mkdir(exist_ok=True)
         self.path.mkdir(exist_ok=True)
-        _run("mount", "-o", "loop,noatime", str(self.disk), str(self._written))
+        _run("mount", "-o", "loop,noatime", str(self.disk), str(self.written))
         for name in ("upper", "work"):
-            (self._written / name).mkdir(exist_ok=True)
-        above = f"lowerdir=/,upperdir={self._written}/upper,workdir={self._written}/work"
+            (self.written / name).mkdir(exist_ok=True)
+        above = f"lowerdir=/,upperdir={self.written}/upper,workdir={self.written}/work"
         _run("mount", "-t", "overlay", "-o", above, "overlay", str(self.path))
 
     def switch_off(self) -> None:
-        for mounted in (self.path, self._written):
+        for mounted in (self.path, self.written):
             subprocess.run(["umount", str(mounted)], capture_output=True)
 
     def copy_of(self, other: BoxRoot) -> BoxRoot:
@@ -98,11 +96,7 @@ class BoxRoot:
 
     def cut_power(self) -> None:
         """What no sync has brought to the disk is lost."""
-        handle = os.open(self._written, os.O_RDONLY)
-        try:
-            fcntl.ioctl(handle, _SHUTDOWN, struct.pack("I", _WITHOUT_FLUSHING))
-        finally:
-            os.close(handle)
+        cut_off(str(self.written))
         self.switch_off()
 
     def check_disk(self) -> int:
