@@ -21,7 +21,8 @@ LASTING = [name for name in SERVICES if "Type=notify" in (UNITS / name).read_tex
 EXPOSURE = 15  # tenths, as systemd-analyze counts: 1.5
 STAGE_STARTS_WITHIN_S = 1.5  # on a small machine; hang to next frame is to take 3.0 s
 BIN = "/opt/bunraku/current/bin"
-NEWER = ("Unknown key 'WantsMountsFor'",)  # what systemd before 256 does not know yet, and leaves out
+# What an older systemd does not know yet, and leaves out: before 256, before 257.
+NEWER = ("Unknown key 'WantsMountsFor'", "Failed to parse boolean value, ignoring: disconnected")
 
 
 def systemd_version() -> int:
