@@ -170,6 +170,14 @@ def test_a_system_that_can_be_written_can_be_damaged(tmp_path: Path, line: str, 
     assert only(storage.system_partition(Patient(tmp_path))).verdict == verdict
 
 
+def test_a_data_partition_that_did_not_come(tmp_path: Path) -> None:
+    lay(tmp_path, "/etc/fstab", "# a comment\nLABEL=data /data ext4 nofail 0 2\n")
+    lay(tmp_path, "/proc/mounts", "overlay / overlay rw 0 0\n/dev/sdb1 /media/bunraku vfat ro 0 0\n")
+    assert verdicts(storage.media(Patient(tmp_path))) == [("data partition", "wrong"), ("stick", "ok")]
+    lay(tmp_path, "/proc/mounts", "overlay / overlay rw 0 0\n/dev/sda4 /data ext4 rw 0 0\n")
+    assert verdicts(storage.media(Patient(tmp_path))) == [("data partition", "ok")]
+
+
 def test_wear(tmp_path: Path) -> None:
     lay(tmp_path, "/sys/block/mmcblk0/device/life_time", "0x02 0x09\n")
     lay(tmp_path, "/sys/block/mmcblk0/device/type", "MMC\n")

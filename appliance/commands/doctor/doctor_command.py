@@ -23,7 +23,14 @@ from appliance.show.config_error import ConfigError
 CHECKS = (
     *(box_state.stage, storage.choice, box_state.units, processor.realtime_rights, processor.locked_memory),
     *(processor.governor, processor.warmth, processor.power, storage.memory, storage.data_folders),
-    *(storage.system_partition, storage.wear, box_state.watchdog, box_state.clock, venue.ports),
+    *(
+        storage.media,
+        storage.system_partition,
+        storage.wear,
+        box_state.watchdog,
+        box_state.clock,
+        venue.ports,
+    ),
     *(venue.network, venue.radios, venue.cables, venue.adapters, venue.display),
 )
 LOOKS = (processor.wake_ups, processor.others, processor.interrupts)

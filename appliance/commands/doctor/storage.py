@@ -8,7 +8,7 @@ from pathlib import Path
 
 from appliance.commands.doctor.finding import Finding, better, ok, wrong
 from appliance.commands.doctor.patient import Patient
-from appliance.show.choice import DATA, RUN, Choice
+from appliance.show.choice import DATA, RUN, STICK, Choice
 
 LEAST_FREE_BYTES, LEAST_FREE_SHARE = 256 << 20, 0.10
 LEAST_MEMORY_KB = 200 << 10
@@ -64,6 +64,26 @@ def _folder(patient: Patient, folder: Path) -> Finding:
             "`journal: {minutes: 10}` in the box file, or remove what else lies there.",
         )
     return ok(what, words)
+
+
+def media(patient: Patient) -> Iterator[Finding]:
+    """The data partition that /etc/fstab names, and the stick."""
+    mounted = patient.mounts()
+    rows = (line.split() for line in (patient.text("/etc/fstab") or "").splitlines())
+    named = {row[1] for row in rows if len(row) > 1 and not row[0].startswith("#")}
+    where = str(DATA.parent)
+    if where in named and where not in mounted:
+        yield wrong(
+            *(
+                "data partition",
+                f"It is not there: {_KEPT} are lost at a power cut. The audience sees nothing.",
+            ),
+            "`lsblk -f` and `dmesg | tail` say why; the disk's contact, or a new disk.",
+        )
+    elif where in mounted:
+        yield ok("data partition", f"It is there ({mounted[where][0]}).")
+    if str(STICK.parent) in mounted:
+        yield ok("stick", "One is plugged in, to read.")
 
 
 def system_partition(patient: Patient) -> Iterator[Finding]:
