@@ -1,0 +1,93 @@
+"""What all boot tests share: the root, the hall around the box, the box itself, the table at the end."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.boot import rights
+from tests.boot.box import KEYS, Box, standing
+from tests.boot.disk import DataDisk
+from tests.boot.figures import Figures
+from tests.boot.hall import Hall, hall
+from tests.boot.root import BUILT, root_image
+
+_FIGURES = pytest.StashKey[Figures]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[_FIGURES] = Figures()
+
+
+@pytest.fixture(scope="session")
+def figures(pytestconfig: pytest.Config) -> Figures:
+    """Where measured times go."""
+    return pytestconfig.stash[_FIGURES]
+
+
+@pytest.fixture(scope="session")
+def image() -> Path:
+    """The box's root."""
+    why_not = rights.why_not()
+    if why_not is not None:
+        pytest.skip(f"no box can boot here: {why_not}")
+    return root_image()
+
+
+@pytest.fixture(scope="session")
+def around(image: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
+    """The hall, its cable and its audience."""
+    with hall(tmp_path_factory.mktemp("hall")) as made:
+        yield made
+
+
+@pytest.fixture(scope="session")
+def proven(
+    image: Path, around: Hall, figures: Figures, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[DataDisk]:
+    """The data disk of a box that has danced an evening with the venue's box file, and was switched off."""
+    folder = tmp_path_factory.mktemp("evening")
+    fresh = DataDisk.made(folder / "data.ext4", {KEYS: around.key_file})
+    with standing(image, around, fresh, tmp_path_factory.mktemp("first")) as box:
+        box.power_on()
+        first = box.await_frames()[0]
+        figures.note("first power-on with a new box file to first frame", first.at - box.machine.powered_at)
+        box.machine.await_that(box.is_proven, "the venue's box file is not taken for good")
+        box.machine.power_off()
+        fresh.repaired()
+        yield box.disk.copied(folder / "proven.ext4")
+
+
+@pytest.fixture
+def box(image: Path, around: Hall, proven: DataDisk, tmp_path: Path) -> Iterator[Box]:
+    """A box after a good evening, switched off; it is off again afterwards."""
+    with standing(image, around, proven, tmp_path) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def dancing(
+    image: Path, around: Hall, proven: DataDisk, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Box]:
+    """A box that dances with a sensor, shared by the tests of a module; each finds it dancing."""
+    with standing(image, around, proven, tmp_path_factory.mktemp("box")) as made:
+        made.power_on()
+        made.await_frames()
+        around.dance_with_sensor()
+        made.await_sensor()
+        yield made
+        around.switch_sensor_off()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """The table; with $BUNRAKU_FIGURES it goes into that folder too."""
+    measured = config.stash[_FIGURES]
+    if not measured.values:
+        return
+    terminalreporter.section("times of the boot tests")
+    for line in measured.table():
+        terminalreporter.write_line(line)
+    measured.write(Path(os.environ.get("BUNRAKU_FIGURES", BUILT)))

@@ -1,0 +1,69 @@
+"""The root that boots: built as the image's is, from the working tree, and kept until an input changes."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.conftest import ROOT
+
+MKROOT = ROOT / "deploy" / "image" / "mkroot.sh"
+MAKE_RELEASE = ROOT / "deploy" / "release" / "make-release"
+BUILT = ROOT / "build" / "boot"
+_INPUTS = ("appliance", "hw_sim", "deploy", "pyproject.toml")
+_DEBIAN = ("deploy/image/packages-box.txt", "deploy/image/drop-files.txt")
+_FAST = ("-comp", "zstd", "-Xcompression-level", "3", "-noappend", "-quiet", "-no-progress")
+_UNSTABLE = {"__pycache__"}
+
+
+def root_image() -> Path:
+    """root.squashfs for this working tree; half a minute when Debian's part is there, else one and a half."""
+    folder = BUILT / f"root-{_key(_files(*_INPUTS))}"
+    image = folder / "root.squashfs"
+    if not image.exists():
+        for old in BUILT.glob("root-*"):
+            shutil.rmtree(old)
+        folder.mkdir(parents=True)
+        _build(folder, image)
+    return image
+
+
+def release(root: Path) -> Path:
+    """The release that is installed in this root, as `make release` lays it on a stick."""
+    return root.parent / "release"
+
+
+def _build(folder: Path, image: Path) -> None:
+    debian, part = BUILT / f"debian-{_key(_files(*_DEBIAN))}.tar", image.with_suffix(".part")
+    _run(str(MAKE_RELEASE), "--out", str(folder / "release"))
+    made = [str(MKROOT), "--without-kernel", "--release", str(folder / "release"), "--debian", str(debian)]
+    _run(*made, str(folder / "root"))
+    _run("mksquashfs", str(folder / "root"), str(part), *_FAST)
+    shutil.rmtree(folder / "root")
+    part.rename(image)
+
+
+def _files(*names: str) -> list[Path]:
+    found: list[Path] = []
+    for name in names:
+        path = ROOT / name
+        found += [path] if path.is_file() else [one for one in path.rglob("*") if one.is_file()]
+    return sorted(one for one in found if not _UNSTABLE & set(one.parts))
+
+
+def _key(files: list[Path]) -> str:
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(f"{path.relative_to(ROOT)}\0{os.access(path, os.X_OK)}\0".encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()[:16]
+
+
+def _run(*words: str) -> None:
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, f"{' '.join(words)}: {done.returncode}\n{done.stdout}{done.stderr}"

@@ -1,0 +1,65 @@
+"""Whoever accompanies the stage may die or hang: it comes back, and the dance does not notice."""
+
+from __future__ import annotations
+
+import signal
+import time
+
+import pytest
+
+from tests.boot.box import STAGE, Box
+from tests.boot.figures import Figures
+from tests.boot.pauses import lives, longest_pause_s, missing_ticks
+
+DARK_S = 0.5  # from here on the projector would fade to black
+
+pytestmark = pytest.mark.boot
+
+
+@pytest.mark.parametrize("way", ["SIGKILL", "SIGSTOP"])
+@pytest.mark.parametrize("name", ["projector", "console", "control", "lights"])
+def test_the_dance_goes_on_without_noticing(dancing: Box, figures: Figures, name: str, way: str) -> None:
+    machine, unit = dancing.machine, f"bunraku-{name}"
+    if way == "SIGSTOP" and name in ("console", "projector"):
+        pytest.skip(f"the watchdog of {name} takes 10 s and more; that it bites is shown for the others")
+    stage = machine.main_pid(STAGE)
+    began = time.time()
+    machine.await_that(lambda: machine.show(unit, "ActiveState") == "active", f"{unit} does not run")
+    process = machine.main_pid(unit)
+    harmed = machine.kill(unit, getattr(signal, way))
+    machine.await_that(lambda: machine.main_pid(unit) not in (0, process), f"{unit} does not come back")
+    machine.await_that(lambda: machine.show(unit, "ActiveState") == "active", f"{unit} does not run again")
+    figures.note(f"{way} to a new {name}", time.time() - harmed)
+    dancing.hall.audience.watch(0.5)
+    seen = [frame for frame in dancing.hall.audience.frames if frame.at > began]
+    figures.note(f"ticks missing after {way} of the {name}", missing_ticks(seen), limit=0, unit="ticks")
+    assert machine.main_pid(STAGE) == stage and lives(seen) == 1
+    assert longest_pause_s(seen) < DARK_S
+
+
+def test_show_control_answers_again_after_it_was_killed(dancing: Box) -> None:
+    dancing.machine.kill("bunraku-control")
+    answered = dancing.machine.await_that(
+        lambda: [
+            arguments for where, arguments in dancing.hall.ask("/status", 0.5) if where == "/bunraku/status"
+        ],
+        "show control does not answer",
+    )
+    assert answered[0][0] == "dancing"
+
+
+def test_the_keeper_may_die_and_the_journal_goes_on(dancing: Box) -> None:
+    machine = dancing.machine
+    machine.await_that(lambda: machine.show("bunraku-keeper", "ActiveState") == "active", "no keeper")
+    process = machine.main_pid("bunraku-keeper")
+    began = machine.kill("bunraku-keeper")
+    machine.await_that(
+        lambda: machine.main_pid("bunraku-keeper") not in (0, process), "the keeper does not come back"
+    )
+    journal = machine.path("/data/bunraku/journal")
+    machine.await_that(
+        lambda: any(path.stat().st_mtime > began + 1.5 for path in journal.rglob("*") if path.is_file()),
+        "the journal does not go on",
+    )
+    seen = [frame for frame in dancing.hall.audience.watch(0.2) if frame.at > began]
+    assert lives(seen) == 1

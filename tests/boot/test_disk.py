@@ -1,0 +1,79 @@
+"""The data partition is full, read-only or not there: the audience notices nothing."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from tests.boot.box import STAGE, Box
+from tests.boot.figures import Figures
+from tests.boot.pauses import lives, longest_pause_s, missing_ticks
+
+pytestmark = pytest.mark.boot
+
+
+def _fill(box: Box) -> None:
+    """Not a byte is free, not even for root."""
+    box.machine.run(
+        "sh", "-c", "head -c 1G /dev/zero >/data/filler; head -c 1M /dev/zero >>/data/filler", check=False
+    )
+    assert "100%" in box.machine.run("df", "/data")
+
+
+def _dances_again_after_a_kill(box: Box, figures: Figures, name: str) -> None:
+    killed = box.machine.kill(STAGE)
+    _, after = box.pause_from(killed)
+    figures.note(f"SIGKILL to next frame, {name}", after.at - killed, limit=1.0)
+
+
+def test_a_full_data_partition(box: Box, figures: Figures) -> None:
+    box.power_on()
+    box.await_frames(50)
+    began = time.time()
+    _fill(box)
+    box.hall.audience.watch(2.5)
+    seen = [frame for frame in box.hall.audience.frames if frame.at > began]
+    assert lives(seen) == 1 and longest_pause_s(seen) < 0.5
+    figures.note(
+        "ticks missing while the data partition fills up", missing_ticks(seen), limit=0, unit="ticks"
+    )
+    _dances_again_after_a_kill(box, figures, "data partition full")
+    box.machine.cut_power()
+    box.power_on()
+    first = box.await_frames()[0]
+    figures.note("power-on to first frame, data partition full", first.at - box.machine.powered_at)
+    said = box.machine.await_that(lambda: _said_of_the_disk(box), "nobody says that the disk is full")
+    assert said
+    box.machine.path("/data/filler").unlink()
+    newest = time.time()
+    journal = box.machine.path("/data/bunraku/journal")
+    box.machine.await_that(
+        lambda: any(path.stat().st_mtime > newest for path in journal.rglob("*") if path.is_file()),
+        "the journal does not go on when there is room again",
+    )
+
+
+def _said_of_the_disk(box: Box) -> str:
+    lines = box.machine.log("bunraku-keeper").splitlines()
+    return "\n".join(line for line in lines if "disk" in line or "partition" in line or "MB" in line)
+
+
+def test_a_read_only_data_partition(box: Box, figures: Figures) -> None:
+    box.power_on()
+    box.await_frames(100)
+    box.machine.power_off()
+    box.power_on(disk_options="ro")
+    first = box.await_frames()[0]
+    figures.note("power-on to first frame, data partition read-only", first.at - box.machine.powered_at)
+    box.hall.dance_with_sensor()
+    box.await_sensor()
+    box.hall.switch_sensor_off()
+    _dances_again_after_a_kill(box, figures, "data partition read-only")
+
+
+def test_no_data_partition_at_all(box: Box, figures: Figures) -> None:
+    box.power_on(disk=None)
+    first = box.await_frames()[0]
+    figures.note("power-on to first frame, no data partition", first.at - box.machine.powered_at)
+    _dances_again_after_a_kill(box, figures, "no data partition")

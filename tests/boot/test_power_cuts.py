@@ -1,0 +1,73 @@
+"""The plug is pulled at any moment: it always dances again, nothing is half written, the phrase goes on."""
+
+from __future__ import annotations
+
+import json
+import random
+import time
+
+import pytest
+
+from appliance.stage.place import Place
+from tests.boot.box import KEYS, Box
+from tests.boot.figures import Figures
+
+CUTS = 20
+AGE_LIMIT_S = 1.0
+MOST_S = 10.0  # however busy this machine is: what is older than this was not the place of that evening
+
+pytestmark = pytest.mark.boot
+
+
+def test_it_dances_again_after_twenty_power_cuts(box: Box, figures: Figures) -> None:
+    chance = random.Random(5)
+    box.power_on()
+    box.await_frames()
+    for cut in range(CUTS):
+        left = _cut_somewhere(box, chance, in_the_start=cut % 5 == 4)
+        box.power_on()
+        first = box.await_frames()[0]
+        figures.note("power-on after a power cut to first frame", first.at - box.machine.powered_at)
+        _nothing_is_half_written(box)
+        if left is not None:
+            age_s = _age_s(left, box.place())
+            figures.note("age of the place after a power cut", age_s, limit=AGE_LIMIT_S)
+            assert -0.05 < age_s < MOST_S, (left, box.place())
+    figures.note("power cuts survived", CUTS, unit=f"of {CUTS}")
+    box.machine.cut_power()
+    box.disk.repaired()
+    assert box.disk.sound()
+
+
+def _cut_somewhere(box: Box, chance: random.Random, in_the_start: bool) -> Place | None:
+    """Cut while it dances, with writes on the way; or while it starts, before or after its first frame.
+
+    Where the dance was; None in a start.
+    """
+    if in_the_start:
+        box.machine.cut_power()
+        box.power_on()
+        time.sleep(chance.uniform(0.0, 3.0))
+        box.machine.cut_power()
+        return None
+    box.hall.audience.watch(chance.uniform(0.1, 2.5))
+    (box.machine.path("/data/bunraku") / "unsynced").write_bytes(bytes(4096))
+    left = box.place()
+    box.machine.cut_power()
+    return left
+
+
+def _age_s(left: Place, now: Place) -> float:
+    """How long before the cut the place was noted at which the dance went on."""
+    began_s = now.position_s - (now.tick + 1) / 50.0
+    start_s, end_s = now.excerpt
+    age_s = left.position_s - began_s
+    return age_s if age_s > -0.05 else age_s + end_s - start_s
+
+
+def _nothing_is_half_written(box: Box) -> None:
+    data = box.machine.path("/data")
+    assert (data / KEYS).read_bytes() == box.hall.key_file
+    chosen = json.loads((data / "bunraku" / "chosen.json").read_bytes())
+    assert chosen["box"].startswith("/data/bunraku/boxes/"), chosen
+    assert not list(data.rglob("*.part")), "an unfinished file was left"

@@ -1,0 +1,61 @@
+"""Power on, and it dances: nobody logs in, nobody presses a key."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.boot.box import STAGE, Box
+from tests.boot.figures import Figures
+
+POWER_ON_LIMIT_S = 3.0
+UNITS = ("stage", "keeper", "control", "lights", "projector", "console")
+
+pytestmark = pytest.mark.boot
+
+
+def test_after_an_evening_that_ended_it_begins_at_the_beginning(box: Box, figures: Figures) -> None:
+    for _ in range(3):
+        box.power_on()
+        first = box.await_frames()[0]
+        figures.note("power-on to first frame", first.at - box.machine.powered_at, limit=POWER_ON_LIMIT_S)
+        assert first.tick == 0
+        now = box.place()
+        assert now.position_s == pytest.approx((now.tick + 1) / 50.0, abs=0.001), (
+            "it did not begin at the beginning"
+        )
+        box.machine.power_off()
+
+
+def test_all_that_belongs_to_the_box_runs_and_nothing_has_failed(box: Box) -> None:
+    box.power_on()
+    box.await_frames()
+    machine = box.machine
+    for unit in UNITS:
+        machine.await_that(
+            lambda unit=unit: machine.show(f"bunraku-{unit}", "ActiveState") == "active",
+            f"{unit} does not run",
+        )
+    machine.await_that(lambda: _settled(box), "the box is still starting")
+    failed = machine.run("systemctl", "--failed", "--plain", "--no-legend")
+    assert not failed, f"{failed}\n{machine.log()}"
+    assert all(machine.show(f"bunraku-{unit}", "NRestarts") == "0" for unit in UNITS), machine.log()
+
+
+def test_only_the_stages_main_thread_has_real_time_priority(box: Box) -> None:
+    box.power_on()
+    box.await_frames(20)
+    stage = box.machine.main_pid(STAGE)
+    policies = box.machine.run(
+        "ps", "-L", "-o", "lwp=,cls=,rtprio=", "-p", str(_inside(box, stage))
+    ).splitlines()
+    realtime = [line.split() for line in policies if "FF" in line.split()]
+    assert [(lwp, priority) for lwp, _, priority in realtime] == [(str(_inside(box, stage)), "70")], policies
+
+
+def _settled(box: Box) -> bool:
+    return box.machine.run("systemctl", "is-system-running", check=False).strip() in ("running", "degraded")
+
+
+def _inside(box: Box, pid: int) -> int:
+    assert pid
+    return int(box.machine.show(STAGE, "MainPID"))
