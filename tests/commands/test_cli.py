@@ -16,8 +16,9 @@ from appliance.cli import main, plug_in
 from appliance.pose.bvh import write_bvh
 from appliance.sensor.keys import create_keys
 from appliance.show.bundle import write_checksums
-from appliance.stage.journal import Journal
-from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+from appliance.stage.journal.export import export
+from tests.stage.bundles import swaying_phrase, write_show
+from tests.stage.night import Night
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -194,13 +195,11 @@ def test_a_filmstrip_of_a_recording_and_of_a_journal(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     show = write_show(tmp_path / "show")
-    journal = Journal(tmp_path / "night.journal", FIGURE, [{"joint": "lShldr"}], minutes=0.2)
-    for tick in range(100):
-        journal.field["tick"][journal.row] = tick
-        journal.field["pose"][journal.row] = (1, 0, 0, 0)
-        journal.commit()
-    journal.close()
-    for source in (show / "phrase.bvh", tmp_path / "night.journal"):
+    night = Night(show, tmp_path / "runtime")
+    night.dance(100)
+    folder = night.kept(tmp_path / "night.journal")
+    exported = export(folder, tmp_path / "night.bunraku")
+    for source in (show / "phrase.bvh", exported):
         picture = tmp_path / "picture.png"
         assert str(picture) in succeeded(
             capsys, "filmstrip", str(source), "--out", str(picture), "--seconds", "1"

@@ -14,9 +14,9 @@ from appliance.commands.rehearsal import has_display, rehearsal_picture
 from appliance.projector.strip import COLUMNS, PICTURE, ROWS, strip
 from appliance.show.look import looks_by_name
 from appliance.show.show import load_show
-from appliance.stage.journal import Journal
 from appliance.stage.stage_error import StageError
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+from tests.stage.night import Night
 
 WIDTH, HEIGHT = PICTURE
 LARGEST_BYTES = 600_000
@@ -30,16 +30,10 @@ def pictures_of(path: Path) -> list[np.ndarray]:
 
 
 def write_journal(path: Path, ticks: int = 100) -> Path:
-    """A journal of a sway, as `play` writes it."""
-    phrase = swaying_phrase()
-    journal = Journal(path, FIGURE, [{"joint": "lShldr"}], minutes=0.2)
-    for tick in range(ticks):
-        journal.field["tick"][journal.row] = tick
-        journal.field["pose"][journal.row] = phrase.poses[tick % len(phrase.poses)]
-        journal.field["root"][journal.row] = phrase.roots[0]
-        journal.commit()
-    journal.close()
-    return path
+    """A journal of a sway, as `play` leaves it."""
+    night = Night(write_show(path.parent / "danced"), path.parent / "runtime")
+    night.dance(ticks)
+    return night.kept(path)
 
 
 @pytest.mark.parametrize("look", ["plaster", "lines"])

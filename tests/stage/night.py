@@ -1,4 +1,4 @@
-"""A night of dancing under the test's clock: a real tick, a real recorder, a real carrier to a real folder."""
+"""A night of dancing under the test's clock: a real tick, a real recorder, a real carrier."""
 
 from __future__ import annotations
 

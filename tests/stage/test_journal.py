@@ -1,128 +1,192 @@
-"""The flight recorder keeps what was danced through a kill, in bounded memory."""
+"""The flight recorder: what the stage notes reaches the disk, and is read back from whatever is left."""
 
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
-import sys
+import tarfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from appliance.pose.skeleton import Skeleton
-from appliance.stage.journal import Journal, JournalError, read_journal
+from appliance.stage.clock import TICK_S
+from appliance.stage.journal import chunks
+from appliance.stage.journal.export import export
+from appliance.stage.journal.journal_error import JournalError
+from appliance.stage.journal.reading import read_journal
+from appliance.stage.journal.recorder import EVENT_BYTES, FILE, LOG_SLOTS
+from appliance.stage.journal.segments import segment_paths
+from tests.stage.bundles import FIGURE, WORN, write_show
+from tests.stage.night import Night, reading
 
-FIGURE = Skeleton(
-    ("Hips", "Chest", "Arm"),
-    (-1, 0, 1),
-    np.array([[0, 0, 0], [0, 0.5, 0], [0.2, 0, 0]], float),
-    ((2, (0.3, 0, 0)),),
-)
-HANDS = [{"joint": "Arm", "kind": "sensor", "name": "left-wrist"}]
-
-LONG_FIGURE = Skeleton(
-    tuple(f"joint{number}" for number in range(200)), tuple(range(-1, 199)), np.ones((200, 3))
-)
-
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from tests.stage.test_journal import FIGURE, HANDS, write_ticks
-from appliance.stage.journal import Journal
-journal = Journal(Path(sys.argv[1]), FIGURE, HANDS, minutes=1.0)
-write_ticks(journal, range(700))
-journal.field["tick"][journal.row] = 700  # torn: killed before the record was complete
-os.kill(os.getpid(), signal.SIGKILL)
-"""
+TURNED = (0.8, 0.6, 0.0, 0.0)
 
 
-def write_ticks(journal: Journal, ticks: range) -> None:
-    for tick in ticks:
-        row = journal.row
-        journal.field["tick"][row] = tick
-        journal.field["pose"][row] = tick
-        journal.field["root"][row] = (tick, 1.0, 2.0)
-        journal.commit()
+@pytest.fixture(scope="module")
+def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_show(tmp_path_factory.mktemp("bundle") / "show")
 
 
-def test_reads_back_every_tick_and_the_figure(tmp_path: Path) -> None:
-    journal = Journal(tmp_path / "night.journal", FIGURE, HANDS, minutes=1.0)
-    write_ticks(journal, range(100))
-    journal.close()
-    recording = read_journal(tmp_path / "night.journal")
-    assert recording.ticks["tick"].tolist() == list(range(100))
-    assert recording.ticks["root"][7].tolist() == [7.0, 1.0, 2.0]
-    assert recording.header["hands"] == HANDS
-    assert recording.skeleton.same_joints(FIGURE)
-    assert recording.skeleton.ends == FIGURE.ends
-    np.testing.assert_allclose(recording.skeleton.offsets, FIGURE.offsets)
+@pytest.fixture
+def night(show: Path, tmp_path: Path) -> Night:
+    return Night(show, tmp_path / "runtime")
 
 
-def test_survives_a_kill_and_leaves_the_torn_record_out(tmp_path: Path) -> None:
-    path = tmp_path / "night.journal"
-    killed = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
-    assert killed.returncode == -signal.SIGKILL
-    assert read_journal(path).ticks["tick"].tolist() == list(range(700))
+def test_every_tick_the_readings_and_the_figure_are_read_back(night: Night, tmp_path: Path) -> None:
+    night.dance(70, reading(TURNED))
+    night.dance(30)
+    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    assert run.ticks["tick"].tolist() == list(range(100))
+    np.testing.assert_array_equal(run.ticks["pose"][-1], night.tick.frame.pose)
+    np.testing.assert_array_equal(run.ticks["reading_here"][:, 0], [1] * 70 + [0] * 30)
+    np.testing.assert_array_equal(run.ticks["reading_orientation"][69, 0], TURNED)
+    assert run.header["hands"] == [WORN | {"kind": "sensor"}]
+    assert run.skeleton.same_joints(FIGURE) and run.skeleton.ends == FIGURE.ends
+    np.testing.assert_allclose(run.skeleton.offsets, FIGURE.offsets)
 
 
-def test_the_ring_keeps_the_newest_ticks_in_order(tmp_path: Path) -> None:
-    journal = Journal(tmp_path / "night.journal", FIGURE, HANDS, minutes=0.2)
-    assert journal.capacity == 600
-    write_ticks(journal, range(1500))
-    journal.close()
-    assert read_journal(tmp_path / "night.journal").ticks["tick"].tolist() == list(range(900, 1500))
+def test_events_are_kept_in_their_place_and_long_ones_lose_their_end(night: Night, tmp_path: Path) -> None:
+    night.dance(3)
+    night.recorder.event("said", 12.5, words="x" * 5 * EVENT_BYTES, count=3)
+    night.dance(2)
+    night.recorder.event("odd", 13.0, what=object())
+    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    assert run.tick_numbers.tolist() == [1, 2, 3, 5, 6]
+    ((number, event),) = run.events
+    assert (number, event["kind"], event["now"], event["count"]) == (4, "said", 12.5, 3)
+    assert 100 < len(event["words"]) < EVENT_BYTES
+    assert night.recorder.lost == 1
 
 
-LONG_NIGHT = """
-import sys
-from pathlib import Path
-from tests.stage.test_journal import LONG_FIGURE, resident_bytes, write_ticks
-from appliance.stage.journal import Journal
-from appliance.stage.realtime import enter_realtime
-journal = Journal(Path(sys.argv[1]), LONG_FIGURE, [], minutes=4.0)  # 12,000 ticks, 39 MB
-enter_realtime(10)
-journal.unlock()
-write_ticks(journal, range(1100))
-before = resident_bytes()
-write_ticks(journal, range(1100, 11000))
-print(resident_bytes() - before)
-"""
+def test_what_a_keeper_missed_is_fetched_by_the_next_one_and_nothing_comes_twice(
+    night: Night, tmp_path: Path
+) -> None:
+    for count in (40, 700, 1):
+        night.dance(count)
+        night.kept(tmp_path / "journal")
+    (run,) = read_journal(tmp_path / "journal").runs
+    assert run.ticks["tick"].tolist() == list(range(741))
+    assert len(run.keyframes) == 2
+    assert len(segment_paths(tmp_path / "journal")) == 3
 
 
-def test_a_long_night_does_not_stay_in_memory_even_where_memory_is_locked(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", LONG_NIGHT, str(tmp_path / "night.journal")]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert int(done.stdout) < 6_000_000
+def test_the_memory_holds_more_than_a_minute_and_what_is_older_is_a_gap(night: Night, tmp_path: Path) -> None:
+    night.dance(10)
+    night.kept(tmp_path / "journal")
+    night.dance(LOG_SLOTS + 20)
+    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    assert LOG_SLOTS * TICK_S > 60.0
+    assert run.ticks["tick"].tolist() == [*range(10), *range(30, LOG_SLOTS + 30)]
 
 
-def resident_bytes() -> int:
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
+def test_a_stage_that_died_leaves_all_that_it_noted(show: Path, tmp_path: Path) -> None:
+    """The keeper has the memory of the old one still open when the new one has put its own in its place."""
+    first = Night(show, tmp_path / "runtime")
+    carrier = first.carrier(tmp_path / "journal")
+    first.dance(20)
+    carrier.turn(0.0)
+    first.dance(15)
+    second = Night(show, tmp_path / "runtime")
+    second.dance(5)
+    carrier.turn(1.0)
+    runs = read_journal(tmp_path / "journal").runs
+    assert [run.ticks["tick"].tolist() for run in runs] == [list(range(35)), list(range(5))]
 
 
-def test_a_place_that_cannot_be_written_says_what_to_do(tmp_path: Path) -> None:
-    with pytest.raises(JournalError, match=r"no journal \(No such file or directory; it needs .* MB\).*Free"):
-        Journal(tmp_path / "absent" / "night.journal", FIGURE, HANDS, minutes=1.0)
+def test_segments_are_a_minute_long_and_the_oldest_go(night: Night, tmp_path: Path) -> None:
+    carrier, folder = night.carrier(tmp_path / "journal", minutes=1.0), tmp_path / "journal"
+    for second in range(190):
+        night.dance(50)
+        carrier.turn(float(second))
+    first, last = (np.int64(tick) for tick in read_journal(folder).ticks["tick"][[0, -1]])
+    assert last == 190 * 50 - 1
+    assert 60 * 50 <= last - first <= 120 * 50
+    assert 2 <= len(segment_paths(folder)) <= 3
+    oldest = read_journal(segment_paths(folder)[0]).runs[0]
+    assert oldest.keyframes[0][0] < oldest.tick_numbers[0]  # a replay may begin with its first tick
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_a_full_disk_is_found_at_the_start(tmp_path: Path) -> None:
-    with pytest.raises(JournalError, match="no journal"):
-        Journal(Path("/dev/full"), FIGURE, HANDS, minutes=1.0)
+def test_a_torn_end_costs_that_piece_alone(night: Night, tmp_path: Path) -> None:
+    carrier, folder = night.carrier(tmp_path / "journal"), tmp_path / "journal"
+    for second in range(4):
+        night.dance(25)
+        carrier.turn(float(second))
+    (segment,) = segment_paths(folder)
+    whole = segment.read_bytes()
+    seen = set()
+    for size in range(0, len(whole), 97):
+        segment.write_bytes(whole[:size])
+        try:
+            ticks = read_journal(folder).ticks["tick"].tolist()
+        except JournalError as error:
+            assert "nothing was recorded" in str(error) or "not a journal" in str(error)
+            ticks = []
+        assert ticks == list(range(len(ticks)))
+        seen.add(len(ticks))
+    assert seen == {0, 25, 50, 75}  # the last byte of the fourth piece was never there
+    damaged = bytearray(whole)
+    damaged[len(whole) - 40] ^= 1
+    segment.write_bytes(damaged)
+    assert len(read_journal(folder).ticks) == 75
 
 
-@pytest.mark.parametrize(
-    "content",
-    [b"", b"bunraku journal 1\n", b"PK\x03\x04" * 40000, b"bunraku journal 1\n{torn".ljust(70000, b"\0")],
-)
+def test_an_export_is_one_file_that_reads_as_the_folder_does(night: Night, tmp_path: Path) -> None:
+    night.dance(120, reading(TURNED))
+    folder = night.kept(tmp_path / "journal")
+    stick = tmp_path / "stick"
+    stick.mkdir()
+    exported = export(folder, stick, lambda: 0.0)
+    assert exported.name.startswith("a-test-19") and exported.suffix == ".bunraku"
+    assert [path.name for path in stick.iterdir()] == [exported.name]
+    assert read_journal(exported).ticks.tobytes() == read_journal(folder).ticks.tobytes()
+    with tarfile.open(exported) as archive:
+        archive.extractall(tmp_path / "unpacked", filter="data")
+    assert os.system(f"cd {tmp_path}/unpacked && sha256sum --check --quiet SHA256SUMS") == 0
+
+
+def test_an_export_that_does_not_fit_leaves_nothing_behind(night: Night, tmp_path: Path) -> None:
+    night.dance(10)
+    folder = night.kept(tmp_path / "journal")
+    with pytest.raises(JournalError, match=r"cannot be written there.*stays on the box"):
+        export(folder, tmp_path / "absent" / "night.bunraku")
+    if Path("/dev/full").exists():
+        (tmp_path / ".full.part").symlink_to("/dev/full")
+        with pytest.raises(JournalError, match="No space left"):
+            export(folder, tmp_path / "full")
+        assert not list(tmp_path.glob("*full*"))
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04" * 40000, b"bkj1" + bytes(200)])
 def test_what_is_no_journal_is_refused_in_words(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "odd.journal"
+    path = tmp_path / "odd"
     path.write_bytes(content)
-    with pytest.raises(JournalError, match=r"not a journal|damaged"):
+    with pytest.raises(JournalError, match=r"not a journal|nothing was recorded"):
         read_journal(path)
 
 
-def test_an_absent_journal_is_refused_in_words(tmp_path: Path) -> None:
+def test_a_journal_of_an_older_release_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "old.journal"
+    path.write_bytes(b"bunraku journal 1\n{}".ljust(70000, b"\0"))
+    with pytest.raises(JournalError, match="older release"):
+        read_journal(path)
+
+
+def test_an_absent_and_an_empty_journal_are_refused_in_words(tmp_path: Path) -> None:
     with pytest.raises(JournalError, match="cannot be read"):
         read_journal(tmp_path / "absent.journal")
+    with pytest.raises(JournalError, match="no journal is in this folder"):
+        read_journal(tmp_path)
+
+
+def test_only_its_owner_reads_what_is_in_memory_and_on_the_disk(night: Night, tmp_path: Path) -> None:
+    night.dance(5)
+    folder = night.kept(tmp_path / "journal")
+    for path in (tmp_path / "runtime" / FILE, folder, *segment_paths(folder)):
+        assert path.stat().st_mode & 0o077 == 0
+
+
+def test_silence_costs_little_room(night: Night, tmp_path: Path) -> None:
+    night.dance(500)
+    (segment,) = segment_paths(night.kept(tmp_path / "journal"))
+    raw = sum(len(one.data) for one in chunks.chunks(segment.read_bytes()))
+    assert segment.stat().st_size < raw / 2

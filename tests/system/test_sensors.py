@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.stage.journal import read_journal
+from appliance.stage.journal.reading import read_journal
 from hw_sim.emulator import Sent
 from tests.hw_sim.null_modem import NullModem
 from tests.stage.bundles import FIGURE, MOVING, write_show

@@ -1,0 +1,128 @@
+"""The keeper and a disk that is full, read-only or gone: said once, tried again, and the newest is kept."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from appliance.stage.journal.carrier import RETRY_S
+from appliance.stage.journal.reading import read_journal
+from appliance.stage.journal.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
+from appliance.stage.keeper import keep_on
+from tests.stage.bundles import write_show
+from tests.stage.fakes import FakeTime
+from tests.stage.night import Night
+
+DISK_BYTES = 8 << 20
+
+
+@pytest.fixture
+def night(tmp_path: Path) -> Night:
+    return Night(write_show(tmp_path / "show"), tmp_path / "runtime")
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of its own, of eight megabytes."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounting = ("mount", "-t", "tmpfs", "-o", f"size={DISK_BYTES}", "tmpfs", str(folder))
+    if subprocess.run(mounting, capture_output=True, check=False).returncode:
+        pytest.skip("no file system can be mounted here (not root, or in a closed container)")
+    yield folder
+    subprocess.run(("umount", "-l", str(folder)), check=True)
+
+
+def fill(disk: Path, but: int = 0) -> Path:
+    """All the room that is left, but for so many bytes, taken by somebody else."""
+    ballast = disk / "ballast"
+    with ballast.open("wb", buffering=0) as file:
+        try:
+            while True:
+                file.write(bytes(4096))
+        except OSError:
+            file.truncate(file.tell() - but)
+            return ballast
+
+
+def test_a_full_disk_is_said_once_and_the_newest_follows_when_there_is_room(night: Night, disk: Path) -> None:
+    carrier = night.carrier(disk / "journal")
+    night.dance(100)
+    carrier.turn(0.0)
+    ballast = fill(disk)
+    for turn in range(1, 100):
+        night.dance(5)
+        carrier.turn(float(turn))
+    (said,) = night.said
+    assert "the journal stops growing (No space left on device)" in said and "Free the disk" in said
+    assert carrier.complaint == said
+    assert carrier.errors == 1 + int(98 / RETRY_S)
+    ballast.unlink()
+    carrier.turn(200.0)
+    assert carrier.complaint == "" and "grows again" in night.said[1]
+    assert read_journal(disk / "journal").ticks["tick"].tolist() == list(range(595))
+
+
+def test_a_disk_that_becomes_read_only_is_no_reason_to_stop(night: Night, disk: Path) -> None:
+    carrier = night.carrier(disk / "journal")
+    night.dance(50)
+    carrier.turn(0.0)
+    carrier._segments.finish()  # nobody writes: it can be remounted
+    subprocess.run(("mount", "-o", "remount,ro", str(disk)), check=True)
+    night.dance(50)
+    carrier.turn(1.0)
+    assert "Read-only file system" in carrier.complaint
+    subprocess.run(("mount", "-o", "remount,rw", str(disk)), check=True)
+    carrier.turn(1.0 + RETRY_S)
+    assert read_journal(disk / "journal").ticks["tick"].tolist() == list(range(100))
+
+
+def test_a_disk_that_is_not_there_is_waited_for(night: Night, tmp_path: Path) -> None:
+    (tmp_path / "data").touch()  # nothing can be made below a file
+    carrier = night.carrier(tmp_path / "data" / "journal")
+    night.dance(50)
+    carrier.turn(0.0)
+    assert "Not a directory" in carrier.complaint
+    (tmp_path / "data").unlink()
+    (tmp_path / "data").mkdir()
+    carrier.turn(5.0)
+    assert carrier.complaint
+    carrier.turn(RETRY_S)
+    assert not carrier.complaint
+    assert len(read_journal(tmp_path / "data" / "journal").ticks) == 50
+
+
+def test_the_oldest_go_where_room_is_short_but_never_the_newest_minute(night: Night, disk: Path) -> None:
+    carrier, folder = night.carrier(disk / "journal"), disk / "journal"
+    for second in range(170):
+        night.dance(50)
+        carrier.turn(float(second))
+    assert len(segment_paths(folder)) == 3
+    fill(disk, but=int(LEAST_FREE_SHARE * DISK_BYTES) + 100_000)
+    for second in range(170, 330):
+        night.dance(50)
+        carrier.turn(float(second))
+        if second % 10 == 9:
+            ticks = read_journal(folder).ticks["tick"]
+            assert len(ticks) >= SEGMENT_TICKS
+    assert int(ticks[0]) > 0 and int(ticks[-1]) == 330 * 50 - 1  # it goes on in the room that the oldest had
+    assert night.said == []
+
+
+def test_the_keeper_turns_until_it_is_stopped_and_then_once_more() -> None:
+    time, happened = FakeTime(), list[str]()
+
+    class Carried:
+        complaint = ""
+
+        def turn(self, now: float) -> None:
+            happened.append(f"turn at {now - 1000.0:.1f}")
+
+        def last_turn(self) -> None:
+            happened.append("last turn")
+
+    keep_on([Carried()], lambda: time.now > 1001.2, lambda now: None, time.monotonic, time.sleep)
+    assert happened == ["turn at 0.0", "turn at 0.5", "turn at 1.0", "last turn"]
