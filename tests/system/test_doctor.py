@@ -19,6 +19,7 @@ from appliance.commands.doctor.patient import LivingStage, Patient
 from appliance.commands.doctor.sample import Sample, sample
 from appliance.control.fallback import Fallen
 from appliance.show.box import BoxConfig
+from appliance.show.choice import Choice
 from tests.stage.bundles import write_show
 from tests.system.box import playing
 
@@ -198,17 +199,10 @@ def test_memory_and_swap(tmp_path: Path) -> None:
 
 
 def test_a_show_that_was_refused_is_told(tmp_path: Path) -> None:
-    pair = {
-        "show": "/data/shows/a",
-        "box": "/data/boxes/a.yaml",
-        "id": "a+a",
-        "source": "stick",
-        "good": True,
-    }
-    choice = {"pairs": [pair], "refused": ["show.yaml:3: no such key."], "aside": ["b+b"]}
-    lay(tmp_path, "/run/bunraku/chosen.json", json.dumps(choice))
+    (tmp_path / "run/bunraku").mkdir(parents=True)
+    Choice(refused=("show.yaml:3: no such key.",)).write(tmp_path / "run/bunraku/chosen.json")
     found = list(storage.choice(Patient(tmp_path)))
-    assert [one.verdict for one in found] == ["ok", "better", "better"]
+    assert [one.verdict for one in found] == ["ok", "better"]
     assert "show.yaml:3" in found[1].words
 
 

@@ -148,8 +148,3 @@ def choice(patient: Patient) -> Iterator[Finding]:
         yield better(
             "show", f"Refused, so the show before dances: {refused}", "Mend it, and plug it in anew."
         )
-    for aside in chosen.aside:
-        yield better(
-            *("show", f"{aside} was put aside: it did not dance for 10 s in three starts."),
-            "`bunraku check` on your workstation says why; `journalctl -u bunraku-stage` what happened here.",
-        )
