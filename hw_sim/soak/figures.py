@@ -20,6 +20,7 @@ METHOD = (
     "cyclictest's."
 )
 MOST_LATE_BEYOND = 0.001  # of all slots, beyond what cyclictest shows of the machine
+MOST_LATE_OF_MACHINE = 0.005  # above it the comparison says little
 MOST_GROWTH_MB = 1.0
 
 
@@ -152,6 +153,11 @@ def table(soak: Soak) -> list[str]:
         f"{soak.guest_changes} times. Commands: {soak.desk.counts['sent']} sent, {soak.desk.counts['done']} "
         f"done, {soak.desk.counts['refused']} refused. Universes of light: {soak.universes}.",
     ]
+    if machine["late_share"] > MOST_LATE_OF_MACHINE:
+        lines.append(
+            f"The machine itself was late in {100 * machine['late_share']:.2f} % of all slots: the comparison "
+            "says little. End what else runs on it, and soak again."
+        )
     limits = limits_of(soak)
     lines += [
         f"{'ok  ' if limit.holds else 'FAIL'}  {limit.name}: {limit.found}; demanded: {limit.demanded}"
