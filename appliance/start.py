@@ -79,12 +79,15 @@ def _play(wishes: Wishes) -> int:
 
     chosen = wishes.pop("chosen", None)
     if isinstance(chosen, Path):
-        from appliance.commands.trying import pair_to_dance
+        from appliance.commands.trying import ended_well, pair_to_dance
 
         pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
         wishes |= {"show": pair.show, "box": pair.box}
     named = {_PARAMETERS.get(name, name): wish for name, wish in wishes.items()}
-    return play_show(**named)  # type: ignore[arg-type]  # wishes_to_play gives each name its type
+    status = play_show(**named)  # type: ignore[arg-type]  # wishes_to_play gives each name its type
+    if isinstance(chosen, Path):
+        ended_well(chosen)
+    return status
 
 
 def _number(text: str) -> float:

@@ -24,14 +24,17 @@ def within(seconds: float, do: Callable[[], bytes]) -> bytes:
     if child == 0:
         _answer(writing, do)
     os.close(writing)
+    how = os.WNOHANG
     try:
-        return _answered(reading, time.monotonic() + seconds, seconds)
+        answer = _answered(reading, time.monotonic() + seconds, seconds)
+        how = 0  # who has answered ends at once
     finally:
         os.close(reading)
         with contextlib.suppress(OSError):
             os.killpg(child, signal.SIGKILL)
         with contextlib.suppress(OSError):
-            os.waitpid(child, os.WNOHANG)
+            os.waitpid(child, how)
+    return answer
 
 
 def _answer(writing: int, do: Callable[[], bytes]) -> None:
@@ -42,6 +45,10 @@ def _answer(writing: int, do: Callable[[], bytes]) -> None:
         with os.fdopen(writing, "wb") as stream:
             stream.write(b"!" + do())
         status = 0
+    except BaseException:
+        import traceback
+
+        traceback.print_exc()
     finally:
         os._exit(status)
 

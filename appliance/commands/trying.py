@@ -51,6 +51,12 @@ def pair_to_dance(chosen: Path, now: float, say: Callable[[str], None]) -> Pair:
     return choice.first
 
 
+def ended_well(chosen: Path) -> None:
+    """The stage was ended as it should: this start counts for nothing."""
+    with contextlib.suppress(OSError):
+        (chosen.parent / TRIES).unlink()
+
+
 def _counted(folder: Path, pair: Pair, now: float) -> Tries | None:
     """What became of the starts before this one; None while another process still dances."""
     try:

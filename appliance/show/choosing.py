@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -62,7 +61,8 @@ def remembered(data: Path) -> Choice:
 def choose(places: Places, arrivals: list[Arrival], check: Check) -> Outcome:
     """Take what is new and sound. The newest arrival counts; the stick goes before the boot partition."""
     before, seen = remembered(places.data), _read_seen(places.data)
-    fresh = [one for one in arrivals if one.listing and _is_new(one, seen)]
+    known = {*(one.id for one in before.pairs), *before.aside, ""}
+    fresh = [one for one in arrivals if one.listing and _is_new(one, seen, known)]
     refused = [
         words for one in arrivals if one.listing and one not in fresh for words in seen[one.source]["refused"]
     ]
@@ -71,13 +71,13 @@ def choose(places: Places, arrivals: list[Arrival], check: Check) -> Outcome:
     choice, taken, said = before, False, []
     for arrival in fresh:
         if taken:
-            seen[arrival.source] = _seen(arrival, [])
+            seen[arrival.source] = _seen(arrival, [], "")
             continue
         newest, problems, is_final = _take(places, arrival, choice, check)
         refused += problems
         said += problems
         if is_final:
-            seen[arrival.source] = _seen(arrival, problems)
+            seen[arrival.source] = _seen(arrival, problems, newest.id if newest else "")
         if newest is not None:
             choice, taken = choice.with_newest(newest), newest.id != (choice.pairs or (Pair(),))[0].id
             said.append(f"{newest.source[0].upper()}{newest.source[1:]}: its show is checked and dances.")
@@ -96,7 +96,7 @@ def _take(
     for root in (places.data, places.run):
         shelf = Shelf(root) if root == places.data else Shelf(root, reserve_bytes=0)
         try:
-            shelf.sweep(choice)
+            shelf.sweep((choice, Choice.read(places.run / CHOSEN) or Choice()))
             newest, problems = _on_shelf(shelf, places, arrival, choice, check)
         except UnreadableError as error:
             cure = "Was it pulled? Plug it in again, or copy the show again."
@@ -177,21 +177,25 @@ def _write_refusals(folder: Path, seen: dict[str, Any]) -> None:
             path.unlink(missing_ok=True)
 
 
-def _is_new(arrival: Arrival, seen: dict[str, Any]) -> bool:
-    with contextlib.suppress(KeyError, TypeError):
-        return bool(seen[arrival.source]["listing"] != arrival.listing)
-    return True
+def _is_new(arrival: Arrival, seen: dict[str, Any], known: set[str]) -> bool:
+    """Another one than at the last look, or what was taken then is lost."""
+    one = seen.get(arrival.source)
+    return one is None or one["listing"] != arrival.listing or one["taken"] not in known
 
 
-def _seen(arrival: Arrival, refused: list[str]) -> dict[str, Any]:
-    return {"listing": arrival.listing, "refused": refused}
+def _seen(arrival: Arrival, refused: list[str], taken: str) -> dict[str, Any]:
+    return {"listing": arrival.listing, "refused": refused, "taken": taken}
 
 
 def _read_seen(data: Path) -> dict[str, Any]:
     try:
         seen = json.loads((data / SEEN).read_bytes())
         return {
-            str(source): {"listing": one["listing"], "refused": [str(words) for words in one["refused"]]}
+            str(source): {
+                "listing": one["listing"],
+                "refused": [str(words) for words in one["refused"]],
+                "taken": str(one["taken"]),
+            }
             for source, one in seen.items()
         }
     except (OSError, ValueError, TypeError, AttributeError, KeyError):

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -92,10 +92,11 @@ class Shelf:
             write_whole(path, (head + text).encode())
         return path
 
-    def sweep(self, choice: Choice) -> None:
-        """Remove what no pair needs any more, and what an interrupted copy has left."""
-        kept = {place for pair in choice.pairs for place in (pair.show, pair.box)}
-        kept |= {pair.box.with_suffix(".original.yaml") for pair in choice.pairs}
+    def sweep(self, choices: Iterable[Choice]) -> None:
+        """Remove what no pair of these needs any more, and what an interrupted copy has left."""
+        pairs = [pair for choice in choices for pair in choice.pairs]
+        kept = {place for pair in pairs for place in (pair.show, pair.box)}
+        kept |= {pair.box.with_suffix(".original.yaml") for pair in pairs}
         for kind in ("shows", "boxes"):
             with contextlib.suppress(OSError):
                 for found in (self._root / kind).iterdir():

@@ -1,0 +1,210 @@
+"""A chosen show that does not dance is put aside; one that has danced is kept, however often it is killed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from appliance.commands.giving_up import within
+from appliance.commands.proof import Proof
+from appliance.commands.trying import ANEW, TRIES, ended_well, pair_to_dance
+from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.shared_frame import FrameWriter
+from appliance.show.choice import CHOSEN, Choice, Pair
+from tests.control.doubles import facts
+from tests.stage.bundles import FIGURE, write_show
+
+NEW, BEFORE = "new+", "before+"
+
+
+class Evening:
+    """The runtime folder of a box, and starts of its stage that end as somebody likes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.run, self.data = folder / "run", folder / "data"
+        for one in (self.run, self.data):
+            one.mkdir()
+        self.said: list[str] = []
+        for name in ("new", "before"):
+            (folder / name).mkdir()
+            (folder / name / "show.yaml").touch()
+        pairs = (
+            Pair(folder / "new", id=NEW, source="show from the stick"),
+            Pair(folder / "before", id=BEFORE, source="show from the boot partition", good=True),
+            Pair(good=True),
+        )
+        Choice(pairs, data=self.data).write(self.run / CHOSEN)
+        Choice(pairs[:2], data=self.data).write(self.data / CHOSEN)
+
+    def start(self, danced_s: float | None) -> str:
+        """A start in a process of its own, which dies after so long (None: before its first frame)."""
+
+        def begin() -> bytes:
+            pair = pair_to_dance(self.run / CHOSEN, time.monotonic(), lambda words: None)
+            if danced_s is not None:
+                self._leave_frames(danced_s)
+            return pair.id.encode()
+
+        return within(60.0, begin).decode()
+
+    def dance(self, seconds: float) -> None:
+        """A stage dances what was chosen for so long, and dies."""
+
+        def dance() -> bytes:
+            self._leave_frames(seconds)
+            return b""
+
+        within(60.0, dance)
+
+    def _leave_frames(self, seconds: float) -> None:
+        """In the shared frame, as a stage that is killed does."""
+        now = time.monotonic()
+        directory = self.choice.first.show.resolve()
+        writer = FrameWriter(
+            self.run, facts(pid=os.getpid(), started=now - seconds, show_directory=directory)
+        )
+        frame = JointFrame(len(FIGURE))
+        frame.frame_time = now
+        writer.write(frame)
+
+    @property
+    def choice(self) -> Choice:
+        choice = Choice.read(self.run / CHOSEN)
+        assert choice is not None
+        return choice
+
+    @property
+    def kept(self) -> Choice:
+        choice = Choice.read(self.data / CHOSEN)
+        assert choice is not None
+        return choice
+
+
+@pytest.fixture
+def evening(tmp_path: Path) -> Evening:
+    return Evening(tmp_path)
+
+
+def test_a_new_show_that_does_not_dance_is_put_aside_at_the_fourth_start(evening: Evening) -> None:
+    assert [evening.start(danced_s=None) for _ in range(4)] == [NEW, NEW, NEW, BEFORE]
+    assert evening.choice.aside == (NEW,)
+    assert "did not dance in 3 starts and is put aside" in evening.choice.refused[0]
+
+
+def test_a_new_show_that_crashes_after_some_frames_is_put_aside(evening: Evening) -> None:
+    assert [evening.start(danced_s=4.0) for _ in range(4)] == [NEW, NEW, NEW, BEFORE]
+
+
+def test_starts_that_end_as_they_should_are_not_counted(evening: Evening) -> None:
+    for _ in range(5):
+        assert evening.start(danced_s=None) == NEW
+        ended_well(evening.run / CHOSEN)
+
+
+def test_a_new_show_that_once_danced_long_enough_is_tried_on(evening: Evening) -> None:
+    assert [evening.start(danced_s=None) for _ in range(2)] == [NEW, NEW]
+    assert evening.start(danced_s=11.0) == NEW
+    assert [evening.start(danced_s=None) for _ in range(3)] == [NEW, NEW, NEW]
+
+
+def test_a_good_show_may_be_killed_as_often_as_somebody_likes(evening: Evening) -> None:
+    evening.choice.with_good(NEW).write(evening.run / CHOSEN)
+    assert {evening.start(danced_s=0.1) for _ in range(12)} == {NEW}
+
+
+def test_a_good_show_that_gives_no_frame_any_more_is_put_aside_too(evening: Evening) -> None:
+    evening.choice.with_good(NEW).write(evening.run / CHOSEN)
+    assert [evening.start(danced_s=None) for _ in range(7)] == [NEW] * 6 + [BEFORE]
+
+
+def test_what_comes_with_the_box_is_never_put_aside(evening: Evening) -> None:
+    Choice().write(evening.run / CHOSEN)
+    assert {evening.start(danced_s=None) for _ in range(8)} == {""}
+
+
+def test_other_box_files_let_the_other_processes_start_anew(evening: Evening) -> None:
+    evening.start(danced_s=None)
+    other = evening.run / "other.yaml"
+    first, *rest = evening.choice.pairs
+    evening.choice._replace(pairs=(first._replace(box=other), *rest)).write(evening.run / CHOSEN)
+    for _ in range(3):
+        evening.start(danced_s=None)
+    assert (evening.run / ANEW).exists()
+
+
+@pytest.mark.parametrize("torn", [b"", b"[1]", b'["x", "many", 0]', b"\0\0"])
+def test_a_torn_count_begins_anew(evening: Evening, torn: bytes) -> None:
+    (evening.run / TRIES).write_bytes(torn)
+    assert evening.start(danced_s=None) == NEW
+
+
+def test_without_a_choice_what_comes_with_the_box_dances(tmp_path: Path) -> None:
+    said: list[str] = []
+    assert pair_to_dance(tmp_path / CHOSEN, 0.0, said.append) == Pair(good=True)
+    assert "The audience sees the show that comes with the box" in said[0]
+
+
+def test_who_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(evening: Evening) -> None:
+    proof = Proof(evening.run, evening.run / CHOSEN)
+    evening.dance(seconds=9.0)
+    proof.turn(time.monotonic())
+    assert not evening.kept.first.good
+    evening.dance(seconds=10.5)
+    proof.turn(time.monotonic() + 1.0)
+    assert evening.kept.first.good
+    assert evening.choice.first.good
+    assert proof.complaint == ""
+    proof.last_turn()
+
+
+def test_what_was_put_aside_is_let_go_once_another_one_has_danced(evening: Evening) -> None:
+    for _ in range(4):
+        evening.start(danced_s=None)
+    proof = Proof(evening.run, evening.run / CHOSEN)
+    evening.dance(seconds=10.5)
+    proof.turn(time.monotonic())
+    assert [pair.id for pair in evening.kept.pairs] == [BEFORE]
+    assert evening.kept.aside == (NEW,)
+    assert len(evening.kept.put_aside) == 1
+    proof.last_turn()
+
+
+def test_a_proof_that_cannot_be_kept_is_said_and_tried_again(evening: Evening) -> None:
+    proof = Proof(evening.run, evening.run / CHOSEN)
+    evening.dance(seconds=10.5)
+    temporary = evening.data / f".{CHOSEN}.new"
+    temporary.mkdir()
+    now = time.monotonic()
+    proof.turn(now)
+    assert "cannot be kept" in proof.complaint
+    temporary.rmdir()
+    proof.turn(now + 5.0)
+    assert not evening.kept.first.good
+    proof.turn(now + 11.0)
+    assert evening.kept.first.good
+    assert proof.complaint == ""
+    proof.last_turn()
+
+
+def test_a_broken_chosen_show_gives_way_on_the_real_stage(evening: Evening, tmp_path: Path) -> None:
+    """The real command, started again and again as a unit does it."""
+    (tmp_path / "new" / "show.yaml").write_text("dancer: nobody\n")
+    write_show(tmp_path / "before")
+    box = tmp_path / "box.yaml"
+    box.write_text("sensors: {udp: null}\noutputs: {osc: []}\ncontrol: null\nruntime: run\n")
+    evening.run.chmod(0o700)
+    pairs = tuple(pair._replace(box=box) for pair in evening.choice.pairs)
+    evening.choice._replace(pairs=pairs).write(evening.run / CHOSEN)
+    play = [sys.executable, "-m", "appliance.start", "play", "--alone", "--seconds", "0.3"]
+    play += ["--chosen", str(evening.run / CHOSEN)]
+    for _ in range(3):
+        assert subprocess.run(play, capture_output=True, check=False).returncode == 2
+    done = subprocess.run(play, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "is put aside" in done.stdout
+    assert "A test" in done.stdout
