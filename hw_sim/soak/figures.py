@@ -155,8 +155,8 @@ def table(soak: Soak) -> list[str]:
     ]
     if machine["late_share"] > MOST_LATE_OF_MACHINE:
         lines.append(
-            f"The machine itself was late in {100 * machine['late_share']:.2f} % of all slots: the comparison "
-            "says little. End what else runs on it, and soak again."
+            f"The machine itself was late in {100 * machine['late_share']:.2f} % of all slots: comparing "
+            "says little then. End what else runs on it, and soak again."
         )
     limits = limits_of(soak)
     lines += [
