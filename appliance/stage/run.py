@@ -166,6 +166,8 @@ class Stage:
         done: list[tuple[Order, bool, str]] = []
         while len(done) < _ORDERS_A_TICK and (order := self.inbox.take(now)) is not None:
             done.append((order, *self._carry_out(order, now)))
+        if done:
+            self.resuming.note(self.cast, self.iterations, self.tick.frame.tick)  # before anybody is told
         if any(not order.quiet for order, _, _ in done):
             self._tell(now)  # whoever asks next hears of it
         for answer in done:
