@@ -1,0 +1,162 @@
+"""The real box, killed in the middle of its dance: it goes on at the place of the phrase where it was."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import shutil
+import signal
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from appliance.stage.place import FILE, Place, PlaceReader
+from appliance.stage.place_file import PlaceFile, read_place
+from tests.stage.bundles import write_show
+from tests.system.box import PATIENCE_S, Box, playing
+
+PLAY = (sys.executable, "-m", "appliance.start", "play")
+NO_REALTIME = {"realtime": {"enabled": False}, "control": None, "state": "state"}
+
+
+@pytest.fixture(scope="module")
+def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_show(tmp_path_factory.mktemp("resume") / "show")
+
+
+def place_in(folder: Path) -> Place:
+    reader = PlaceReader(folder / "runtime")
+    place = reader.read()
+    reader.close()
+    assert place is not None
+    return place
+
+
+def goes_on_at(box: Box, count: int) -> float:
+    """Where the phrase goes on, as the box says it the `count`-th time."""
+    box.await_words("goes on at", count)
+    return float(box.words.split("goes on at ")[count].split()[0])
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
+def test_goes_on_where_it_was_however_it_died(show: Path, tmp_path: Path, how: int) -> None:
+    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+        box.frames(30)
+        box.end(how)
+        died_at = place_in(tmp_path)
+        assert not died_at.ended and died_at.position_s > 0.4
+        box.kill_and_restart()
+        box.frames(10)
+        assert goes_on_at(box, 1) == pytest.approx(died_at.position_s, abs=0.051)  # said to a tenth
+        now = place_in(tmp_path)
+        assert (now.restarts, now.power_cuts) == (1, 0)
+        assert (now.position_s - died_at.position_s) % 3.0 == pytest.approx(0.02 * (now.tick + 1), abs=0.021)
+        if how == signal.SIGABRT:  # the watchdog's: it says which line hung
+            assert "Fatal Python error: Aborted" in box.words and "run.py" in box.words
+
+
+def test_twelve_kills_in_a_row(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+        danced = 0
+        for kill in range(1, 13):
+            box.frames(1)
+            box.end(signal.SIGKILL)
+            died_at = place_in(tmp_path)
+            danced += died_at.tick + 1
+            assert died_at.restarts == kill - 1
+            assert died_at.position_s == pytest.approx(danced * 0.02 % 3.0, abs=0.045)
+            box.kill_and_restart()
+        box.frames(3)
+
+
+def test_a_show_that_was_ended_begins_at_the_beginning(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+        box.frames(20)
+        assert box.end() == 0
+        assert place_in(tmp_path).ended
+        box.kill_and_restart()
+        box.frames(5)
+        assert place_in(tmp_path).position_s < 0.4
+        assert "goes on" not in box.words
+
+
+def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Path) -> None:
+    settings = {**NO_REALTIME, "journal": {"folder": "journal"}}
+    with playing(show, tmp_path, command=PLAY, settings=settings) as box:
+        box.frame_that(lambda frame: read_place(tmp_path / "state" / FILE) is not None)
+        assert box.end() == 0
+        place = read_place(tmp_path / "state" / FILE)
+        assert place is not None and place.ended
+        shutil.rmtree(tmp_path / "runtime")
+        box.kill_and_restart()
+        box.frames(2)
+        assert "goes on" not in box.words
+
+
+def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path) -> None:
+    """The whole box with its keeper. What a power cut takes is memory: the runtime folder and the boot id."""
+    settings = {**NO_REALTIME, "journal": {"folder": "journal"}}
+    with playing(show, tmp_path, command=PLAY, settings=settings) as box:
+        box.frame_that(lambda frame: read_place(tmp_path / "state" / FILE) is not None)
+        box.frames(60)
+        await_carried(tmp_path)
+        box.end(signal.SIGKILL)
+        await_end_of_keeper(tmp_path)
+        at_cut = place_in(tmp_path)
+        on_disk = read_place(tmp_path / "state" / FILE)
+        assert on_disk is not None and not on_disk.ended and on_disk.tick <= at_cut.tick
+        shutil.rmtree(tmp_path / "runtime")
+        _as_of_another_boot(tmp_path / "state" / FILE, on_disk)
+        box.kill_and_restart()
+        box.frames(5)
+        assert goes_on_at(box, 1) == pytest.approx(on_disk.position_s, abs=0.051)
+        assert "After a power cut the show goes on" in box.words
+        assert place_in(tmp_path).power_cuts == 1
+
+
+def await_carried(folder: Path) -> None:
+    """Until the keeper has brought another place to the disk: it works, however busy the machine is."""
+    before = read_place(folder / "state" / FILE)
+    until = time.monotonic() + PATIENCE_S
+    while read_place(folder / "state" / FILE) == before:
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def await_end_of_keeper(folder: Path) -> None:
+    """It ends with the box; a power cut would have taken it in the same moment."""
+    with (folder / "runtime" / "keeper.lock").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+
+
+def _as_of_another_boot(path: Path, place: Place) -> None:
+    file = PlaceFile(path)
+    file.write(replace(place, boot="of another boot"))
+    file.close()
+
+
+@pytest.mark.parametrize("resume", ["never", "after_crash"])
+def test_the_box_file_says_whether_it_goes_on(show: Path, tmp_path: Path, resume: str) -> None:
+    settings = {**NO_REALTIME, "resume": resume}
+    with playing(show, tmp_path, "--alone", command=PLAY, settings=settings) as box:
+        box.frames(20)
+        box.kill_and_restart()
+        box.frames(3)
+        assert ("goes on" in box.words) == (resume == "after_crash")
+
+
+def test_a_return_measures_nothing_and_reads_no_phrase(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+        box.frames(5)
+        runtime = tmp_path / "runtime"
+        measured = (runtime / "admission.json").read_bytes()
+        [phrase] = (runtime / "prepared").iterdir()
+        made = phrase.stat().st_mtime_ns
+        box.kill_and_restart()
+        box.frames(5)
+        assert (runtime / "admission.json").read_bytes() == measured
+        assert json.loads(measured)["measured"]["coding"] == 3
+        assert phrase.stat().st_mtime_ns == made

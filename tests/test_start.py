@@ -1,0 +1,107 @@
+"""The command's own start: what plain playing means there is what the whole parser makes of it."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer.main
+
+from appliance import cli
+from appliance.commands.play import play_show
+from appliance.start import wishes_to_play
+
+
+def play_command() -> typer.main.TyperCommand:  # type: ignore[name-defined]
+    group = typer.main.get_command(cli.app)
+    return group.commands["play"]  # type: ignore[attr-defined,no-any-return]
+
+
+@pytest.mark.parametrize(
+    ("given", "wishes"),
+    [
+        (["play"], {}),
+        (["play", "--alone"], {"alone": True}),
+        (
+            ["play", "--alone", "--chosen", "/run/chosen.json"],
+            {"alone": True, "chosen": Path("/run/chosen.json")},
+        ),
+        (["play", "--show=a", "--box", "b.yaml"], {"show": Path("a"), "box": Path("b.yaml")}),
+        (["play", "--seconds", "2.5", "--journal", "j"], {"seconds": 2.5, "journal": Path("j")}),
+    ],
+)
+def test_plain_playing_is_understood(given: list[str], wishes: dict[str, object]) -> None:
+    assert wishes_to_play(given) == wishes
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "",
+        "check",
+        "--help",
+        "play --help",
+        "play show",
+        "play --emulate",
+        "play --rehearse x.png",
+        "play --shwo x",
+        "play --show",
+        "play --show --alone",
+        "play --alone=yes",
+        "play --seconds soon",
+        "play --seconds 0.01",
+        "play --seconds nan",
+        "play --show a --chosen c",
+        "play --box= --alone",
+        "play -- --alone",
+    ],
+)
+def test_everything_else_is_for_the_whole_parser(line: str) -> None:
+    assert wishes_to_play(line.split()) is None
+
+
+def test_every_plain_wish_is_an_option_of_the_command_and_of_playing() -> None:
+    line = "play --show a --box b --journal c --seconds 1 --alone"
+    wishes = wishes_to_play(line.split()) or {}
+    options = {parameter.name for parameter in play_command().params}
+    assert wishes.keys() | {"chosen"} <= options
+    parameters = inspect.signature(play_show).parameters
+    assert {"directory", "box_file", "journal", "seconds", "alone"} <= parameters.keys()
+
+
+def test_mistakes_are_one_line_as_everywhere(tmp_path: Path) -> None:
+    (tmp_path / "box.yaml").write_text("sensors: {udp: {prot: 1}}\n")
+    command = [
+        sys.executable,
+        "-m",
+        "appliance.start",
+        "play",
+        "--alone",
+        "--box",
+        str(tmp_path / "box.yaml"),
+    ]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ran.returncode == cli.REFUSED
+    assert ran.stderr.startswith("bunraku: ") and "prot" in ran.stderr and "Traceback" not in ran.stderr
+
+
+def test_playing_loads_no_parser_no_simulation_and_no_other_process_s_parts() -> None:
+    """What a start loads keeps the stage black after a crash."""
+    words = "import sys, appliance.start, appliance.commands.play; print(*sorted(sys.modules))"
+    ran = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
+    loaded = set(ran.stdout.split())
+    needless = {
+        "typer",
+        "rich",
+        "click",
+        "hw_sim",
+        "matplotlib",
+        "onnx",
+        "torch",
+        "appliance.commands.emulation",
+    }
+    needless |= {"appliance.cli", "appliance.commands.companions", "appliance.projector", "subprocess"}
+    assert not loaded & needless
