@@ -18,14 +18,17 @@ DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump 
     gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \
     qemu-system-arm:qemu-system-arm systemd:systemd-analyze shellcheck:shellcheck
 
+# A box that boots in a container; the emulated clock of its tests.
+DEBIAN_FOR_BOOT := mmdebstrap:mmdebstrap systemd-container:systemd-nspawn squashfs-tools:mksquashfs \
+    e2fsprogs:mke2fs dosfstools:mkfs.vfat mtools:mcopy libfaketime:/usr/lib/*/faketime/libfaketime.so.1
 DEBIAN_FOR_SOAK := $(DEBIAN_FOR_GL) stress-ng:stress-ng rt-tests:cyclictest
 
 FUZZ_SECONDS ?= 30
 MINUTES ?= 60
 
 .DEFAULT_GOAL := help
-.PHONY: help run release studio firmware test firmware-test fuzz-corpus lint bench lock clean soak \
-    debian-for-firmware debian-for-tests debian-for-soak
+.PHONY: help run release studio firmware test firmware-test fuzz-corpus lint bench lock clean soak boot-figures \
+    debian-for-firmware debian-for-tests debian-for-boot debian-for-soak
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -41,7 +44,7 @@ firmware: debian-for-firmware ## build the wearable's firmware for this machine:
 	@$(call build,firmware,wearable)
 	@echo "Built build/firmware/libwearable.so"
 
-test: $(VENV)/.ready-to-test debian-for-tests lint firmware firmware-test ## style, types, contracts, all tests
+test: $(VENV)/.ready-to-test debian-for-tests debian-for-boot lint firmware firmware-test ## style, types, contracts, all tests
 	@$(BIN)/pytest $(TEST_ARGS)
 
 firmware-test: debian-for-tests ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
@@ -68,6 +71,9 @@ define build
 mkdir -p build && cmake -S firmware -B build/$(1) $(3) >build/$(1).log 2>&1 || { cat build/$(1).log; exit 1; }; \
 cmake --build build/$(1) --target $(2) --parallel 2 -- --silent --no-print-directory
 endef
+
+boot-figures: $(VENV)/.ready-to-test debian-for-boot ## boot the box, harm it, cut its power; times in out/boot (root)
+	@BUNRAKU_FIGURES=out/boot $(BIN)/pytest tests/boot -rs $(TEST_ARGS)
 
 soak: $(VENV)/.ready-to-run debian-for-soak ## the whole box under load and trouble for MINUTES; figures and picture in out/soak
 	@exec $(BIN)/python -m hw_sim.soak --minutes $(MINUTES) --out out/soak
@@ -106,6 +112,9 @@ endef
 
 debian-for-tests:
 	@$(call debian,$(DEBIAN_FOR_TESTS))
+
+debian-for-boot:
+	@$(call debian,$(DEBIAN_FOR_BOOT))
 
 debian-for-soak:
 	@$(call debian,$(DEBIAN_FOR_SOAK))

@@ -1,0 +1,53 @@
+"""A USB stick with the label BUNRAKU: its image, what lies on it, and how it is pulled while it is read."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from appliance.show.bundle import default_show_path, write_checksums
+
+
+@dataclass(frozen=True)
+class Stick:
+    """An image of a FAT file system, as sticks come from the shop."""
+
+    image: Path
+
+    @staticmethod
+    def made(image: Path, content: Path, megabytes: int = 64) -> Stick:
+        """With what lies in the folder `content`."""
+        with image.open("wb") as made:
+            made.truncate(megabytes << 20)
+        _run("mkfs.vfat", "-n", "BUNRAKU", str(image))
+        _run("mcopy", "-s", "-m", "-i", str(image), *map(str, sorted(content.iterdir())), "::/")
+        return Stick(image)
+
+    def pull(self) -> None:
+        """Whoever reads it from now on gets an error instead."""
+        devices = _run("losetup", "--associated", str(self.image), "--noheadings", "--output", "NAME").split()
+        os.truncate(self.image, 0)
+        for device in devices:
+            _run("losetup", "--set-capacity", device)
+
+
+def show_on(stick: Path, name: str) -> Path:
+    """A sound show of this name in the folder of a stick's content; it can be changed before it is sealed."""
+    folder = stick / "bunraku" / "show"
+    shutil.copytree(default_show_path(), folder)
+    show = folder / "show.yaml"
+    show.write_text(show.read_text().replace("name: One hand", f"name: {name}"))
+    return sealed(folder)
+
+
+def sealed(show: Path) -> Path:
+    """The show with checksums of what lies in it now."""
+    write_checksums(show)
+    return show
+
+
+def _run(*words: str) -> str:
+    return subprocess.run(words, capture_output=True, text=True, check=True).stdout

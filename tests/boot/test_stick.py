@@ -1,0 +1,78 @@
+"""Shows come on a stick: a sound one is danced, a broken or half-read one never stops the show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.boot.box import Box
+from tests.boot.figures import Figures
+from tests.boot.stick import Stick, show_on
+
+pytestmark = pytest.mark.boot
+
+
+def _name_of_the_show(box: Box) -> str:
+    """As show control tells it."""
+    return str(
+        box.machine.await_that(
+            lambda: [words[1] for where, words in box.hall.ask("/status", 0.5) if where == "/bunraku/status"],
+            "show control does not answer",
+        )[0]
+    )
+
+
+def test_a_new_show_on_the_stick_is_danced_and_kept(box: Box, tmp_path: Path, figures: Figures) -> None:
+    show_on(tmp_path / "content", "From the stick")
+    stick = Stick.made(tmp_path / "stick.img", tmp_path / "content")
+    box.power_on(stick=stick.image)
+    first = box.await_frames()[0]
+    figures.note("power-on with a new show on the stick to first frame", first.at - box.machine.powered_at)
+    assert _name_of_the_show(box) == "From the stick"
+    box.machine.await_that(box.is_proven, "the show is not kept as one that dances")
+    box.machine.cut_power()
+    box.power_on()
+    box.await_frames()
+    assert _name_of_the_show(box) == "From the stick", "it is gone with the stick"
+
+
+def test_a_broken_show_on_the_stick_is_refused_with_file_and_line(box: Box, tmp_path: Path) -> None:
+    show = show_on(tmp_path / "content", "Broken") / "show.yaml"
+    show.write_text(show.read_text().replace("coding_iterations: 10", "coding_iteration: 10"))
+    line = next(
+        number
+        for number, words in enumerate(show.read_text().splitlines(), 1)
+        if "coding_iteration:" in words
+    )
+    stick = Stick.made(tmp_path / "stick.img", tmp_path / "content")
+    box.power_on(stick=stick.image)
+    box.await_frames()
+    assert _name_of_the_show(box) == "One hand"
+    said = box.machine.log("bunraku-preflight")
+    assert f"/media/bunraku/bunraku/show/show.yaml:{line}" in said, said
+    assert "coding_iterations" in said, "the nearest name is not told"
+    assert any(f"show.yaml:{line}" in path.read_text() for path in _refusals(box)), said
+
+
+def test_a_stick_that_is_pulled_while_it_is_read(box: Box, tmp_path: Path, figures: Figures) -> None:
+    show = show_on(tmp_path / "content", "Half read")
+    (show / "zz-long.bvh").write_bytes(bytes(100 << 20))
+    stick = Stick.made(tmp_path / "stick.img", tmp_path / "content", megabytes=128)
+    box.power_on(stick=stick.image)
+    shows = box.machine.path("/data/bunraku/shows")
+    box.machine.await_that(lambda: list(shows.glob("*part*/zz-long.bvh")), "the stick is not read")
+    stick.pull()
+    first = box.await_frames()[0]
+    figures.note(
+        "power-on with a stick that is pulled to first frame",
+        first.at - box.machine.powered_at,
+    )
+    assert _name_of_the_show(box) == "One hand"
+    assert not list(shows.glob("*part*")), "what was half read has been kept"
+    said = box.machine.log("bunraku-preflight")
+    assert "stick" in said and "goes on" in said, said
+
+
+def _refusals(box: Box) -> list[Path]:
+    return list(box.machine.path("/data/bunraku/refusals").glob("*.txt"))
