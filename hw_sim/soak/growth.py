@@ -17,26 +17,20 @@ _SHORTEST_LIFE_S = 3.0
 class Growth:
     """What one process held after its first minute, and at the end; it has lived for `lived_s`.
 
-    Memory is a median over some seconds. Handles and threads come and go with receivers and fades: their most
-    in the first half is compared with their most in the last quarter.
+    Memory is a median over some seconds. Handles and threads come and go, with receivers or for an instant:
+    what the last quarter has more than the first half, at its least and at its most, was not given back.
     """
 
     name: str
     lived_s: float
     first: Vitals
     last: Vitals
+    handles: int
+    threads: int
 
     @property
     def rss_mb(self) -> float:
         return self.last.rss_mb - self.first.rss_mb
-
-    @property
-    def handles(self) -> int:
-        return self.last.handles - self.first.handles
-
-    @property
-    def threads(self) -> int:
-        return self.last.threads - self.first.threads
 
 
 def growth(unit: Unit, run_s: float) -> Growth | None:
@@ -55,11 +49,16 @@ def growth(unit: Unit, run_s: float) -> Growth | None:
     if not early or last_at < first_at + _SHORTEST_LIFE_S:
         return None
     after = [held for at, held in history if at >= first_at]
-    half, quarter = len(after) // 2 + 1, len(after) // 4 + 1
+    half, quarter = after[: len(after) // 2 + 1], after[-(len(after) // 4 + 1) :]
     return Growth(
-        *(unit.name, history[-1][0] - history[0][0]),
-        *(_summary(early, after[:half]), _summary(late, after[-quarter:])),
+        *(unit.name, history[-1][0] - history[0][0], _summary(early, half), _summary(late, quarter)),
+        _more([held.handles for held in half], [held.handles for held in quarter]),
+        _more([held.threads for held in half], [held.threads for held in quarter]),
     )
+
+
+def _more(before: list[int], after: list[int]) -> int:
+    return min(min(after) - min(before), max(after) - max(before))
 
 
 def _summary(window: list[Vitals], while_: list[Vitals]) -> Vitals:

@@ -155,7 +155,7 @@ def test_growth_counts_from_the_first_minute_on(tmp_path: Path) -> None:
 
 
 def test_handles_that_come_and_go_are_no_leak_and_more_each_time_are(tmp_path: Path) -> None:
-    breathing = [9 + second // 10 % 3 for second in range(400)]
+    breathing = [9 + second // 10 % 3 + (second == 390) for second in range(400)]
     steady = growth(lived(tmp_path, [50.0] * 400, breathing), 400.0)
     leaking = growth(lived(tmp_path, [50.0] * 400, [b + s // 130 for s, b in enumerate(breathing)]), 400.0)
     assert steady is not None
