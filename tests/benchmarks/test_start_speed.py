@@ -1,0 +1,107 @@
+"""From the start of `bunraku play` to its first frame, and what it costs at each tick to make that quick."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.bundle import default_show_path
+from appliance.show.show import load_show
+from appliance.stage.cast import assemble
+from appliance.stage.iterations import Iterations
+from appliance.stage.resuming import Resuming
+from hw_sim.osc_receiver import OscReceiver
+from hw_sim.peers import HOST
+
+GROUP = "bunraku play, the default show: start of the process -> first frame"
+NOTE_GROUP = "the place of the dance, noted after each frame"
+ROUNDS = 7
+_PATIENCE_S = 30.0
+
+
+class Starts:
+    """Starts a box again and again; `kill`: as a crash ends it, so that the next start is a return."""
+
+    def __init__(self, folder: Path, module: str, kill: bool) -> None:
+        self._receiver = OscReceiver(HOST)
+        settings = {
+            "sensors": {"udp": None},
+            "control": None,
+            "runtime": "runtime",
+            "outputs": {"osc": [{"host": HOST, "port": self._receiver.port}]},
+        }
+        (folder / "box.yaml").write_text(yaml.safe_dump(settings))
+        self._command = [sys.executable, "-m", module, "play", "--alone", "--box", str(folder / "box.yaml")]
+        # As on the box, where everything is compiled when it is installed.
+        self._environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(folder / "compiled")}
+        self._environment.pop("PYTHONDONTWRITEBYTECODE", None)
+        self._kill = kill
+        self._process: subprocess.Popen[bytes] | None = None
+        self.first_frame()  # compiles, and prepares what a return finds
+
+    def end(self) -> None:
+        """The box before this one, and its last frames."""
+        if self._process is not None:
+            (self._process.kill if self._kill else self._process.terminate)()
+            self._process.wait()
+        self._receiver.poll(0.01)
+
+    def first_frame(self) -> None:
+        """Start it, and wait for the first thing that it sends."""
+        self._process = subprocess.Popen(
+            self._command, env=self._environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        assert self._receiver.poll(_PATIENCE_S)
+
+    def close(self) -> None:
+        self.end()
+        self._receiver.close()
+
+
+@pytest.fixture
+def starts(tmp_path: Path) -> Iterator[Callable[..., Starts]]:
+    made: list[Starts] = []
+
+    def one(module: str = "appliance.start", kill: bool = True) -> Starts:
+        made.append(Starts(tmp_path, module, kill))
+        return made[-1]
+
+    yield one
+    for each in made:
+        each.close()
+
+
+def test_the_first_start(starts: Callable[..., Starts], measured: Callable[..., Any]) -> None:
+    """The phrase is prepared already; the budget is measured."""
+    one = starts(kill=False)
+    timed = measured("after a show that was ended", GROUP, reference=True)
+    timed.pedantic(one.first_frame, setup=one.end, rounds=ROUNDS)
+
+
+def test_the_return_after_a_crash(starts: Callable[..., Starts], measured: Callable[..., Any]) -> None:
+    one = starts()
+    measured("after a crash", GROUP).pedantic(one.first_frame, setup=one.end, rounds=ROUNDS)
+
+
+def test_the_return_by_the_whole_parser(starts: Callable[..., Starts], measured: Callable[..., Any]) -> None:
+    """What a start costs that goes by the parser of all commands."""
+    one = starts("appliance.cli")
+    timed = measured("after a crash, by the parser of all commands", GROUP)
+    timed.pedantic(one.first_frame, setup=one.end, rounds=ROUNDS)
+
+
+def test_noting_the_place(tmp_path: Path, measured: Callable[..., Any]) -> None:
+    box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+    cast = assemble(load_show(default_show_path()), box)
+    resuming, iterations = Resuming("A show", tmp_path, None, "always"), Iterations(10, 9, 20)
+    measured("noting it", NOTE_GROUP, reference=True)(lambda: resuming.note(cast, iterations, 1))
+    resuming.close()
+    cast.close()
