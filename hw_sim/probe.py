@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import os
 import socket
 import subprocess
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hw_sim.journal_reader import read_journal
 from hw_sim.latency import Frame, Reading, Restart
 from hw_sim.osc_receiver import OscReceiver, decode
 from hw_sim.peers import (
@@ -37,7 +37,6 @@ from hw_sim.peers import (
 
 PLAYER_STOP = b"/player/stop\0\0\0\0,\0\0\0"
 POSE = b"/mocap/0/joint/rot_local\0"
-JOURNAL_MAGIC = b"bunraku journal 1\n"
 STEADY_S = 1.0  # the box dances with the sensor for so long before it is killed
 
 
@@ -87,7 +86,7 @@ def run(setting: Setting, course: Course) -> Run:
                 first_reading(emulator, log, folder / "emulator.txt")
                 datagrams, rss_mb, stood_from = _watch(receiver, stage, course, control)
             stop(stage, words)
-    header, ticks = _read_journal(folder / "run.journal")
+    header, ticks = read_journal(folder / "run.journal")
     return Run(
         frames=_frames(datagrams, header["joints"].index(setting.joint)),
         readings=_read_log(log, setting.sensor),
@@ -193,18 +192,6 @@ def _read_log(path: Path, sensor: str) -> list[Reading]:
         )
         for row in rows
     ]
-
-
-def _read_journal(path: Path) -> tuple[dict[str, Any], NDArray[Any]]:
-    """The box's flight recorder, by what its header says of itself."""
-    data = path.read_bytes()
-    header = json.loads(data[len(JOURNAL_MAGIC) : data.index(b"\0")])
-    record = np.dtype([(name, form, tuple(shape)) for name, form, shape in header["record"]])
-    first = header["header_bytes"]
-    count = min(header["capacity"], (len(data) - first) // record.itemsize)
-    ring = np.frombuffer(data, record, count, first)
-    ticks = ring[ring["written"] > 0]
-    return header, ticks[np.argsort(ticks["written"], kind="stable")]
 
 
 def _resident_mb(process: int) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import zlib
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 CPU_INFO = Path("/proc/cpuinfo")
 _UNKNOWN = "unknown"
+_ABILITIES = ("cpu family", "model", "stepping", "flags", "CPU variant", "CPU revision", "Features")
 _WORDS = {
     "machine": "the machine",
     "cpu": "the processor",
@@ -67,11 +69,15 @@ def _version(distribution: str) -> str:
 
 
 def _processor() -> str:
-    """Its name as the kernel has it; on ARM its part number and the board's name."""
+    """Its name as the kernel has it, and a number for what it can do: libraries choose their code by that.
+
+    Machines in a rack of virtual ones share a name, and not what they can do.
+    """
     try:
         lines = CPU_INFO.read_text(errors="replace").splitlines()
     except OSError:
         return _UNKNOWN
     named = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in lines)}
     parts = [named[name] for name in ("model name", "CPU part", "Model") if name in named]
-    return ", ".join(parts) or _UNKNOWN
+    abilities = " ".join(named.get(name, "") for name in _ABILITIES)
+    return f"{', '.join(parts) or _UNKNOWN} [{zlib.crc32(abilities.encode()):08x}]"
