@@ -111,7 +111,8 @@ check_machine() {
     # An image's root lies under an overlay in memory.
     [[ -n $root || $fleeting = yes || $(stat -f -c %T "$releases") != overlayfs ]] ||
         fail "this box runs from a read-only image and would forget the installation at power-off." \
-            "Write the new image to its card (shows and keys in /data stay), or try the release: --until-power-off"
+            "Write the new image to its card (copy /data/bunraku to a stick before: shows, keys)," \
+            "or try the release as long as the power is on: --until-power-off"
 }
 
 # ---- a release of its own beside the others
@@ -141,7 +142,8 @@ build() {
         fail "the packages could not be unpacked (above). The box dances as before."
     drop_unneeded
     write_command
-    in_root "$inside/bin/python" -I -m compileall -q -j 0 -s "$inside" -p "$home/releases/$name" "$inside/lib"
+    in_root "$inside/bin/python" -I -m compileall -q -j 0 -s "$inside" -p "$home/releases/$name" "$inside/lib" ||
+        fail "a part of bunraku $version cannot be read by Python (above). The box dances as before."
     for file in system release SHA256SUMS install.sh; do mv "$part/source/$file" "$part/"; done
     chmod 755 "$part/install.sh"
     rm -rf "$part/source" "$part/.gitignore" "$part/include"
@@ -165,10 +167,13 @@ write_command() {
     chmod 755 "$part/bin/bunraku"
 }
 
-# On the box it dances a moment out of sight; in an image, whose machine is another one, it loads every part.
+# On the box it dances a moment out of sight; in an image, whose machine is another one, it loads every part, and
+# under emulation, which has no processor that onnxruntime knows (it ends with SIGSEGV), its command alone.
 works() {
     local python=$home/releases/$1/bin/python meeting result=0
-    if [ -n "$root" ]; then
+    if [[ -n $root && $(in_root dpkg --print-architecture) != $(dpkg --print-architecture) ]]; then
+        in_root "$python" -I -c 'import appliance.start'
+    elif [ -n "$root" ]; then
         in_root "$python" -I -c 'import importlib, pkgutil, appliance
 for module in pkgutil.walk_packages(appliance.__path__, "appliance."):
     if not module.name.startswith("appliance.studio"):
@@ -288,8 +293,8 @@ starts() {
     local pid deadline=$((SECONDS + STARTS_WITHIN_S))
     runs_here || return 0
     systemctl daemon-reload
-    systemd-tmpfiles --create || true
-    udevadm control --reload || true
+    systemd-tmpfiles --create "$home/current/system/usr/lib/tmpfiles.d/bunraku.conf" || true
+    udevadm control --reload 2>/dev/null || true # a container has no udev
     timeout "$STARTS_WITHIN_S" systemctl restart bunraku.target || true
     until is_active; do
         [ "$SECONDS" -lt "$deadline" ] || return 1

@@ -1,4 +1,4 @@
-"""Cuts the disk mounted at the folder in argv[1] off: what was not synced is lost, and nothing more is written."""
+"""Cuts the disk mounted at argv[1] off: what was not synced is lost, and nothing more is written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A small whole release: laid out as `make release` does it, one tiny wheel, for roots that have no Debian 13."""
+"""A small whole release as `make release` lays it out: one tiny wheel, for roots that have no Debian 13."""
 
 from __future__ import annotations
 

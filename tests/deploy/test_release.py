@@ -1,0 +1,135 @@
+"""What a release is made of: locks with hashes and without hosts, the same packages for every processor."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+RELEASE = ROOT / "deploy" / "release"
+LINE = re.compile(r"(?P<name>[A-Za-z0-9_.]+)==(?P<version>[0-9][0-9A-Za-z.]*) --hash=sha256:[0-9a-f]{64}")
+ELF_MACHINES = {"amd64": 62, "arm64": 183}
+
+
+def _pins(*locks: str) -> dict[str, str]:
+    """Name (as package indexes spell it) to version."""
+    pins: dict[str, str] = {}
+    for lock in locks:
+        for line in (RELEASE / lock).read_text().splitlines():
+            if not line.startswith("#"):
+                found = LINE.fullmatch(line)
+                assert found is not None, f"{lock}: {line}"
+                pins[found["name"].lower().replace("_", "-")] = found["version"]
+    return pins
+
+
+AMD64 = ("requirements-amd64.lock",)
+ARM64 = ("requirements-arm64.lock", "sources-arm64.lock")
+
+
+@pytest.mark.parametrize("locks", [AMD64, ARM64])
+def test_everything_that_the_box_needs_is_pinned(locks: tuple[str, ...]) -> None:
+    needed = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    names = {re.split(r"[<>=~! ]", one)[0].lower().replace("_", "-") for one in needed}
+    assert names - set(_pins(*locks)) == set(), "run deploy/release/lock"
+
+
+def test_a_box_has_the_same_packages_on_every_processor() -> None:
+    assert _pins(*AMD64) == _pins(*ARM64)
+
+
+def test_no_lock_and_no_script_names_a_host() -> None:
+    for path in RELEASE.iterdir():
+        assert "://" not in path.read_text(), path.name
+
+
+def test_what_is_left_out_of_an_installation_is_never_loaded() -> None:
+    """The patterns as modules: nothing that the whole box imports comes from there."""
+    modules = {
+        line.removesuffix(".py").replace("/", ".")
+        for line in (RELEASE / "unneeded.txt").read_text().splitlines()
+        if line and "*" not in line and not line.startswith("#")
+    }
+    code = (
+        "import importlib, pkgutil, sys, appliance, hw_sim\n"
+        "for package in (appliance, hw_sim):\n"
+        "    for one in pkgutil.walk_packages(package.__path__, package.__name__ + '.'):\n"
+        "        if not one.name.startswith('appliance.studio') and not one.name.endswith('__main__'):\n"
+        "            importlib.import_module(one.name)\n"
+        "print(*sys.modules)"
+    )
+    loaded = subprocess.check_output([sys.executable, "-c", code], text=True, cwd=ROOT).split()
+    assert [
+        name for name in loaded if any(name == one or name.startswith(f"{one}.") for one in modules)
+    ] == []
+
+
+def test_the_cross_built_wheels_are_for_the_processor_that_they_name() -> None:
+    wheels = sorted((ROOT / "build/release/built-arm64").glob("*.whl"))
+    if not wheels:
+        pytest.skip("No wheel was cross-built here: make release ARCH=arm64 does it.")
+    assert {path.name.split("-")[0] for path in wheels} == set(_pins("sources-arm64.lock"))
+    for wheel in wheels:
+        with zipfile.ZipFile(wheel) as content:
+            libraries = [name for name in content.namelist() if name.endswith(".so")]
+            assert libraries, wheel.name
+            for name in libraries:
+                header = content.read(name)[:20]
+                assert header[:4] == b"\x7fELF"
+                assert int.from_bytes(header[18:20], "little") == ELF_MACHINES["arm64"], name
+                assert name.endswith(".cpython-313-aarch64-linux-gnu.so")
+
+
+@pytest.mark.parametrize(
+    "script", ["install.sh", "release/make-release", "release/lock", "release/cross-build"]
+)
+def test_every_script_teaches_its_use(script: str) -> None:
+    done = subprocess.run([ROOT / "deploy" / script, "--help"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert done.stdout.startswith("Usage: ")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A release of this working tree; its packages come from build/release, or from the network once."""
+    folder = tmp_path_factory.mktemp("made") / "release"
+    done = subprocess.run([RELEASE / "make-release", "--out", folder], capture_output=True, text=True)
+    if "Is there a network" in done.stderr:
+        pytest.skip(f"No release can be made here: {done.stderr.strip().splitlines()[-1]}")
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_a_release_names_each_of_its_files_with_its_sum(made: Path) -> None:
+    lines = (made / "SHA256SUMS").read_text().splitlines()
+    sums = {name: digest for digest, name in (line.split("  ./", 1) for line in lines)}
+    files = {str(path.relative_to(made)) for path in made.rglob("*") if path.is_file()} - {"SHA256SUMS"}
+    assert {name: _sum(made / name) for name in files} == sums
+
+
+def test_a_release_brings_exactly_what_is_pinned_and_the_box_itself(made: Path) -> None:
+    wheels = [path.name.split("-")[:2] for path in (made / "wheels").iterdir()]
+    brought = {name.lower().replace("_", "-"): version for name, version in wheels}
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert brought == _pins(*AMD64) | {"bunraku": version}
+    assert (made / "release").read_text().startswith(f"version {version}\narchitecture amd64\npython 3.13\n")
+
+
+def test_the_boxs_wheel_has_everything_that_is_no_python(made: Path) -> None:
+    with zipfile.ZipFile(next((made / "wheels").glob("bunraku-*.whl"))) as wheel:
+        inside = set(wheel.namelist())
+    kinds = {".yaml", ".onnx", ".bvh", ".glsl", ".json", ".png"}
+    there = {str(path.relative_to(ROOT)) for path in (ROOT / "appliance").rglob("*") if path.suffix in kinds}
+    assert there - inside == set()
+
+
+def _sum(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
