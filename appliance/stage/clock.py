@@ -42,6 +42,10 @@ class TickClock:
         self._sleep = sleep
         self._slot = Slot(deadline=monotonic())
 
+    def begin(self, in_s: float) -> None:
+        """Call it before the first wait, when all is ready: the grid begins in so many seconds."""
+        self._slot.deadline = self.now() + in_s - self.period_s
+
     def wait(
         self, shift_s: float = 0.0, lead_s: float = 0.0, warm_up: Callable[[], object] | None = None
     ) -> Slot:

@@ -36,6 +36,7 @@ from appliance.stage.wearing import Wearing
 
 _ORDERS_A_TICK = 4  # show control sends no more in that time
 _WARM_UP_MARGIN_MS = 0.5
+_FIRST_FRAME_IN_S = 0.001
 _LONGEST_WARM_UP_MS = 3.0  # a network this heavy comes from memory each time: warming it up gains nothing
 _FORGET_PHASE_S = 5.0  # a sensor silent for longer may come back anywhere: the phase is learnt anew
 
@@ -119,6 +120,7 @@ class Stage:
         self.resuming.begin(self.cast, self.iterations)
         if self.recorder is not None:
             self.recorder.keyframe(self.tick.state())
+        clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self.tick.run(slot)

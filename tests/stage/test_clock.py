@@ -27,6 +27,17 @@ def test_ticks_stand_on_the_grid_although_every_sleep_overshoots() -> None:
         time.work(noise.uniform(0.0, 0.015))
 
 
+def test_the_first_slot_is_due_when_all_is_ready() -> None:
+    time = FakeTime()
+    clock = clock_on(time)
+    time.work(0.3)  # opening ports, sharing the frame
+    clock.begin(0.004)
+    slot = clock.wait()
+    assert (slot.tick, slot.skipped) == (0, 0)
+    assert slot.deadline == slot.started == pytest.approx(1000.304)
+    assert clock.wait().deadline == pytest.approx(1000.304 + TICK_S)
+
+
 def test_a_long_tick_skips_slots_and_is_never_followed_by_a_burst() -> None:
     time = FakeTime()
     clock = clock_on(time)
