@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -185,6 +186,33 @@ def test_a_cue_is_the_stages_first_and_then_picture_and_lights_follow(
     asker.ask("/cue", 1)
     now = house(folder)
     assert (now.cue, now.look, now.lights, now.master) == ("1", "lines", "cold", 0.5)
+
+
+def test_after_a_power_cut_picture_and_lights_are_those_of_the_stages_cue(folder: Path) -> None:
+    """Memory is empty, and the stage has found in the disk's place in which cue it was."""
+    with StageDouble(folder) as stage:
+        stage.tell(cue="storm")
+        control = ControlInThread(folder)
+        until(lambda: house(folder).cue == "storm")
+        now = house(folder)
+        assert (now.look, now.lights, now.master) == ("ink", "cold", 1.0)
+        assert now.look_mix(time.monotonic()) == 1.0
+        control.close()
+
+
+@pytest.mark.parametrize(("left", "cue"), [(House(cue="1", look="lines"), "storm"), (House(), "of another")])
+def test_what_is_in_force_stays_whatever_the_stages_cue(folder: Path, left: House, cue: str) -> None:
+    with closing(HouseWriter(folder)) as writer:
+        writer.write(left)
+    with StageDouble(folder) as stage:
+        stage.tell(cue=cue)
+        control = ControlInThread(folder)
+        asker = Asker(control.port)
+        until(lambda: control.process.desk.status(0, time.monotonic()).state == "dancing")
+        asker.ask("/ping")
+        assert (house(folder).cue, house(folder).look) == (left.cue, left.look)
+        asker.close()
+        control.close()
 
 
 def test_a_cue_that_the_stage_refuses_or_does_not_hear_changes_nothing(
