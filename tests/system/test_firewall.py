@@ -1,4 +1,4 @@
-"""The firewall lets in what a running box listens to beyond loopback, and nothing else; nft takes its rules."""
+"""The firewall lets in what a running box listens to beyond loopback, nothing else; nft takes its rules."""
 
 from __future__ import annotations
 

@@ -1,0 +1,147 @@
+"""All processes of a box tell how they are, and show control tells it on; who dies is counted."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from appliance.commands.proof import Proof
+from appliance.control.company import LATE_S, Company, CompanyWriter
+from appliance.control.fallback import Fallback, Fallbacks
+from appliance.control.sight import StageSight
+from appliance.control.tellings import Status
+from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.shared_frame import FrameWriter
+from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
+from appliance.show.choice import CHOSEN, Choice, Pair
+from appliance.stage.journal.carrier import JournalCarrier
+from appliance.stage.keeper_health import (
+    CHOICE_NOT_KEPT,
+    JOURNAL_STOPPED,
+    PLACE_NOT_KEPT,
+    KeeperHealth,
+)
+from appliance.stage.place_file import PlaceCarrier
+from tests.control.doubles import Asker, ControlInThread, StageDouble, facts
+from tests.stage.bundles import FIGURE
+
+DMX = Fallback("dmx-away", "A wire is away.")
+
+
+def told(company: Company, now: float) -> dict[str, tuple[str, int, bool]]:
+    return {one.name: (who, one.times, one.active) for who, one in company.fallbacks(now)}
+
+
+def test_a_process_tells_its_fallbacks(folder: Path) -> None:
+    fallbacks, company = Fallbacks([DMX]), Company(folder)
+    lights = CompanyWriter(folder, "lights", fallbacks)
+    lights.tell(10.0)
+    assert told(company, 10.0) == {}
+    fallbacks.set("dmx-away", True, "The adapter is unplugged.")
+    lights.tell(10.5)
+    assert told(company, 10.5) == {}, "once a second is enough"
+    lights.tell(11.0)
+    assert told(company, 11.0) == {"dmx-away": ("lights", 1, True)}
+    lights.end(11.5)
+    lights.close()
+    company.close()
+
+
+def test_lights_projector_and_keeper_that_die_are_counted(folder: Path) -> None:
+    company = Company(folder)
+    for who in ("lights", "projector", "keeper"):
+        first = CompanyWriter(folder, who, Fallbacks(()))
+        first.tell(10.0)
+        first.close()  # and never says that it ends
+        assert told(company, 10.0 + LATE_S) == {}
+        late = told(company, 10.1 + LATE_S)
+        assert late == {f"{who}-died": (who, 1, True)}
+        second = CompanyWriter(folder, who, Fallbacks(()))
+        second.tell(20.0)
+        assert told(company, 20.0) == {f"{who}-died": (who, 1, False)}
+        second.end(21.0)
+        second.close()
+        assert told(company, 90.0) == {f"{who}-died": (who, 1, False)}, "who has ended is not late"
+        third = CompanyWriter(folder, who, Fallbacks(()))
+        third.tell(100.0)
+        assert told(company, 100.0) == {}
+        third.close()
+        (folder / f"{who}.health").unlink()
+        company = Company(folder)
+
+
+def test_a_second_projector_says_nothing(folder: Path) -> None:
+    first = CompanyWriter(folder, "projector", Fallbacks(OF_THE_PROJECTOR))
+    second_fallbacks = Fallbacks(OF_THE_PROJECTOR)
+    second = CompanyWriter(folder, "projector", second_fallbacks)
+    for row in (STAGE_UNSEEN, PICTURES_SMALLER):
+        second_fallbacks.set(row.name, True)
+    first.tell(10.0)
+    second.tell(10.0)
+    assert told(Company(folder), 10.0) == {}
+    second.close()
+    first.close()
+
+
+def test_the_keeper_tells_that_the_journal_has_stopped(folder: Path) -> None:
+    carrier = JournalCarrier(folder, Path("/nowhere/at/all"), 1.0, lambda words: None)
+    carrier.complaint = "The disk is full."
+    keeper = KeeperHealth(folder)
+    keeper.tell([carrier], 10.0)
+    assert told(Company(folder), 10.0) == {JOURNAL_STOPPED.name: ("keeper", 1, True)}
+    keeper.end(11.0)
+
+
+def test_the_keeper_tells_all_that_it_cannot_keep(folder: Path) -> None:
+    chosen, place = Proof(folder, folder / CHOSEN), PlaceCarrier(folder, folder, lambda words: None)
+    chosen.complaint = place.complaint = "The disk is read-only."
+    keeper = KeeperHealth(folder)
+    keeper.tell([chosen, place], 10.0)
+    assert set(told(Company(folder), 10.0)) == {PLACE_NOT_KEPT.name, CHOICE_NOT_KEPT.name}
+    chosen.complaint = place.complaint = ""
+    keeper.tell([chosen, place], 12.0)
+    assert not any(active for _, _, active in told(Company(folder), 12.0).values())
+    keeper.end(13.0)
+
+
+def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
+    company = Company(folder)
+    assert told(company, 1.0) == {}
+    Choice((Pair(),), ("Broken one.", "Broken two.", "Did not dance."), ("a+",)).write(folder / CHOSEN)
+    assert told(company, 1.0) == {
+        "show-refused": ("preflight", 2, True),
+        "show-put-aside": ("preflight", 1, True),
+    }
+    (folder / CHOSEN).write_bytes(b"{")
+    assert told(company, 1.0) == {}
+
+
+def test_a_stage_that_hangs_is_counted_once(folder: Path) -> None:
+    writer = FrameWriter(folder, facts())
+    frame = JointFrame(len(FIGURE))
+    frame.frame_time = time.monotonic()
+    writer.write(frame)
+    sight = StageSight(folder)
+    now = frame.frame_time
+    assert sight.fallbacks(now) == []
+    for later in (0.6, 0.7, 0.8):
+        assert sight.state(now + later) == "hung"
+    [(who, hung)] = sight.fallbacks(now + 0.9)
+    assert (who, hung.name, hung.times, hung.active) == ("control", "stage-hung", 1, True)
+    sight.close()
+    writer.close()
+
+
+def test_the_desk_answers_and_the_status_counts(folder: Path) -> None:
+    words = "A tick was late."
+    control = ControlInThread(folder)
+    with StageDouble(folder) as stage:
+        stage.tell(fallbacks=[["tick-late", 3, True, words], ["receiver-gone", 1, False, "Gone."]])
+        asker = Asker(control.port)
+        *answers, end = asker.ask_all("/fallbacks")
+        assert end == ["/end", "/fallbacks", 2]
+        assert answers[0] == ["/fallbacks/fallback", "tick-late", "stage", 3, 1, words]
+        status = asker.ask_all("/status")[0]
+        assert Status(*status[1:]).fallbacks == 1
+        asker.close()
+    control.close()

@@ -1,0 +1,233 @@
+"""Every fallback of the stage: counted when it happens, in force while it lasts, with words for people."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from appliance.control.company import OF_THE_COMPANY
+from appliance.control.fallback import RECENT_S, Fallback, Fallbacks, Fallen, fallen
+from appliance.lights.fallback import OF_THE_LIGHTS
+from appliance.projector.fallback import OF_THE_PROJECTOR
+from appliance.sensor.link import SensorReading
+from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig, SerialConfig
+from appliance.show.show import load_show
+from appliance.stage import fallback as rows
+from appliance.stage.budget import Admission
+from appliance.stage.cast import Cast, assemble
+from appliance.stage.fallback import OF_THE_STAGE, StageFallbacks
+from appliance.stage.health import Health
+from appliance.stage.keeper_health import OF_THE_KEEPER
+from appliance.stage.resuming import Resuming
+from tests.stage.bundles import write_show
+
+FITS = Admission(3, 2, 3, 2, 64, 0.1, 0.2, 0.3, 10.0)
+DOES_NOT_FIT = Admission(30, 20, 9, 6, 9, 1.0, 20.0, 30.0, 10.0)
+
+
+@pytest.fixture
+def danced(tmp_path: Path) -> Iterator[Cast]:
+    """A cast with one sensor, a cable that is not there, and a receiver."""
+    cable = SerialConfig(device=str(tmp_path / "ttyACM0"))
+    box = BoxConfig(
+        sensors=SensorsConfig(udp=None, serial=[cable]), outputs=OutputsConfig(osc=[OscConfig(port=9)])
+    )
+    cast = assemble(load_show(write_show(tmp_path / "show")), box)
+    yield cast
+    cast.close()
+
+
+@pytest.fixture
+def stage(danced: Cast) -> StageFallbacks:
+    return StageFallbacks(danced, FITS)
+
+
+def of(stage: StageFallbacks, row: Fallback, now: float) -> Fallen:
+    found = [one for one in stage.told(now) if one.name == row.name]
+    return found[0] if found else Fallen(row.name, 0, False, row.words)
+
+
+def hear(danced: Cast, at: float) -> None:
+    danced.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, at, at, 90, 255))
+
+
+def test_sensor_silent(stage: StageFallbacks, danced: Cast) -> None:
+    for now in (1.0, 1.02):
+        stage.watch(now)
+    assert of(stage, rows.SENSOR_SILENT, 1.0).times == 0, "one that was never heard is not silent"
+    hear(danced, 2.0)
+    for now in (2.08, 2.12, 2.14, 20.0):
+        stage.watch(now)
+    stage.look(20.0, Health())
+    assert of(stage, rows.SENSOR_SILENT, 20.0)[1:3] == (1, True)
+    hear(danced, 20.5)
+    stage.watch(20.52)
+    stage.look(21.0, Health())
+    assert of(stage, rows.SENSOR_SILENT, 21.0)[1:3] == (1, False)
+
+
+@pytest.mark.parametrize("reason", ["zero", "norm", "torn", "rate"])
+def test_reading_refused(stage: StageFallbacks, danced: Cast, reason: str) -> None:
+    danced.link._counts[reason] += 3
+    stage.look(1.0, Health())
+    stage.look(2.0, Health())
+    assert of(stage, rows.READING_REFUSED, 2.0)[1:3] == (3, True)
+    assert not of(stage, rows.READING_REFUSED, 1.1 + RECENT_S).active
+
+
+@pytest.mark.parametrize("reason", ["length", "magic", "device", "tag"])
+def test_packet_refused(stage: StageFallbacks, danced: Cast, reason: str) -> None:
+    danced.link._counts[reason] += 1
+    stage.look(1.0, Health())
+    assert of(stage, rows.PACKET_REFUSED, 1.0)[1:3] == (1, True)
+
+
+def test_cable_away(stage: StageFallbacks, danced: Cast) -> None:
+    stage.look(1.0, Health())
+    told = of(stage, rows.CABLE_AWAY, 1.0)
+    assert told[1:3] == (1, True)
+    assert "ttyACM0" in told.words
+    danced.link.intakes[0].trouble = None  # type: ignore[attr-defined]
+    stage.look(2.0, Health())
+    assert of(stage, rows.CABLE_AWAY, 2.0)[1:3] == (1, False)
+
+
+def test_sensor_not_let_in(stage: StageFallbacks) -> None:
+    told = of(stage, rows.NOT_LET_IN, 1.0)
+    assert told[1:3] == (1, True)
+    assert "key file" in told.words
+
+
+@pytest.mark.parametrize(
+    ("row", "counter"),
+    [
+        (rows.TICK_LATE, "late"),
+        (rows.TICK_SKIPPED, "skipped"),
+        (rows.OVER_BUDGET, "over_budget"),
+        (rows.NETWORK_FAILED, "not_finite"),
+    ],
+)
+def test_what_health_counts(stage: StageFallbacks, row: Fallback, counter: str) -> None:
+    health = Health()
+    setattr(health, counter, 2)
+    stage.look(1.0, health)
+    setattr(health, counter, 5)
+    stage.look(2.0, health)
+    assert of(stage, row, 2.0)[1:3] == (5, True)
+    stage.look(3.0 + RECENT_S, health)
+    assert of(stage, row, 3.0 + RECENT_S)[1:3] == (5, False)
+
+
+def test_iterations_lowered(danced: Cast, stage: StageFallbacks) -> None:
+    assert of(stage, rows.ITERATIONS_LOWERED, 0.0).times == 0
+    told = of(StageFallbacks(danced, DOES_NOT_FIT), rows.ITERATIONS_LOWERED, 0.0)
+    assert told[1:3] == (1, True)
+    assert "30 coding iterations do not fit" in told.words
+
+
+def test_receiver_gone(stage: StageFallbacks, danced: Cast) -> None:
+    stage.look(1.0, Health())
+    danced.outputs.receivers[0].dropped += 4
+    stage.look(2.0, Health())
+    assert of(stage, rows.RECEIVER_GONE, 2.0)[1:3] == (1, True)
+    stage.look(3.0, Health())
+    assert of(stage, rows.RECEIVER_GONE, 3.0)[1:3] == (1, False)
+
+
+def test_not_realtime(stage: StageFallbacks) -> None:
+    stage.lack_rights(())
+    assert of(stage, rows.NOT_REALTIME, 0.0).times == 0
+    stage.lack_rights(("Memory is not locked.",))
+    assert of(stage, rows.NOT_REALTIME, 0.0) == Fallen("not-realtime", 1, True, "Memory is not locked.")
+
+
+def resumed(**changes: Any) -> Resuming:
+    return cast(Resuming, SimpleNamespace(**{"restarts": 0, "power_cuts": 0, "complaint": ""} | changes))
+
+
+BEGINNINGS: dict[str, tuple[Fallback, Callable[[StageFallbacks], None]]] = {
+    "restarts": (rows.STAGE_RESTARTED, lambda stage: stage.begin(1.0, resumed(restarts=2), "", True)),
+    "power cuts": (rows.POWER_CUT, lambda stage: stage.begin(1.0, resumed(power_cuts=2), "", True)),
+    "place": (rows.PLACE_NOT_NOTED, lambda stage: stage.begin(1.0, resumed(complaint="Full."), "", True)),
+    "frames": (rows.NOT_SHARED, lambda stage: stage.begin(1.0, resumed(), "Full.", True)),
+    "journal": (rows.NOT_RECORDED, lambda stage: stage.begin(1.0, resumed(), "", False)),
+}
+
+
+@pytest.mark.parametrize("what", BEGINNINGS)
+def test_how_a_stage_begins(stage: StageFallbacks, what: str) -> None:
+    row, begins = BEGINNINGS[what]
+    stage.begin(0.0, resumed(), "", True)
+    before = of(stage, row, 0.0).times
+    begins(stage)
+    assert (before, of(stage, row, 1.0).active) == (0, True)
+    others = {one.name for one, _ in BEGINNINGS.values()} - {row.name}
+    assert not others & {one.name for one in stage.told(1.0)}
+
+
+def test_the_status_line_names_what_is_in_force() -> None:
+    every = Fallbacks(OF_THE_STAGE)
+    assert every.line(0.0) == ""
+    every.count(rows.TICK_LATE.name, 10.0)
+    every.set(rows.RECEIVER_GONE.name, True)
+    assert every.line(11.0) == "fallbacks: tick-late, receiver-gone"
+    assert every.line(10.0 + RECENT_S) == "fallbacks: receiver-gone"
+
+
+def test_what_begins_counts_once_until_it_is_over() -> None:
+    every = Fallbacks(OF_THE_STAGE)
+    for active in (True, True, False, True):
+        every.set(rows.RECEIVER_GONE.name, active)
+    assert every.told(0.0)[0].times == 2
+
+
+def test_other_versions_say_what_they_like() -> None:
+    assert fallen(None) == fallen({"a": 1}) == fallen([1, "x", ["name"]]) == ()
+    assert fallen([["tick-late", 2, True, "Words."]]) == (Fallen("tick-late", 2, True, "Words."),)
+
+
+def test_a_look_costs_little_and_a_watch_makes_nothing(stage: StageFallbacks, danced: Cast) -> None:
+    """Objects that a tick leaves behind would call the collector, which is switched off during a show."""
+    import sys
+
+    hear(danced, 1.0)
+    stage.watch(1.0)
+    before = sys.getallocatedblocks()
+    for _ in range(1000):
+        stage.watch(1.05)
+    assert sys.getallocatedblocks() - before < 50
+
+
+ROOT = Path(__file__).resolve().parents[2]
+TABLE = re.compile(r"^\| [^|]+ \| `([a-z-]+)` \|.*\| `(\S+)::(\w+)` \|$", re.MULTILINE)
+EVERY = {
+    row.name: row
+    for row in (*OF_THE_STAGE, *OF_THE_KEEPER, *OF_THE_LIGHTS, *OF_THE_PROJECTOR, *OF_THE_COMPANY)
+}
+
+
+def test_the_table_for_technicians_has_each_fallback_and_a_test_that_names_it() -> None:
+    page = (ROOT / "docs" / "technician.md").read_text()
+    rows_of_table = TABLE.findall(page[page.index("## When things go wrong") :])
+    assert sorted(name for name, _, _ in rows_of_table) == sorted(EVERY)
+    for name, file, test in rows_of_table:
+        source = (ROOT / "tests" / file).read_text()
+        assert f"def {test}(" in source, f"{name}: {file} has no {test}"
+
+
+def test_the_table_for_desks_has_each_fallback() -> None:
+    page = (ROOT / "docs" / "osc.md").read_text()
+    page = page[page.index("### Fallbacks") : page.index("### MIDI")]
+    assert sorted(re.findall(r"^\| `([a-z-]+)` \|", page, re.MULTILINE)) == sorted(EVERY)
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_names_are_for_scripts_and_words_are_sentences(name: str) -> None:
+    row = EVERY[name]
+    assert re.fullmatch(r"[a-z]+(-[a-z]+)+", row.name)
+    assert row.words[0].isupper() and row.words.endswith(".")

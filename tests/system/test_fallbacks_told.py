@@ -1,0 +1,85 @@
+"""What lights and projector do when a wire or the stage is away is told to the box, by the real processes."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+import yaml
+
+from appliance.control.company import Company
+from appliance.control.fallback import Fallen
+from appliance.lights.fallback import DMX_AWAY
+from appliance.lights.fallback import STAGE_UNSEEN as LIGHTS_SAFE
+from appliance.projector.fallback import STAGE_UNSEEN as PICTURE_BLACK
+from hw_sim.dmx.usb_pro import UsbProWidget
+from tests.stage.bundles import write_show
+from tests.system.box import PATIENCE_S, Box, playing
+from tests.system.lit import RIG, LightsProcess
+from tests.system.test_projector import projecting
+
+
+@pytest.fixture
+def show(tmp_path: Path) -> Path:
+    folder = write_show(tmp_path / "show", hands=[])
+    config = yaml.safe_load((folder / "show.yaml").read_text()) | {"lights": RIG}
+    (folder / "show.yaml").write_text(yaml.safe_dump(config))
+    return folder
+
+
+@contextmanager
+def lit(show: Path, folder: Path, device: Path) -> Iterator[Box]:
+    """A stage alone, whose box file has one wire: a USB adapter."""
+    wire = {"universe": 1, "wire": "usb-pro", "device": str(device)}
+    with playing(show, folder, "--alone", settings={"outputs": {"dmx": [wire]}}) as box:
+        yield box
+
+
+def await_told(runtime: Path, name: str, is_wanted: Callable[[Fallen], bool]) -> Fallen:
+    until = time.monotonic() + PATIENCE_S
+    with closing(Company(runtime)) as company:
+        while True:
+            told = {one.name: one for _, one in company.fallbacks(time.monotonic())}
+            if name in told and is_wanted(told[name]):
+                return told[name]
+            assert time.monotonic() < until, told
+            time.sleep(0.05)
+
+
+def test_a_wire_that_is_away_and_back(show: Path, tmp_path: Path) -> None:
+    widget = UsbProWidget(tmp_path / "ttyUSB7")
+    with lit(show, tmp_path, widget.path) as box, LightsProcess(tmp_path) as lights:
+        away = await_told(tmp_path / "runtime", DMX_AWAY.name, lambda one: one.active)
+        assert away.times == 1
+        assert "it is not plugged in" in away.words
+        with widget:
+            await_told(tmp_path / "runtime", DMX_AWAY.name, lambda one: not one.active)
+            assert lights.end() == 0
+        box.frames(5)
+
+
+def test_a_stage_that_is_lost_and_back(show: Path, tmp_path: Path) -> None:
+    with lit(show, tmp_path, tmp_path / "none") as box, LightsProcess(tmp_path) as lights:
+        lights.await_words("The stage dances, and the lights with it.")
+        box.kill_and_restart()
+        box.end(signal.SIGKILL)
+        lost = await_told(tmp_path / "runtime", LIGHTS_SAFE.name, lambda one: one.active)
+        assert "fade to their safe look" in lost.words
+        box.kill_and_restart()
+        await_told(tmp_path / "runtime", LIGHTS_SAFE.name, lambda one: not one.active)
+
+
+def test_a_picture_without_a_stage_and_with_one(tmp_path: Path) -> None:
+    show = write_show(tmp_path / "show", hands=[])
+    with playing(show, tmp_path, "--alone") as box, projecting(tmp_path / "box.yaml", tmp_path) as projection:
+        projection.await_dance()
+        box.end(signal.SIGKILL)
+        await_told(tmp_path / "runtime", PICTURE_BLACK.name, lambda one: one.active)
+        box.kill_and_restart()
+        await_told(tmp_path / "runtime", PICTURE_BLACK.name, lambda one: not one.active)
+        assert projection.end(signal.SIGKILL) == -signal.SIGKILL
+        await_told(tmp_path / "runtime", "projector-died", lambda one: one.active)
