@@ -1,4 +1,4 @@
-"""Roots to install into: this machine's own below, what a test writes above, on a disk that can be cut off."""
+"""Roots to install into: this machine's own below, what a test writes above, on a disk that can be cut."""
 
 from __future__ import annotations
 

@@ -11,17 +11,18 @@ import pytest
 
 from tests.deploy.box_root import BoxRoot
 
-CUTS = 16
+CUTS = 8
 HERE = Path(__file__).parent
 MakeRelease = Callable[..., Path]
 
 
-def _cutting(box: BoxRoot, at: int, count: Path) -> dict[str, str]:
-    """The environment in which install.sh loses the power at its command number `at`."""
+def _cutting(box: BoxRoot, at: int | str, log: Path) -> dict[str, str]:
+    """The environment in which install.sh loses the power at command number `at`, or counts, or watches."""
     return {
         "BASH_ENV": str(HERE / "cut.bash"),
         "CUT_AT": str(at),
-        "CUT_COUNT": str(count),
+        "CUT_LOG": str(log),
+        "CUT_ROOT": str(box.path),
         "CUT_DISK": str(box.written),
         "CUT_PYTHON": sys.executable,
         "CUT_PROGRAM": str(HERE / "cut.py"),
@@ -39,7 +40,7 @@ def commands(with_first_release: BoxRoot, second: Path, tmp_path_factory: pytest
     folder = tmp_path_factory.mktemp("counted")
     box = BoxRoot(folder / "box").copy_of(with_first_release)
     try:
-        done = box.install(second, env=_cutting(box, 0, folder / "count"))
+        done = box.install(second, env=_cutting(box, "count", folder / "count"))
         assert done.returncode == 0, done.stderr
         assert box.current == "2.0.0"
     finally:
@@ -52,6 +53,17 @@ def own(with_first_release: BoxRoot, tmp_path: Path) -> Iterator[BoxRoot]:
     box = BoxRoot(tmp_path / "box").copy_of(with_first_release)
     yield box
     box.switch_off()
+
+
+def test_before_every_single_command_the_box_would_start(own: BoxRoot, second: Path, tmp_path: Path) -> None:
+    log = tmp_path / "commands"
+    log.write_text("")
+    for words in ((second,), ("--rollback",)):
+        done = own.install(*words, env=_cutting(own, "watch", log))
+        assert done.returncode == 0, done.stderr
+        assert log.read_text() == ""
+    assert own.install("--uninstall", env=_cutting(own, "watch", log)).returncode == 0
+    assert log.read_text() != "", "the watch sees a box that would not start"
 
 
 @pytest.mark.parametrize("cut", range(1, CUTS + 1))
@@ -68,7 +80,7 @@ def test_cut_at_any_command_the_box_has_one_whole_release(
     assert own.run("/usr/local/bin/bunraku") == f"bunraku {version}\n"
     assert f"version {version}" in own.run("cat", "/usr/lib/systemd/system/bunraku.target")
     assert own.run("test", "-e", "/etc/systemd/system/multi-user.target.wants/bunraku.target") == ""
-    if cut % 4 == 0:
+    if cut % 2 == 0:
         _goes_on(own, second)
 
 
