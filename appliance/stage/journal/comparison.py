@@ -70,7 +70,7 @@ class Comparison:
             metres,
             words,
         )
-        if self.worst is None or found.degrees > self.worst.degrees:
+        if self.worst is None or _size(found) > _size(self.worst):
             self.worst = replace(found, words="")
         if self.first is None and (words or self._is_beyond(found)):
             self.first = found
@@ -84,7 +84,11 @@ class Comparison:
     def _is_beyond(self, found: Difference) -> bool:
         if not self._tolerance:
             return True
-        return found.degrees > self._tolerance or found.metres > METRES_PER_DEGREE * self._tolerance
+        return _size(found) > self._tolerance
+
+
+def _size(found: Difference) -> float:
+    return max(found.degrees, found.metres / METRES_PER_DEGREE)
 
 
 def _other(recorded: Any, tick: Tick) -> str:
