@@ -18,9 +18,13 @@ DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump 
     gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \
     qemu-system-arm:qemu-system-arm systemd:systemd-analyze shellcheck:shellcheck
 
-# A box that boots in a container; the emulated clock of its tests.
+# A box that boots in a container.
 DEBIAN_FOR_BOOT := mmdebstrap:mmdebstrap systemd-container:systemd-nspawn squashfs-tools:mksquashfs \
-    e2fsprogs:mke2fs dosfstools:mkfs.vfat mtools:mcopy libfaketime:/usr/lib/*/faketime/libfaketime.so.1
+    e2fsprogs:mke2fs
+# Its disk image, and a whole machine in software that starts it.
+DEBIAN_FOR_IMAGE := $(DEBIAN_FOR_BOOT) mtools:mcopy dosfstools:mkfs.vfat fdisk:sfdisk grub-common:grub-mkimage \
+    grub-pc-bin:/usr/lib/grub/i386-pc/boot.img grub-efi-amd64-bin:/usr/lib/grub/x86_64-efi/linux.mod
+DEBIAN_FOR_VM := $(DEBIAN_FOR_IMAGE) qemu-system-x86:qemu-system-x86_64 ovmf:/usr/share/ovmf/OVMF.fd
 DEBIAN_FOR_SOAK := $(DEBIAN_FOR_GL) stress-ng:stress-ng rt-tests:cyclictest
 
 FUZZ_SECONDS ?= 30
@@ -28,7 +32,7 @@ MINUTES ?= 60
 
 .DEFAULT_GOAL := help
 .PHONY: help run release studio firmware test firmware-test fuzz-corpus lint bench lock clean soak boot-figures \
-    debian-for-firmware debian-for-tests debian-for-boot debian-for-soak
+    image test-vm debian-for-image debian-for-vm debian-for-firmware debian-for-tests debian-for-boot debian-for-soak
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -75,6 +79,18 @@ endef
 boot-figures: $(VENV)/.ready-to-test debian-for-boot ## boot the box, harm it, cut its power; times in out/boot (root)
 	@BUNRAKU_FIGURES=out/boot $(BIN)/pytest tests/boot -rs $(TEST_ARGS)
 
+image: debian-for-image ## the box's disk image, out/bunraku-amd64.img (ARCH=arm64: a Pi's root as a tar; root)
+ifeq ($(ARCH),arm64)
+	@deploy/image/mkroot.sh --arch arm64 out/bunraku-arm64.tar
+else
+	@rm -rf build/image && deploy/image/mkroot.sh build/image
+	@deploy/image/mkimage.sh build/image out/bunraku-amd64.img
+endif
+
+test-vm: $(VENV)/.ready-to-test debian-for-vm ## start the image in a machine in software, harm it, cut its power (an hour)
+	@[ -f out/bunraku-amd64.img ] || $(MAKE) image
+	@BUNRAKU_IMAGE=out/bunraku-amd64.img $(BIN)/pytest tests/vm -rs -s $(TEST_ARGS)
+
 soak: $(VENV)/.ready-to-run debian-for-soak ## the whole box under load and trouble for MINUTES; figures and picture in out/soak
 	@exec $(BIN)/python -m hw_sim.soak --minutes $(MINUTES) --out out/soak
 
@@ -115,6 +131,12 @@ debian-for-tests:
 
 debian-for-boot:
 	@$(call debian,$(DEBIAN_FOR_BOOT))
+
+debian-for-image:
+	@$(call debian,$(DEBIAN_FOR_IMAGE))
+
+debian-for-vm:
+	@$(call debian,$(DEBIAN_FOR_VM))
 
 debian-for-soak:
 	@$(call debian,$(DEBIAN_FOR_SOAK))

@@ -1,0 +1,172 @@
+"""A whole machine in software: the real image starts in qemu, somebody sits at its serial console."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import socket
+import subprocess
+import time
+from pathlib import Path
+from types import TracebackType
+
+CONSOLE_PROMPT = "technician# "
+"""Set after the login, so that the end of a command's output is known."""
+
+
+class Machine:
+    """One box of this image; its disk belongs to it alone and outlives its power."""
+
+    def __init__(self, disk: Path, folder: Path, firmware: Path | None = None) -> None:
+        self.disk, self.folder, self.firmware = disk, folder, firmware
+        self.console = Console(folder / "console", folder / "console.log")
+        self._qemu: subprocess.Popen[bytes] | None = None
+        self._powered_on = 0.0
+
+    def power_on(self) -> None:
+        """Presses the button; returns at once."""
+        assert self._qemu is None, "the machine runs already"
+        self._powered_on = time.monotonic()
+        self._qemu = subprocess.Popen(self._command(), stdin=subprocess.DEVNULL)
+        self.console.plug_in(self._qemu)
+
+    def cut_power(self) -> None:
+        """Pulls the plug: whatever the machine had not written is gone."""
+        assert self._qemu is not None, "the machine is off"
+        self._qemu.kill()
+        self._qemu.wait()
+        self._qemu = None
+        self.console.unplug()
+
+    def seconds_on(self) -> float:
+        return time.monotonic() - self._powered_on
+
+    def ask_qemu(self, command: str) -> None:
+        """One line to qemu itself, as `device_del dmx`."""
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as monitor:
+            monitor.connect(str(self.folder / "monitor"))
+            monitor.sendall(f"{command}\n".encode())
+            monitor.settimeout(5)
+            seen = b""
+            while seen.count(b"(qemu)") < 2:
+                seen += monitor.recv(4096)
+
+    def __enter__(self) -> Machine:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, what: object, trace: TracebackType | None) -> None:
+        if self._qemu is not None:
+            self.cut_power()
+
+    def _command(self) -> list[str]:
+        # One core for the box's real-time thread, one for the rest, as on the smallest real machine.
+        command = "-machine q35 -accel tcg -icount shift=1 -cpu max -smp 2 -m 2048 -nodefaults -no-user-config"
+        command += " -display none -device i6300esb -action watchdog=reset -device qemu-xhci,id=usb"
+        command += " -netdev user,id=net -device virtio-net-pci,netdev=net -device virtio-rng-pci"
+        command += " -uuid 6c1f3c8e-6a55-4a0e-9a63-0b5a6c0b8d11 -chardev null,id=adapter"
+        words = ["qemu-system-x86_64", *command.split()]
+        words += ["-drive", f"file={self.disk},format=raw,if=none,id=disk,discard=unmap"]
+        words += ["-device", "virtio-blk-pci,drive=disk"]
+        words += ["-chardev", f"socket,id=tty,path={self.console.path},server=on,wait=off", "-serial", "chardev:tty"]
+        words += ["-monitor", f"unix:{self.folder / 'monitor'},server=on,wait=off"]
+        if self.firmware is not None:
+            words += ["-drive", f"if=pflash,format=raw,readonly=on,file={self.firmware}"]
+        return words
+
+
+class Console:
+    """The serial console, with somebody who reads everything and types."""
+
+    def __init__(self, path: Path, log: Path) -> None:
+        self.path, self.log = path, log
+        self._line: socket.socket | None = None
+        self._read = ""
+
+    def plug_in(self, machine: subprocess.Popen[bytes]) -> None:
+        while True:
+            line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            try:
+                line.connect(str(self.path))
+            except OSError:
+                line.close()
+                if machine.poll() is not None:
+                    raise RuntimeError(f"qemu ended at once with {machine.returncode}") from None
+                time.sleep(0.05)
+                continue
+            self._line, self._read = line, ""
+            return
+
+    def unplug(self) -> None:
+        if self._line is not None:
+            self._line.close()
+        self._line = None
+        self.path.unlink(missing_ok=True)
+
+    def wait_for(self, pattern: str, within_s: float) -> str:
+        """Reads on until `pattern` (a regular expression) has been seen; returns what came up to its end."""
+        assert self._line is not None, "the machine is off"
+        deadline = time.monotonic() + within_s
+        while (found := re.search(pattern, self._read)) is None:
+            left_s = deadline - time.monotonic()
+            if left_s <= 0:
+                raise TimeoutError(f"no {pattern!r} within {within_s:.0f} s; the console: {self._read[-2000:]}")
+            self._line.settimeout(left_s)
+            try:
+                came = self._line.recv(65536)
+            except TimeoutError:
+                continue
+            if not came:
+                raise RuntimeError(f"the machine went off; the console: {self._read[-2000:]}")
+            with self.log.open("ab") as log:
+                log.write(came)
+            self._read += came.decode(errors="replace").replace("\r", "")
+        before, self._read = self._read[: found.end()], self._read[found.end() :]
+        return before
+
+    def type(self, words: str) -> None:
+        assert self._line is not None, "the machine is off"
+        self._line.sendall(words.encode())
+
+    def log_in(self, within_s: float = 600.0) -> None:
+        """Logs in as root, as the image lets whoever stands at the rack."""
+        self.wait_for(r"login: ", within_s)
+        self.type("root\n")
+        self.wait_for(r"# ", 120.0)
+        self.type(f"export TERM=dumb PAGER=cat; stty -echo cols 200; PS1='{CONSOLE_PROMPT}'\n")
+        self.wait_for(f"\n.*{CONSOLE_PROMPT}", 60.0)
+
+    def run(self, command: str, within_s: float = 120.0) -> str:
+        """What `command` prints, without its last line break."""
+        self.type(command + "\n")
+        printed = self.wait_for(re.escape(CONSOLE_PROMPT), within_s)
+        return re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", printed).removesuffix(CONSOLE_PROMPT).strip()
+
+
+def disk_of(image: Path, folder: Path, size_mib: int, files: dict[str, bytes], options: str = "") -> Path:
+    """A disk onto which `image` was written, larger than it; `files` go to the folder bunraku/ of its boot partition.
+
+    `options` are added to the kernel's command line.
+    """
+    disk = folder / "disk.img"
+    subprocess.run(["cp", "--sparse=always", image, disk], check=True)
+    boot = f"{disk}@@2M"
+    for name, content in files.items():
+        (folder / "file").write_bytes(content)
+        subprocess.run(["mcopy", "-o", "-i", boot, folder / "file", f"::/bunraku/{name}"], check=True)
+    loader = subprocess.run(["mtype", "-i", boot, "::/grub/grub.cfg"], check=True, capture_output=True, text=True)
+    (folder / "file").write_text(loader.stdout.replace("\r", "").replace(" panic=", f" {options} panic="))
+    subprocess.run(["mcopy", "-o", "-i", boot, folder / "file", "::/grub/grub.cfg"], check=True)
+    with disk.open("r+b") as grown:
+        grown.truncate(size_mib * 1024 * 1024)
+    return disk
+
+
+def firmware() -> Path | None:
+    """UEFI for the machine, or None: it starts by BIOS."""
+    found = [path for path in (Path("/usr/share/ovmf/OVMF.fd"), Path("/usr/share/qemu/OVMF.fd")) if path.exists()]
+    return found[0] if found else None
+
+
+def missing_programs() -> list[str]:
+    """What this machine lacks to run another one."""
+    return [name for name in ("qemu-system-x86_64", "mcopy", "mtype") if shutil.which(name) is None]
