@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -32,12 +32,21 @@ Recorded = Annotated[
 
 
 @journal.command("list")
-def list_journal(box: BoxFile = None, chosen: ChosenFile = None, recorded: Recorded = None) -> None:
+def list_journal(
+    box: BoxFile = None,
+    chosen: ChosenFile = None,
+    recorded: Recorded = None,
+    events: Annotated[
+        bool, typer.Option("--events", help="And what was ordered and said, in order.")
+    ] = False,
+) -> None:
     """List the runs in a journal: when, how long, what was late, how often the network failed."""
     from appliance.stage.journal.reading import read_journal
 
     for number, run in enumerate(read_journal(_recorded(box, chosen, recorded)).runs, 1):
         typer.echo(_line(number, run))
+        for _, event in run.events if events else ():
+            typer.echo(_event_line(event, float(run.ticks["frame_time"][0])))
 
 
 @journal.command("export")
@@ -90,6 +99,14 @@ def _line(number: int, run: Run) -> str:
     told += [f"{count} x {kind}" for kind, count in sorted(happened.items())]
     seconds = len(run.ticks) * run.header["tick_s"]
     return f"{number}. {begun}  {run.header['show']}: {seconds:.0f} s, {', '.join(told)}"
+
+
+def _event_line(event: dict[str, Any], begun: float) -> str:
+    """When, in seconds of the run, and what."""
+    asked = event.get("order", {})
+    words = [str(word) for word in (asked.get("name", ""), asked.get("text", ""), *asked.get("values", ()))]
+    words += [str(event.get("words", ""))] + ["(refused)"] * (event.get("done") is False)
+    return f"   {event['now'] - begun:9.2f} s  {event['kind']}: {' '.join(filter(None, words))}"
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from appliance.stage.clock import Slot, TickClock
 from appliance.stage.fallback import StageFallbacks
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
-from appliance.stage.journal.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
+from appliance.stage.journal.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
 from appliance.stage.journal.recorder import Recorder
 from appliance.stage.obey import carry_out, resume
 from appliance.stage.phase_lock import PhaseLock
@@ -51,7 +51,8 @@ class Stage:
         say: Callable[[str], None],
         box_file: Path | None = None,
     ) -> None:
-        self.show, self.box, self.say, self.box_file = show, box, say, box_file
+        self.show, self.box, self.box_file = show, box, box_file
+        self.say, self._now = say, 0.0
         self.health = Health()
         with ExitStack() as opened:
             self.sharing = Sharing(box)
@@ -80,7 +81,7 @@ class Stage:
         )
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
-        self.wearing = Wearing(self.cast, self.memory, say)
+        self.wearing = Wearing(self.cast, self.memory, self._tell_people)
         self._resume()
         self.tick = Tick(self.cast, self.wearing, self.iterations, latest_start_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
@@ -123,6 +124,7 @@ class Stage:
         clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
+            self._now = slot.started
             self.tick.run(slot)
             self._note(slot)
             self._obey(slot.started)
@@ -203,6 +205,12 @@ class Stage:
         self.sharing.tell(now, self.health, self.cast, self.iterations, age_s, locked, roster, fallbacks)
         return states
 
+    def _tell_people(self, words: str) -> None:
+        """Say it, and note in the journal that it was said after this tick."""
+        self.say(words)
+        if self.recorder is not None:
+            self.recorder.event(SAID, self._now, words=words)
+
     def _sensor_age_s(self, now: float) -> float | None:
         """None: the show has no sensor."""
         primary = self.cast.primary
@@ -222,7 +230,7 @@ class Stage:
         self.notifier.status(line)
         self.say(line)
         for sentence in self.watch.news(now, self._tell(now)):
-            self.say(sentence)
+            self._tell_people(sentence)
         for imu_id, offsets in self.cast.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)
 

@@ -100,6 +100,8 @@ def test_a_night_and_its_restart_dance_again_from_the_disk_and_from_an_export(
     assert str(exported) in bunraku("journal", "export", str(exported), "--box", str(box_file))
     assert bunraku("replay", str(exported)) == said
     assert len(bunraku("journal", "list", "--journal", str(exported)).splitlines()) == 2
+    events = bunraku("journal", "list", "--journal", str(exported), "--events")
+    assert "order: cue storm" in events and "said: Sensor left-wrist is linked" in events
 
 
 def test_a_keeper_that_hangs_or_dies_costs_no_tick_of_the_journal(show: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from appliance.stage.journal.record import NOT_FINITE, RESENT
 if TYPE_CHECKING:
     from appliance.stage.tick import Tick
 
-METRES_PER_DEGREE = 0.02  # how far the root may be off where joints may be off by a degree
+METRES_PER_DEGREE = 0.01  # how far the root may be off where joints may be off by a degree
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ LATE, NOT_FINITE, JUMPED, RESENT = 1, 2, 4, 8  # flags of a tick; RESENT: it sen
 SECTIONS = ("drain", "puppeteers", "motion", "puppet", "blend", "figure", "send")
 TICK, EVENT = 1, 2  # kinds of entries
 ORDER = "order"  # kind of the event that show control asked for something, and what came of it
+SAID = "said"  # kind of the event that people were told something
 
 
 def record(joints: int, hands: int, sensors: int) -> np.dtype[np.void]:
