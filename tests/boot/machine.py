@@ -75,7 +75,13 @@ class Machine:
                 stderr=subprocess.STDOUT,
                 preexec_fn=_die_with_the_tests,
             )
-        self.pid1 = self._await_pid1()
+        try:
+            self.pid1 = self._await_pid1()
+        except AssertionError:
+            self.process.kill()
+            self.process.wait()
+            self.process = None
+            raise
 
     def run(self, *words: str, check: bool = True, patience_s: float = PATIENCE_S) -> str:
         """What a command says that runs inside, as root."""

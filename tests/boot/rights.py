@@ -14,8 +14,6 @@ _COMMANDS = {
     "mmdebstrap": "mmdebstrap",
     "mksquashfs": "squashfs-tools",
     "mke2fs": "e2fsprogs",
-    "mkfs.vfat": "dosfstools",
-    "mcopy": "mtools",
     "unshare": "util-linux",
     "nsenter": "util-linux",
 }
@@ -52,8 +50,3 @@ def no_memory_limits() -> str | None:
     if controllers.exists() and "memory" in controllers.read_text().split():
         return None
     return "the control groups of this machine have no memory controller"
-
-
-def faketime() -> Path | None:
-    """libfaketime, which stands between a process and the clock; None when it is not installed."""
-    return next(iter(sorted(Path("/usr/lib").glob("*/faketime/libfaketime.so.1"))), None)

@@ -43,7 +43,7 @@ def test_a_program_that_takes_all_memory(short_of_memory: Box, figures: Figures)
     began = _take_all_memory(box)
     box.hall.audience.watch(1.0)
     seen = [frame for frame in box.hall.audience.frames if frame.at > began - 0.5]
-    figures.note("longest time without frames while memory is short", longest_pause_s(seen), limit=1.0)
+    figures.note("longest time without frames while memory is short", longest_pause_s(seen))
     assert box.await_frames(50, time.time())
     assert box.machine.show(STAGE, "ActiveState") == "active"
 
@@ -56,7 +56,7 @@ def test_a_stage_that_is_killed_for_lack_of_memory_goes_on_at_its_place(
     Path(f"/proc/{process}/oom_score_adj").write_text("1000")
     began = _take_all_memory(box)
     before, after = box.pause_from(began)
-    figures.note("stage killed for lack of memory: time without frames", after.at - before.at, limit=1.0)
+    figures.note("stage killed for lack of memory: time without frames", after.at - before.at)
     assert box.machine.main_pid(STAGE) != process
     now = box.place()
     assert now.phrase == left.phrase and now.position_s > left.position_s
