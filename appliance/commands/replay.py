@@ -13,8 +13,8 @@ from appliance.stage.journal.journal_error import JournalError
 from appliance.stage.journal.reading import Run, read_journal
 from appliance.stage.replay import Replay
 
-# Other processors round otherwise, and iterating makes more of it: an emulated Nehalem, which has none of the
-# vector instructions that a Xeon of today used, was 0.46 degrees and 1.9 mm off at worst in 25 s of the default show.
+# Other processors round otherwise, and iterating makes more of it: an emulated Nehalem was 0.46 degrees and
+# 1.9 mm off at worst in 25 s of the default show that a Xeon with AVX-512 had recorded (docs/journal.md).
 TOLERANCE_DEGREES = 2.0
 _PROGRESS_TICKS = 500
 
