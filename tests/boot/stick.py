@@ -27,9 +27,9 @@ class Stick:
 
     def pull(self) -> None:
         """Whoever reads it from now on gets an error instead."""
-        devices = _run("losetup", "--associated", str(self.image), "--noheadings", "--output", "NAME").split()
         os.truncate(self.image, 0)
-        for device in devices:
+        devices = _run("losetup", "--associated", str(self.image), "--noheadings", "--output", "NAME")
+        for device in devices.split():
             _run("losetup", "--set-capacity", device)
 
 

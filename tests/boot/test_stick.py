@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -57,8 +58,8 @@ def test_a_broken_show_on_the_stick_is_refused_with_file_and_line(box: Box, tmp_
 
 def test_a_stick_that_is_pulled_while_it_is_read(box: Box, tmp_path: Path, figures: Figures) -> None:
     show = show_on(tmp_path / "content", "Half read")
-    (show / "zz-long.bvh").write_bytes(bytes(100 << 20))
-    stick = Stick.made(tmp_path / "stick.img", tmp_path / "content", megabytes=128)
+    (show / "zz-long.bvh").write_bytes(os.urandom(100 << 20))
+    stick = Stick.made(tmp_path / "stick.img", tmp_path / "content", megabytes=160)
     box.power_on(stick=stick.image)
     shows = box.machine.path("/data/bunraku/shows")
     box.machine.await_that(lambda: list(shows.glob("*part*/zz-long.bvh")), "the stick is not read")

@@ -15,11 +15,7 @@ def changed_release(sound: Path, folder: Path, version: str, module: str, last_l
     """
     shutil.copytree(sound, folder)
     wheel = next((folder / "wheels").glob("bunraku-*.whl"))
-    before = hashlib.sha256(wheel.read_bytes()).hexdigest()
     _rewrite(wheel, module, last_lines)
-    after = hashlib.sha256(wheel.read_bytes()).hexdigest()
-    requirements = folder / "requirements.txt"
-    requirements.write_text(requirements.read_text().replace(before, after))
     facts = [
         line for line in (folder / "release").read_text().splitlines() if not line.startswith("version ")
     ]
