@@ -8,6 +8,7 @@ import socket
 from collections.abc import Sequence
 
 from appliance.control.packet import Message, datagram
+from appliance.sensor.ways.udp import bind_early
 
 LARGEST_DATAGRAM = 4096  # no command comes near; what is larger is none
 _SAY_EVERY_S = 60.0
@@ -17,11 +18,11 @@ Address = tuple[str, int]
 
 
 def open_port(host: str, port: int) -> socket.socket:
-    """The control port's socket, bound. Raises OSError when it is taken."""
+    """The control port's socket, bound, also to an address that comes later. Raises OSError: it is taken."""
     one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WAITING_BYTES)
     try:
-        one.bind((host, port))
+        bind_early(one, (host, port))
     except OSError:
         one.close()
         raise

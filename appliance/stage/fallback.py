@@ -30,6 +30,11 @@ CABLE_AWAY = Fallback(
     "cable-away",
     "A sensor's cable is unplugged: its joint moves freely. It is taken again when it is plugged in.",
 )
+ADDRESS_ABSENT = Fallback(
+    "address-absent",
+    "This machine lacks the address at which it listens to sensors: joints move freely until it comes. "
+    "Look at the network's cable or access point, then at sensors: udp: in the box file.",
+)
 NOT_LET_IN = Fallback(
     "sensor-not-let-in", "A sensor of the show has no key here: its joint moves freely. Provision it."
 )
@@ -89,7 +94,7 @@ POWER_CUT = Fallback(
     "The power was cut: the dance went on where it was, less than a second before. Check the plug.",
 )
 OF_THE_STAGE = (
-    *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, NOT_LET_IN),
+    *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, ADDRESS_ABSENT, NOT_LET_IN),
     *(TICK_LATE, TICK_SKIPPED, OVER_BUDGET, ITERATIONS_LOWERED, NETWORK_FAILED),
     *(RECEIVER_GONE, NOT_REALTIME, NOT_SHARED, NOT_RECORDED, PLACE_NOT_NOTED, STAGE_RESTARTED, POWER_CUT),
 )
@@ -146,6 +151,10 @@ class StageFallbacks:
         every.follow(NETWORK_FAILED.name, health.not_finite, now)
         cables = [getattr(one, "trouble", None) or "" for one in self._cast.link.intakes]
         every.set(CABLE_AWAY.name, any(cables), " ".join(filter(None, cables)))
+        every.set(
+            ADDRESS_ABSENT.name,
+            any(getattr(one, "address_is_absent", False) for one in self._cast.link.intakes),
+        )
         every.set(RECEIVER_GONE.name, self._receiver_is_gone())
 
     def told(self, now: float) -> Sequence[Fallen]:

@@ -12,7 +12,7 @@ from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, open_link
 from appliance.sensor.ways import udp
-from appliance.sensor.ways.udp import PortError, UdpIntake
+from appliance.sensor.ways.udp import PortError, UdpIntake, is_own
 from tests.sensor.flood import flood
 from tests.sensor.peers import KEYS, Wearable
 
@@ -194,10 +194,23 @@ def test_a_taken_port_says_what_to_do_also_while_sensors_are_linked(link: Sensor
         radio.pair(link)
 
 
-@pytest.mark.parametrize(("host", "port"), [("no.such.host.invalid", 9750), ("203.0.113.1", 9750)])
-def test_an_impossible_address_says_what_to_do(host: str, port: int) -> None:
+def test_an_impossible_address_says_what_to_do() -> None:
     with pytest.raises(PortError, match="cannot be opened"):
-        UdpIntake(host, port)
+        UdpIntake("no.such.host.invalid", 9750)
+
+
+def test_an_address_that_comes_later_is_listened_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    intake = UdpIntake("203.0.113.1", 0)
+    assert intake.address_is_absent
+    assert list(intake.receive(time.monotonic())) == []
+    monkeypatch.setattr(udp, "is_own", lambda host: True)
+    assert not intake.address_is_absent
+    intake.close()
+
+
+def test_which_addresses_are_this_machines() -> None:
+    assert is_own("127.0.0.1")
+    assert not is_own("203.0.113.1")
 
 
 def test_closed_sockets_never_raise_into_the_tick(link: SensorLink, radio: Radio) -> None:

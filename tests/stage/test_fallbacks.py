@@ -97,6 +97,14 @@ def test_cable_away(stage: StageFallbacks, danced: Cast) -> None:
     assert of(stage, rows.CABLE_AWAY, 2.0)[1:3] == (1, False)
 
 
+def test_address_absent(stage: StageFallbacks, danced: Cast) -> None:
+    stage.look(1.0, Health())
+    assert of(stage, rows.ADDRESS_ABSENT, 1.0).times == 0
+    danced.link.intakes[0].address_is_absent = True  # type: ignore[attr-defined]
+    stage.look(2.0, Health())
+    assert of(stage, rows.ADDRESS_ABSENT, 2.0)[1:3] == (1, True)
+
+
 def test_sensor_not_let_in(stage: StageFallbacks) -> None:
     told = of(stage, rows.NOT_LET_IN, 1.0)
     assert told[1:3] == (1, True)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import struct
 import sys
 import time
 from collections import Counter
 from collections.abc import Collection, Iterator
+from typing import Any
 
 from appliance.sensor import wire
 from appliance.sensor.ways.intake import Origin
 
 # Linux, include/uapi/asm-generic/socket.h: the kernel stamps each datagram as it comes in, on the wall clock.
 SO_TIMESTAMPNS = 35
+IP_FREEBIND = 15  # include/uapi/linux/in.h
 TIMESPEC = struct.Struct("@qq")
 OLDEST_S = 1.0
 # The kernel counts about 768 bytes for a datagram of ours and doubles what is asked for.
@@ -43,7 +46,7 @@ class UdpIntake:
         except (OSError, OverflowError, UnicodeError) as error:
             raise PortError(_advice(host, port, error)) from error
         try:
-            self._socket.bind(address)
+            self._waits_for_address = not bind_early(self._socket, address)
         except OSError as error:
             self._socket.close()
             raise PortError(_advice(host, port, error)) from error
@@ -61,6 +64,13 @@ class UdpIntake:
         self._buffers = [self._buffer]
         self._ancillary_bytes = socket.CMSG_SPACE(TIMESPEC.size)
         self._monotonic_minus_wall = 0.0
+
+    @property
+    def address_is_absent(self) -> bool:
+        """Whether this machine does not have the address (yet): nobody is heard until it comes."""
+        if self._waits_for_address:
+            self._waits_for_address = not is_own(self.address[0])
+        return self._waits_for_address
 
     def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
         """Waiting datagrams, their arrivals (monotonic seconds, <= now) and senders; linked sensors' first.
@@ -144,6 +154,31 @@ class UdpIntake:
         seconds, nanoseconds = TIMESPEC.unpack(ancillary[0][2])
         arrival: float = seconds + nanoseconds * 1e-9 + self._monotonic_minus_wall
         return arrival if now - OLDEST_S < arrival < now else now
+
+
+def bind_early(one: socket.socket, address: tuple[Any, ...]) -> bool:
+    """Bind, also to an address that this machine is yet to get (an access point that comes up later); returns
+    whether it is there. IP_FREEBIND, ip(7). Raises OSError.
+    """
+    try:
+        one.bind(address)
+    except OSError as error:
+        if error.errno != errno.EADDRNOTAVAIL or sys.platform != "linux":
+            raise
+        one.setsockopt(socket.IPPROTO_IP, IP_FREEBIND, 1)
+        one.bind(address)
+        return False
+    return True
+
+
+def is_own(host: str) -> bool:
+    """Whether this machine has the address now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        try:
+            one.bind((host, 0))
+        except OSError as error:
+            return error.errno != errno.EADDRNOTAVAIL
+    return True
 
 
 def _prepare(one: socket.socket, buffer_bytes: int) -> None:
