@@ -12,7 +12,7 @@ usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--release FOLDER] [--d
 
 Builds the root file system of a box into OUT: a tar where OUT ends with .tar, else a folder.
 
-  --arch ARCH        amd64 (default) or arm64. A foreign one needs qemu-user-static and binfmt_misc.
+  --arch ARCH        amd64 (default) or arm64. A foreign one needs qemu-user-static, arch-test, binfmt_misc.
   --without-kernel   no kernel, no firmware: for systemd-nspawn, or for a Raspberry Pi's own boot partition
   --release FOLDER   what `make release` made; left out: one made now from the working tree
   --debian TAR       keeps Debian's part in TAR, and takes it from there the next time
@@ -48,8 +48,8 @@ case $arch in
     *) fail "--arch $arch: a box is amd64 or arm64." ;;
 esac
 if [ "$arch" != "$(dpkg --print-architecture)" ] && ! ls /proc/sys/fs/binfmt_misc/qemu-"$machine" >/dev/null 2>&1; then
-    fail "this machine cannot run $arch programs. Install qemu-user-static binfmt-support and mount" \
-        "binfmt_misc on /proc/sys/fs/binfmt_misc, or build on such a machine."
+    fail "this machine cannot run $arch programs. Install qemu-user-static, binfmt-support and arch-test, mount" \
+        "binfmt_misc on /proc/sys/fs/binfmt_misc, and run update-binfmts --enable; or build on such a machine."
 fi
 
 # Names of a list of packages or paths, without its comments.
@@ -124,12 +124,14 @@ settle() {
     : >"$root/etc/machine-id"
     rm -f "$root/etc/resolv.conf" "$root/var/lib/dbus/machine-id"
     mkdir -p "$root/data" "$root/media/bunraku"
+    # Whoever can plug a keyboard into the box could take its disk as well: there is no password and no ssh.
     sed -i 's|^root:[^:]*:|root::|' "$root/etc/shadow"
     systemctl --root="$root" set-default multi-user.target >/dev/null 2>&1
     systemctl --root="$root" mask getty@tty1.service systemd-random-seed.service apt-daily.timer \
         apt-daily-upgrade.timer dpkg-db-backup.timer e2scrub_all.timer fstrim.timer \
         NetworkManager-wait-online.service >/dev/null 2>&1
     chroot "$root" dpkg-query --show --showformat '${Package} ${Version} ${Installed-Size}\n' >"$root/etc/bunraku-packages"
+    echo LANG=C.UTF-8 >"$root/etc/default/locale"
     rm -rf "$root"/var/lib/apt/lists/* "$root"/var/cache/* "$root"/var/log/* "$root"/tmp/*
     first_start_done
 }

@@ -59,15 +59,24 @@ class Machine:
             self.cut_power()
 
     def _command(self) -> list[str]:
-        # One core for the box's real-time thread, one for the rest, as on the smallest real machine.
-        command = "-machine q35 -accel tcg -icount shift=1 -cpu max -smp 2 -m 2048 -nodefaults -no-user-config"
+        # -icount: the machine's own clock counts its instructions, 2 ns each: it is a slow but steady machine
+        # however busy this one is; all times inside are its own, the clock of the day too.
+        command = (
+            "-machine q35 -accel tcg -icount shift=1 -cpu max -smp 2 -m 2048 -nodefaults -no-user-config"
+        )
+        command += " -rtc clock=vm"
         command += " -display none -device i6300esb -action watchdog=reset -device qemu-xhci,id=usb"
         command += " -netdev user,id=net -device virtio-net-pci,netdev=net -device virtio-rng-pci"
         command += " -uuid 6c1f3c8e-6a55-4a0e-9a63-0b5a6c0b8d11 -chardev null,id=adapter"
         words = ["qemu-system-x86_64", *command.split()]
         words += ["-drive", f"file={self.disk},format=raw,if=none,id=disk,discard=unmap"]
         words += ["-device", "virtio-blk-pci,drive=disk"]
-        words += ["-chardev", f"socket,id=tty,path={self.console.path},server=on,wait=off", "-serial", "chardev:tty"]
+        words += [
+            "-chardev",
+            f"socket,id=tty,path={self.console.path},server=on,wait=off",
+            "-serial",
+            "chardev:tty",
+        ]
         words += ["-monitor", f"unix:{self.folder / 'monitor'},server=on,wait=off"]
         if self.firmware is not None:
             words += ["-drive", f"if=pflash,format=raw,readonly=on,file={self.firmware}"]
@@ -109,7 +118,9 @@ class Console:
         while (found := re.search(pattern, self._read)) is None:
             left_s = deadline - time.monotonic()
             if left_s <= 0:
-                raise TimeoutError(f"no {pattern!r} within {within_s:.0f} s; the console: {self._read[-2000:]}")
+                raise TimeoutError(
+                    f"no {pattern!r} within {within_s:.0f} s; the console: {self._read[-2000:]}"
+                )
             self._line.settimeout(left_s)
             try:
                 came = self._line.recv(65536)
@@ -143,9 +154,9 @@ class Console:
 
 
 def disk_of(image: Path, folder: Path, size_mib: int, files: dict[str, bytes], options: str = "") -> Path:
-    """A disk onto which `image` was written, larger than it; `files` go to the folder bunraku/ of its boot partition.
+    """A disk onto which `image` was written, larger than it.
 
-    `options` are added to the kernel's command line.
+    `files` go to the folder bunraku/ of its boot partition, `options` are added to the kernel's command line.
     """
     disk = folder / "disk.img"
     subprocess.run(["cp", "--sparse=always", image, disk], check=True)
@@ -153,7 +164,9 @@ def disk_of(image: Path, folder: Path, size_mib: int, files: dict[str, bytes], o
     for name, content in files.items():
         (folder / "file").write_bytes(content)
         subprocess.run(["mcopy", "-o", "-i", boot, folder / "file", f"::/bunraku/{name}"], check=True)
-    loader = subprocess.run(["mtype", "-i", boot, "::/grub/grub.cfg"], check=True, capture_output=True, text=True)
+    loader = subprocess.run(
+        ["mtype", "-i", boot, "::/grub/grub.cfg"], check=True, capture_output=True, text=True
+    )
     (folder / "file").write_text(loader.stdout.replace("\r", "").replace(" panic=", f" {options} panic="))
     subprocess.run(["mcopy", "-o", "-i", boot, folder / "file", "::/grub/grub.cfg"], check=True)
     with disk.open("r+b") as grown:
@@ -163,7 +176,9 @@ def disk_of(image: Path, folder: Path, size_mib: int, files: dict[str, bytes], o
 
 def firmware() -> Path | None:
     """UEFI for the machine, or None: it starts by BIOS."""
-    found = [path for path in (Path("/usr/share/ovmf/OVMF.fd"), Path("/usr/share/qemu/OVMF.fd")) if path.exists()]
+    found = [
+        path for path in (Path("/usr/share/ovmf/OVMF.fd"), Path("/usr/share/qemu/OVMF.fd")) if path.exists()
+    ]
     return found[0] if found else None
 
 
