@@ -72,9 +72,7 @@ def test_it_dances_after_power_on(box: Box) -> None:
         f"power on -> first frame: {box.first_frame_s():.1f} s of its own time "
         f"({box.machine.seconds_on():.0f} s here); the stage says: {box.stage('StatusText')}"
     )
-    assert (
-        box.run("systemctl is-active bunraku-stage bunraku-control bunraku-keeper").split() == ["active"] * 3
-    )
+    box.run("until systemctl is-active --quiet bunraku-control bunraku-keeper; do sleep 1; done")
     assert box.run("systemctl --failed --no-legend --plain") == ""
 
 
@@ -135,7 +133,7 @@ def test_it_dances_again_after_a_power_cut(box: Box, number: int) -> None:
         f"({box.machine.seconds_on():.0f} s here); data partition: {repaired or 'clean'}"
     )
     assert box.run("find /data -name '*.part' -o -name '*.tmp'") == ""
-    assert "power-cut" in box.run("journalctl -b -o cat -u bunraku-stage; cat /run/bunraku/*.json")
+    assert "power-cut" in box.run("journalctl -b -o cat -u bunraku-stage")
 
 
 def test_the_watchdog_resets_a_machine_whose_pid_1_hangs(box: Box) -> None:
