@@ -75,6 +75,12 @@ class Box:
         with contextlib.closing(reader):
             return self.machine.await_that(reader.read, "there is no place in memory")
 
+    def await_unit(self, unit: str) -> None:
+        """Until it runs."""
+        self.machine.await_that(
+            lambda: self.machine.show(unit, "ActiveState") == "active", f"{unit} does not run"
+        )
+
     def is_proven(self) -> bool:
         """Whether what dances is kept as something that dances for good."""
         kept = self.machine.path("/data/bunraku/chosen.json")

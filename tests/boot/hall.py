@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import select
 import socket
 import struct
@@ -11,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from tests.system.namespace import Cable, Namespace
 
 BOX, HALL = "10.77.0.1", "10.77.0.2"
 SENSOR = "left-wrist"
-SENSORS, CONTROL, FRAMES, HEARTBEATS = 9750, 9002, 9004, 9003
+SENSORS, CONTROL, FRAMES = 9750, 9002, 9004
 _TIMESTAMPS = 35  # SO_TIMESTAMPNS
 _BUFFER_BYTES = 64 << 20  # minutes of frames: nobody has to read while the box is being killed
 _SO_RCVBUFFORCE = 33
@@ -66,7 +65,8 @@ class Audience:
                 datagram, told, _, _ = self._socket.recvmsg(65536, 64)
             except BlockingIOError:
                 return
-            for address, arguments in decode(datagram):
+            for address, received in decode(datagram):
+                arguments: list[Any] = list(received)
                 if address == "/bunraku/frame":
                     seconds, nanoseconds = struct.unpack("qq", told[0][2])
                     self._frame = seconds + 1e-9 * nanoseconds, arguments
@@ -84,12 +84,10 @@ class Hall:
     folder: Path
     box_network: Namespace
     network: Namespace
-    cable: Cable
     audience: Audience
     desk: socket.socket
     key_file: bytes = b""
     sensor: subprocess.Popen[bytes] | None = None
-    heartbeats: list[tuple[float, list[Any]]] = field(default_factory=list)
 
     def ask(self, address: str, patience_s: float = 5.0) -> list[tuple[str, list[Any]]]:
         """What show control answers to a question without arguments."""
@@ -136,13 +134,13 @@ def hall(folder: Path) -> Iterator[Hall]:
     with contextlib.ExitStack() as opened:
         box = opened.enter_context(Namespace("box"))
         outside = opened.enter_context(Namespace("hall"))
-        cable = Cable(box, f"{BOX}/24", outside, f"{HALL}/24")
+        Cable(box, f"{BOX}/24", outside, f"{HALL}/24")
         with outside.entered():
             audience = opened.enter_context(contextlib.closing(Audience()))
             desk = opened.enter_context(contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)))
             desk.bind((HALL, 0))
         create_keys(folder / "sensors.keys", [SENSOR])
-        made = Hall(folder, box, outside, cable, audience, desk, (folder / "sensors.keys").read_bytes())
+        made = Hall(folder, box, outside, audience, desk, (folder / "sensors.keys").read_bytes())
         opened.callback(made.switch_sensor_off)
         yield made
 
@@ -160,9 +158,3 @@ def box_file(**own: Any) -> str:
         **own,
     }
     return str(yaml.safe_dump(values))
-
-
-def sensor_settled(pid: int) -> None:
-    """The emulator stands for hardware that waits for no processor."""
-    with contextlib.suppress(OSError):
-        os.sched_setscheduler(pid, os.SCHED_FIFO, os.sched_param(50))

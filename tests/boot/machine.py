@@ -81,6 +81,7 @@ class Machine:
             self.process.kill()
             self.process.wait()
             self.process = None
+            _remove_groups(self.cgroup)
             raise
 
     def run(self, *words: str, check: bool = True, patience_s: float = PATIENCE_S) -> str:

@@ -15,7 +15,7 @@ MKROOT = ROOT / "deploy" / "image" / "mkroot.sh"
 MAKE_RELEASE = ROOT / "deploy" / "release" / "make-release"
 BUILT = ROOT / "build" / "boot"
 _INPUTS = ("appliance", "hw_sim", "deploy", "pyproject.toml")
-_DEBIAN = ("deploy/image/packages-box.txt", "deploy/image/drop-files.txt")
+_DEBIAN = tuple(f"deploy/image/{name}" for name in ("mkroot.sh", "packages-box.txt", "drop-files.txt"))
 _FAST = ("-comp", "zstd", "-Xcompression-level", "3", "-noappend", "-quiet", "-no-progress")
 _UNSTABLE = {"__pycache__"}
 
@@ -39,6 +39,9 @@ def release(root: Path) -> Path:
 
 def _build(folder: Path, image: Path) -> None:
     debian, part = BUILT / f"debian-{_key(_files(*_DEBIAN))}.tar", image.with_suffix(".part")
+    for old in BUILT.glob("debian-*.tar"):
+        if old != debian:
+            old.unlink()
     _run(str(MAKE_RELEASE), "--out", str(folder / "release"))
     made = [str(MKROOT), "--without-kernel", "--release", str(folder / "release"), "--debian", str(debian)]
     _run(*made, str(folder / "root"))

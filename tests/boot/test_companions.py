@@ -24,11 +24,11 @@ def test_the_dance_goes_on_without_noticing(dancing: Box, figures: Figures, way:
     machine, unit = dancing.machine, f"bunraku-{name}"
     stage = machine.main_pid(STAGE)
     began = time.time()
-    machine.await_that(lambda: machine.show(unit, "ActiveState") == "active", f"{unit} does not run")
+    dancing.await_unit(unit)
     process = machine.main_pid(unit)
     harmed = machine.kill(unit, getattr(signal, way))
     machine.await_that(lambda: machine.main_pid(unit) not in (0, process), f"{unit} does not come back")
-    machine.await_that(lambda: machine.show(unit, "ActiveState") == "active", f"{unit} does not run again")
+    dancing.await_unit(unit)
     figures.note(f"{way} to a new {name}", time.time() - harmed)
     dancing.hall.audience.watch(0.5)
     seen = [frame for frame in dancing.hall.audience.frames if frame.at > began]
@@ -50,7 +50,7 @@ def test_show_control_answers_again_after_it_was_killed(dancing: Box) -> None:
 
 def test_the_keeper_may_die_and_the_journal_goes_on(dancing: Box) -> None:
     machine = dancing.machine
-    machine.await_that(lambda: machine.show("bunraku-keeper", "ActiveState") == "active", "no keeper")
+    dancing.await_unit("bunraku-keeper")
     process = machine.main_pid("bunraku-keeper")
     began = machine.kill("bunraku-keeper")
     machine.await_that(

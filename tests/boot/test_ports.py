@@ -38,7 +38,7 @@ def test_ports_that_listen_are_those_of_the_box_file(dancing: Box) -> None:
 
 def test_the_firewall_lets_in_what_the_box_file_opens_and_nothing_else(dancing: Box) -> None:
     machine = dancing.machine
-    machine.await_that(lambda: machine.show("bunraku-firewall", "ActiveState") == "active", "no firewall")
+    dancing.await_unit("bunraku-firewall")
     assert dancing.hall.ask("/ping"), "a listed desk is shut out"
     assert _heard(dancing, inside=True), "this test cannot tell what gets in"
     assert not _heard(dancing, inside=False), machine.run("nft", "list", "ruleset")

@@ -31,10 +31,7 @@ def test_all_that_belongs_to_the_box_runs_and_nothing_has_failed(box: Box) -> No
     box.await_frames()
     machine = box.machine
     for unit in UNITS:
-        machine.await_that(
-            lambda unit=unit: machine.show(f"bunraku-{unit}", "ActiveState") == "active",
-            f"{unit} does not run",
-        )
+        box.await_unit(f"bunraku-{unit}")
     machine.await_that(lambda: _settled(box), "the box is still starting")
     failed = machine.run("systemctl", "--failed", "--plain", "--no-legend")
     assert not failed, f"{failed}\n{machine.log()}"
