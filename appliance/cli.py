@@ -59,7 +59,10 @@ def play(
         Path | None, typer.Option(help="At the end draw what was danced into this PNG.")
     ] = None,
     alone: Annotated[
-        bool, typer.Option("--alone", help="Start neither show control nor lights: they run by themselves.")
+        bool,
+        typer.Option(
+            "--alone", help="Start no companions (show control, lights, keeper): they run by themselves."
+        ),
     ] = False,
     window: Annotated[bool, typer.Option("--window", help="Show the projection in a window.")] = False,
     rehearse: Annotated[

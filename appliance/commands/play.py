@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from appliance.control.house import forget_house
 from appliance.control.speaker import Speaker
 from appliance.control.stop_signals import stop_signals
+from appliance.sensor.memory_block import forget_memory
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.control import ControlConfig
@@ -64,7 +65,7 @@ def play_show(
         if (filmstrip or rehearse) is not None and scratch and (alone or journal is None):
             journal = scratch / "dance.journal"
             keeper = _keeper(box_file, journal, PICTURED_MINUTES)
-        elif keeper is None and journal is not None and not alone:
+        elif keeper is None and not alone and (journal or (box.state_folder and not emulate)):
             keeper = _keeper(box_file, journal, box.journal.minutes)
         speaker = Speaker()
         opened.callback(speaker.close)
@@ -75,11 +76,10 @@ def play_show(
             for line in _introduction(stage, emulate, control):
                 speaker.say(line)
             company = () if alone else tuple(_company(show, box, box_file, control, window or shown))
-            company += () if keeper is None else (keeper,)
-            with _accompanied(company, speaker, stage):
+            with _accompanied(company + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
         if not alone:
-            forget_house(stage.sharing.folder)
+            _forget(stage)
         for line in _conclusion(stage):
             speaker.say(line)
         if filmstrip is not None and journal is not None:
@@ -169,14 +169,21 @@ def _company(
         )
 
 
-def _keeper(box_file: Path | None, journal: Path, minutes: float) -> Companion:
-    """Who carries the journal to the disk."""
+def _forget(stage: Stage) -> None:
+    """All have ended as they should: the next show begins anew."""
+    forget_house(stage.sharing.folder)
+    if stage.box.state_folder is not None:
+        forget_memory(stage.sharing.folder, stage.box.state_folder)
+
+
+def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Companion:
+    """Who carries the journal, the place and the sensors' memory to the disk."""
     from appliance.commands.companions import Companion
 
     named = () if box_file is None else ("--box", str(box_file))
-    kept = ("--journal", str(journal), "--minutes", str(minutes))
+    kept = () if journal is None else ("--journal", str(journal), "--minutes", str(minutes))
     return Companion(
-        "The keeper of the journal",
+        "The keeper",
         (sys.executable, "-m", "appliance.cli", "keep", *named, *kept),
         "What is danced meanwhile waits in memory.",
     )

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
+from appliance.sensor.memory_carrier import MemoryCarrier
 from appliance.show.box import BoxConfig
 from appliance.stage.journal.carrier import JournalCarrier
 from appliance.stage.place_file import PlaceCarrier
@@ -19,7 +20,7 @@ _LOOK_S = 0.05  # how often it looks whether it is to end
 
 
 class Carrier(Protocol):
-    """Carries one thing (the journal, the place) from the runtime folder to the disk.
+    """Carries one thing (the journal, the place, the sensors' memory) from the runtime folder to the disk.
 
     complaint: what cannot be kept, in words for people, or "".
     """
@@ -36,12 +37,15 @@ class Carrier(Protocol):
 def carriers(
     box: BoxConfig, runtime: Path, journal: Path | None, minutes: float, say: Callable[[str], None]
 ) -> list[Carrier]:
-    """What this box keeps: its journal in a folder, if there is one, and its place in the state folder."""
+    """What this box keeps: its journal, where one is wanted; its place and what it learns of its sensors, in
+    the state folder, where there is one.
+    """
     kept: list[Carrier] = []
     if journal is not None:
         kept.append(JournalCarrier(runtime, journal, minutes, say))
     if box.state_folder is not None:
         kept.append(PlaceCarrier(runtime, box.state_folder, say))
+        kept.append(MemoryCarrier(runtime, box.state_folder, say))
     return kept
 
 

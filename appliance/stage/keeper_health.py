@@ -7,6 +7,7 @@ from pathlib import Path
 
 from appliance.control.company import CompanyWriter
 from appliance.control.fallback import Fallback, Fallbacks
+from appliance.sensor.memory_carrier import MemoryCarrier
 from appliance.stage.journal.carrier import JournalCarrier
 from appliance.stage.keeper import Carrier
 from appliance.stage.place_file import PlaceCarrier
@@ -21,13 +22,22 @@ PLACE_NOT_KEPT = Fallback(
     "The place of the dance is not kept on the disk. The audience sees nothing of it, but after a power cut "
     "the dance begins where it was kept last. Free some room, or look at the disk.",
 )
+SENSORS_NOT_KEPT = Fallback(
+    "sensors-not-kept",
+    "Neutral poses and calibrations are not kept on the disk. The audience sees nothing of it, but after a "
+    "power cut sensors need a moment of stillness. Free some room, or look at the disk.",
+)
 CHOICE_NOT_KEPT = Fallback(
     "choice-not-kept",
     "That a show has danced, or has not, cannot be kept. The audience sees nothing of it; after the next "
     "power-on it is tried anew. Free some room, or look at the disk.",
 )
-OF_THE_KEEPER = (JOURNAL_STOPPED, PLACE_NOT_KEPT, CHOICE_NOT_KEPT)
-_ROWS: Mapping[type, Fallback] = {JournalCarrier: JOURNAL_STOPPED, PlaceCarrier: PLACE_NOT_KEPT}
+OF_THE_KEEPER = (JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT, CHOICE_NOT_KEPT)
+_ROWS: Mapping[type, Fallback] = {
+    JournalCarrier: JOURNAL_STOPPED,
+    PlaceCarrier: PLACE_NOT_KEPT,
+    MemoryCarrier: SENSORS_NOT_KEPT,
+}
 
 
 class KeeperHealth:

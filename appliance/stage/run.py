@@ -61,7 +61,7 @@ class Stage:
             opened.callback(self.notifier.close)
             self.resuming = Resuming(show.config.name, self.sharing.folder, box.state_folder, box.resume)
             opened.callback(self.resuming.close)
-            self.memory = SensorMemory(box.state_folder, say)
+            self.memory = SensorMemory(box.state_folder, say, self.sharing.folder)
             opened.callback(self.memory.close)
             self.cast: Cast = assemble(
                 show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY

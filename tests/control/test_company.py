@@ -13,12 +13,14 @@ from appliance.control.tellings import Status
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
+from appliance.sensor.memory_carrier import MemoryCarrier
 from appliance.show.choice import CHOSEN, Choice, Pair
 from appliance.stage.journal.carrier import JournalCarrier
 from appliance.stage.keeper_health import (
     CHOICE_NOT_KEPT,
     JOURNAL_STOPPED,
     PLACE_NOT_KEPT,
+    SENSORS_NOT_KEPT,
     KeeperHealth,
 )
 from appliance.stage.place_file import PlaceCarrier
@@ -94,12 +96,14 @@ def test_the_keeper_tells_that_the_journal_has_stopped(folder: Path) -> None:
 
 def test_the_keeper_tells_all_that_it_cannot_keep(folder: Path) -> None:
     chosen, place = Proof(folder, folder / CHOSEN), PlaceCarrier(folder, folder, lambda words: None)
-    chosen.complaint = place.complaint = "The disk is read-only."
+    sensors = MemoryCarrier(folder, folder, lambda words: None)
+    chosen.complaint = place.complaint = sensors.complaint = "The disk is read-only."
     keeper = KeeperHealth(folder)
-    keeper.tell([chosen, place], 10.0)
-    assert set(told(Company(folder), 10.0)) == {PLACE_NOT_KEPT.name, CHOICE_NOT_KEPT.name}
-    chosen.complaint = place.complaint = ""
-    keeper.tell([chosen, place], 12.0)
+    keeper.tell([chosen, place, sensors], 10.0)
+    rows = {PLACE_NOT_KEPT.name, SENSORS_NOT_KEPT.name, CHOICE_NOT_KEPT.name}
+    assert set(told(Company(folder), 10.0)) == rows
+    chosen.complaint = place.complaint = sensors.complaint = ""
+    keeper.tell([chosen, place, sensors], 12.0)
     assert not any(active for _, _, active in told(Company(folder), 12.0).values())
     keeper.end(13.0)
 

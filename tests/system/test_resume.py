@@ -53,7 +53,8 @@ def test_goes_on_where_it_was_however_it_died(show: Path, tmp_path: Path, how: i
         assert goes_on_at(box, 1) == pytest.approx(died_at.position_s, abs=0.051)  # said to a tenth
         now = place_in(tmp_path)
         assert (now.restarts, now.power_cuts) == (1, 0)
-        assert (now.position_s - died_at.position_s) % 3.0 == pytest.approx(0.02 * (now.tick + 1), abs=0.021)
+        gone_on_s = (now.position_s - died_at.position_s) % 3.0  # slots that were skipped are no dance
+        assert 0.17 <= gone_on_s <= 0.02 * (now.tick + 1) + 0.021
         if how == signal.SIGABRT:  # the watchdog's: it says which line hung
             assert "Fatal Python error: Aborted" in box.words and "run.py" in box.words
 
@@ -115,6 +116,14 @@ def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path)
         assert goes_on_at(box, 1) == pytest.approx(on_disk.position_s, abs=0.051)
         assert "After a power cut the show goes on" in box.words
         assert place_in(tmp_path).power_cuts == 1
+
+
+def test_a_box_without_a_journal_keeps_its_place_on_the_disk_too(show: Path, tmp_path: Path) -> None:
+    with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME) as box:
+        box.frame_that(lambda frame: read_place(tmp_path / "state" / FILE) is not None)
+        assert box.end() == 0
+        place = read_place(tmp_path / "state" / FILE)
+        assert place is not None and place.ended
 
 
 def await_carried(folder: Path) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
+import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -86,6 +89,24 @@ def test_killed_and_started_anew_it_uses_the_readings_and_the_neutral_pose_again
             assert wearables.sensors[0].reboots == 0
     assert after > before  # the same power-on, still counting
     assert box.words.count("neutral pose taken.") == 1
+
+
+def test_after_a_power_cut_the_neutral_pose_is_used_again(show: Path, tmp_path: Path) -> None:
+    """The sensor has a battery; what the box loses is its memory."""
+    with playing(show, tmp_path) as box, Wearables([box.key], box.sensors):
+        box.await_words("neutral pose taken")
+        until = time.monotonic() + PATIENCE_S
+        while not (tmp_path / "sensors.memory").exists():
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        box.end(signal.SIGKILL)
+        with (tmp_path / "runtime" / "keeper.lock").open() as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # the keeper ends with its box
+        shutil.rmtree(tmp_path / "runtime")
+        box.kill_and_restart()
+        box.await_words("Sensor left-wrist: the neutral pose taken before is used on. Dance.")
+        assert box.end() == 0
+        assert box.words.count("neutral pose taken.") == 1
 
 
 def test_out_of_reach_and_back_in_the_same_session(show: Path, tmp_path: Path) -> None:
