@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import itertools
 import os
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 _SHUTDOWN = 0x8004587D  # FS_IOC_SHUTDOWN
 _NO_LOG_FLUSH = 2
+_plugs = itertools.count()
 
 
 def why_not() -> str | None:
@@ -49,9 +52,24 @@ def made_image(path: Path, megabytes: int = 8) -> Path:
     return path
 
 
-def disk(image: Path, folder: Path, how: str = "rw") -> contextlib.AbstractContextManager[Path]:
-    """The disk of an image, mounted rw or ro."""
-    return mounted(folder, "-o", f"loop,{how}", str(image))
+@contextlib.contextmanager
+def disk(image: Path, folder: Path, how: str = "rw") -> Iterator[Path]:
+    """The disk of an image, mounted rw or ro.
+
+    Each time it is a file of its own: whoever makes a mount namespace meanwhile holds on to this mount, and
+    the same file mounted again would be the file system that has lost its power.
+    """
+    plugged = image.with_name(f"{image.name}.{next(_plugs)}")
+    shutil.copyfile(image, plugged)
+    if how == "ro":  # nothing else would bring its own journal to an end
+        subprocess.run(["e2fsck", "-p", str(plugged)], capture_output=True, check=False)
+    try:
+        with mounted(folder, "-o", f"loop,{how}", str(plugged)):
+            yield folder
+            subprocess.run(["sync", "--file-system", str(folder)], capture_output=True, check=False)
+    finally:
+        shutil.copyfile(plugged, image)
+        plugged.unlink()
 
 
 def cut_power(folder: Path) -> None:
