@@ -41,12 +41,13 @@ def list_journal(
     ] = False,
 ) -> None:
     """List the runs in a journal: when, how long, what was late, how often the network failed."""
+    from appliance.control.packet import readable
     from appliance.stage.journal.reading import read_journal
 
     for number, run in enumerate(read_journal(_recorded(box, chosen, recorded)).runs, 1):
-        typer.echo(_line(number, run))
+        typer.echo(readable(_line(number, run)))
         for _, event in run.events if events else ():
-            typer.echo(_event_line(event, float(run.ticks["frame_time"][0])))
+            typer.echo(readable(_event_line(event, float(run.ticks["frame_time"][0]))))
 
 
 @journal.command("export")

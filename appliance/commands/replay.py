@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from appliance.control.packet import readable
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
 from appliance.stage.journal.comparison import METRES_PER_DEGREE, Comparison
@@ -26,7 +27,7 @@ def replay_journal(journal: Path, show: Path | None, from_s: float, tolerance_de
     Raises JournalError, StageError, ConfigError.
     """
     outcomes = [
-        _replay(run, show, from_s, tolerance_degrees, f"Run {number} of '{run.header['show']}'")
+        _replay(run, show, from_s, tolerance_degrees, readable(f"Run {number} of '{run.header['show']}'"))
         for number, run in enumerate(read_journal(journal).runs, 1)
     ]
     if not any(ticks for ticks, _ in outcomes):
@@ -53,7 +54,7 @@ def _replay(
             _progress(name, danced, len(run.ticks))
     _progress("", 0, 0)
     for line in _told(name, comparison, replay, [*others, *files], tolerance):
-        print(line)
+        print(readable(line))
     return comparison.ticks, comparison.first is None
 
 

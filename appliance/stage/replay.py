@@ -20,7 +20,7 @@ from appliance.stage.iterations import Iterations
 from appliance.stage.journal.comparison import Comparison
 from appliance.stage.journal.journal_error import JournalError
 from appliance.stage.journal.keyframe import unpacked
-from appliance.stage.journal.reading import Run
+from appliance.stage.journal.reading import DAMAGED, Run
 from appliance.stage.journal.record import NOT_FINITE, ORDER
 from appliance.stage.obey import carry_out
 from appliance.stage.tick import Tick
@@ -71,7 +71,7 @@ class Replay:
                 if number - 1 not in keyframes:
                     self.skipped += number in rows
                     continue
-                self.tick.restore(unpacked(keyframes[number - 1]))
+                self._restore(keyframes[number - 1])
             before = number
             if number in rows:
                 self._dance_row(rows[number], comparison)
@@ -79,6 +79,15 @@ class Replay:
                 yield danced
             elif events[number]["kind"] == ORDER:
                 self._obey(events[number], comparison)
+
+    def _restore(self, keyframe: bytes) -> None:
+        try:
+            self.tick.restore(unpacked(keyframe))
+        except DAMAGED as error:
+            raise JournalError(
+                f"A keyframe is of another release, or damaged ({type(error).__name__}: {error}). It can be "
+                "drawn; to dance it again, take the release that recorded it."
+            ) from error
 
     def _rows(self) -> dict[int, int]:
         return {int(number): row for row, number in enumerate(self._run.tick_numbers)}
@@ -110,11 +119,15 @@ class Replay:
         comparison.look(recorded, self.tick)
 
     def _obey(self, event: dict[str, Any], comparison: Comparison) -> None:
-        asked, cast = event["order"], self.tick.cast
-        order = Order(asked["name"], tuple(asked["values"]), asked["text"])
-        self._link.answers(order.text, event["done"])
-        done, _ = carry_out(order, cast, self.tick.iterations, self._wearing, self._usual_rate, event["now"])
-        comparison.note_order(order.name, event["done"], done)
+        cast = self.tick.cast
+        try:
+            asked, now, done_then = event["order"], float(event["now"]), bool(event["done"])
+            order = Order(asked["name"], tuple(map(float, asked["values"])), asked["text"])
+        except DAMAGED as error:
+            raise JournalError(f"An order is of another release, or damaged ({error}).") from error
+        self._link.answers(order.text, done_then)
+        done, _ = carry_out(order, cast, self.tick.iterations, self._wearing, self._usual_rate, now)
+        comparison.note_order(order.name, done_then, done)
 
 
 class _RecordedPuppet(Puppet):

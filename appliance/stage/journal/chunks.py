@@ -70,4 +70,14 @@ def _whole(data: bytes, at: int) -> tuple[Chunk, int] | None:
     stored = data[begin:end]
     if zlib.crc32(stored, zlib.crc32(data[at : at + _CHECK_AT])) != check:
         return None
-    return Chunk(kind, ticks, zlib.decompress(stored, bufsize=max(raw_bytes, 1))), end
+    data_bytes = _unpacked(stored, raw_bytes)
+    return None if data_bytes is None else (Chunk(kind, ticks, data_bytes), end)
+
+
+def _unpacked(stored: bytes, size: int) -> bytes | None:
+    """So many bytes and no more, whatever the file's maker has put in; None where there are others."""
+    try:
+        found = zlib.decompressobj().decompress(stored, max(size, 1))
+    except zlib.error:
+        return None
+    return found if len(found) == size else None

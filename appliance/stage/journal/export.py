@@ -14,9 +14,11 @@ from pathlib import Path
 
 from appliance.show.choice import sync_folder
 from appliance.stage.journal.journal_error import JournalError
-from appliance.stage.journal.reading import EXPORTED, header_of, segments_of
+from appliance.stage.journal.reading import DAMAGED, EXPORTED, header_of, segments_of
+from appliance.stage.journal.segments import SUFFIX
 
 CHECKSUMS = "SHA256SUMS"
+_LONGEST_NAME = 80  # of a show, before the date
 
 
 def export(
@@ -37,7 +39,8 @@ def export(
     try:
         with part.open("wb") as file:
             with tarfile.open(fileobj=file, mode="w:", format=tarfile.USTAR_FORMAT) as archive:
-                for name, data in segments_of(journal):
+                for number, (_, data) in enumerate(segments_of(journal), 1):
+                    name = f"{number:08d}{SUFFIX}"  # whatever it is called there
                     _add(archive, name, data)
                     checksums.append(f"{hashlib.sha256(data).hexdigest()}  {name}\n")
                     written += len(data)
@@ -61,8 +64,9 @@ def _show_and_size(journal: Path) -> tuple[str, int]:
     """The newest show in it, and its bytes."""
     show, size = "journal", 0
     for _, data in segments_of(journal):
-        header = header_of(data)
-        show = show if header is None else str(header["show"])
+        with contextlib.suppress(*DAMAGED):
+            header = header_of(data)
+            show = show if header is None else header["show"]
         size += len(data)
     return show, size
 
@@ -75,5 +79,5 @@ def _add(archive: tarfile.TarFile, name: str, data: bytes) -> None:
 
 def _name(show: str, now: float) -> str:
     """After the show, and the time by the box's clock."""
-    plain = re.sub(r"[^a-z0-9]+", "-", show.lower()).strip("-") or "journal"
+    plain = re.sub(r"[^a-z0-9]+", "-", show.lower()).strip("-")[:_LONGEST_NAME] or "journal"
     return f"{plain}-{time.strftime('%Y%m%d-%H%M%S', time.localtime(now))}{EXPORTED}"

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import json
+import os
 import struct
 import tarfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -17,13 +19,15 @@ from appliance.pose.skeleton import Skeleton
 from appliance.stage.journal import chunks, log
 from appliance.stage.journal.journal_error import JournalError
 from appliance.stage.journal.keyframe import POSITION
-from appliance.stage.journal.record import EVENT, TICK, layout_of, skeleton_of
+from appliance.stage.journal.record import EVENT, TICK, layout_of, require_sound, skeleton_of
 from appliance.stage.journal.segments import SUFFIX, segment_paths
 
 EXPORTED = ".bunraku"
 _OLD_MAGIC = b"bunraku journal 1\n"
 _NAME_ONE = "Name the folder of `bunraku play --journal`, a segment in it, or an exported file."
-_DAMAGED = (ValueError, KeyError, TypeError, struct.error, zlib.error)
+_LARGEST = 1 << 28  # bytes of a segment: one that the keeper wrote has a hundredth of it
+# What facts, events and ticks raise that no box wrote.
+DAMAGED = (ValueError, KeyError, TypeError, AttributeError, RecursionError, struct.error)
 
 Ticks = np.ndarray[Any, np.dtype[np.void]]
 
@@ -84,11 +88,16 @@ def read_journal(path: Path) -> JournalRecording:
     for name, data in segments_of(path):
         try:
             _add(parts, data)
-        except _DAMAGED as error:
+        except DAMAGED as error:
             raise JournalError(
                 f"{path}: {name} is damaged ({error}). Remove it, and read the rest."
             ) from error
-    runs = tuple(part.run() for part in parts.values() if part.has_ticks)
+    try:
+        runs = tuple(part.run() for part in parts.values() if part.has_ticks)
+    except DAMAGED as error:
+        raise JournalError(
+            f"{path}: its ticks are no ticks of Bunraku ({error}). Export it again."
+        ) from error
     if not runs:
         raise JournalError(f"{path}: nothing was recorded in it yet. Let the show dance, then look again.")
     return JournalRecording(runs)
@@ -102,12 +111,13 @@ def segments_of(path: Path) -> Iterator[tuple[str, bytes]]:
             if not paths:
                 raise JournalError(f"{path}: no journal is in this folder. {_NAME_ONE}")
             for segment in paths:
-                yield segment.name, segment.read_bytes()
+                with contextlib.suppress(FileNotFoundError):  # the keeper let the oldest go meanwhile
+                    yield segment.name, _read(segment)
             return
         with path.open("rb") as file:
             begin = file.read(512)
         if chunks.is_segment(begin):
-            yield path.name, path.read_bytes()
+            yield path.name, _read(path)
         elif tarfile.is_tarfile(path):
             yield from _exported(path)
         else:
@@ -119,11 +129,15 @@ def segments_of(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def header_of(data: bytes) -> dict[str, Any] | None:
-    """The facts of the run that a segment belongs to; None where its begin is damaged."""
+    """The facts of the run that a segment belongs to; None where its begin is damaged.
+
+    Raises what is raised for facts of something else.
+    """
     first = next(chunks.chunks(data), None)
     if first is None or first.kind != chunks.HEADER:
         return None
     header: dict[str, Any] = json.loads(first.data)
+    require_sound(header)
     return header
 
 
@@ -137,16 +151,23 @@ def last_kept(folder: Path, run: str) -> tuple[int, int]:
         return 0, -1
     entries, keyframe = 0, -1
     for path in reversed(paths[-2:]):
-        data = path.read_bytes()
-        header = header_of(data)
-        if header is None or header["run"] != run:
-            continue
-        for one in chunks.chunks(data):
-            if one.kind == chunks.KEYFRAME:
-                keyframe = max(keyframe, *POSITION.unpack_from(one.data))
-            elif one.kind == chunks.LOG:
-                entries = max(entries, *(entry.number for entry in log.unpacked(one.data)))
+        data = _read(path)
+        with contextlib.suppress(*DAMAGED):
+            header = header_of(data)
+            if header is None or header["run"] != run:
+                continue
+            for one in chunks.chunks(data):
+                if one.kind == chunks.KEYFRAME:
+                    keyframe = max(keyframe, *POSITION.unpack_from(one.data))
+                elif one.kind == chunks.LOG:
+                    entries = max(entries, *(entry.number for entry in log.unpacked(one.data)))
     return max(entries, keyframe), keyframe
+
+
+def _read(path: Path) -> bytes:
+    if path.stat().st_size > _LARGEST:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+    return path.read_bytes()
 
 
 def _exported(path: Path) -> Iterator[tuple[str, bytes]]:
@@ -156,8 +177,9 @@ def _exported(path: Path) -> Iterator[tuple[str, bytes]]:
             raise JournalError(f"{path}: no journal is in this archive. Name a file that was exported.")
         for member in sorted(members, key=lambda member: member.name):
             file = archive.extractfile(member)
-            assert file is not None
-            yield member.name, file.read()
+            if file is None or member.size > _LARGEST:
+                raise JournalError(f"{path}: a part of it is larger than any journal's. Export it again.")
+            yield PurePosixPath(member.name).name, file.read()  # a foreign archive may name any folder
 
 
 def _no_journal(path: Path, begin: bytes) -> str:
@@ -207,4 +229,12 @@ def _add(parts: dict[str, _Part], data: bytes) -> None:
                 if entry.kind == TICK:
                     part.ticks[entry.number] = entry.data
                 elif entry.kind == EVENT:
-                    part.events[entry.number] = json.loads(entry.data)
+                    part.events[entry.number] = _event(entry.data)
+
+
+def _event(data: bytes) -> dict[str, Any]:
+    """Raises one of DAMAGED for what is none."""
+    event: dict[str, Any] = json.loads(data)
+    if not isinstance(event["kind"], str) or not isinstance(event.get("order", {}), dict):
+        raise TypeError("an event of an unknown kind")
+    return event | {"now": float(event["now"])}

@@ -18,6 +18,7 @@ LATE, NOT_FINITE, JUMPED, RESENT = 1, 2, 4, 8  # flags of a tick; RESENT: it sen
 SECTIONS = ("drain", "puppeteers", "motion", "puppet", "blend", "figure", "send")
 TICK, EVENT = 1, 2  # kinds of entries
 ORDER = "order"  # kind of the event that show control asked for something, and what came of it
+_LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970: the year 5138
 SAID = "said"  # kind of the event that people were told something
 
 
@@ -83,6 +84,24 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
         "numpy": np.__version__,
         "onnxruntime": onnxruntime.__version__,
     }
+
+
+def require_sound(facts: dict[str, Any]) -> None:
+    """Raises KeyError, ValueError or TypeError where a file's facts are not those of a run."""
+    figure, layout = skeleton_of(facts), layout_of(facts)
+    needed = record(len(figure), len(facts["hands"]), len(facts["sensors"]))
+    for name in needed.names or ():
+        if layout[name] != needed[name]:
+            raise ValueError(f"another '{name}' in its ticks")
+    for hand in facts["hands"]:
+        figure.index(hand["joint"])
+    directory, files = facts["show_directory"], facts["show_files"]
+    texts = [facts["run"], facts["show"], *facts["sensors"], *files, *files.values()]
+    texts += [] if directory is None else [directory]
+    if not all(isinstance(text, str) for text in texts):
+        raise TypeError("names that are no text")
+    if not 0.0 < facts["tick_s"] < _LONGEST_TICK_S or not 0.0 <= facts["written_at"] < _LAST_WRITTEN_AT:
+        raise ValueError("times that no clock shows")
 
 
 def layout_of(facts: dict[str, Any]) -> np.dtype[np.void]:

@@ -1,0 +1,235 @@
+"""Journals from who knows where: whatever is in them, they are read or refused in words, and nothing else."""
+
+from __future__ import annotations
+
+import io
+import json
+import tarfile
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from appliance.cli import main
+from appliance.commands.replay import replay_journal
+from appliance.show.show import load_show
+from appliance.stage.journal import chunks, log
+from appliance.stage.journal.comparison import Comparison
+from appliance.stage.journal.environment import fingerprints
+from appliance.stage.journal.export import export
+from appliance.stage.journal.journal_error import JournalError
+from appliance.stage.journal.keyframe import POSITION
+from appliance.stage.journal.reading import last_kept, read_journal
+from appliance.stage.journal.record import EVENT, TICK
+from appliance.stage.journal.segments import segment_paths
+from appliance.stage.replay import Replay
+from tests.stage.bundles import write_show
+from tests.stage.night import Night
+
+
+@pytest.fixture(scope="module")
+def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_show(tmp_path_factory.mktemp("bundle") / "show")
+
+
+@pytest.fixture(scope="module")
+def whole(show: Path, tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """A segment as a box writes it."""
+    folder = tmp_path_factory.mktemp("night")
+    night = Night(show, folder / "runtime")
+    night.dance(20)
+    night.order("rate", 0.5)
+    night.dance(5)
+    (segment,) = segment_paths(night.kept(folder / "journal"))
+    return segment.read_bytes()
+
+
+def header(whole: bytes) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(next(chunks.chunks(whole)).data)
+    return found
+
+
+def with_header(whole: bytes, facts: Any) -> bytes:
+    _, *others = chunks.chunks(whole)
+    parts = [chunks.chunk(one.kind, one.data, one.ticks) for one in others]
+    return b"".join([chunks.chunk(chunks.HEADER, json.dumps(facts).encode()), *parts])
+
+
+def odd_headers(whole: bytes) -> Iterator[Any]:
+    facts = header(whole)
+    yield from ([], {}, "run", None, 7)
+    for name in facts:
+        yield {other: value for other, value in facts.items() if other != name}
+        yield from (facts | {name: odd} for odd in (None, [], {}, "", -1, 1e300, [[]], ["a"], {"a": 1}))
+    yield facts | {"record": [*facts["record"][:-1], ["reading_numbers", "|O", [1, 8]]]}
+    yield facts | {"record": [[name, form, [10**6, 10**6]] for name, form, _ in facts["record"]]}
+    yield facts | {"hands": [{"joint": "nobody's", "kind": "", "sensor": None}]}
+
+
+def all_that_reads(path: Path, folder: Path) -> None:
+    """Every command that takes a journal; JournalError alone may come out of it."""
+    recording = read_journal(path)
+    assert recording.skeleton and recording.ticks is not None
+    export(path, folder / "again.bunraku")
+    with pytest.raises(SystemExit) as ended:
+        main(("journal", "list", "--journal", str(path), "--events"))
+    assert ended.value.code == 0
+
+
+def test_facts_of_something_else_are_refused_in_words(
+    whole: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, refused = tmp_path / "odd.segment", 0
+    for facts in odd_headers(whole):
+        path.write_bytes(with_header(whole, facts))
+        try:
+            all_that_reads(path, tmp_path)
+        except JournalError:
+            refused += 1
+        last_kept(tmp_path, "another run")  # a keeper that finds it in its folder
+    assert refused > 50
+    assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        log.Entry(1, TICK, b"short"),
+        log.Entry(1, EVENT, b"no json"),
+        log.Entry(1, EVENT, b"[]"),
+        log.Entry(1, EVENT, b"{}"),
+        log.Entry(1, EVENT, b'{"kind": "order", "now": 1, "order": []}'),
+        log.Entry(1, EVENT, b"[" * 100_000),
+    ],
+)
+def test_entries_of_something_else_are_refused_in_words(
+    whole: bytes, tmp_path: Path, entry: log.Entry
+) -> None:
+    path = tmp_path / "odd.segment"
+    path.write_bytes(whole + chunks.chunk(chunks.LOG, log.packed([entry]), 1))
+    with pytest.raises(JournalError, match=r"damaged|no ticks of Bunraku"):
+        read_journal(path)
+    path.write_bytes(whole + chunks.chunk(chunks.LOG, b"\xff" * 10_000, 1))
+    assert len(read_journal(path).ticks) == 25  # kinds that are not known are left out
+
+
+def test_a_chunk_unpacks_to_what_it_says_and_to_no_more(whole: bytes, tmp_path: Path) -> None:
+    """A kilobyte may stand for a megabyte of zeros, and that for more than any memory holds."""
+    bomb = chunks.chunk(chunks.LOG, bytes(1 << 22), 1)
+    said_small = bytearray(bomb)
+    said_small[16:20] = (100).to_bytes(4, "little")  # where its head has the bytes unpacked
+    said_small[20:24] = zlib.crc32(said_small[24:], zlib.crc32(said_small[:20])).to_bytes(4, "little")
+    assert [one.kind for one in chunks.chunks(bytes(said_small))] == []
+    no_zlib = bytearray(bomb)
+    no_zlib[24:] = b"x" * (len(bomb) - 24)
+    no_zlib[20:24] = zlib.crc32(no_zlib[24:], zlib.crc32(no_zlib[:20])).to_bytes(4, "little")
+    (tmp_path / "odd.segment").write_bytes(whole + bytes(no_zlib))
+    assert len(read_journal(tmp_path / "odd.segment").ticks) == 25
+
+
+def test_names_in_an_archive_lead_nowhere(whole: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "odd.bunraku"
+    with tarfile.open(path, "w:", format=tarfile.PAX_FORMAT) as archive:
+        for name in ("../../../1.segment", "/etc/2.segment", "a" * 90 + "/" + "3" * 190 + ".segment"):
+            member = tarfile.TarInfo(name)
+            member.size = len(whole)
+            archive.addfile(member, io.BytesIO(whole))
+        link = tarfile.TarInfo("4.segment")
+        link.type, link.linkname = tarfile.SYMTYPE, "/etc/passwd"
+        archive.addfile(link)
+    again = export(path, tmp_path / "again.bunraku")
+    with tarfile.open(again) as archive:
+        assert archive.getnames() == [
+            "00000001.segment",
+            "00000002.segment",
+            "00000003.segment",
+            "SHA256SUMS",
+        ]
+
+
+def test_a_part_that_claims_to_be_enormous_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "odd.bunraku"
+    member = tarfile.TarInfo("1.segment")
+    member.size = 1 << 40
+    path.write_bytes(member.tobuf() + bytes(10240))
+    with path.open("r+b") as file:
+        file.truncate((1 << 40) + 10240)  # as long as it claims, and no room taken
+    with pytest.raises(JournalError, match="larger than any journal"):
+        read_journal(path)
+
+
+def test_a_segment_that_goes_while_it_is_exported_is_no_fault(
+    show: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A box that dances lets its oldest minute go, however long a slow stick takes."""
+    night, folder = Night(show, tmp_path / "runtime"), tmp_path / "journal"
+    for _ in range(3):
+        night.dance(20)
+        night.kept(folder)
+    oldest, *_ = segment_paths(folder)
+    exported = export(
+        folder, tmp_path / "night.bunraku", progress=lambda written, of: oldest.unlink(missing_ok=True)
+    )
+    assert len(read_journal(exported).ticks) == 60
+    assert len(read_journal(export(folder, tmp_path / "later.bunraku")).ticks) == 40
+
+
+def test_what_is_no_file_has_no_fingerprint(tmp_path: Path) -> None:
+    """Names in a journal may lead to a device that never ends."""
+    assert fingerprints(tmp_path, ["../../../../../../../dev/zero"]) == {"../../../../../../../dev/zero": ""}
+
+
+@pytest.mark.parametrize(
+    "state",
+    [b"", b"\x02\x00\x00\x00{}", b"\xff\xff\xff\xff", b"\x0f\x00\x00\x00" + b'{"motion": 17}'],
+)
+def test_a_keyframe_of_another_release_is_refused_in_words(
+    whole: bytes, show: Path, tmp_path: Path, state: bytes
+) -> None:
+    path = tmp_path / "odd.segment"
+    facts, _, entries = chunks.chunks(whole)
+    odd = chunks.chunk(chunks.KEYFRAME, POSITION.pack(0) + state)
+    path.write_bytes(
+        b"".join([chunks.chunk(chunks.HEADER, facts.data), odd, chunks.chunk(chunks.LOG, entries.data, 25)])
+    )
+    (run,) = read_journal(path).runs
+    with pytest.raises(JournalError, match="another release"):
+        list(Replay(run, load_show(show)).dance(Comparison(0.0, 0.0)))
+
+
+def changed_order(whole: bytes, change: Callable[[dict[str, Any]], None]) -> bytes:
+    def entries(data: bytes) -> Iterator[log.Entry]:
+        for one in log.unpacked(data):
+            if one.kind == EVENT:
+                event = json.loads(one.data)
+                change(event)
+                one = log.Entry(one.number, EVENT, json.dumps(event).encode())
+            yield one
+
+    return b"".join(
+        chunks.chunk(one.kind, log.packed(list(entries(one.data))), one.ticks)
+        if one.kind == chunks.LOG
+        else chunks.chunk(one.kind, one.data, one.ticks)
+        for one in chunks.chunks(whole)
+    )
+
+
+def test_an_order_of_another_release_is_refused_in_words(whole: bytes, show: Path, tmp_path: Path) -> None:
+    path = tmp_path / "odd.segment"
+    path.write_bytes(changed_order(whole, lambda event: event.pop("order")))
+    with pytest.raises(JournalError, match="another release"):
+        replay_journal(path, show, 0.0, None)
+
+
+def test_nothing_in_a_journal_steers_the_terminal(
+    whole: bytes, show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "odd.segment"
+    steering = with_header(whole, header(whole) | {"show": "\x1b]0;taken\x07", "cpu": "\x1b[2J"})
+    path.write_bytes(changed_order(steering, lambda event: event.update(words="\x1b[2J\n\r")))
+    all_that_reads(path, tmp_path)
+    assert replay_journal(path, show, 0.0, None) == 0
+    said = capsys.readouterr()
+    assert "\x1b" not in said.out + said.err and "\r" not in said.out
