@@ -160,9 +160,7 @@ class Playback:
         It begins at its start (backwards: at its end); one that plays already goes on where it is, told by
         False. An excerpt that was chosen meanwhile is forgotten: the phrase is what it was at the beginning.
         """
-        if name not in self._phrases:
-            raise ValueError(f"This show has no phrase '{name}'. {did_you_mean(name, self.phrases)}")
-        phrase, loop = self._phrases[name]
+        phrase, loop = self._known(name)
         if loop is self._excerpt:
             return False
         self._asked, self._excerpt = phrase, loop
@@ -187,11 +185,12 @@ class Playback:
 
         Without a crossfade, at once at this rate. Raises ValueError for what this show does not have.
         """
-        self.play(name)
-        if max(abs(one - other) for one, other in zip(self.excerpt_s, excerpt_s, strict=True)) > 0.5 / FPS:
-            self.excerpt(*excerpt_s)
+        phrase, loop = self._known(name)
+        whole_s = loop.start_s, loop.start_s + loop.length / FPS
+        if max(abs(one - other) for one, other in zip(whole_s, excerpt_s, strict=True)) > 0.5 / FPS:
+            loop = phrase.cut(*excerpt_s)
         self._rate = self._wanted_rate = _checked_rate(rate)
-        loop = self._excerpt
+        self._asked, self._excerpt = phrase, loop
         position = round((position_s - loop.start_s) * FPS, _FRAME_DIGITS)
         self._begin(min(max(position, 0.0), loop.length - 1.0), standing)
 
@@ -245,6 +244,12 @@ class Playback:
         self._end = self._window
         self._played[: self._end] = state["played"]
         self._played_track[: self._end] = state["played_track"]
+
+    def _known(self, name: str) -> tuple[Phrase, Loop]:
+        """A phrase of this show, and all of it made endless. Raises ValueError."""
+        if name not in self._phrases:
+            raise ValueError(f"This show has no phrase '{name}'. {did_you_mean(name, self.phrases)}")
+        return self._phrases[name]
 
     def _named(self, loop: Loop) -> list[Any]:
         """A loop by its phrase, its frames in it, and whether it is what that phrase plays by itself."""

@@ -41,11 +41,11 @@ def carriers(
     the state folder, where there is one.
     """
     kept: list[Carrier] = []
+    if box.state_folder is not None:
+        kept.append(PlaceCarrier(runtime, box.state_folder, say))  # its last turn waits for the stage's end
+        kept.append(MemoryCarrier(runtime, box.state_folder, say))
     if journal is not None:
         kept.append(JournalCarrier(runtime, journal, minutes, say))
-    if box.state_folder is not None:
-        kept.append(PlaceCarrier(runtime, box.state_folder, say))
-        kept.append(MemoryCarrier(runtime, box.state_folder, say))
     return kept
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from appliance.cli import main
 from appliance.commands import journal
+from appliance.show import choice
 from appliance.stage.journal.reading import read_journal
 from tests.stage.bundles import write_show
 from tests.stage.night import Night
@@ -73,6 +74,21 @@ def test_without_a_stick_or_a_journal_it_says_what_to_do(
     (tmp_path / "box.yaml").write_text("{}\n")
     assert bunraku("journal", "list", "--box", str(tmp_path / "box.yaml")) == 2
     assert "No box file names a journal" in capsys.readouterr().err
+
+
+def test_on_a_box_it_is_the_journal_of_what_was_chosen(
+    recorded: Path, stick: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without any option, as a technician types it."""
+    monkeypatch.setattr(choice, "RUN", recorded.parent)
+    box = recorded.with_name("box.yaml")
+    box.write_text("journal: {folder: journal}\n")
+    choice.Choice((choice.Pair(box=box),), (), ()).write(choice.RUN / choice.CHOSEN)
+    assert bunraku("journal", "list") == 0
+    assert "A test: 1 s, 20 late" in capsys.readouterr().out
+    assert bunraku("journal", "export") == 0
+    (exported,) = stick.iterdir()
+    assert len(read_journal(exported).ticks) == 50
 
 
 def test_a_list_tells_what_happened(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -191,6 +191,10 @@ def test_a_place_that_this_show_does_not_have_is_no_place(
     assert "begins at the beginning" in words and reason in words
     assert not resuming.went_on
     assert (cast.motion.phrase, cast.motion.position_s) == ("main", 0.0)
+    for _ in range(20):
+        cast.motion.advance()
+    assert (cast.motion.phrase, cast.motion.rate) == ("main", 1.0)
+    assert cast.motion.going_on[1] == pytest.approx(20 * TICK_S, abs=2e-3)
 
 
 def test_a_second_beyond_the_phrase_is_its_last_one(cast_of: Callable[[], Cast], runtime: Path) -> None:
