@@ -12,7 +12,7 @@ Usage: install.sh [FOLDER]         install the release in FOLDER (left out: wher
        install.sh --uninstall --purge      these too
 
   --root DIR             work on the root file system in DIR (an image) instead of this machine's
-  --until-power-off      try the release although this root forgets everything when the power goes
+  --until-power-off      keep the release in memory: on a box made from the image, for a trial
   --help                 this text
 
 For Debian 13 and Raspberry Pi OS (amd64, arm64), as root, with the stick that `make release` is copied to:
@@ -22,6 +22,10 @@ On a box that has a release already, the same script is the command bunraku-inst
 Nothing is switched before the new release lies whole on the disk and has danced for a moment where nobody
 sees it. If it does not start then, the box goes back to the release before. Whenever the power fails, the
 box has the old release or the new one, whole. Two releases before the current one stay.
+
+A box made from the image forgets what is written to its root. Its releases lie on the data partition, in
+/data/bunraku-releases, and at each power-on the chosen one is switched to before anything dances. The release
+that came with the image always stays, and dances when the chosen one is damaged or does not dance.
 Exit status: 0 done; 1 refused, or gone back to the release before: the message says why.
 HELP
 }
@@ -32,6 +36,14 @@ fail() { echo "install: $*" >&2; exit 1; }
 KEPT=2
 STARTS_WITHIN_S=20
 STAYS_S=3
+# At power-on a release on the data partition has so long, and so many starts of its stage, to dance for a moment;
+# more starts than it takes to put two shows aside that do not dance. After so many power-ons in which it never
+# came to that, it is not tried again.
+DANCES_WITHIN_S=120
+DANCES_FOR_S=5
+STARTS_TRIED=10
+POWER_ONS_TRIED=5
+once=/run/bunraku-release # bunraku-release.service looks for it
 home=/opt/bunraku
 data=/data/bunraku
 units=usr/lib/systemd/system
@@ -44,6 +56,8 @@ read_options() {
         --root) root=$(cd "${2:?--root needs a folder}" && pwd) && shift ;;
         --list | --rollback | --uninstall) action=${1#--} ;;
         --use) action=use chosen=${2:?"--use needs a version, see --list"} && shift ;;
+        --at-power-on) action=at-power-on ;;                 # bunraku-release.service
+        --watch) action=watch chosen=${2:?} && shift ;;      # what that starts
         --purge) purge=yes ;;
         --until-power-off) fleeting=yes ;;
         -h | --help) usage && exit 0 ;;
@@ -54,8 +68,14 @@ read_options() {
     done
     [ "$root" != / ] || root=''
     [ -n "$source" ] || source=$(dirname "$0")
-    releases=$root$home/releases
+    releases=$root$home/releases kept=$root/data/bunraku-releases store=$releases
+    if ! forgets || [ $fleeting = yes ]; then return; fi
+    store=$kept
 }
+
+# An image's root lies under an overlay in memory.
+forgets() { [ "$(stat -f -c %T "$root/opt")" = overlayfs ] && { [ -z "$root" ] || has_data; }; }
+has_data() { mountpoint --quiet "$root/data"; }
 
 # A root that does not run has no /proc of its own, and the packages ask it for the processor.
 in_root() {
@@ -72,9 +92,30 @@ current() { basename "$(readlink "$root$home/current" || true)"; }
 # Oldest first, as "number version": the number says in which order they came, whatever the clock said.
 installed() {
     local folder
-    for folder in "$releases"/*/; do
-        if [[ -f $folder/number && $folder != *.part/ ]]; then echo "$(<"$folder/number") $(basename "$folder")"; fi
-    done | sort -n
+    for folder in "$releases"/*/ "$kept"/*/; do
+        if [[ -f $folder/number && $folder != *.part/ && $folder != */current/ ]]; then
+            echo "$(<"$folder/number") $(basename "$folder")"
+        fi
+    done | sort -n | uniq
+}
+
+# The release that came with the image: the oldest one that does not lie on the data partition.
+own() {
+    local name
+    while read -r _ name; do
+        if [[ -d $releases/$name && ! -L $releases/$name ]]; then echo "$name" && return; fi
+    done < <(installed)
+}
+
+# Releases on the data partition are seen among the others.
+link_kept() {
+    local folder name
+    for folder in "$kept"/*/; do
+        name=$(basename "$folder")
+        if [[ -f $folder/whole && $name != *.part && $name != current && ! -e $releases/$name ]]; then
+            ln -sfn "../../../data/bunraku-releases/$name" "$releases/$name"
+        fi
+    done
 }
 
 # One at a time; and whatever ends this script, no half release stays.
@@ -85,6 +126,7 @@ begin() {
     flock --nonblock 9 || fail "another installation is running on this box. Wait for its end."
     trap '[ -z "$part" ] || rm -rf "$part"' EXIT
     umask 022
+    link_kept
 }
 
 # ---- before anything is written
@@ -104,16 +146,25 @@ check_machine() {
     python=$(fact "$source" python)
     in_root "/usr/bin/python$python" -c 'import venv' 2>/dev/null ||
         fail "Python $python is missing. Bunraku is made for Debian 13; there: apt-get install libpython3-stdlib"
+    [[ $store = "$releases" ]] || check_data
     needs=$(fact "$source" needs-mb)
-    have=$(df --output=avail -m "$releases" | tail -n 1 | tr -d ' ')
-    [ "$have" -ge "$needs" ] || fail "$have MB are free in $releases, $needs MB are needed." \
+    have=$(df --output=avail -m "$store" | tail -n 1 | tr -d ' ')
+    [ "$have" -ge "$needs" ] || fail "$have MB are free in $store, $needs MB are needed." \
         "Nothing was changed. Make room, or use a larger card."
-    # An image's root lies under an overlay in memory.
-    [[ -n $root || $fleeting = yes || $(stat -f -c %T "$releases") != overlayfs ]] ||
-        fail "this box runs from a read-only image and would forget the installation at power-off." \
-            "Write the new image to its card (copy /data/bunraku to a stick before: shows, keys)," \
-            "or try the release as long as the power is on: --until-power-off"
 }
+
+check_data() {
+    has_data ||
+        fail "this box runs from a read-only image, and its data partition, where releases are kept, is not there." \
+            "Look at its disk: bunraku doctor. As long as the power is on it can be tried: --until-power-off"
+    { mkdir -p "$kept" && [ -w "$kept" ]; } 2>/dev/null ||
+        fail "$kept cannot be written. Nothing was changed. Ask bunraku doctor."
+    belongs_to_root "$root/data" "$kept" ||
+        fail "others than root may write into /data or $kept, and what lies there would be started as root." \
+            "Nothing was changed. chown root: and chmod 755 both."
+}
+
+belongs_to_root() { [ "$(stat -c %u:%a "$@" | sort -u)" = 0:755 ]; }
 
 # ---- a release of its own beside the others
 
@@ -170,7 +221,7 @@ write_command() {
 # On the box it dances a moment out of sight; in an image, whose machine is another one, it loads every part, and
 # under emulation, which has no processor that onnxruntime knows (it ends with SIGSEGV), its command alone.
 works() {
-    local python=$home/releases/$1/bin/python meeting result=0
+    local python=$1/bin/python meeting result=0 as=()
     if [[ -n $root && $(in_root dpkg --print-architecture) != $(dpkg --print-architecture) ]]; then
         in_root "$python" -I -c 'import appliance.start'
     elif [ -n "$root" ]; then
@@ -180,7 +231,13 @@ for module in pkgutil.walk_packages(appliance.__path__, "appliance."):
         importlib.import_module(module.name)'
     else
         meeting=$(mktemp -d)
-        RUNTIME_DIRECTORY=$meeting timeout 60 "$python" -I -m appliance.cli preflight --check-release || result=$?
+        # It loads the shows on this box, which are not root's.
+        if id bunraku >/dev/null 2>&1; then
+            as=(setpriv --reuid bunraku --regid bunraku --init-groups --no-new-privs)
+            chown bunraku "$meeting"
+        fi
+        RUNTIME_DIRECTORY=$meeting timeout 60 "${as[@]}" "$python" -I -m appliance.cli preflight --check-release ||
+            result=$?
         rm -rf "$meeting"
         return $result
     fi
@@ -194,9 +251,10 @@ install_release() {
     if [ -d "$releases/$name" ] && ! cmp -s "$releases/$name/SHA256SUMS" "$source/SHA256SUMS"; then
         name=$version-$(sha256sum <"$source/SHA256SUMS" | cut -c 1-8)
     fi
+    if [[ -L $releases/$name && -n $(flaw "$name") ]]; then discard "$name"; fi
     if [ ! -d "$releases/$name" ]; then
-        rm -rf "$releases"/*.part
-        part=$releases/$name.part
+        rm -rf "${store:?}/$name" "$store"/*.part
+        part=$store/$name.part
         say "bunraku $version: reading $source and checking every file"
         copy_and_verify
         say "unpacking it beside the release that dances"
@@ -204,11 +262,14 @@ install_release() {
         number=$(installed | tail -n 1 | cut -d ' ' -f 1)
         echo $((${number:-0} + 1)) >"$part/number"
         say "trying it"
-        works "$name.part" || fail "bunraku $version does not work on this box (above). The box dances as before."
+        works "${part#"$root"}" ||
+            fail "bunraku $version does not work on this box (above). The box dances as before."
+        if [ "$store" = "$kept" ]; then contents "$part" >"$part/whole"; fi
         sync -f "$part"
-        mv "$part" "$releases/$name"
+        mv "$part" "$store/$name"
         part='' fresh=yes
-        sync -f "$releases"
+        sync -f "$store"
+        link_kept
     fi
     switch_or_go_back "$name"
     forget_old
@@ -288,13 +349,17 @@ switch_to() {
 is_active() { [ "$(systemctl show --property ActiveState --value bunraku-stage)" = active ]; }
 main_pid() { systemctl show --property MainPID --value bunraku-stage; }
 
+read_system_files() {
+    systemctl daemon-reload
+    systemd-tmpfiles --create "$home/current/system/usr/lib/tmpfiles.d/bunraku.conf" || true
+    udevadm control --reload 2>/dev/null || true # a container has no udev
+}
+
 # True when the stage dances and goes on dancing; in an image there is nothing to start.
 starts() {
     local pid deadline=$((SECONDS + STARTS_WITHIN_S))
     runs_here || return 0
-    systemctl daemon-reload
-    systemd-tmpfiles --create "$home/current/system/usr/lib/tmpfiles.d/bunraku.conf" || true
-    udevadm control --reload 2>/dev/null || true # a container has no udev
+    read_system_files
     timeout "$STARTS_WITHIN_S" systemctl restart bunraku.target || true
     until is_active; do
         [ "$SECONDS" -lt "$deadline" ] || return 1
@@ -310,6 +375,7 @@ switch_or_go_back() {
     before=$(current)
     switch_to "$1"
     if starts; then
+        keep_choice "$1"
         say "bunraku $1 is installed$(runs_here && echo ' and dances')"
         return
     fi
@@ -317,29 +383,154 @@ switch_or_go_back() {
     [[ -n $before && $before != "$1" && -d $releases/$before ]] ||
         fail "bunraku $1 did not start (above). There is no release before it on this box."
     switch_to "$before"
-    [ "$fresh" = no ] || rm -rf "${releases:?}/$1"
+    [ "$fresh" = no ] || discard "$1"
     starts || fail "bunraku $1 did not start (above), and $before does not start now either. Ask bunraku doctor."
     fail "bunraku $1 did not start (above). Back on $before, which dances. Report what stands above."
 }
 
+# Of an image's releases those count that lie on the data partition; its own stays.
 forget_old() {
-    local folder
-    for folder in $(installed | cut -d ' ' -f 2 | grep -vxF "$(current)" | head -n -"$KEPT"); do
-        rm -rf "${releases:?}/$folder"
+    local name
+    for name in $(installed | cut -d ' ' -f 2 | grep -vxF "$(current)" |
+        { if forgets; then grep -vxF "$(own)" || true; else cat; fi; } | head -n -"$KEPT"); do
+        discard "$name"
     done
+}
+
+# Under another name first: whenever the power fails, no half release is taken for a whole one.
+discard() {
+    local folder=${releases:?}/$1
+    if [ -L "$folder" ]; then rm "$folder" && folder=${kept:?}/$1 && rm -f "$folder.aside"; fi
+    mv "$folder" "$folder.part"
+    rm -rf "$folder.part"
+}
+
+# ---- a box made from the image: its root forgets, its data partition does not
+
+# What every file of a release is: kind, rights, owner, size, name, and where a link leads.
+contents() {
+    (cd "$1" && find . -mindepth 1 -not -name whole \( -type d -printf 'd %m %U %P\n' -o \
+        -printf '%y %m %U %s %P %l\n' \) | LC_ALL=C sort)
+}
+
+# Why a release on the data partition is not to be switched to; nothing when it is sound. To read all of it would
+# cost seconds at power-on: of most files only the size counts, of those that systemd reads every byte. A stage that
+# does not dance with the rest is put aside by the watch.
+flaw() {
+    local folder=$kept/$1
+    [ -f "$folder/whole" ] || { echo "it is not whole" && return; }
+    [ -L "$releases/$1" ] || { echo "the image came with another one of this name" && return; }
+    belongs_to_root "$root/data" "$kept" "$folder" || { echo "others than root may write there" && return; }
+    [ -z "$(contents "$folder" | LC_ALL=C comm -13 - "$folder/whole")" ] ||
+        { echo "files of it are missing or damaged" && return; }
+    (cd "$folder" && grep -E '  \./(system/|release$|install\.sh$)' SHA256SUMS | sha256sum --check --strict --status) ||
+        { echo "what systemd reads of it is damaged" && return; }
+    [ "$(in_root dpkg --print-architecture)" = "$(fact "$folder" architecture)" ] ||
+        { echo "it is for $(fact "$folder" architecture)" && return; }
+    [ -x "$root/usr/bin/python$(fact "$folder" python)" ] || echo "it needs Python $(fact "$folder" python)"
+}
+
+# What this box dances at the next power-on.
+keep_choice() {
+    if ! forgets || [[ $fleeting = yes || ! -d $kept ]]; then return; fi
+    if [ -L "$releases/$1" ]; then
+        rm -f "$kept/tries" "$kept/$1.aside"
+        link "$1" "$kept/current"
+    else
+        rm -f "$kept/current" "$kept/tries"
+    fi
+    sync -f "$kept"
+}
+
+# $2 says why; from now on the image's own release dances.
+put_aside() {
+    local words
+    words="$2. The release that came with the image dances. Install it anew, or try again: bunraku-install --use $1"
+    say "bunraku $1: $words"
+    { echo "$words" >"$kept/$1.aside" && keep_choice "$(own)"; } 2>/dev/null ||
+        say "The data partition cannot be written: it is tried again at the next power-on."
+}
+
+# Before anything dances, once. The system files are read anew only if they are other ones than the image's.
+at_power_on() {
+    local name why tries=0
+    forgets || return 0
+    if runs_here; then : >"$once"; fi
+    name=$(basename "$(readlink "$kept/current")")
+    why=$(flaw "$name")
+    if [ -n "$why" ]; then
+        put_aside "$name" "$why"
+        return
+    fi
+    [ ! -s "$kept/tries" ] || tries=$(tr -cd 0-9 <"$kept/tries" | head -c 3)
+    if [ "${tries:-0}" -ge "$POWER_ONS_TRIED" ]; then
+        put_aside "$name" "it did not dance for $DANCES_FOR_S s in $POWER_ONS_TRIED power-ons"
+        return
+    fi
+    { echo $((10#${tries:-0} + 1)) >"$kept/tries"; } 2>/dev/null || true
+    if diff -qr "$releases/$(current)/system" "$releases/$name/system" >/dev/null; then
+        link "releases/$name" "$root$home/current"
+        start_watch "$name"
+    else
+        switch_to "$name"
+        start_watch "$name"
+        if runs_here; then read_system_files && systemctl --no-block start bunraku.target; fi
+    fi
+    say "bunraku $name, from the data partition"
+}
+
+# By the image's own script, whatever the release is.
+start_watch() {
+    runs_here || return 0
+    systemd-run --quiet --no-block --unit=watch-release --description="Does bunraku $1 dance?" \
+        --property=After=bunraku-preflight.service "$releases/$(own)/install.sh" --watch "$1"
+}
+
+restarts() { systemctl show --property NRestarts --value bunraku-stage; }
+
+# True as soon as the stage has danced for a moment, or when somebody has stopped it; false when it does not dance.
+danced() {
+    local pid='' now since=0 deadline=$((SECONDS + DANCES_WITHIN_S))
+    while [ "$SECONDS" -lt "$deadline" ] && [ "$(restarts)" -lt "$STARTS_TRIED" ]; do
+        sleep 1
+        if is_active; then now=$(main_pid); else now=''; fi
+        [[ -n $now && $now = "$pid" ]] || since=$SECONDS
+        pid=$now
+        if [ $((SECONDS - since)) -ge "$DANCES_FOR_S" ]; then return 0; fi
+    done
+    [ "$(systemctl show --property ActiveState --value bunraku-stage)" = inactive ]
+}
+
+watch() {
+    sync -f "$kept" || true
+    if danced; then
+        rm -f "$kept/tries"
+        return
+    fi
+    begin
+    [ "$(current)" = "$1" ] || return 0
+    put_aside "$1" "its stage did not dance"
+    switch_to "$(own)"
+    starts || fail "the release that came with the image does not start either. Ask bunraku doctor."
 }
 
 # ---- what else one can ask for
 
 list() {
-    local name
+    local name sign
     while read -r _ name; do
-        if [ "$name" = "$(current)" ]; then echo "* $name"; else echo "  $name"; fi
+        if [ "$name" = "$(current)" ]; then sign='*'; else sign=' '; fi
+        echo "$sign $name$([ ! -f "$kept/$name.aside" ] || echo "  put aside: $(<"$kept/$name.aside")")"
     done < <(installed)
 }
 
 use() {
+    local why
     [ -f "$releases/$1/number" ] || fail "no release '$1' on this box. It has: $(installed | cut -d ' ' -f 2 | xargs)"
+    if [ -L "$releases/$1" ]; then
+        why=$(flaw "$1")
+        [ -z "$why" ] || fail "bunraku $1: $why. The box dances as before. Install it anew."
+    fi
     switch_or_go_back "$1"
 }
 
@@ -352,6 +543,10 @@ rollback() {
 
 uninstall() {
     local file
+    if forgets; then
+        uninstall_kept
+        return
+    fi
     if runs_here; then
         systemctl stop bunraku.target 'bunraku-*' || true
     fi
@@ -366,11 +561,26 @@ uninstall() {
     if [ "$purge" = yes ]; then rm -rf "${root:?}$data" && say "and so are all shows, keys and the journal"; fi
 }
 
+# What came with the image stays, and dances.
+uninstall_kept() {
+    local name
+    if [ "$purge" = yes ]; then
+        ! runs_here || systemctl stop bunraku.target 'bunraku-*' || true
+        rm -rf "${root:?}$data"
+    fi
+    switch_or_go_back "$(own)"
+    for name in $(installed | cut -d ' ' -f 2); do [ ! -L "$releases/$name" ] || discard "$name"; done
+    rm -rf "${kept:?}"
+    say "nothing but what came with the image is on this box$([ "$purge" = no ] || echo ': all shows, keys and the journal are gone')"
+}
+
 main() {
     read_options "$@"
-    [ "$action" = list ] || begin
+    case $action in list | watch) ;; *) begin ;; esac
     case $action in
     install) install_release ;;
+    at-power-on) at_power_on ;;
+    watch) watch "$chosen" ;;
     list) list ;;
     rollback) rollback ;;
     use) use "$chosen" ;;

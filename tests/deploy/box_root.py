@@ -70,27 +70,35 @@ class BoxRoot:
         self.folder.mkdir(parents=True, exist_ok=True)
         with self.disk.open("wb") as disk:
             disk.truncate(_SIZE_MB << 20)
-        _run("mke2fs", "-q", "-t", "ext4", str(self.disk))
+        run("mke2fs", "-q", "-t", "ext4", str(self.disk))
         self.switch_on()
 
     def switch_on(self) -> None:
         """Mount it, as a boot does: the disk's journal is played back first."""
         self.written.mkdir(exist_ok=True)
         self.path.mkdir(exist_ok=True)
-        _run("mount", "-o", "loop,noatime", str(self.disk), str(self.written))
+        run("mount", "-o", "loop,noatime", str(self.disk), str(self.written))
         for name in ("upper", "work"):
             (self.written / name).mkdir(exist_ok=True)
         above = f"lowerdir=/,upperdir={self.written}/upper,workdir={self.written}/work"
-        _run("mount", "-t", "overlay", "-o", above, "overlay", str(self.path))
+        run("mount", "-t", "overlay", "-o", above, "overlay", str(self.path))
 
     def switch_off(self) -> None:
         for mounted in (self.path, self.written):
-            subprocess.run(["umount", str(mounted)], capture_output=True)
+            unmount(mounted)
+        self.release_disk()
+
+    def release_disk(self) -> None:
+        """Whoever copied this machine's mounts meanwhile (a box in a container does) holds another disk."""
+        if subprocess.check_output(["losetup", "--associated", str(self.disk)]):
+            copy = self.disk.with_suffix(".copy")
+            run("cp", "--sparse=always", str(self.disk), str(copy))
+            copy.replace(self.disk)
 
     def copy_of(self, other: BoxRoot) -> BoxRoot:
         """The same disk as `other`'s, which must be off; it is on afterwards."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        _run("cp", "--sparse=always", str(other.disk), str(self.disk))
+        run("cp", "--sparse=always", str(other.disk), str(self.disk))
         self.switch_on()
         return self
 
@@ -117,7 +125,14 @@ class BoxRoot:
         )
 
 
-def _run(*words: str) -> None:
+def run(*words: str) -> str:
+    """What a command prints that has to do what it should."""
     done = subprocess.run(words, capture_output=True, text=True)
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(words)}: {done.stderr}")
+    return done.stdout
+
+
+def unmount(folder: Path) -> None:
+    """Also where nothing is mounted."""
+    subprocess.run(["umount", str(folder)], capture_output=True)

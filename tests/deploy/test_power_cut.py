@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.deploy.box_root import BoxRoot
+from tests.deploy.cutting import cutting
 
 CUTS = 8
-HERE = Path(__file__).parent
 MakeRelease = Callable[..., Path]
-
-
-def _cutting(box: BoxRoot, at: int | str, log: Path) -> dict[str, str]:
-    """The environment in which install.sh loses the power at command number `at`, or counts, or watches."""
-    return {
-        "BASH_ENV": str(HERE / "cut.bash"),
-        "CUT_AT": str(at),
-        "CUT_LOG": str(log),
-        "CUT_ROOT": str(box.path),
-        "CUT_DISK": str(box.written),
-        "CUT_PYTHON": sys.executable,
-        "CUT_PROGRAM": str(HERE / "cut.py"),
-    }
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +26,7 @@ def commands(with_first_release: BoxRoot, second: Path, tmp_path_factory: pytest
     folder = tmp_path_factory.mktemp("counted")
     box = BoxRoot(folder / "box").copy_of(with_first_release)
     try:
-        done = box.install(second, env=_cutting(box, "count", folder / "count"))
+        done = box.install(second, env=cutting(box, "count", folder / "count"))
         assert done.returncode == 0, done.stderr
         assert box.current == "2.0.0"
     finally:
@@ -59,10 +45,10 @@ def test_before_every_single_command_the_box_would_start(own: BoxRoot, second: P
     log = tmp_path / "commands"
     log.write_text("")
     for words in ((second,), ("--rollback",)):
-        done = own.install(*words, env=_cutting(own, "watch", log))
+        done = own.install(*words, env=cutting(own, "watch", log))
         assert done.returncode == 0, done.stderr
         assert log.read_text() == ""
-    assert own.install("--uninstall", env=_cutting(own, "watch", log)).returncode == 0
+    assert own.install("--uninstall", env=cutting(own, "watch", log)).returncode == 0
     assert log.read_text() != "", "the watch sees a box that would not start"
 
 
@@ -71,7 +57,7 @@ def test_cut_at_any_command_the_box_has_one_whole_release(
     own: BoxRoot, second: Path, commands: int, tmp_path: Path, cut: int
 ) -> None:
     at = commands * cut // CUTS
-    assert own.install(second, env=_cutting(own, at, tmp_path / "count")).returncode != 0, "it was cut"
+    assert own.install(second, env=cutting(own, at, tmp_path / "count")).returncode != 0, "it was cut"
     own.switch_off()
     assert own.check_disk() in (0, 1)
     own.switch_on()

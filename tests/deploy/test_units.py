@@ -59,7 +59,13 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for path in Path("/usr/lib/systemd/system").iterdir():
         if path.is_file() and not (root / "usr/lib/systemd/system" / path.name).exists():
             shutil.copy(path, root / "usr/lib/systemd/system")
-    programs = ("/usr/sbin/nft", "/usr/bin/systemctl", "/usr/bin/systemd-tmpfiles", "/bin/bash")
+    programs = (
+        "/usr/sbin/nft",
+        "/usr/bin/systemctl",
+        "/usr/bin/systemd-tmpfiles",
+        "/bin/bash",
+        "/usr/local/sbin/bunraku-install",
+    )
     for program in (f"{BIN}/bunraku", f"{BIN}/python", *programs):
         path = root / program.lstrip("/")
         path.parent.mkdir(parents=True, exist_ok=True)
