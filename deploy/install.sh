@@ -53,9 +53,17 @@ root='' action=install source='' chosen='' purge=no fleeting=no part='' fresh=no
 read_options() {
     while [ $# -gt 0 ]; do
         case $1 in
-        --root) root=$(cd "${2:?--root needs a folder}" && pwd) && shift ;;
+        --root)
+            [ -d "${2:-}" ] || fail "--root: there is no folder '${2:-}'. Nothing was touched."
+            root=$(cd "$2" && pwd)
+            shift
+            ;;
         --list | --rollback | --uninstall) action=${1#--} ;;
-        --use) action=use chosen=${2:?"--use needs a version, see --list"} && shift ;;
+        --use)
+            [ $# -gt 1 ] || fail "--use needs a version: install.sh --list shows which there are."
+            action=use chosen=$2
+            shift
+            ;;
         --at-power-on) action=at-power-on ;;                 # bunraku-release.service
         --watch) action=watch chosen=${2:?} && shift ;;      # what that starts
         --purge) purge=yes ;;
@@ -279,7 +287,7 @@ install_release() {
 
 # System files under usr/ are links through `current`: renaming that one link switches all of them at once.
 # Those under etc/ are copies: other daemons may not read elsewhere, and a technician may change them.
-system_files() { (cd "$releases/$1/system" && find usr etc -type f 2>/dev/null) || true; }
+system_files() { (cd "$releases/$1/system" && find usr etc -type f) 2>/dev/null || true; }
 
 link() {
     mkdir -p "$(dirname "$2")"
@@ -522,11 +530,13 @@ list() {
         if [ "$name" = "$(current)" ]; then sign='*'; else sign=' '; fi
         echo "$sign $name$([ ! -f "$kept/$name.aside" ] || echo "  put aside: $(<"$kept/$name.aside")")"
     done < <(installed)
+    [ -n "$(installed)" ] || say "no release is on this box"
 }
 
 use() {
     local why
-    [ -f "$releases/$1/number" ] || fail "no release '$1' on this box. It has: $(installed | cut -d ' ' -f 2 | xargs)"
+    [ -f "$releases/$1/number" ] ||
+        fail "no release '$1' on this box. It has: $(installed | cut -d ' ' -f 2 | xargs | grep . || echo none)."
     if [ -L "$releases/$1" ]; then
         why=$(flaw "$1")
         [ -z "$why" ] || fail "bunraku $1: $why. The box dances as before. Install it anew."
@@ -535,9 +545,11 @@ use() {
 }
 
 rollback() {
-    local before
-    before=$(installed | cut -d ' ' -f 2 | grep -xF -B 1 "$(current)" | head -n 1) || true
-    [[ -n $before && $before != "$(current)" ]] || fail "no release before $(current) on this box."
+    local before now
+    now=$(current)
+    [ -n "$now" ] || fail "no release is on this box."
+    before=$(installed | cut -d ' ' -f 2 | grep -xF -B 1 "$now" | head -n 1) || true
+    [[ -n $before && $before != "$now" ]] || fail "no release before $now on this box. The box dances as before."
     use "$before"
 }
 

@@ -37,6 +37,7 @@ while [ $# -gt 0 ]; do
 done
 [ "${#given[@]}" = 2 ] || { usage >&2; exit 2; }
 root=${given[0]} out=${given[1]}
+[ -d "$root/boot" ] || fail "$root is no root file system: it has no boot/. Fill it with mkroot.sh."
 kernel=$(find "$root/boot" -name 'vmlinuz-*' | sort -V | tail -n 1)
 start_image=$(find "$root/boot" -name 'initrd.img-*' | sort -V | tail -n 1)
 if [ -z "$kernel" ] || [ -z "$start_image" ]; then

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.deploy.box_root import BoxRoot, python
-from tests.deploy.small_release import write_facts
+from tests.deploy.small_release import INSTALL, write_facts
 
 MakeRelease = Callable[..., Path]
 UNITS = "usr/lib/systemd/system"
@@ -142,6 +143,13 @@ def test_a_folder_without_a_release_is_said(box: BoxRoot, tmp_path: Path) -> Non
     assert done.returncode == 1
     assert f"no release in {tmp_path}" in done.stderr
     assert "unknown option '--again'. See install.sh --help." in box.install("--again").stderr
+
+
+def test_a_root_that_is_not_there_is_never_taken_for_this_machine(tmp_path: Path) -> None:
+    command = ("bash", str(INSTALL), "--uninstall", "--root", str(tmp_path / "nowhere"))
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "there is no folder" in done.stderr
 
 
 def test_uninstalled_nothing_points_to_it_and_shows_stay_until_purged(box: BoxRoot) -> None:
