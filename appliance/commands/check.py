@@ -13,7 +13,8 @@ from appliance.show.posistagenet import misfits
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import misplaced, unwired
 from appliance.stage.budget import Admission
-from appliance.stage.cast import Cast, admission, assemble, reach
+from appliance.stage.cast import Cast, admission, assemble
+from appliance.stage.ears import reach
 from appliance.stage.stage_error import StageError
 
 
@@ -29,7 +30,7 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
     too_many = too_much(show.config.cues, verdict.most_coding, show.file)
-    for warning in (*reach(cast, box), *unwired(show, box), *too_many):
+    for warning in (*reach(list(cast.worn), box), *unwired(show, box), *too_many):
         print(warning)
 
 

@@ -17,7 +17,7 @@ from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.control import ControlConfig
 from appliance.show.show import Show, load_show
-from appliance.stage.cast import reach
+from appliance.stage.ears import reach
 from appliance.stage.run import Stage
 from appliance.stage.stage_error import StageError
 
@@ -211,7 +211,7 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
     ]
     lines += stage.cast.complaints
     if not emulate:
-        lines += reach(stage.cast, stage.box)
+        lines += reach(list(stage.cast.worn), stage.box)
     return lines
 
 

@@ -1,4 +1,4 @@
-"""Puppeteers: whatever holds joints (worn sensor, turning axis, fixed orientation, OSC), and their hands."""
+"""Puppeteers: whatever holds a joint (worn sensor, turning axis, fixed orientation, OSC)."""
 
 from __future__ import annotations
 
@@ -13,15 +13,10 @@ from numpy.typing import NDArray
 
 from appliance.dancer.slerp import FloatArray, Slerp
 from appliance.pose import quaternion
-from appliance.pose.skeleton import UnknownJointError
 
 HOLD_S = 0.1  # a sensor may be silent for so long before its joint is given back
 GIVE_BACK_S = 1.0
 TAKE_S = 0.5
-
-
-class HandError(ValueError):
-    """A hand that cannot hold its joint: which one, why, which joints there are."""
 
 
 @dataclass(slots=True)
@@ -253,60 +248,6 @@ class Remote(Puppeteer):
         held = self._held
         if held is not None:
             orientation[:] = held
-
-
-class Hands:
-    """All puppeteers of a show, gathered for the puppet: mask (M,), targets (M, 4) and weights (M,)."""
-
-    def __init__(self, puppeteers: Sequence[Puppeteer], joints: Sequence[str]) -> None:
-        """joints: the M moving joints of the network. Raises HandError."""
-        self.puppeteers = tuple(puppeteers)
-        self._places: list[int] = []
-        for puppeteer in puppeteers:
-            place = _place(puppeteer.joint, joints)
-            if place in self._places:
-                raise HandError(f"Two hands hold '{puppeteer.joint}'. Give each joint to one hand only.")
-            self._places.append(place)
-        self.mask: NDArray[np.bool_] = np.zeros(len(joints), dtype=np.bool_)
-        self.targets = np.tile(quaternion.IDENTITY, (len(joints), 1))
-        self.weights = np.zeros(len(joints), dtype=np.float32)
-        self._before = self.targets.copy()
-        self._signs = np.empty((len(joints), 1), dtype=np.float32)
-
-    def pull(self, now: float) -> None:
-        """Write all targets of this moment; their signs do not jump from one tick to the next."""
-        np.copyto(self._before, self.targets)
-        for place, puppeteer in zip(self._places, self.puppeteers, strict=True):
-            target = puppeteer.pull(now)
-            self.targets[place] = target.orientation
-            self.weights[place] = target.weight
-        np.einsum("mk,mk->m", self.targets, self._before, out=self._signs[:, 0])
-        np.copysign(1.0, self._signs, out=self._signs)
-        np.multiply(self.targets, self._signs, out=self.targets)
-        np.greater(self.weights, 0.0, out=self.mask)
-
-    def state(self) -> dict[str, Any]:
-        """What the targets to come depend on, for `restore`: plain values and copies of arrays."""
-        return {
-            "puppeteers": [puppeteer.state() for puppeteer in self.puppeteers],
-            "mask": self.mask.copy(),
-            "targets": self.targets.copy(),
-            "weights": self.weights.copy(),
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the hands of the same show did that gave this state."""
-        for puppeteer, kept in zip(self.puppeteers, state["puppeteers"], strict=True):
-            puppeteer.restore(kept)
-        self.mask[:], self.targets[:], self.weights[:] = state["mask"], state["targets"], state["weights"]
-
-
-def _place(joint: str, joints: Sequence[str]) -> int:
-    if joint in joints:
-        return list(joints).index(joint)
-    nearest = UnknownJointError(joint, joints).nearest
-    meant = f"Did you mean '{nearest}'? " if nearest else ""
-    raise HandError(f"No hand can hold '{joint}': {meant}The network moves {', '.join(joints)}.")
 
 
 def _unit(orientation: Sequence[float]) -> tuple[float, float, float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -10,37 +10,28 @@ from typing import Any
 
 from appliance.dancer.blending import Blending
 from appliance.dancer.grounding import Floor, Grounding, GroundingError
+from appliance.dancer.hands import Hands
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
 from appliance.dancer.puppet import Puppet, PuppetError
-from appliance.dancer.puppeteers import (
-    FixedOrientation,
-    Hands,
-    Puppeteer,
-    Remote,
-    TurningAxis,
-    WornSensor,
-)
+from appliance.dancer.puppeteers import FixedOrientation, Puppeteer, Remote, TurningAxis, WornSensor
 from appliance.outputs.outputs import Outputs
 from appliance.pose.bvh import BvhError
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.sensor.keys import KeyFileError, SensorKey, load_keys, unknown_sensor
-from appliance.sensor.link import SensorLink, SensorReading, open_link
+from appliance.sensor.link import SensorLink, SensorReading
 from appliance.sensor.neutral import Mounting, joint_from_reading
 from appliance.sensor.state import restored_reading
-from appliance.sensor.ways.udp import PortError
-from appliance.show.box import BoxConfig, out_of_reach
+from appliance.show.box import BoxConfig
 from appliance.show.config_error import ConfigError
 from appliance.show.cues import CueConfig
 from appliance.show.posistagenet import misfits
 from appliance.show.show import HandConfig, Show
 from appliance.stage.budget import Admission, admit
+from appliance.stage.ears import open_ears
 from appliance.stage.prepared import Preparations
 from appliance.stage.realtime import borrowed_priority
 from appliance.stage.stage_error import StageError
-
-_MOVES_FREELY = "No sensor is let in, and the dancer moves freely."
 
 
 @dataclass(slots=True)
@@ -128,7 +119,7 @@ def assemble(
         if hand.sensor is not None and isinstance(puppeteer, WornSensor):
             worn.setdefault(hand.sensor, []).append(puppeteer)
             mountings[hand.joint] = _mounting(hand)
-    keys, complaints = _keys(box.sensors.keys, list(worn))
+    link, complaints = open_ears(box, list(worn), profiles)
     return Cast(
         skeleton=show.skeleton,
         puppet=puppet,
@@ -141,7 +132,7 @@ def assemble(
         worn=worn,
         mountings=mountings,
         primary=show.config.primary_sensor,
-        link=_link(box, keys, list(worn), profiles),
+        link=link,
         outputs=_outputs(show, box, box_file),
         complaints=complaints,
     )
@@ -172,15 +163,6 @@ def _dance(cast: Cast) -> Callable[[int, int], object]:
         return cast.puppet.dance(window, mask, targets, weights, coding, interaction)
 
     return dance
-
-
-def reach(cast: Cast, box: BoxConfig) -> list[str]:
-    """A warning when keys are there, but no wearable can reach this box: neither by Wi-Fi nor by cable."""
-    sensors = box.sensors
-    if not cast.worn or sensors.keys is None or sensors.serial:
-        return []
-    why = out_of_reach(sensors)
-    return [why] if why else []
 
 
 def _puppeteer(hand: HandConfig) -> Puppeteer:
@@ -238,48 +220,3 @@ def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:
     if problems:
         raise ConfigError(problems)
     return Outputs(box.outputs, show.skeleton)
-
-
-def _link(
-    box: BoxConfig, keys: Mapping[str, SensorKey], sensors: Sequence[str], profiles: Mapping[bytes, bytes]
-) -> SensorLink:
-    udp = box.sensors.udp
-    try:
-        link = open_link(
-            keys,
-            (udp.host, udp.port) if udp is not None and sensors else None,
-            [(line.device, line.baud) for line in box.sensors.serial],
-            profiles,
-            sensors,
-        )
-    except PortError as error:
-        raise StageError(str(error)) from error
-    link.light = box.sensors.light
-    return link
-
-
-def _keys(path: Path | None, sensors: Sequence[str]) -> tuple[dict[str, SensorKey], tuple[str, ...]]:
-    """Keys of the box's sensors, and why those of the show that have none are not let in."""
-    if not sensors:
-        return {}, ()
-    if path is None:
-        return {}, (
-            "No key file: no sensor is let in, and the dancer moves freely. "
-            "Set sensors.keys in the box file (bunraku provision makes it), or try it with --emulate.",
-        )
-    try:
-        keys = load_keys(path)
-    except KeyFileError as error:
-        return {}, (f"{error}. {_MOVES_FREELY} Mend the key file.",)
-    except FileNotFoundError:
-        cure = "Correct `keys` under sensors in the box file, or run: bunraku provision."
-        return {}, (f"There is no key file {path}. {_MOVES_FREELY} {cure}",)
-    except OSError as error:
-        reason = f"{path}: the key file cannot be read ({error.strerror})"
-        return {}, (f"{reason}. {_MOVES_FREELY} Let this user read it, or play as the user who provisioned.",)
-    return keys, tuple(
-        f"{path}: {unknown_sensor(name, keys)}. It is not let in, and the dancer moves freely there. "
-        f"Provision it (bunraku provision --name {name}), or rename another one (bunraku sensors rename)."
-        for name in sensors
-        if name not in keys
-    )

@@ -4,26 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import astuple, dataclass, field
 from typing import Any
 
-from appliance.dancer.puppeteers import WornSensor
 from appliance.sensor.link import SensorReading
 from appliance.sensor.memory import SensorMemory
 from appliance.sensor.neutral import (
     NO_BOOT,
     STILL_S,
-    Mounting,
     NeutralPose,
-    Stillness,
     carried,
     front,
-    joint_from_reading,
     with_heading_reset,
 )
-from appliance.sensor.state import restored_reading
 from appliance.show.config_error import did_you_mean
 from appliance.stage.cast import Cast
+from appliance.stage.wearer import Wearer, WornHand, upright
 
 ASKED_STILL_S = 0.5  # of stillness are enough for a neutral pose that was asked for
 ASKED_WITHIN_S = 3.0
@@ -45,7 +40,7 @@ class Wearing:
         self._say = say
         self._news: list[str] = []
         self._wearers = {
-            name: _Wearer(name, [_Hand(joint, cast.mountings[joint.joint]) for joint in joints])
+            name: Wearer(name, [WornHand(joint, cast.mountings[joint.joint]) for joint in joints])
             for name, joints in cast.worn.items()
         }
         for wearer in self._wearers.values():
@@ -132,14 +127,14 @@ class Wearing:
                 self._link.wants_neutral.discard(name)
         self._news[:] = state[""]
 
-    def _meet(self, wearer: _Wearer, reading: SensorReading) -> None:
+    def _meet(self, wearer: Wearer, reading: SensorReading) -> None:
         """The first reading of this run: after a restart of the box alone, its pose holds still."""
         if wearer.has_pose_of(reading.boot_nonce):
             self._news.append(f"Sensor {wearer.name}: the neutral pose taken before is used on. Dance.")
         else:
             self._ask_for_stillness(wearer)
 
-    def _meet_again(self, wearer: _Wearer, before: SensorReading, reading: SensorReading) -> None:
+    def _meet_again(self, wearer: Wearer, before: SensorReading, reading: SensorReading) -> None:
         """The sensor was switched on again, or its IMU restarted: its heading is another one."""
         wearer.stillness.restart()
         is_known = wearer.has_pose_of(before.boot_nonce)
@@ -157,11 +152,11 @@ class Wearing:
             "If it stands askew: a double tap on the sensor, then stand still."
         )
 
-    def _ask_for_stillness(self, wearer: _Wearer) -> None:
+    def _ask_for_stillness(self, wearer: Wearer) -> None:
         self._wait_for(wearer, STILL_S)
         self._news.append(f"Sensor {wearer.name} is on. Its dancer stands still for a breath now.")
 
-    def _take(self, wearer: _Wearer) -> None:
+    def _take(self, wearer: Wearer) -> None:
         reading = wearer.reading
         assert reading is not None
         self._settle(wearer)
@@ -171,9 +166,9 @@ class Wearing:
         for hand in wearer.hands:
             _, axis = front(pose.orientation, hand.mounting.facing)
             if axis != hand.mounting.facing:
-                self._news.append(_upright(wearer.name, hand, axis))
+                self._news.append(upright(wearer.name, hand, axis))
 
-    def _give_up(self, wearer: _Wearer) -> None:
+    def _give_up(self, wearer: Wearer) -> None:
         """Who asked did not stand still. A power-on that still waits for its first pose goes on waiting."""
         self._news.append(
             f"Sensor {wearer.name} did not keep still within {ASKED_WITHIN_S:g} s: no new neutral pose. "
@@ -184,22 +179,22 @@ class Wearing:
         else:
             self._wait_for(wearer, STILL_S)
 
-    def _wait_for(self, wearer: _Wearer, still_s: float, until: float = math.inf) -> None:
+    def _wait_for(self, wearer: Wearer, still_s: float, until: float = math.inf) -> None:
         wearer.needs_still_s, wearer.waits_until = still_s, until
         self._link.wants_neutral.add(wearer.name)
 
-    def _settle(self, wearer: _Wearer) -> None:
+    def _settle(self, wearer: Wearer) -> None:
         wearer.needs_still_s, wearer.waits_until = 0.0, math.inf
         self._link.wants_neutral.discard(wearer.name)
 
-    def _wear(self, wearer: _Wearer, poses: Iterable[NeutralPose]) -> None:
+    def _wear(self, wearer: Wearer, poses: Iterable[NeutralPose]) -> None:
         """Put a pose on each of the sensor's joints, and keep it for the next start."""
         for hand, pose in zip(wearer.hands, poses, strict=True):
             hand.wear(pose)
             if pose.boot_nonce != NO_BOOT:
                 self._memory.keep_neutral(wearer.name, hand.joint.joint, pose)
 
-    def _asked(self, sensor: str | None, now: float) -> list[tuple[_Wearer, SensorReading]]:
+    def _asked(self, sensor: str | None, now: float) -> list[tuple[Wearer, SensorReading]]:
         """The sensors that a person means, with a fresh reading; of the others it is said why not."""
         try:
             names = self.named(sensor)
@@ -216,57 +211,3 @@ class Wearing:
                     "Switch it on, then ask again."
                 )
         return asked
-
-
-@dataclass(slots=True)
-class _Hand:
-    """One joint that a sensor holds, and the neutral pose that is in force for it."""
-
-    joint: WornSensor
-    mounting: Mounting
-    pose: NeutralPose = field(init=False)
-
-    def wear(self, pose: NeutralPose) -> None:
-        self.pose = pose
-        self.joint.wear(joint_from_reading(pose, self.mounting))
-
-
-@dataclass(slots=True)
-class _Wearer:
-    """One sensor on a dancer: its joints, its newest reading, the stillness that it needs yet (0: none)."""
-
-    name: str
-    hands: list[_Hand]
-    stillness: Stillness = field(default_factory=Stillness)
-    reading: SensorReading | None = None
-    needs_still_s: float = 0.0
-    waits_until: float = math.inf
-
-    def state(self) -> dict[str, Any]:
-        return {
-            "poses": [astuple(hand.pose) for hand in self.hands],
-            "stillness": self.stillness.state(),
-            "reading": self.reading,
-            "needs_still_s": self.needs_still_s,
-            "waits_until": self.waits_until,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        for hand, ((w, x, y, z), heading, boot_nonce) in zip(self.hands, state["poses"], strict=True):
-            hand.pose = NeutralPose((w, x, y, z), heading, boot_nonce)
-        self.stillness.restore(state["stillness"])
-        self.reading = restored_reading(state["reading"])
-        self.needs_still_s, self.waits_until = state["needs_still_s"], state["waits_until"]
-
-    def has_pose_of(self, boot_nonce: int) -> bool:
-        """Whether all poses hold for the readings of that power-on."""
-        return all(hand.pose.boot_nonce == boot_nonce for hand in self.hands)
-
-
-def _upright(name: str, hand: _Hand, axis: tuple[float, float, float]) -> str:
-    told_by = "arrow" if axis[0] else "lid"
-    return (
-        f"Sensor {name}: the axis that should face the front stood upright, so the front was told by its "
-        f"{told_by}. {hand.joint.joint} may move to a wrong side. Wear it as `facing` of its hand says "
-        "(the arrow to the front, unless the show says otherwise), and take the neutral pose again."
-    )

@@ -14,9 +14,10 @@ import pytest
 import appliance.show
 from appliance.dancer.blending import Blending
 from appliance.dancer.grounding import Grounding, measure_standing, survey
+from appliance.dancer.hands import Hands
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.puppet import Puppet
-from appliance.dancer.puppeteers import FixedOrientation, Hands, Puppeteer, TurningAxis
+from appliance.dancer.puppeteers import FixedOrientation, Puppeteer, TurningAxis
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording

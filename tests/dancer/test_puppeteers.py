@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from appliance.dancer.puppeteers import FixedOrientation, HandError, Hands, Remote, TurningAxis, WornSensor
+from appliance.dancer.hands import HandError, Hands
+from appliance.dancer.puppeteers import FixedOrientation, Remote, TurningAxis, WornSensor
 from appliance.pose import quaternion
 from tests.dancer.conftest import random_quaternions
 
