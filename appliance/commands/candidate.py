@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import resource
 import sys
 from pathlib import Path
 
@@ -15,6 +17,8 @@ from appliance.pose.bvh import BvhError  # noqa: E402
 from appliance.show.config_error import ConfigError  # noqa: E402
 from appliance.stage.stage_error import StageError  # noqa: E402
 
+_OF_ALL_MEMORY, _LEAST_MEMORY_BYTES = 0.2, 400 << 20
+
 
 def main(show: str, box: str) -> int:
     """0: it dances; 1: it does not, and stderr says why.
@@ -23,15 +27,26 @@ def main(show: str, box: str) -> int:
     to lower: another program may have come between at the measurement, as many do while a box starts. A
     network is too slow when half of its runs are, were they of one iteration alone.
     """
+    _limit_memory()
     try:
         _, verdict = verified(Path(show), Path(box))
     except (BvhError, ConfigError, RuntimeFolderError, StageError) as error:
         print(error, file=sys.stderr)
         return 1
+    except MemoryError:
+        print(f"{show}: it takes more memory than this box has for a show.", file=sys.stderr)
+        return 1
     if verdict.p50_ms > verdict.asked_coding * verdict.budget_ms:
         print(verdict.sentence(), file=sys.stderr)
         return 1
     return 0
+
+
+def _limit_memory() -> None:
+    """A show that takes all memory ends this check, and not the preflight that waits for it, or the dance."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    most = max(_LEAST_MEMORY_BYTES, int(_OF_ALL_MEMORY * memory))
+    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
 if __name__ == "__main__":

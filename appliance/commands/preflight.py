@@ -13,12 +13,13 @@ from typing import NamedTuple
 from appliance.commands.giving_up import GivenUpError, within
 from appliance.show.arrivals import look
 from appliance.show.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice, alone_in
-from appliance.show.choosing import Outcome, Places, built_in_box, choose
+from appliance.show.choosing import Outcome, Places, built_in_box, choose, remembered
 
 ANEW = "anew"  # touched when units have to start anew, for another show or box file dances
 _AT_ONCE_S = 120.0  # after power-on a stick takes effect at once; later no show is interrupted
 _PATIENCE_S, _CHECK_S = 45.0, 30.0  # a stick that is read for ever keeps nobody from dancing
-_NOT_WRITTEN, _WRONG_OPTIONS = 1, 2
+_TURN_S, _LATE_TURN_S = 20.0, 60.0  # how long another preflight is waited for
+_NOT_WRITTEN = 1
 
 
 class Options(NamedTuple):
@@ -37,37 +38,52 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
     if options.late:
         with contextlib.suppress(OSError):  # its unit has said so already, and allows no more
             os.nice(19)
-    with alone_in(options.data), alone_in(options.run):
-        outcome = _found(options, places)
-        for words in outcome.words:
-            say(words)
-        try:
+    try:
+        if not options.late:  # whatever becomes of what is new: this dances, should it end this process
+            _publish(places, Outcome(remembered(places.data), False, ()), False, uptime_s, say)
+        patience_s = _LATE_TURN_S if options.late else _TURN_S
+        with alone_in(options.data, patience_s), alone_in(options.run, patience_s):
+            outcome = _found(options, places)
+            for words in outcome.words:
+                say(words)
             _publish(places, outcome, options.late, uptime_s, say)
-        except OSError as error:
-            say(
-                f"{places.run}: what was chosen cannot be written there ({error.strerror}). The audience "
-                "sees the show that comes with the box. Look who owns this folder."
-            )
-            return _NOT_WRITTEN
+    except BlockingIOError:
+        say("Another preflight has not ended. What danced before goes on. Plug the stick in again.")
+    except OSError as error:
+        say(
+            f"{places.run}: what was chosen cannot be written there ({error.strerror}). The audience "
+            "sees the show that comes with the box. Look who owns this folder."
+        )
+        return _NOT_WRITTEN
     return 0
 
 
 def _found(options: Options, places: Places) -> Outcome:
     """What is chosen; a stick is read in a process that can be given up."""
-    boot = options.boot or next((one for one in BOOTS if one.is_dir()), BOOTS[-1])
-    if not options.stick.is_dir():
-        return choose(places, [look("boot", boot)], candidate_problems)
+    boot = options.boot or next((one for one in BOOTS if _is_folder(one)), BOOTS[-1])
 
-    def with_stick() -> bytes:
+    def chosen() -> Outcome:
         arrivals = [look("stick", options.stick), look("boot", boot)]
-        return choose(places, arrivals, candidate_problems).packed()
+        return choose(places, arrivals, candidate_problems, options.late)
 
     try:
-        return Outcome.unpacked(within(_PATIENCE_S, with_stick))
+        if _is_folder(options.stick):
+            return Outcome.unpacked(within(_PATIENCE_S, lambda: chosen().packed()))
+        return chosen()
     except GivenUpError as error:
         words = f"The stick could not be read ({error}). What danced before goes on. Try another stick."
-        outcome = choose(places, [], candidate_problems)
-        return Outcome(outcome.choice._replace(refused=(words,)), False, (words,))
+    except Exception as error:
+        words = f"What is new cannot be looked at ({error!r}). What danced before goes on. Copy it again."
+    outcome = choose(places, [], candidate_problems)
+    return Outcome(outcome.choice._replace(refused=(words, *outcome.choice.refused)), False, (words,))
+
+
+def _is_folder(path: Path) -> bool:
+    """Not one on a stick that is pulled at this moment, or gives errors."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
 
 
 def _publish(
@@ -93,7 +109,9 @@ def candidate_problems(show: Path, box: Path) -> list[str]:
 
     command = (sys.executable, "-m", "appliance.commands.candidate", str(show), str(box))
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=_CHECK_S)
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", check=False, timeout=_CHECK_S
+        )
     except subprocess.TimeoutExpired:
         return [f"{show}: its check did not end within {_CHECK_S:g} s. Try it with: bunraku check."]
     except OSError as error:

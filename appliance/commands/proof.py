@@ -32,28 +32,35 @@ class Proof:
         choice = Choice.read(self._chosen)
         if choice is None or facts.show_directory != choice.first.show.resolve():
             return
-        if self._proven != (facts.pid, choice.first.id):
-            self._note(choice, now)
-            if not self.complaint:
-                self._proven = (facts.pid, choice.first.id)
+        if self._proven != (facts.pid, choice.first.id) and self._is_noted(choice.first.id, now):
+            self._proven = (facts.pid, choice.first.id)
 
     def last_turn(self) -> None:
         """Nothing waits."""
         self._frames.close()
 
-    def _note(self, choice: Choice, now: float) -> None:
-        self.complaint, self._again_at = "", 0.0
+    def _is_noted(self, identity: str, now: float) -> bool:
+        """Nobody is waited for: while a preflight reads a stick, the journal has to go on."""
+        self.complaint, self._again_at = "", now + _AGAIN_S
         try:
             with alone_in(self._chosen.parent):
-                choice.with_good(choice.first.id).write(self._chosen)
+                choice = Choice.read(self._chosen)
+                if choice is None or choice.first.id != identity:
+                    return False
+                choice.with_good(identity).write(self._chosen)
             with alone_in(choice.data):
                 kept = Choice.read(choice.data / CHOSEN)
-                noted = None if kept is None else kept.with_good(choice.first.id).without(choice)
+                noted = None if kept is None else kept.with_good(identity).without(choice)
                 if noted is not None and noted != kept:
                     noted.write(choice.data / CHOSEN)
+        except BlockingIOError:
+            return False
         except OSError as error:
-            self._again_at = now + _AGAIN_S
             self.complaint = (
-                f"{choice.data}: that the show has danced cannot be kept ({os.strerror(error.errno or 0)}). "
-                "The dance goes on; after the next power-on it is tried anew. Look at the data partition."
+                f"{self._chosen.parent} or the data partition: that the show has danced cannot be kept "
+                f"({os.strerror(error.errno or 0)}). The dance goes on; after the next power-on it is tried "
+                "anew. Look at the data partition."
             )
+            return False
+        self._again_at = 0.0
+        return True

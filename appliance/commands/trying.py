@@ -39,6 +39,7 @@ def pair_to_dance(chosen: Path, now: float, say: Callable[[str], None]) -> Pair:
         )
         return Pair(good=True)
     folder = chosen.parent
+    choice = _found_again(chosen, choice, say)
     tries = _counted(folder, choice.first, now)
     if tries is not None and len(choice.pairs) > 1:
         most = _STARTS_OF_A_GOOD_ONE if choice.first.good else _STARTS
@@ -87,15 +88,33 @@ def _put_aside(chosen: Path, choice: Choice, starts: int, say: Callable[[str], N
         f"The {before.source} did not dance in {starts} starts and is put aside. The audience sees the dance "
         f"that {_source(after)}. Run bunraku check on it, mend it, and bring it again."
     )
-    say(words)
     left = choice._replace(
         pairs=choice.pairs[1:], refused=(*choice.refused, words), aside=(*choice.aside, before.id)
     )
+    return _told(chosen, choice, left, words, say)
+
+
+def _found_again(chosen: Path, choice: Choice, say: Callable[[str], None]) -> Choice:
+    """Without pairs at the front that are gone with their disk: to try them would cost the audience time."""
+    there = next((number for number, one in enumerate(choice.pairs) if one.is_there), len(choice.pairs) - 1)
+    if there == 0:
+        return choice
+    words = (
+        f"The {choice.first.source} cannot be found any more. The audience sees the dance that "
+        f"{_source(choice.pairs[there])}. Look at the data partition: bunraku doctor."
+    )
+    left = choice._replace(pairs=choice.pairs[there:], refused=(words, *choice.refused))
+    return _told(chosen, choice, left, words, say)
+
+
+def _told(chosen: Path, before: Choice, after: Choice, words: str, say: Callable[[str], None]) -> Choice:
+    """What dances from now on, to all processes of the box."""
+    say(words)
     with contextlib.suppress(OSError):
-        left.write(chosen)
-        if before.box != after.box:
+        after.write(chosen)
+        if before.first.box != after.first.box:
             (chosen.parent / ANEW).touch()
-    return left
+    return after
 
 
 def _source(pair: Pair) -> str:

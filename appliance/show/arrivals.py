@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 SHOW, BOX = "show", "box.yaml"
-_MOST_FILES = 4000
-_DEEPEST = 8
+_MOST_ENTRIES = 4000  # files, folders and all else: a folder may lie in itself on a damaged stick
+_UNREADABLE = [f"{SHOW}/?", 0, 0]  # it is there, and what reads it says that it cannot be read
 
 
 class Arrival(NamedTuple):
@@ -45,23 +46,30 @@ def look(source: str, folder: Path) -> Arrival:
     except OSError:
         pass
     try:
-        _list(folder / SHOW, f"{SHOW}/", listing, _DEEPEST)
+        listing += _files(folder / SHOW)
+    except FileNotFoundError:
+        pass
     except OSError:
-        listing.append([f"{SHOW}/?", 0, 0])  # it is there, and what reads it says why it cannot be read
+        listing.append(_UNREADABLE)
     return Arrival(source, folder, sorted(listing))
 
 
-def _list(folder: Path, prefix: str, listing: list[list[Any]], deeper: int) -> None:
+def _files(show: Path) -> Iterator[list[Any]]:
     """Regular files alone: a link could lead anywhere, and hidden files are the file manager's."""
-    try:
-        entries = list(os.scandir(folder))
-    except (FileNotFoundError, NotADirectoryError):
-        return
-    for entry in entries:
-        if entry.name.startswith(".") or len(listing) >= _MOST_FILES:
-            continue
-        if entry.is_dir(follow_symlinks=False) and deeper:
-            _list(Path(entry.path), f"{prefix}{entry.name}/", listing, deeper - 1)
-        elif entry.is_file(follow_symlinks=False):
-            found = entry.stat(follow_symlinks=False)
-            listing.append([prefix + entry.name, found.st_size, found.st_mtime_ns])
+    folders = [(show, f"{SHOW}/")] if stat.S_ISDIR(show.lstat().st_mode) else []
+    left = _MOST_ENTRIES
+    while folders:
+        folder, prefix = folders.pop()
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                left -= 1
+                if left < 0:
+                    yield _UNREADABLE
+                    return
+                if entry.name.startswith("."):
+                    continue
+                if entry.is_dir(follow_symlinks=False):
+                    folders.append((Path(entry.path), f"{prefix}{entry.name}/"))
+                elif entry.is_file(follow_symlinks=False):
+                    found = entry.stat(follow_symlinks=False)
+                    yield [prefix + entry.name, found.st_size, found.st_mtime_ns]

@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import json
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +19,7 @@ DATA = Path("/data/bunraku")
 RUN = Path("/run/bunraku")
 CHOSEN = "chosen.json"
 _MOST_REMEMBERED = 2  # the newest and the last good one; what comes with the box is always there
+_AGAIN_S = 0.02
 
 
 class Pair(NamedTuple):
@@ -51,8 +53,11 @@ class Pair(NamedTuple):
 
     @property
     def is_there(self) -> bool:
-        """Whether both can still be found."""
-        return (self.show / "show.yaml").is_file() and self.box.is_file()
+        """Whether both can still be found, on a disk that may be gone or belong to somebody else."""
+        try:
+            return (self.show / "show.yaml").is_file() and self.box.is_file()
+        except OSError:
+            return False
 
 
 class Choice(NamedTuple):
@@ -109,7 +114,8 @@ class Choice(NamedTuple):
         """To remember: this one first, then the newest of those that have danced."""
         others = [one for one in self.pairs if one.id and one.id != pair.id]
         good = [one for one in others if one.good] or others
-        return Choice((pair, *good[: _MOST_REMEMBERED - 1]))
+        has_danced = pair.good or any(one.good for one in self.pairs if one.id == pair.id)
+        return Choice((pair._replace(good=has_danced), *good[: _MOST_REMEMBERED - 1]))
 
     def with_good(self, identity: str) -> Choice:
         """This pair has danced."""
@@ -118,9 +124,17 @@ class Choice(NamedTuple):
         )
 
     def without(self, other: Choice) -> Choice:
-        """Without pairs that did not dance, as another choice tells; what comes with the box stays."""
-        pairs = tuple(one for one in self.pairs if not one.id or one.id not in other.aside)
-        return self._replace(pairs=pairs or (Pair(good=True),), refused=other.put_aside, aside=other.aside)
+        """Without pairs that did not dance, as another choice tells; what comes with the box stays.
+
+        So does what has danced on this box: that it does not tonight may be tonight's fault.
+        """
+        good = {one.id for one in self.pairs if one.good}
+        both = zip(other.aside, other.put_aside, strict=False)
+        told = [(one, words) for one, words in both if one not in good]
+        aside = tuple(one for one, _ in told)
+        pairs = tuple(one for one in self.pairs if not one.id or one.id not in aside)
+        refused = tuple(words for _, words in told)
+        return self._replace(pairs=pairs or (Pair(good=True),), refused=refused, aside=aside)
 
     @property
     def put_aside(self) -> tuple[str, ...]:
@@ -167,18 +181,32 @@ def appliance_box(places: dict[str, str]) -> str:
 
 
 @contextlib.contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
-    """One process at a time in a folder, also in a read-only one; without one there is nothing to guard."""
+def alone_in(folder: Path, patience_s: float = 0.0) -> Iterator[None]:
+    """One process at a time in a folder, also in a read-only one; without one there is nothing to guard.
+
+    Raises BlockingIOError where another one does not leave within `patience_s`: it may hang on a disk.
+    """
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError:
         yield
         return
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        _lock(descriptor, time.monotonic() + patience_s)
         yield
     finally:
+        fcntl.flock(descriptor, fcntl.LOCK_UN)  # a fork of ours that hangs has it open too
         os.close(descriptor)
+
+
+def _lock(descriptor: int, until: float) -> None:
+    while True:
+        try:
+            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= until:
+                raise
+            time.sleep(_AGAIN_S)
 
 
 def write_whole(path: Path, content: bytes) -> None:

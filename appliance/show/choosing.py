@@ -58,11 +58,15 @@ def remembered(data: Path) -> Choice:
     return choice._replace(pairs=tuple(one for one in pairs if one.is_there))
 
 
-def choose(places: Places, arrivals: list[Arrival], check: Check) -> Outcome:
-    """Take what is new and sound. The newest arrival counts; the stick goes before the boot partition."""
+def choose(places: Places, arrivals: list[Arrival], check: Check, late: bool = False) -> Outcome:
+    """Take what is new and sound. The newest arrival counts; the stick goes before the boot partition.
+
+    late: beside a running show, where a check may fail for want of time or memory: what is refused then is
+    checked once more at the next power-on.
+    """
     before, seen = remembered(places.data), _read_seen(places.data)
-    known = {*(one.id for one in before.pairs), *before.aside, ""}
-    fresh = [one for one in arrivals if one.listing and _is_new(one, seen, known)]
+    lost = _lost(places.data, seen)
+    fresh = [one for one in arrivals if one.listing and _is_new(one, seen, lost)]
     refused = [
         words for one in arrivals if one.listing and one not in fresh for words in seen[one.source]["refused"]
     ]
@@ -76,8 +80,8 @@ def choose(places: Places, arrivals: list[Arrival], check: Check) -> Outcome:
         newest, problems, is_final = _take(places, arrival, choice, check)
         refused += problems
         said += problems
-        if is_final:
-            seen[arrival.source] = _seen(arrival, problems, newest.id if newest else "")
+        looked_at = arrival if is_final and (newest or not late) else arrival._replace(listing=[])
+        seen[arrival.source] = _seen(looked_at, problems, newest.id if newest else "")
         if newest is not None:
             choice, taken = choice.with_newest(newest), newest.id != (choice.pairs or (Pair(),))[0].id
             said.append(f"{newest.source[0].upper()}{newest.source[1:]}: its show is checked and dances.")
@@ -94,20 +98,20 @@ def _take(
     no_room = ""
     # In memory where the disk takes nothing: a stick that is pulled in mid-show is missed by nobody.
     for root in (places.data, places.run):
-        shelf = Shelf(root) if root == places.data else Shelf(root, reserve_bytes=0)
+        shelf = Shelf(root)
         try:
             shelf.sweep((choice, Choice.read(places.run / CHOSEN) or Choice()))
             newest, problems = _on_shelf(shelf, places, arrival, choice, check)
         except UnreadableError as error:
             cure = "Was it pulled? Plug it in again, or copy the show again."
-            return None, [f"{arrival.words.capitalize()}: {error} {_GOES_ON} {cure}"], False
+            return None, [_printable(f"{arrival.words.capitalize()}: {error} {_GOES_ON} {cure}")], False
         except NoRoomError as error:
             no_room = (
                 f"{arrival.words.capitalize()}: no room for its show ({error}). {_GOES_ON} Free some room."
             )
         else:
             return newest, problems, root == places.data
-    return None, [no_room], False
+    return None, [_printable(no_room)], False
 
 
 def _on_shelf(
@@ -150,7 +154,12 @@ def _as_on_the_stick(words: str, copies: dict[str, str]) -> str:
     """What people find on their stick, not the copy that was checked."""
     for copy, source in copies.items():
         words = words.replace(copy, source)
-    return words
+    return _printable(words)
+
+
+def _printable(words: str) -> str:
+    """A file's name may be no text: nobody who tells these words any further should stumble over it."""
+    return words.encode("utf-8", "backslashreplace").decode()
 
 
 def _remember(data: Path, choice: Choice, seen: dict[str, Any]) -> list[str]:
@@ -177,10 +186,18 @@ def _write_refusals(folder: Path, seen: dict[str, Any]) -> None:
             path.unlink(missing_ok=True)
 
 
-def _is_new(arrival: Arrival, seen: dict[str, Any], known: set[str]) -> bool:
+def _is_new(arrival: Arrival, seen: dict[str, Any], lost: set[str]) -> bool:
     """Another one than at the last look, or what was taken then is lost."""
     one = seen.get(arrival.source)
-    return one is None or one["listing"] != arrival.listing or one["taken"] not in known
+    return one is None or one["listing"] != arrival.listing or one["taken"] in lost
+
+
+def _lost(data: Path, seen: dict[str, Any]) -> set[str]:
+    """What should still be there and is not. What gave way to something newer is not lost: it stays away."""
+    kept = Choice.read(data / CHOSEN)
+    if kept is None:
+        return {one["taken"] for one in seen.values() if one["taken"]}
+    return {one.id for one in kept.pairs if one.id and not one.here().is_there}
 
 
 def _seen(arrival: Arrival, refused: list[str], taken: str) -> dict[str, Any]:

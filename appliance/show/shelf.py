@@ -17,7 +17,7 @@ from appliance.show.choice import Choice, appliance_box, sync_folder, write_whol
 _CHUNK = 1 << 18
 _LARGEST_BYTES = 400_000_000
 _LARGEST_BOX_BYTES = 1_000_000
-_LEFT_FREE_BYTES = 32_000_000  # of the partition: the journal and the place need some
+_LEFT_FREE_BYTES = 32_000_000  # of the partition, or of memory: the journal and the place need some
 _PART = ".part"
 
 
@@ -32,8 +32,8 @@ class NoRoomError(Exception):
 class Shelf:
     """Shows in `shows/<id>/`, box files in `boxes/<id>.yaml`; an id is of the content."""
 
-    def __init__(self, root: Path, reserve_bytes: int = _LEFT_FREE_BYTES) -> None:
-        self._root, self._reserve_bytes = root, reserve_bytes
+    def __init__(self, root: Path) -> None:
+        self._root = root
 
     def take_show(self, arrival: Arrival) -> tuple[str, Path]:
         """Copy a show bundle; its id and place. Raises UnreadableError, NoRoomError; then nothing is left."""
@@ -101,12 +101,12 @@ class Shelf:
             with contextlib.suppress(OSError):
                 for found in (self._root / kind).iterdir():
                     if found not in kept:
-                        shutil.rmtree(found, ignore_errors=True) if found.is_dir() else found.unlink()
+                        _remove(found)
 
     def _require_room(self, folder: Path, needed: int) -> None:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         free = os.statvfs(folder)
-        if free.f_bavail * free.f_frsize < needed + self._reserve_bytes:
+        if free.f_bavail * free.f_frsize < needed + _LEFT_FREE_BYTES:
             raise NoRoomError(f"{folder}: {needed / 1e6:.1f} MB do not fit there")
 
 
@@ -122,23 +122,25 @@ def _copy_files(source: Path, target: Path, names: list[tuple[str, int]]) -> str
         with _reading(source / name) as reading:
             try:
                 with (target / name).open("wb") as writing:
-                    copied = _copy(reading, writing, digest, source / name)
+                    copied = _copy(reading, writing, digest, source / name, size)
                     writing.flush()
                     os.fsync(writing.fileno())
             except OSError as error:
                 raise NoRoomError(f"{target}: {error.strerror}") from error
         if copied != size:
-            raise UnreadableError(f"{source / name} ends after {copied} of {size} bytes.")
-        whole.update(f"{name}\0{digest.hexdigest()}\n".encode())
+            ends = f"ends after {copied}" if copied < size else "goes on after all"
+            raise UnreadableError(f"{source / name} {ends} of {size} bytes.")
+        whole.update(os.fsencode(f"{name}\0{digest.hexdigest()}\n"))
     with _writing():
         for folder in folders:
             sync_folder(folder)
     return whole.hexdigest()[:16]
 
 
-def _copy(reading: BinaryIO, writing: BinaryIO, digest: Any, source: Path) -> int:
+def _copy(reading: BinaryIO, writing: BinaryIO, digest: Any, source: Path, size: int) -> int:
+    """As much as the file was said to have, and some more where it goes on; gives how much."""
     copied = 0
-    while True:
+    while copied <= size:
         try:
             chunk = reading.read(_CHUNK)
         except OSError as error:
@@ -148,6 +150,16 @@ def _copy(reading: BinaryIO, writing: BinaryIO, digest: Any, source: Path) -> in
         digest.update(chunk)
         writing.write(chunk)
         copied += len(chunk)
+    return copied
+
+
+def _remove(found: Path) -> None:
+    """Whatever it is; what cannot be removed stays, and holds up nothing else."""
+    with contextlib.suppress(OSError):
+        if found.is_dir() and not found.is_symlink():
+            shutil.rmtree(found, ignore_errors=True)
+        else:
+            found.unlink()
 
 
 def _put(part: Path, place: Path) -> Path:

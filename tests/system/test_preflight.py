@@ -12,12 +12,13 @@ from pathlib import Path
 
 import pytest
 
+from appliance.commands import candidate
 from appliance.commands import preflight as commands
 from appliance.commands.giving_up import GivenUpError, within
 from appliance.commands.preflight import ANEW, Options, candidate_problems, preflight
 from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
-from appliance.show.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice
+from appliance.show.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, alone_in
 from appliance.show.show import load_show
 from tests.stage.bundles import write_show
 
@@ -161,6 +162,63 @@ def test_with_nothing_new_nothing_heavy_is_imported(machine: Machine) -> None:
     )
     done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+def test_what_danced_before_is_chosen_before_anything_new_is_looked_at(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine.bring("Spring")
+    machine.preflight()
+    (machine.run / CHOSEN).unlink()
+    seen: list[Choice | None] = []
+
+    def broken(source: str, folder: Path) -> None:
+        seen.append(Choice.read(machine.run / CHOSEN))
+        raise RecursionError("nobody thought of this")
+
+    monkeypatch.setattr(commands, "look", broken)
+    said: list[str] = []
+    assert preflight(machine.options._replace(stick=machine.stick / "none"), said.append, 10.0) == 0
+    assert seen[0] is not None and seen[0].first == machine.choice.first
+    assert machine.dances == "Spring"
+    assert "nobody thought of this" in said[0] and said[0] in machine.choice.refused
+
+
+def test_a_preflight_that_never_ends_holds_up_nobody(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine.bring("Spring")
+    machine.preflight()
+    (machine.run / CHOSEN).unlink()
+    monkeypatch.setattr(commands, "_TURN_S", 0.1)
+    said: list[str] = []
+    with alone_in(machine.data):
+        assert preflight(machine.options, said.append, 10.0) == 0
+    assert "Another preflight has not ended" in said[0]
+    assert machine.dances == "Spring"
+
+
+def test_two_preflights_at_once_take_turns(machine: Machine) -> None:
+    machine.bring("Spring")
+    both = [
+        subprocess.Popen([*PREFLIGHT, *machine.arguments, *more], stdout=subprocess.DEVNULL)
+        for more in ((), ("--late",))
+    ]
+    assert [process.wait() for process in both] == [0, 0]
+    assert machine.preflight().returncode == 0
+    assert machine.dances == "Spring"
+    assert not [path for path in machine.data.rglob("*") if ".part" in path.name]
+
+
+def test_a_check_that_takes_all_memory_ends_alone(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else systemd ends the preflight with it, for both are one unit's."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    monkeypatch.setattr(candidate, "verified", lambda show, box: bytearray(memory // 2))
+
+    def check() -> bytes:
+        return str(candidate.main("show", "box")).encode()
+
+    assert within(60.0, check) == b"1"
 
 
 def test_a_power_cut_at_any_moment_leaves_whole_shows_alone(machine: Machine) -> None:

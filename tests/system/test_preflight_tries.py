@@ -15,7 +15,7 @@ from appliance.commands.proof import Proof
 from appliance.commands.trying import ANEW, TRIES, ended_well, pair_to_dance
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
-from appliance.show.choice import CHOSEN, Choice, Pair
+from appliance.show.choice import CHOSEN, Choice, Pair, alone_in
 from tests.control.doubles import facts
 from tests.stage.bundles import FIGURE, write_show
 
@@ -172,6 +172,28 @@ def test_what_was_put_aside_is_let_go_once_another_one_has_danced(evening: Eveni
     assert evening.kept.aside == (NEW,)
     assert len(evening.kept.put_aside) == 1
     proof.last_turn()
+
+
+def test_a_preflight_that_reads_a_stick_does_not_hold_up_the_keeper(evening: Evening) -> None:
+    proof = Proof(evening.run, evening.run / CHOSEN)
+    evening.dance(seconds=10.5)
+    now = time.monotonic()
+    with alone_in(evening.data), alone_in(evening.run):
+        proof.turn(now)
+    assert (proof.complaint, evening.kept.first.good) == ("", False)
+    proof.turn(now + 11.0)
+    assert evening.kept.first.good
+    proof.last_turn()
+
+
+def test_a_show_that_is_gone_with_its_disk_is_not_even_tried(evening: Evening) -> None:
+    evening.choice.with_good(NEW).write(evening.run / CHOSEN)
+    (evening.run.parent / "new" / "show.yaml").unlink()
+    assert evening.start(danced_s=None) == BEFORE
+    assert "cannot be found any more" in evening.choice.refused[0]
+    assert evening.choice.aside == (), "it is there again, perhaps, after the next power-on"
+    (evening.run.parent / "before" / "show.yaml").unlink()
+    assert evening.start(danced_s=None) == ""
 
 
 def test_a_proof_that_cannot_be_kept_is_said_and_tried_again(evening: Evening) -> None:
