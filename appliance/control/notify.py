@@ -14,7 +14,7 @@ class Notifier:
     """Tells systemd how this process is; silent where nobody listens, never raises, never waits.
 
     Takes $NOTIFY_SOCKET, $WATCHDOG_USEC and $WATCHDOG_PID, which systemd sets for a unit with Type=notify
-    and WatchdogSec=. A word for which systemd has no room at the moment is lost.
+    and WatchdogSec=. A word for which systemd has no room at the moment is lost; READY comes again.
     """
 
     def __init__(self, environ: Mapping[str, str] | None = None) -> None:
@@ -28,16 +28,18 @@ class Notifier:
         self.every_s = _watchdog_s(environ) / _PINGS_IN_A_PERIOD
         """The longest pause between two pings, seconds; infinite where no watchdog waits for them."""
         self._due = 0.0
+        self._owed = ""  # a lost READY would be the end of this process: it is said again with each ping
 
     def ready(self, status: str = "") -> None:
         """It works now."""
-        self._tell("READY=1", status)
+        self._owed = "" if self._tell("READY=1", status) else "READY=1\n"
 
     def ping(self, now: float) -> None:
         """It still works; monotonic seconds. Call it as often as you like: told four times a period."""
         if now >= self._due and self._socket is not None and self.every_s != float("inf"):
             self._due = now + self.every_s
-            self._tell("WATCHDOG=1")
+            if self._tell(f"{self._owed}WATCHDOG=1"):
+                self._owed = ""
 
     def status(self, words: str) -> None:
         """One line for whoever asks `systemctl status`."""
@@ -53,14 +55,18 @@ class Notifier:
             self._socket.close()
             self._socket = None
 
-    def _tell(self, word: str, status: str = "") -> None:
+    def _tell(self, word: str, status: str = "") -> bool:
+        """Whether it was taken; True where nobody listens."""
         if self._socket is None:
-            return
+            return True
         lines = [word] if word else []
         if status:
             lines.append("STATUS=" + " ".join(status.splitlines()))
-        with contextlib.suppress(OSError):
+        try:
             self._socket.sendto("\n".join(lines).encode(), self._address)
+        except OSError:
+            return False
+        return True
 
 
 def _address(named: str) -> str:

@@ -74,3 +74,16 @@ def test_where_nobody_listens_it_is_silent(address: str) -> None:
     notifier.stopping()
     notifier.close()
     notifier.ping(100.0)
+
+
+def test_a_ready_for_which_there_was_no_room_is_said_again(tmp_path: Path) -> None:
+    """Else it would be ended for never having been ready: PID 1 was busy for a moment."""
+    environ = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "1000000"}
+    notifier = Notifier(environ)
+    notifier.ready("50.0 Hz")
+    supervisor = Supervisor(environ["NOTIFY_SOCKET"])
+    for now in (1000.0, 1000.3):
+        notifier.ping(now)
+    assert supervisor.heard() == ["READY=1\nWATCHDOG=1", "WATCHDOG=1"]
+    notifier.close()
+    supervisor.close()
