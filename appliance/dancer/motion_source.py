@@ -9,18 +9,18 @@ import numpy as np
 
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
-from appliance.dancer.phrase import AT, FPS, LIFT, NUMBER, STANDING, Phrase, PhraseError, X, Z
+from appliance.dancer.phrase import FPS, NUMBER, Phrase, X, Z
 from appliance.dancer.reading_head import Reader, ReadingHead
+from appliance.dancer.repertoire import Repertoire
 from appliance.dancer.slerp import FloatArray, Slerp
+from appliance.dancer.stream import Stream
 from appliance.pose.recording import Recording
-from appliance.show.config_error import did_you_mean
 from appliance.show.dance import MAIN
 
 MAX_RATE = 4.0
 RATE_CHANGE_PER_TICK = 0.08  # from standing to full speed in a quarter of a second
 _HURRY = 25  # ticks that a long crossfade takes at most, once the next change waits for it
 _FRAME_DIGITS = 2  # of a place to start at: its seconds are exact to some thousandths of a frame
-_ROWS = 256  # poses of the played motion before it moves back to the start of its memory
 
 
 class Playback:
@@ -53,56 +53,53 @@ class Playback:
         self._rate = self._wanted_rate = _checked_rate(rate)
         self._asked = Phrase(0, MAIN, phrase, floor, self._fade, window)
         self._excerpt = self._asked.cut(start_s, end_s)
-        self._phrases = {MAIN: (self._asked, self._excerpt)}
-        self.phrases: tuple[str, ...] = (MAIN,)
-
+        self._repertoire = Repertoire(self._asked, self._excerpt, self._fade, window)
         joints, columns = len(phrase.skeleton), self._excerpt.track.shape[1]
         self._reader = Reader(joints)
         self._between_heads = Slerp(joints, short=False)
         self._entering_track = np.empty(columns, dtype=np.float32)
-        self._played = np.zeros((_ROWS, joints, 4), dtype=np.float32)
-        self._played[..., 0] = 1.0
-        self._played_track = np.zeros((_ROWS, columns), dtype=np.float32)
+        self._stream = Stream(joints, columns, window)
         self._request: tuple[Loop, float, int] | None = None
         self._leaving: ReadingHead | None = None
         self._begin()
 
     def add(self, name: str, phrase: Recording, floor: Floor | None = None) -> None:
         """Make another phrase of the same skeleton ready before the first tick. Raises PhraseError."""
-        if not phrase.skeleton.same_joints(self._asked.skeleton):
-            raise PhraseError(f"The phrase '{name}' has other joints than '{MAIN}'. Nothing can be danced.")
-        ready = Phrase(len(self._phrases), name, phrase, floor, self._fade, self._window)
-        self._phrases[name] = ready, ready.cut(0.0, None)
-        self.phrases = tuple(self._phrases)
+        self._repertoire.add(name, phrase, floor)
+
+    @property
+    def phrases(self) -> tuple[str, ...]:
+        """Names of all phrases, the one that the show starts with first."""
+        return self._repertoire.names
 
     def window(self) -> FloatArray:
         """The next poses (window, J, 4) of the motion, without sign jumps; valid until advance()."""
-        return self._played[self._end - self._window : self._end]
+        return self._stream.poses()
 
     def roots(self) -> FloatArray:
         """The root's position (window, 3) in metres at the poses of the window."""
-        return self._played_track[self._end - self._window : self._end, :3]
+        return self._stream.roots()
 
     @property
     def lift(self) -> float:
         """How far the phrase is above the floor (metres) at the window's first pose."""
-        return float(self._played_track[self._end - self._window, LIFT])
+        return self._stream.lift
 
     @property
     def rest_heights(self) -> FloatArray | None:
         """Heights (S,) in metres of the soles' points while they stand, at the window's first pose."""
-        heights = self._played_track[self._end - self._window, STANDING:NUMBER]
+        heights = self._stream.rest_heights
         return heights if len(heights) else None
 
     @property
     def phrase(self) -> str:
         """Name of the phrase that the window's first pose comes from; in a crossfade the one that enters."""
-        return self.phrases[round(float(self._played_track[self._end - self._window, NUMBER]))]
+        return self.phrases[self._stream.number]
 
     @property
     def position_s(self) -> float:
         """Where in the phrase (seconds) the window's first pose comes from."""
-        return float(self._played_track[self._end - self._window, AT])
+        return self._stream.position_s
 
     @property
     def rate(self) -> float:
@@ -135,10 +132,7 @@ class Playback:
     @property
     def standing(self) -> tuple[float, float, float]:
         """Where the root stands at the window's first pose: x, z in metres, heading in radians."""
-        first = self._end - self._window
-        x, z = self._played_track[first, [X, Z]].tolist()
-        w, _, y, _ = self._played[first, 0].tolist()
-        return x, z, 2 * math.atan2(y, w)
+        return self._stream.standing
 
     def jump(self, to_s: float) -> None:
         """Go on at another second of the phrase, crossfaded; the nearest one inside the excerpt is taken.
@@ -160,7 +154,7 @@ class Playback:
         It begins at its start (backwards: at its end); one that plays already goes on where it is, told by
         False. An excerpt that was chosen meanwhile is forgotten: the phrase is what it was at the beginning.
         """
-        phrase, loop = self._known(name)
+        phrase, loop = self._repertoire.find(name)
         if loop is self._excerpt:
             return False
         self._asked, self._excerpt = phrase, loop
@@ -185,7 +179,7 @@ class Playback:
 
         Without a crossfade, at once at this rate. Raises ValueError for what this show does not have.
         """
-        phrase, loop = self._known(name)
+        phrase, loop = self._repertoire.find(name)
         whole_s = loop.start_s, loop.start_s + loop.length / FPS
         if max(abs(one - other) for one, other in zip(whole_s, excerpt_s, strict=True)) > 0.5 / FPS:
             loop = phrase.cut(*excerpt_s)
@@ -212,67 +206,35 @@ class Playback:
 
     def state(self) -> dict[str, Any]:
         """What the poses to come depend on, for `restore`: plain values and copies of arrays."""
-        played = slice(self._end - self._window, self._end)
-        request = self._request
+        repertoire, request = self._repertoire, self._request
         return {
             "rate": self._rate,
             "wanted_rate": self._wanted_rate,
             "asked": self._asked.name,
-            "excerpt": self._named(self._excerpt),
-            "head": self._head_state(self._head),
-            "leaving": None if self._leaving is None else self._head_state(self._leaving),
+            "excerpt": repertoire.named(self._excerpt),
+            "head": repertoire.head_state(self._head),
+            "leaving": None if self._leaving is None else repertoire.head_state(self._leaving),
             "fade": [self._fade_tick, self._fade_length],
             "entered": [self._on_the_way, float(self._entered_at)],
-            "request": None if request is None else [self._named(request[0]), *request[1:]],
+            "request": None if request is None else [repertoire.named(request[0]), *request[1:]],
             "jumped": self.jumped,
-            "played": self._played[played].copy(),
-            "played_track": self._played_track[played].copy(),
+            **self._stream.state(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state, with the same phrases. Raises KeyError, PhraseError."""
+        """Go on as the one did that gave this state, with the same phrases. Raises KeyError, ValueError."""
         self._rate, self._wanted_rate = state["rate"], state["wanted_rate"]
-        self._asked = self._phrases[state["asked"]][0]
-        self._excerpt = self._loop(state["excerpt"])
-        self._head = self._restored_head(state["head"])
+        repertoire = self._repertoire
+        self._asked, _ = repertoire.find(state["asked"])
+        self._excerpt = repertoire.loop(state["excerpt"])
+        self._head = repertoire.head(state["head"])
         leaving, request = state["leaving"], state["request"]
-        self._leaving = self._restored_head(leaving) if leaving is not None else None
+        self._leaving = repertoire.head(leaving) if leaving is not None else None
         self._fade_tick, self._fade_length = state["fade"]
-        self._request = None if request is None else (self._loop(request[0]), *request[1:])
+        self._request = None if request is None else (repertoire.loop(request[0]), *request[1:])
         self._on_the_way, self._entered_at = state["entered"]
         self.jumped = state["jumped"]
-        self._end = self._window
-        self._played[: self._end] = state["played"]
-        self._played_track[: self._end] = state["played_track"]
-
-    def _known(self, name: str) -> tuple[Phrase, Loop]:
-        """A phrase of this show, and all of it made endless. Raises ValueError."""
-        if name not in self._phrases:
-            raise ValueError(f"This show has no phrase '{name}'. {did_you_mean(name, self.phrases)}")
-        return self._phrases[name]
-
-    def _named(self, loop: Loop) -> list[Any]:
-        """A loop by its phrase, its frames in it, and whether it is what that phrase plays by itself."""
-        name = self.phrases[round(float(loop.track[0, NUMBER]))]
-        return [name, loop.start_s, loop.length, loop is self._phrases[name][1]]
-
-    def _loop(self, named: list[Any]) -> Loop:
-        name, start_s, length, is_own = named
-        phrase, own = self._phrases[name]
-        return own if is_own else phrase.cut(start_s, start_s + length / FPS)
-
-    def _head_state(self, head: ReadingHead) -> dict[str, Any]:
-        place = head.placement
-        return {
-            "loop": self._named(head.loop),
-            "position": float(head.position),
-            "pose": head.pose.copy(),
-            "placement": [float(place.yaw), float(place.x), float(place.z)],
-        }
-
-    def _restored_head(self, state: dict[str, Any]) -> ReadingHead:
-        pose = np.array(state["pose"], dtype=np.float32)
-        return ReadingHead(self._loop(state["loop"]), state["position"], pose, Placement(*state["placement"]))
+        self._stream.restore(state)
 
     def _begin(self, position: float = 0.0, standing: tuple[float, float, float] | None = None) -> None:
         """Stand at a frame of the phrase, with a full window; `standing`: there on the stage."""
@@ -287,16 +249,14 @@ class Playback:
         self._fade_tick = self._fade_length = 0.0
         self._request = None
         self.jumped = False
-        self._end = 0
+        self._stream.clear()
         for _ in range(self._window):
             self._push()
 
     def _push(self) -> None:
         """Append one pose to the played motion and move the heads."""
-        if self._end == _ROWS:
-            self._move_to_start()
         self._on_the_way = max(0, self._on_the_way - 1)
-        pose, track = self._played[self._end], self._played_track[self._end]
+        pose, track = self._stream.next_row()
         leaving = self._leaving
         if leaving is None:
             self._reader.read(self._head, track)
@@ -314,7 +274,7 @@ class Playback:
             if self._fade_tick > self._fade_length - 1.5:
                 self._leaving = None
         self._head.move(self._rate)
-        self._end += 1
+        self._stream.append()
 
     def _cross_over(self, loop: Loop, position: float, fade: int) -> None:
         """Begin to fade over so many ticks from the present head to another place, put where the figure
@@ -334,12 +294,6 @@ class Playback:
         if self._fade_length - self._fade_tick > soon:
             self._fade_length *= soon / (self._fade_length - self._fade_tick)
             self._fade_tick = self._fade_length - soon
-
-    def _move_to_start(self) -> None:
-        kept = self._window
-        self._played[:kept] = self._played[-kept:]
-        self._played_track[:kept] = self._played_track[-kept:]
-        self._end = kept
 
 
 def _checked_rate(rate: float) -> float:
