@@ -13,15 +13,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from appliance.commands.chosen import ChosenFile, box_of
-from appliance.show import choice
+from appliance.commands.chosen import ChosenFile
+from appliance.control.this_box import box_here
 
 if TYPE_CHECKING:
     from appliance.stage.journal.reading import Run
 
 STICK = Path("/media/bunraku")
 
-journal = typer.Typer(help="What this box has recorded.", no_args_is_help=True)
+journal = typer.Typer(
+    help="List what the flight recorder holds, or export it to a stick.", no_args_is_help=True
+)
 
 BoxFile = Annotated[
     Path | None, typer.Option("--box", help="box.yaml of the venue, which names the journal.")
@@ -75,10 +77,7 @@ def _recorded(box: Path | None, chosen: Path | None, recorded: Path | None) -> P
 
     if recorded is not None:
         return recorded
-    usual = choice.RUN / choice.CHOSEN
-    if box is None and chosen is None and usual.exists():
-        chosen = usual
-    folder = load_box(box_of(box, chosen)).journal.folder
+    folder = load_box(box_here(box, chosen)).journal.folder
     if folder is None:
         raise JournalError(
             "No box file names a journal. Name it: --journal FOLDER, or the box file: --box FILE, where "

@@ -17,7 +17,10 @@ class Fusion(StrEnum):
 
 
 BoxFile = Annotated[
-    Path | None, typer.Option("--box", help="box.yaml: names the key file and the control port.")
+    Path | None,
+    typer.Option(
+        "--box", help="box.yaml of the venue: its key file, its control port. Left out: this box's."
+    ),
 ]
 KeyFile = Annotated[
     Path | None, typer.Option("--keys", help="Key file, instead of --box; left out: sensors.keys.")

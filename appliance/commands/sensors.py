@@ -16,6 +16,7 @@ from rich.text import Text
 
 from appliance.commands.asking import NoBoxError, Roll, RunningBox
 from appliance.commands.sensor_table import SensorTable, known_table, plain_values, unheard
+from appliance.control.this_box import box_here
 from appliance.sensor.key_editing import KeyEditing, editing
 from appliance.sensor.keys import KeyFileError, exposure, load_keys
 from appliance.show.box import BoxConfig, load_box
@@ -44,6 +45,7 @@ def venue(box_file: Path | None, keys: Path | None) -> Venue:
     """By the box file, the key file alone, or what lies in this folder. Raises StageError, ConfigError."""
     if box_file is not None and keys is not None:
         raise StageError("Give --box or --keys, not both: a box file names its key file.")
+    box_file = box_file if keys is not None else box_here(box_file)
     box = load_box(box_file)
     if box_file is not None and box.sensors.keys is None:
         raise StageError(

@@ -54,8 +54,10 @@ def walk_through(
     seconds: Annotated[float, typer.Option(min=0.1, max=600, help="How long each attribute moves.")] = 3.0,
 ) -> None:
     """Walk through the rig, fixture by fixture, attribute by attribute, and say what should be seen."""
+    from appliance.control.this_box import pair_here
     from appliance.lights.rig_walk import walk_rig
 
+    show, box = pair_here(show, box)
     walk_rig(show, box, fixture or [], attribute, seconds)
 
 

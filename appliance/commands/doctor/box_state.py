@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 from appliance.commands.doctor.finding import Finding, better, ok, wrong
 from appliance.commands.doctor.patient import Patient
+from appliance.show.choice import CHOSEN, RUN
 
 _EARLIEST = 2026  # this program did not exist before
 _TIME_ERROR = 5  # adjtimex(2): nobody keeps the clock right
@@ -20,7 +21,13 @@ _LATE_SHARE = 0.001
 def stage(patient: Patient) -> Iterator[Finding]:
     """How the dance that runs here fares."""
     if patient.stage is None:
-        yield ok("stage", "Nothing dances here now.")
+        if patient.at(RUN / CHOSEN).exists():  # the units run, or should
+            yield wrong(
+                *("stage", "Nothing dances, though the box is on: the audience sees black."),
+                "`journalctl -b -u bunraku-stage` says why. No time? The second box.",
+            )
+        else:
+            yield ok("stage", "Nothing dances here now.")
         return
     health = patient.stage.health
     ticks, late = (

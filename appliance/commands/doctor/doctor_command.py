@@ -11,13 +11,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from appliance.commands.chosen import box_of
 from appliance.commands.doctor import box_state, processor, storage, venue
 from appliance.commands.doctor.finding import ORDER, Finding, wrong
 from appliance.commands.doctor.patient import Patient, living_stage
 from appliance.commands.doctor.sample import Sample, sample
+from appliance.control.this_box import box_here
 from appliance.show.box import BoxConfig, load_box
-from appliance.show.choice import CHOSEN, RUN
 from appliance.show.config_error import ConfigError
 
 CHECKS = (
@@ -43,13 +42,11 @@ def doctor(box_file: Path | None, chosen: Path | None, as_json: bool) -> int:
     With neither file, the one that was chosen at power-on, on a box that has such.
     """
     found: list[Finding] = []
-    if box_file is None and chosen is None and (RUN / CHOSEN).exists():
-        chosen = RUN / CHOSEN
     try:
-        box = load_box(box_of(box_file, chosen))
+        box = load_box(box_here(box_file, chosen))
     except ConfigError as error:
         box = BoxConfig()
-        found.append(wrong("box file", str(error), "Until then the last good one is used, or none."))
+        found.append(wrong("box file", str(error), "Below, a box without a box file is looked at."))
     found += findings(Patient(box=box, stage=living_stage(box)))
     found.sort(key=lambda finding: ORDER.index(finding.verdict))
     if as_json:

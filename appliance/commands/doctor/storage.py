@@ -35,27 +35,30 @@ def data_folders(patient: Patient) -> Iterator[Finding]:
 
 def _folder(patient: Patient, folder: Path) -> Finding:
     """One of them, or the nearest one above it that is there."""
-    what, there = f"data in {folder}", patient.at(folder)
+    what, there = "data", patient.at(folder)
     while not there.exists() and there != there.parent:
         there = there.parent
     try:
         room = os.statvfs(there)
     except OSError as error:
         return wrong(
-            *(what, f"It cannot be read ({error.strerror}): {_KEPT} are lost at a power cut."),
+            *(what, f"{folder} cannot be read ({error.strerror}): {_KEPT} are lost at a power cut."),
             "`dmesg | tail` says why; often the card or its contact.",
         )
     free, whole = room.f_bavail * room.f_frsize, room.f_blocks * room.f_frsize
-    words = f"{free / 1e6:,.0f} of {whole / 1e6:,.0f} MB are free."
+    words = f"{folder}: {free / 1e6:,.0f} of {whole / 1e6:,.0f} MB are free."
     if room.f_flag & os.ST_RDONLY:
         return wrong(
-            *(what, f"It cannot be written: {_KEPT} are lost at a power cut. The audience sees nothing."),
+            *(
+                what,
+                f"{folder} cannot be written: {_KEPT} are lost at a power cut. Nobody sees it.",
+            ),
             "After an error Linux writes no more: `dmesg | tail`, then a new card or disk.",
         )
     if not os.access(there, os.W_OK):
         return wrong(
             what,
-            "This user may not write there.",
+            f"This user may not write in {folder}.",
             f"`sudo chown -R bunraku {folder}`, or run me as that user.",
         )
     if free < min(LEAST_FREE_BYTES, LEAST_FREE_SHARE * whole):
@@ -144,7 +147,6 @@ def choice(patient: Patient) -> Iterator[Finding]:
     if chosen is None:
         return
     yield ok("show", f"{chosen.first.show}, box file {chosen.first.box} ({chosen.first.source}).")
-    for refused in chosen.refused:
-        yield better(
-            "show", f"Refused, so the show before dances: {refused}", "Mend it, and plug it in anew."
-        )
+    if chosen.refused:
+        words = "What is new was refused, and the show before dances:\n" + "\n".join(chosen.refused)
+        yield better("show", words, "Mend it on the stick, and plug it in anew.")
