@@ -17,6 +17,7 @@ from appliance.control.notify import Notifier
 from appliance.control.orders import OrderInbox
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.runtime_folder import AlreadyHereError, Claim, runtime_folder
+from appliance.projector.advice import about_resolution, about_software
 from appliance.projector.alignment import AlignmentFile, alignment_folder
 from appliance.projector.context import GlContext
 from appliance.projector.controls import Controls
@@ -34,7 +35,6 @@ from appliance.show.box import BoxConfig
 
 _ORDERS_A_PICTURE = 8
 _REPORT_S = 1.0
-_SMOOTH = 0.8  # of the display's pictures: fewer look jerky
 _JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
 
 
@@ -165,7 +165,7 @@ class Run:
         if not self._is_resolution_said:
             self._is_resolution_said = True
             rate = 1.0 / self._pacing.period_s
-            self._say(_about_resolution(self._resolution.share, self._window.size, rate))
+            self._say(about_resolution(self._resolution.share, self._window.size, rate))
 
     def _keep(self, folder: Path, pixels: bytes, size: Size) -> None:
         try:
@@ -219,7 +219,7 @@ class Run:
             self._say(f"{figures.sentence()}, {width}x{height}{drawn_at}, stage {state}")
         if not self._warned and figures.dances >= _JUDGED_AFTER:
             self._warned = True
-            self._say(_about_software(figures.rate, 1.0 / self._pacing.period_s, self._context.renderer))
+            self._say(about_software(figures.rate, 1.0 / self._pacing.period_s, self._context.renderer))
 
     def _tell(self, now: float, stage: str, share: float) -> None:
         """For the box's other processes; a stage that was never seen is none that is away."""
@@ -236,27 +236,6 @@ class Run:
                 "often, look at the card's cooling and power.",
                 GPU_LOST,
             )
-
-
-def _about_resolution(share: float, display: Size, wanted: float) -> str:
-    """What it means that pictures of the display's own size take too long."""
-    width, height = (round(share * side) for side in display)
-    return (
-        f"Pictures of {display[0]}x{display[1]} take longer here than a display of {wanted:.0f} Hz waits. "
-        f"The audience sees the dance in {width}x{height}: softer, and smoother. That changes by itself with "
-        "the look and with what else this machine does; `picture` in the projector's part of the box file "
-        "fixes it."
-    )
-
-
-def _about_software(rate: float, wanted: float, renderer: str) -> str:
-    """What it means that no graphics card draws."""
-    seen = "The audience sees a jerky dance." if rate < _SMOOTH * wanted else "The audience sees the dance."
-    return (
-        f"No graphics card draws here but the processor ({renderer}): about {rate:.0f} of {wanted:.0f} "
-        f"pictures a second. {seen} Use a machine with a graphics card and its driver, or a display "
-        "mode of fewer pixels."
-    )
 
 
 def _inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> OrderInbox | None:
