@@ -48,6 +48,13 @@ class DataDisk:
         _run("cp", "--sparse=always", str(self.image), str(image))
         return DataDisk(image)
 
+    def grown(self, megabytes: int) -> None:
+        """To this size, while it is in use nowhere."""
+        self.repaired()
+        with self.image.open("r+b") as image:
+            image.truncate(megabytes << 20)
+        _run("resize2fs", "-f", str(self.image))
+
     def repaired(self) -> str:
         """Checked as before each boot; what was said. Raises AssertionError where that is not enough."""
         done = subprocess.run(["e2fsck", "-p", str(self.image)], capture_output=True, text=True)

@@ -27,9 +27,11 @@ def second(make_release: MakeRelease) -> Path:
 def fresh(with_first_release: BoxRoot, tmp_path: Path) -> Iterator[ImageBox]:
     """A box made from an image that came with release 1.0.0; nothing was ever installed on it."""
     own = ImageBox(tmp_path / "box", with_first_release)
-    own.make()
-    yield own
-    own.switch_off()
+    try:
+        own.make()
+        yield own
+    finally:
+        own.switch_off()
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +53,11 @@ def with_second(
 def box(with_second: ImageBox, tmp_path: Path) -> Iterator[ImageBox]:
     """A box made from the image, on whose data partition release 2.0.0 was installed."""
     own = ImageBox(tmp_path / "box", with_second.image)
-    own.copy_of(with_second)
-    yield own
-    own.switch_off()
+    try:
+        own.copy_of(with_second)
+        yield own
+    finally:
+        own.switch_off()
 
 
 def again(box: ImageBox) -> None:
