@@ -42,6 +42,10 @@ def _replay(
     if not run.keyframes:
         print(f"{name}: {len(run.ticks)} ticks, and no keyframe was kept: it can be drawn, not danced again.")
         return 0, True
+    lasted_s = float(run.ticks["frame_time"][-1] - run.ticks["frame_time"][0])
+    if from_s > lasted_s:
+        print(f"{name}: it lasts {lasted_s:.1f} s, and is left out.")
+        return 0, True
     directory = _show_of(run, given)
     others = differing_software(run.header, environment())
     files = [f"the show's {file}" for file in differing_files(run.header["show_files"], directory)]

@@ -32,11 +32,13 @@ def main(
 ) -> None:
     """Soak the box: its processes as its units start them, under load, with trouble all the time.
 
-    Sensors fall silent and come back, their network gets bad, receivers come and go, a desk sends commands
-    and nonsense, processes beside the stage are killed. Frames are counted outside. cyclictest runs at the
-    same time with the stage's priority and period: what it shows is the machine's part. Ctrl-C or SIGTERM
-    ends it early, with figures and verdict of the time until then. Exit status 0 when everything holds, else
-    1.
+    Sensors fall silent and come back, their network gets bad, receivers
+    come and go, a desk sends commands and nonsense, processes beside the
+    stage are killed. Frames are counted outside. cyclictest runs at the same
+    time with the stage's priority and period: its figures are the machine's
+    part. Ctrl-C or SIGTERM ends it early, with figures and a verdict until
+    then. Exit status: 0 everything holds, 1 something does not, 2 it could
+    not begin.
     """
     stops: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
