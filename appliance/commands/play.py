@@ -78,6 +78,10 @@ def play_show(
             company = () if alone else tuple(_company(show, box, box_file, control, window or shown))
             with _accompanied(company + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
+            if keeper is not None:
+                from appliance.stage.keeper import keep_rest
+
+                keep_rest(stage.box, stage.sharing.folder, journal, box.journal.minutes, speaker.say)
         if not alone:
             _forget(stage)
         for line in _conclusion(stage):

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Protocol
 
+from appliance.outputs.runtime_folder import Claim, RuntimeFolderError
 from appliance.sensor.memory_carrier import MemoryCarrier
 from appliance.show.box import BoxConfig
 from appliance.stage.journal.carrier import JournalCarrier
@@ -47,6 +49,19 @@ def carriers(
     if journal is not None:
         kept.append(JournalCarrier(runtime, journal, minutes, say))
     return kept
+
+
+def keep_rest(
+    box: BoxConfig, runtime: Path, journal: Path | None, minutes: float, say: Callable[[str], None]
+) -> None:
+    """After the dance: what a keeper did not live to carry, for it was ended while it started."""
+    try:
+        claim = Claim(runtime, "keeper")
+    except RuntimeFolderError:  # one that is still at work
+        return
+    with closing(claim):
+        for carrier in carriers(box, runtime, journal, minutes, say):
+            carrier.last_turn()
 
 
 def keep_on(

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from appliance.outputs.runtime_folder import Claim
+from appliance.show.box import BoxConfig
 from appliance.stage.journal.carrier import RETRY_S
 from appliance.stage.journal.reading import read_journal
 from appliance.stage.journal.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
-from appliance.stage.keeper import keep_on
+from appliance.stage.keeper import keep_on, keep_rest
 from tests.stage.bundles import write_show
 from tests.stage.fakes import FakeTime
 from tests.stage.night import Night
@@ -126,3 +129,16 @@ def test_the_keeper_turns_until_it_is_stopped_and_then_once_more() -> None:
 
     keep_on([Carried()], lambda: time.now > 1001.2, lambda now: None, time.monotonic, time.sleep)
     assert happened == ["turn at 0.0", "turn at 0.5", "turn at 1.0", "last turn"]
+
+
+def test_what_a_keeper_did_not_live_to_carry_is_carried_after_the_dance(night: Night, tmp_path: Path) -> None:
+    journal = tmp_path / "journal"
+    night.dance(40)
+    box = BoxConfig()
+    with closing(Claim(tmp_path / "runtime", "keeper")):
+        keep_rest(box, tmp_path / "runtime", journal, 1.0, print)
+        assert not journal.exists()  # a keeper that is there does it itself
+    for _ in range(2):
+        keep_rest(box, tmp_path / "runtime", journal, 1.0, print)
+        assert len(read_journal(journal).ticks) == 40
+    assert len(segment_paths(journal)) == 1
