@@ -200,10 +200,27 @@ def test_memory_and_swap(tmp_path: Path) -> None:
 
 def test_a_show_that_was_refused_is_told(tmp_path: Path) -> None:
     (tmp_path / "run/bunraku").mkdir(parents=True)
-    Choice(refused=("show.yaml:3: no such key.",)).write(tmp_path / "run/bunraku/chosen.json")
+    Choice(refused=("show.yaml:3: no such key.", "It is not danced.")).write(
+        tmp_path / "run/bunraku/chosen.json"
+    )
     found = list(storage.choice(Patient(tmp_path)))
     assert [one.verdict for one in found] == ["ok", "better"]
-    assert "show.yaml:3" in found[1].words
+    assert "show.yaml:3: no such key.\nIt is not danced." in found[1].words
+
+
+def test_a_box_that_is_on_and_does_not_dance_is_wrong(tmp_path: Path) -> None:
+    assert only(box_state.stage(Patient(tmp_path))).verdict == "ok"
+    (tmp_path / "run/bunraku").mkdir(parents=True)
+    Choice().write(tmp_path / "run/bunraku/chosen.json")
+    assert only(box_state.stage(Patient(tmp_path))).verdict == "wrong"
+
+
+def test_a_release_that_was_put_aside_is_told(tmp_path: Path) -> None:
+    lay(tmp_path, "/data/bunraku-releases/0.2.0.aside", "its stage did not dance\n")
+    found = only(storage.releases(Patient(tmp_path)))
+    assert found.verdict == "better"
+    assert "0.2.0 is put aside: its stage did not dance. The release" in found.words
+    assert "bunraku-install --use 0.2.0" in found.cure
 
 
 @pytest.mark.parametrize(("state", "verdict"), [("active", "ok"), ("inactive", "better"), (None, "better")])
