@@ -20,7 +20,8 @@ from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError
 
 CHECKS = (
-    *(box_state.stage, storage.choice, box_state.units, processor.realtime_rights, processor.locked_memory),
+    *(box_state.stage, storage.choice, storage.releases, box_state.units),
+    *(processor.realtime_rights, processor.locked_memory),
     *(processor.governor, processor.warmth, processor.power, storage.memory, storage.data_folders),
     *(
         storage.media,

@@ -12,6 +12,7 @@ from appliance.show.choice import DATA, RUN, STICK, Choice
 
 LEAST_FREE_BYTES, LEAST_FREE_SHARE = 256 << 20, 0.10
 LEAST_MEMORY_KB = 200 << 10
+RELEASES = Path("/data/bunraku-releases")  # of a box made from the image
 WORN = 8  # of ten steps of an eMMC's life
 _KEPT = "the journal, the place of the dance, what the box knows about sensors"
 
@@ -150,3 +151,13 @@ def choice(patient: Patient) -> Iterator[Finding]:
     if chosen.refused:
         words = "What is new was refused, and the show before dances:\n" + "\n".join(chosen.refused)
         yield better("show", words, "Mend it on the stick, and plug it in anew.")
+
+
+def releases(patient: Patient) -> Iterator[Finding]:
+    """Installed releases that did not dance at a power-on; bunraku-install leaves a note."""
+    for note in sorted(patient.at(RELEASES).glob("*.aside")):
+        version, reason = note.stem, note.read_text(errors="replace").strip()
+        yield better(
+            *("release", f"{version} is put aside: {reason}. The release that came with the image dances."),
+            f"Install it anew from a stick, or try it again: sudo bunraku-install --use {version}",
+        )
