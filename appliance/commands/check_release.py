@@ -66,12 +66,12 @@ def _undanced(pair: Pair) -> list[str]:
 def _danced(pair: Pair) -> tuple[float, float]:
     """The usual cost of a tick, and its budget, ms: the stage's own tick, without ports and receivers."""
     from appliance.commands.check import verified, without_ports
-    from appliance.sensor.memory import SensorMemory
     from appliance.show.box import load_box
     from appliance.show.show import load_show
     from appliance.stage.cast import assemble
     from appliance.stage.clock import TICK_S, Slot
     from appliance.stage.iterations import Iterations
+    from appliance.stage.sensor_memory import SensorMemory
     from appliance.stage.tick import Tick
     from appliance.stage.wearing import Wearing
 

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 from appliance.control.house import forget_house
 from appliance.control.speaker import Speaker
 from appliance.control.stop_signals import stop_signals
-from appliance.sensor.memory_block import forget_memory
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.control import ControlConfig
 from appliance.show.show import Show, load_show
 from appliance.stage.ears import reach
 from appliance.stage.run import Stage
+from appliance.stage.sensor_memory_block import forget_memory
 from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:

@@ -15,12 +15,22 @@ HEADER = "# What this box remembers of its sensors: neutral poses, and calibrati
 IMU_ID_BYTES = 16
 OFFSETS_BYTES = 22
 LARGEST = 256 * 1024  # bytes
+MOST_PROFILES = 64  # so many IMUs no house has: more would only fill the file
 
 Worn = tuple[str, str]  # sensor, joint
 
 
 class DamagedMemoryError(ValueError):
     """The text is none that a box wrote."""
+
+
+def with_profile(profiles: Mapping[bytes, bytes], imu_id: bytes, offsets: bytes) -> dict[bytes, bytes]:
+    """These calibrations and a new one; of too many the oldest give way."""
+    kept = {other: those for other, those in profiles.items() if other != imu_id}
+    kept[imu_id] = offsets
+    for oldest in list(kept)[:-MOST_PROFILES]:
+        del kept[oldest]
+    return kept
 
 
 def memory_text(neutral: Mapping[Worn, NeutralPose], profiles: Mapping[bytes, bytes]) -> str:

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Protocol
 
 from appliance.outputs.runtime_folder import Claim, RuntimeFolderError
-from appliance.sensor.memory_carrier import MemoryCarrier
 from appliance.show.box import BoxConfig
 from appliance.stage.journal.carrier import JournalCarrier
 from appliance.stage.place_file import PlaceCarrier
+from appliance.stage.sensor_memory_carrier import MemoryCarrier
 
 TURN_S = 0.5
 _LOOK_S = 0.05  # how often it looks whether it is to end

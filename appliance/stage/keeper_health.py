@@ -7,10 +7,10 @@ from pathlib import Path
 
 from appliance.control.company import CompanyWriter
 from appliance.control.fallback import Fallback, Fallbacks
-from appliance.sensor.memory_carrier import MemoryCarrier
 from appliance.stage.journal.carrier import JournalCarrier
 from appliance.stage.keeper import Carrier
 from appliance.stage.place_file import PlaceCarrier
+from appliance.stage.sensor_memory_carrier import MemoryCarrier
 
 JOURNAL_STOPPED = Fallback(
     "journal-stopped",

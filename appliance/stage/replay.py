@@ -11,7 +11,6 @@ from appliance.control.orders import Order
 from appliance.dancer.puppet import Puppet
 from appliance.dancer.slerp import FloatArray
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
-from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show
 from appliance.stage.cast import assemble
@@ -23,6 +22,7 @@ from appliance.stage.journal.keyframe import unpacked
 from appliance.stage.journal.reading import DAMAGED, Run
 from appliance.stage.journal.record import NOT_FINITE, ORDER
 from appliance.stage.obey import carry_out
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.tick import Tick
 from appliance.stage.wearing import Wearing
 

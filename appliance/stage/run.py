@@ -10,7 +10,6 @@ from appliance.control.house import HouseReader
 from appliance.control.notify import Notifier
 from appliance.control.orders import Order, OrderInbox
 from appliance.sensor.link import SensorState
-from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.admitted import admitted
@@ -28,6 +27,7 @@ from appliance.stage.prepared import MEMORY
 from appliance.stage.realtime import enter_realtime, leave_realtime
 from appliance.stage.resuming import Resuming
 from appliance.stage.roster import roster_lines
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.sharing import Sharing, facts_of
 from appliance.stage.stage_error import StageError
 from appliance.stage.tick import Tick

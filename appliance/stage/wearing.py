@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from appliance.sensor.link import SensorReading
-from appliance.sensor.memory import SensorMemory
 from appliance.sensor.neutral import (
     NO_BOOT,
     STILL_S,
@@ -18,6 +17,7 @@ from appliance.sensor.neutral import (
 )
 from appliance.show.config_error import did_you_mean
 from appliance.stage.cast import Cast
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.wearer import Wearer, WornHand, upright
 
 ASKED_STILL_S = 0.5  # of stillness are enough for a neutral pose that was asked for

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from appliance.sensor.keys import SensorKey, create_keys
-from appliance.sensor.memory import SensorMemory
 from appliance.sensor.ways.udp import UdpIntake
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig, UdpConfig
 from appliance.show.bundle import default_show_path
@@ -18,6 +17,7 @@ from appliance.show.show import load_show
 from appliance.stage.cast import Cast, assemble
 from appliance.stage.clock import TICK_S, Slot
 from appliance.stage.iterations import Iterations
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.tick import Tick
 from appliance.stage.wearing import Wearing
 from hw_sim.motions import turning

@@ -13,7 +13,6 @@ from appliance.control.tellings import Status
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
-from appliance.sensor.memory_carrier import MemoryCarrier
 from appliance.show.choice import CHOSEN, Choice, Pair
 from appliance.stage.journal.carrier import JournalCarrier
 from appliance.stage.keeper_health import (
@@ -24,6 +23,7 @@ from appliance.stage.keeper_health import (
     KeeperHealth,
 )
 from appliance.stage.place_file import PlaceCarrier
+from appliance.stage.sensor_memory_carrier import MemoryCarrier
 from tests.control.doubles import Asker, ControlInThread, StageDouble, facts
 from tests.stage.bundles import FIGURE
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from appliance.control.orders import Order
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
-from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import assemble
@@ -17,6 +16,7 @@ from appliance.stage.journal.carrier import JournalCarrier
 from appliance.stage.journal.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
 from appliance.stage.journal.recorder import Recorder
 from appliance.stage.obey import carry_out
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.tick import Tick
 from appliance.stage.wearing import Wearing
 

@@ -14,7 +14,6 @@ from appliance.control.house import House, HouseWriter
 from appliance.control.orders import Order
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
-from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
 from appliance.show.show import Show, load_show
 from appliance.stage.cast import Cast, assemble
@@ -22,6 +21,7 @@ from appliance.stage.clock import Slot
 from appliance.stage.iterations import Iterations
 from appliance.stage.obey import obey, resume
 from appliance.stage.run import Stage
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.tick import Tick
 from appliance.stage.wearing import Wearing
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show

@@ -12,12 +12,12 @@ from appliance.control.orders import Order
 from appliance.pose import quaternion
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, SensorState
-from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import Cast, assemble
 from appliance.stage.iterations import Iterations
 from appliance.stage.obey import obey, obey_for_sensors
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.wearing import Wearing
 from tests.stage.bundles import write_show
 

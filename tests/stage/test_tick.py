@@ -11,12 +11,12 @@ import pytest
 
 from appliance.pose import quaternion
 from appliance.sensor.link import SensorReading
-from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import Cast, assemble
 from appliance.stage.clock import TICK_S, Slot
 from appliance.stage.iterations import Iterations
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.tick import Tick
 from appliance.stage.wearing import Wearing
 from hw_sim.osc_receiver import OscReceiver

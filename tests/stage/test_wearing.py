@@ -11,11 +11,11 @@ import pytest
 
 from appliance.pose import quaternion
 from appliance.sensor.link import SensorReading
-from appliance.sensor.memory import SensorMemory
 from appliance.sensor.neutral import NeutralPose
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import Cast, assemble
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.wearing import Wearing
 from tests.stage.bundles import write_show
 

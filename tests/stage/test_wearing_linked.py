@@ -12,10 +12,10 @@ import pytest
 from appliance.pose import quaternion
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorReading
-from appliance.sensor.memory import SensorMemory
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import assemble
+from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.wearing import Wearing
 from hw_sim.device import Device
 from hw_sim.emulated_sensor import EmulatedSensor

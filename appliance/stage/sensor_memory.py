@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
-from appliance.sensor.memory_block import FILE_NAME, MemoryReader, MemoryWriter, text_on_disk
-from appliance.sensor.memory_text import DamagedMemoryError, Worn, memory_text, remembered
+from appliance.sensor.memory_text import DamagedMemoryError, Worn, memory_text, remembered, with_profile
 from appliance.sensor.neutral import NeutralPose
-
-MOST_PROFILES = 64  # so many IMUs no house has: more would only fill the file
-
-
-def with_profile(profiles: Mapping[bytes, bytes], imu_id: bytes, offsets: bytes) -> dict[bytes, bytes]:
-    """These calibrations and a new one; of too many the oldest give way."""
-    kept = {other: those for other, those in profiles.items() if other != imu_id}
-    kept[imu_id] = offsets
-    for oldest in list(kept)[:-MOST_PROFILES]:
-        del kept[oldest]
-    return kept
+from appliance.stage.sensor_memory_block import FILE_NAME, MemoryReader, MemoryWriter, text_on_disk
 
 
 class SensorMemory:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from appliance.sensor.memory_block import FILE_NAME, MemoryReader, text_on_disk
 from appliance.sensor.private_file import replace_private
+from appliance.stage.sensor_memory_block import FILE_NAME, MemoryReader, text_on_disk
 
 RETRY_S = 10.0
 
