@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import sys
@@ -12,6 +13,7 @@ from appliance.stage.realtime import prepare_environment
 prepare_environment()
 
 from appliance.commands.check import verified  # noqa: E402  (numpy must find the environment prepared)
+from appliance.commands.prepare_show import prepare_show  # noqa: E402
 from appliance.outputs.runtime_folder import RuntimeFolderError  # noqa: E402
 from appliance.pose.bvh import BvhError  # noqa: E402
 from appliance.show.config_error import ConfigError  # noqa: E402
@@ -39,6 +41,8 @@ def main(show: str, box: str) -> int:
     if verdict.p50_ms > verdict.asked_coding * verdict.budget_ms:
         print(verdict.sentence(), file=sys.stderr)
         return 1
+    with contextlib.suppress(Exception):  # it dances all the same, and starts somewhat later
+        prepare_show(Path(show))
     return 0
 
 
@@ -46,7 +50,8 @@ def _limit_memory() -> None:
     """A show that takes all memory ends this check, and not the preflight that waits for it, or the dance."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     most = max(_LEAST_MEMORY_BYTES, int(_OF_ALL_MEMORY * memory))
-    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+    with contextlib.suppress(OSError, ValueError):  # a lower limit holds already
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
 if __name__ == "__main__":

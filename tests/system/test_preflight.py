@@ -20,6 +20,7 @@ from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
 from appliance.show.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, alone_in
 from appliance.show.show import load_show
+from appliance.stage.prepared import FOLDER, SUFFIX
 from tests.stage.bundles import write_show
 
 PREFLIGHT = (sys.executable, "-m", "appliance.commands.preflight")
@@ -98,6 +99,14 @@ def test_the_built_in_box_file_is_sound() -> None:
     box = load_box(APPLIANCE_BOX)
     assert box.sensors.keys == Path("/data/bunraku/keys/sensors.keys")
     assert (box.runtime, box.journal.folder) == (Path("/run/bunraku"), Path("/data/bunraku/journal"))
+
+
+def test_a_show_that_was_checked_is_prepared_for_its_first_start(machine: Machine) -> None:
+    machine.bring("Spring")
+    machine.preflight()
+    show = machine.choice.first.show
+    assert list((show / FOLDER).glob(f"*{SUFFIX}")), "its phrase would be read at each power-on"
+    assert not checksum_problems(show)
 
 
 def test_without_a_show_what_comes_with_the_box_is_chosen(machine: Machine) -> None:
