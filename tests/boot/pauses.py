@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-PAUSE_S = 0.1  # five ticks: what is longer than that is no jitter
+FPS = 50.0
 
 
 class Seen(NamedTuple):
@@ -20,11 +20,19 @@ class Seen(NamedTuple):
 
 
 def pause_after(frames: Sequence[Seen], at: float) -> tuple[Seen, Seen] | None:
-    """The frames around the first pause that begins or lasts after `at`; None when there was none."""
+    """The last frame of the life that ended around `at`, the first one of the next; None: it goes on.
+
+    However long a machine that is busy takes for it: each life of the stage counts its ticks anew.
+    """
     for before, after in pairwise(frames):
-        if after.at > at and after.at - before.at > PAUSE_S:
+        if after.at > at and after.tick <= before.tick:
             return before, after
     return None
+
+
+def share(frames: Sequence[Seen], since: float, until: float) -> float:
+    """How many of the frames of this time came in: near 1 when it danced, near 0 when it waited."""
+    return sum(since < one.at < until for one in frames) / (FPS * (until - since))
 
 
 def longest_pause_s(frames: Sequence[Seen]) -> float:

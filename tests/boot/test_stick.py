@@ -30,7 +30,7 @@ def test_a_new_show_on_the_stick_is_danced_and_kept(box: Box, tmp_path: Path, fi
     box.power_on(stick=stick.image)
     first = box.await_frames()[0]
     figures.note("power-on with a new show on the stick to first frame", first.at - box.machine.powered_at)
-    assert _name_of_the_show(box) == "From the stick"
+    assert _name_of_the_show(box) == "From the stick", box.machine.log("bunraku-preflight", "bunraku-stage")
     box.machine.await_that(box.is_proven, "the show is not kept as one that dances")
     box.machine.cut_power()
     box.power_on()
