@@ -31,6 +31,16 @@ class Arrival(NamedTuple):
         return self.folder / BOX if any(name == BOX for name, *_ in self.listing) else None
 
     @property
+    def parts(self) -> frozenset[str]:
+        """What it brings of a show and a box file."""
+        return frozenset(name.partition("/")[0] for name, *_ in self.listing)
+
+    def without(self, parts: frozenset[str]) -> Arrival:
+        """What it brings besides these."""
+        listing = [one for one in self.listing if one[0].partition("/")[0] not in parts]
+        return self._replace(listing=listing)
+
+    @property
     def words(self) -> str:
         """What people call it."""
         return "the stick" if self.source == "stick" else "the boot partition"

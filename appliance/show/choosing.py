@@ -73,17 +73,20 @@ def choose(places: Places, arrivals: list[Arrival], check: Check, late: bool = F
     if not fresh:
         return Outcome(before._replace(refused=(*refused, *before.put_aside)), False, ())
     choice, taken, said = before, False, []
+    brought: frozenset[str] = frozenset()  # a show from the stick goes with a box file from elsewhere
     for arrival in fresh:
-        if taken:
+        lacking = arrival.without(brought)
+        if not lacking.listing:
             seen[arrival.source] = _seen(arrival, [], "")
             continue
-        newest, problems, is_final = _take(places, arrival, choice, check)
+        newest, problems, is_final = _take(places, lacking, choice, check)
         refused += problems
         said += problems
         looked_at = arrival if is_final and (newest or not late) else arrival._replace(listing=[])
         seen[arrival.source] = _seen(looked_at, problems, newest.id if newest else "")
         if newest is not None:
-            choice, taken = choice.with_newest(newest), newest.id != (choice.pairs or (Pair(),))[0].id
+            taken = taken or newest.id != (choice.pairs or (Pair(),))[0].id
+            choice, brought = choice.with_newest(newest), brought | lacking.parts
             said.append(f"{newest.source[0].upper()}{newest.source[1:]}: its show is checked and dances.")
     said += _remember(places.data, choice, seen)
     return Outcome(choice._replace(refused=(*refused, *choice.put_aside)), taken, tuple(said))

@@ -41,6 +41,19 @@ def test_what_gave_way_to_newer_shows_does_not_come_back_from_the_boot_partition
     assert _power_on(venue) == "summer"
 
 
+@pytest.mark.parametrize("boot_show", ["", "from the boot partition"])
+def test_a_show_from_the_stick_goes_with_the_box_file_from_the_boot_partition(
+    venue: Venue, boot_show: str
+) -> None:
+    venue.bring(venue.stick, "spring")
+    venue.bring(venue.boot, boot_show, box="sensors: {udp: {port: 9751}}")
+    outcome = venue.look()
+    assert outcome.taken and dancing(outcome) == "spring"
+    assert outcome.choice.first.box_id, "at the first power-on the venue's box file was passed over"
+    assert not venue.look().taken
+    assert dancing(venue.look()) == "spring"
+
+
 def test_a_show_put_aside_does_not_come_back_once_another_one_is_there(venue: Venue) -> None:
     venue.bring(venue.boot, "never danced")
     choice = venue.look().choice
