@@ -166,9 +166,10 @@ def test_cues_stop_and_go_reach_the_dance_and_are_answered(show: Path, tmp_path:
         assert box.end() == 0
     poses = read_journal(tmp_path / "run.journal").ticks["pose"]
     moves = np.abs(np.diff(poses, axis=0)).max(axis=(1, 2)) > 0
-    still = np.flatnonzero(~moves)
-    assert len(still) >= 5  # it stood
-    assert moves[still[-1] + 1 :].sum() > 20  # and went on
+    runs = np.split(np.arange(len(moves)), np.flatnonzero(np.diff(moves)) + 1)
+    stood = max((run for run in runs if not moves[run[0]]), key=len)  # a late tick is one that stands, too
+    assert len(stood) >= 5
+    assert moves[stood[-1] + 1 :].sum() > 20  # and it went on
     assert "Traceback" not in box.words
 
 
