@@ -311,10 +311,10 @@ copy() {
 }
 
 # What one of the last lines of a unit says ([Install] WantedBy=), so that it starts with the box.
-enable() {
-    local target
-    sed -n 's/^WantedBy=//p' "$releases/$name/system/$1" | while read -r target; do
-        link "/$1" "$root/etc/systemd/system/$target.wants/$(basename "$1")"
+enable_units() {
+    local file target
+    { (cd "$releases/$name/system" && grep -sH '^WantedBy=' "$units"/*) || true; } | while IFS=: read -r file target; do
+        link "/$file" "$root/etc/systemd/system/${target#WantedBy=}.wants/${file##*/}"
     done
 }
 
@@ -326,26 +326,38 @@ folders_of_links() {
         sed 's|/[^/]*$||' | sort -u
 }
 
+# Links through `current` that are there, as "where to".
+links() {
+    local folder folders=()
+    while read -r folder; do
+        if [ -d "$root/$folder" ]; then folders+=("$root/$folder"); fi
+    done < <(folders_of_links)
+    [ ${#folders[@]} = 0 ] || find "${folders[@]}" -maxdepth 1 -type l -lname "$home/current/*" -printf '%p %l\n'
+}
+
 # Links that the chosen release does not have any more, and what a power cut left.
 unlink_left_over() {
-    local folder where to
-    while read -r folder; do
-        [ ! -d "$root/$folder" ] || find "$root/$folder" -maxdepth 1 -type l -lname "$home/current/*" -printf '%p %l\n'
-    done < <(folders_of_links) | while read -r where to; do [[ -e $root$to && $where != *.new ]] || rm "$where"; done
+    local where to
+    links | while read -r where to; do [[ -e $root$to && $where != *.new ]] || rm "$where"; done
     find "$root/etc/systemd/system" -type l -lname "/$units/*" -printf '%p %l\n' |
         while read -r where to; do [[ -L $root$to || -e $root$to ]] || rm "$where"; done
 }
 
 switch_to() {
-    local file before
+    local file before where to
+    local -A linked=()
     name=$1 before=$(current)
+    while read -r where to; do linked[$where]=$to; done < <(links)
     while read -r file; do
         case $file in
-        usr/*) link "$home/current/system/$file" "$root/$file" ;;
+        usr/*)
+            to=$home/current/system/$file
+            [ "${linked[$root/$file]:-}" = "$to" ] || link "$to" "$root/$file"
+            ;;
         *) copy "$file" "$before" ;;
         esac
-        case $file in "$units"/*) enable "$file" ;; esac
     done < <(system_files "$name")
+    enable_units
     link "$home/current/bin/bunraku" "$root/usr/local/bin/bunraku"
     link "$home/current/install.sh" "$root/usr/local/sbin/bunraku-install"
     if [[ -f $releases/$name/$users && -x $root/usr/bin/systemd-sysusers ]]; then

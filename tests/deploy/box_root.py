@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from tests.deploy.cut import cut_off
 from tests.deploy.small_release import INSTALL
 
 _SIZE_MB = 64
+_ENDS_WITHIN_S = 5.0
 
 
 def why_not() -> str | None:
@@ -134,5 +136,10 @@ def run(*words: str) -> str:
 
 
 def unmount(folder: Path) -> None:
-    """Also where nothing is mounted."""
-    subprocess.run(["umount", str(folder)], capture_output=True)
+    """Also where nothing is mounted; what a script that was killed has started may need a moment to end."""
+    until = time.monotonic() + _ENDS_WITHIN_S
+    while folder.is_mount() and time.monotonic() < until:
+        subprocess.run(["umount", str(folder)], capture_output=True)
+        time.sleep(0.01)
+    if folder.is_mount():
+        run("umount", "--lazy", str(folder))
