@@ -125,9 +125,7 @@ def test_it_dances_again_after_a_power_cut(box: Box, number: int) -> None:
     box.machine.cut_power()
     box.machine.power_on()
     box.awaits_dance()
-    repaired = box.run(
-        "journalctl -b -o cat -u 'systemd-fsck@*' | grep -v -i clean | tail -n 2 | tr '\\n' ' '"
-    )
+    repaired = box.run("journalctl -b -o cat -u 'systemd-fsck@*' | grep -i -E 'recover|error' | head -n 1")
     box.note(
         f"power cut {number} -> first frame: {box.first_frame_s():.1f} s of its own time after power is back "
         f"({box.machine.seconds_on():.0f} s here); data partition: {repaired or 'clean'}"
