@@ -85,11 +85,13 @@ read_options() {
 forgets() { [ "$(stat -f -c %T "$root/opt")" = overlayfs ] && { [ -z "$root" ] || has_data; }; }
 has_data() { mountpoint --quiet "$root/data"; }
 
-# A root that does not run has no /proc of its own, and the packages ask it for the processor.
+# A root that does not run has no /proc of its own, and the packages ask it for the processor. What this machine's
+# environment says (where its libraries lie) means nothing in there.
 in_root() {
     # shellcheck disable=SC2016 # $0 and $@ belong to the inner shell
     if [ -z "$root" ]; then "$@"; else
-        unshare --mount bash -c 'mount --rbind /proc "$0/proc" 2>/dev/null; exec chroot "$0" "$@"' "$root" "$@"
+        unshare --mount bash -c 'mount --rbind /proc "$0/proc" 2>/dev/null; exec env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin chroot "$0" "$@"' \
+            "$root" "$@"
     fi
 }
 

@@ -47,6 +47,7 @@ def test_what_goes_wrong_is_found(figures: dict[str, Any]) -> None:
     worse = {
         **figures,
         "malformed": 2,
+        "stage": ["Danced 900 ticks: late 0, longest tick 2.0 ms, skipped 2."],
         "receivers": {**figures["receivers"], "vmc": {"frames": 900, "missing": 3, "late": 0}},
         "lamps": {**figures["lamps"], "1": {"looks": 9, "followed": 8, "levels": 5}},
         "memory_mb": {**figures["memory_mb"], "lights": (50.0, 90.0)},
