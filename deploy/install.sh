@@ -90,8 +90,8 @@ has_data() { mountpoint --quiet "$root/data"; }
 in_root() {
     # shellcheck disable=SC2016 # $0 and $@ belong to the inner shell
     if [ -z "$root" ]; then "$@"; else
-        unshare --mount bash -c 'mount --rbind /proc "$0/proc" 2>/dev/null; exec env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin chroot "$0" "$@"' \
-            "$root" "$@"
+        unshare --mount bash -c 'mount --rbind /proc "$0/proc" 2>/dev/null
+            exec env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin chroot "$0" "$@"' "$root" "$@"
     fi
 }
 

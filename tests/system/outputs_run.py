@@ -190,7 +190,7 @@ class Measurement:
 def faults(figures: dict[str, Any], judge_growth: bool = True) -> list[str]:
     """What is wrong; empty when all is well. Growth cannot be judged in a run of seconds.
 
-    A slot that the stage itself skipped, because this machine stood still, is no frame that a receiver missed.
+    A slot that the stage itself skipped, because this machine stood still, is none that a receiver missed.
     """
     skipped = sum(int(number) for line in figures["stage"] for number in re.findall(r"skipped (\d+)", line))
     found = [
