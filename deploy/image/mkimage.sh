@@ -86,7 +86,8 @@ boot_partition() {
 }
 
 root_partition() {
-    mksquashfs "$root" "$work/root" "${packing[@]}" -noappend -quiet -no-progress -e "$root/boot/"* >/dev/null
+    mksquashfs "$root" "$work/root" "${packing[@]}" -noappend -quiet -no-progress -wildcards -e 'boot/*' \
+        >/dev/null
     local size
     size=$(stat -c %s "$work/root")
     [ "$size" -le $((ROOT_MIB * MIB)) ] || fail "the packed root has $((size / MIB)) MiB: more than its partition."
