@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from appliance.outputs.frame_reader import FrameReader
-from appliance.show.choice import Choice, Pair, write_whole
+from appliance.show.choice import Choice, Pair
+from appliance.show.durable import write_whole
 
 TRIES, ANEW = "tries", "anew"
 PROVEN_S = 10.0  # a show that has danced for so long dances on this box

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from appliance.show.durable import sync_folder
+
 OWNER_ONLY = 0o600
 
 
@@ -34,11 +36,7 @@ def write_beside(path: Path, text: str) -> Path:
 def put_in_place(beside: Path, path: Path) -> None:
     """Let the file beside `path` take its place, at once and for good."""
     beside.replace(path)
-    directory = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(directory)
-    finally:
-        os.close(directory)
+    sync_folder(path.parent)
 
 
 def _give_to_owner(descriptor: int, path: Path) -> None:

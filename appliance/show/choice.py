@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from appliance.show.durable import write_whole
+
 APPLIANCE_BOX = Path(__file__).resolve().parent / "appliance_box.yaml"
 EMBEDDED_SHOW = Path(__file__).resolve().parent / "default_show"
 BOOTS = (Path("/boot/firmware/bunraku"), Path("/boot/bunraku"))
@@ -207,31 +209,6 @@ def _lock(descriptor: int, until: float) -> None:
             if time.monotonic() >= until:
                 raise
             time.sleep(_AGAIN_S)
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """A file and its name in the folder, on the disk when this returns; raises OSError: the old one stays."""
-    temporary = path.with_name(f".{path.name}.new")
-    try:
-        with temporary.open("wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise
-    sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """A rename is on the disk only once its folder is."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _pair(values: dict[str, Any]) -> Pair:

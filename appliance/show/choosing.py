@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from appliance.show.arrivals import Arrival
-from appliance.show.choice import APPLIANCE_BOX, CHOSEN, DATA, RUN, Choice, Pair, appliance_box, write_whole
+from appliance.show.choice import APPLIANCE_BOX, CHOSEN, DATA, RUN, Choice, Pair, appliance_box
+from appliance.show.durable import write_whole
 
 if TYPE_CHECKING:
     from appliance.show.shelf import Shelf

@@ -12,7 +12,8 @@ from typing import Any, BinaryIO
 
 from appliance.show.arrivals import SHOW, Arrival
 from appliance.show.bundle import WORKSHOP
-from appliance.show.choice import Choice, appliance_box, sync_folder, write_whole
+from appliance.show.choice import Choice, appliance_box
+from appliance.show.durable import sync_folder, write_whole
 
 _CHUNK = 1 << 18
 _LARGEST_BYTES = 400_000_000

@@ -12,11 +12,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from appliance.show.durable import sync_folder
 from appliance.stage.place import FILE, LARGEST, Place, PlaceReader, packed, unpacked
 
-SLOT_BYTES = (
-    4096  # a page: never shares a sector, nor the cell of a card that is being written, with the other
-)
+# A page: never shares a sector, nor the cell of a card that is being written, with the other.
+SLOT_BYTES = 4096
 SLOTS = 2
 EVERY_S = 0.45  # with turns of half a second: each of them, and never more than a second is lost
 RETRY_S = 10.0
@@ -177,16 +177,7 @@ def _make(path: Path) -> None:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
-    _sync_folder(path.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    """A new name is on the disk once its folder is."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    sync_folder(path.parent)
 
 
 def _no_space() -> OSError:

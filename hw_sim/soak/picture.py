@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from hw_sim.report import IVORY, LOOK, SLATE, VERMILION
 from hw_sim.soak.box import LATE_MS
 from hw_sim.soak.run import Soak
+from hw_sim.soak.vitals import Vitals
 
 _SHADES = {"processor": "#3a2a2a", "memory": "#2a3a2a", "disk": "#2a2f44", "all": "#43283a"}
 _LINES = (VERMILION, IVORY, "#7fb5a8", "#c9a24b", "#8f7fd0", SLATE)
@@ -55,26 +57,26 @@ def _lateness(axes: Any, soak: Soak) -> None:
 
 
 def _memory(axes: Any, soak: Soak) -> None:
-    for number, unit in enumerate(soak.box.units):
-        seen = [
-            (look.at / 60.0, look.held[unit.name].rss_mb) for look in soak.looks if unit.name in look.held
-        ]
-        if seen:
-            axes.plot(*zip(*seen, strict=True), color=_LINES[number % len(_LINES)], label=unit.name)
+    _draw_units(axes, soak, lambda held: held.rss_mb)
     axes.set_title("Resident memory", loc="left")
     axes.set(ylabel="MB", ylim=(0.0, None))
     axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(soak.box.units))
 
 
 def _handles(axes: Any, soak: Soak) -> None:
+    _draw_units(axes, soak, lambda held: held.handles)
+    axes.set_title("Open handles", loc="left")
+    axes.set_ylim(0.0)
+
+
+def _draw_units(axes: Any, soak: Soak, value: Callable[[Vitals], float]) -> None:
+    """A line for each process, over the minutes in which it lived."""
     for number, unit in enumerate(soak.box.units):
         seen = [
-            (look.at / 60.0, look.held[unit.name].handles) for look in soak.looks if unit.name in look.held
+            (look.at / 60.0, value(look.held[unit.name])) for look in soak.looks if unit.name in look.held
         ]
         if seen:
             axes.plot(*zip(*seen, strict=True), color=_LINES[number % len(_LINES)], label=unit.name)
-    axes.set_title("Open handles", loc="left")
-    axes.set_ylim(0.0)
 
 
 def _shade_loads(axes: Any, soak: Soak) -> None:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
-import struct
 import subprocess
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 BUNRAKU_ID = 990  # the box's user and group on every installation
-_FS_IOC_SHUTDOWN = 0x8004587D
-_WITHOUT_FLUSHING_THE_JOURNAL = 2
 _RELEASED_WITHIN_S = 20.0
 
 
@@ -71,15 +67,6 @@ class DataDisk:
         while _run("losetup", "--associated", str(self.image)):
             assert time.monotonic() < until, f"{self.image} is still in use."
             time.sleep(0.02)
-
-
-def shut_down_unflushed(mounted: Path) -> None:
-    """The file system stops at once; neither its journal nor what waits in memory is written."""
-    descriptor = os.open(mounted, os.O_RDONLY)
-    try:
-        fcntl.ioctl(descriptor, _FS_IOC_SHUTDOWN, struct.pack("I", _WITHOUT_FLUSHING_THE_JOURNAL))
-    finally:
-        os.close(descriptor)
 
 
 def _run(*words: str) -> str:

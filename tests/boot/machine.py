@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from tests.boot.disk import DataDisk, shut_down_unflushed
+from tests.boot.disk import DataDisk
+from tests.deploy.cut import cut_off
 from tests.system.namespace import Namespace
 
 NSPAWN = Path(__file__).parent / "nspawn.sh"
@@ -143,7 +144,7 @@ class Machine:
         """Everything is gone between two instructions; what the data disk had not written stays unwritten."""
         assert self.process is not None
         if self.started_with.disk is not None:
-            shut_down_unflushed(self.mounted("data"))
+            cut_off(self.mounted("data"))
         os.kill(self.pid1, signal.SIGKILL)
         self._gone()
 

@@ -106,7 +106,7 @@ class BoxRoot:
 
     def cut_power(self) -> None:
         """What no sync has brought to the disk is lost."""
-        cut_off(str(self.written))
+        cut_off(self.written)
         self.switch_off()
 
     def check_disk(self) -> int:

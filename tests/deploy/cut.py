@@ -10,7 +10,7 @@ import sys
 _SHUTDOWN, _WITHOUT_FLUSHING = 0x8004587D, 2  # FS_IOC_SHUTDOWN, GOING_FLAGS_NOLOGFLUSH
 
 
-def cut_off(folder: str) -> None:
+def cut_off(folder: str | os.PathLike[str]) -> None:
     """The moment at which the plug is pulled, for this one disk."""
     handle = os.open(folder, os.O_RDONLY)
     try:

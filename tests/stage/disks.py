@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import itertools
 import os
 import shutil
@@ -11,8 +10,6 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
-_SHUTDOWN = 0x8004587D  # FS_IOC_SHUTDOWN
-_NO_LOG_FLUSH = 2
 _plugs = itertools.count()
 
 
@@ -70,12 +67,3 @@ def disk(image: Path, folder: Path, how: str = "rw") -> Iterator[Path]:
     finally:
         shutil.copyfile(plugged, image)
         plugged.unlink()
-
-
-def cut_power(folder: Path) -> None:
-    """From now on nothing reaches the disk of this folder, and what was not synced is lost."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.ioctl(descriptor, _SHUTDOWN, _NO_LOG_FLUSH.to_bytes(4, "little"))
-    finally:
-        os.close(descriptor)

@@ -22,6 +22,7 @@ from appliance.stage.place_file import (
     PlaceFile,
     read_place,
 )
+from tests.deploy.cut import cut_off
 from tests.stage import disks
 
 HEAD_BYTES = 24  # of a slot
@@ -240,7 +241,7 @@ def test_a_disk_that_fails_in_the_middle(tmp_path: Path, carried: Carried) -> No
     with disks.disk(image, carried.state):
         carried.stage.write(at(1))
         carried.carrier.turn(100.0)
-        disks.cut_power(carried.state)
+        cut_off(carried.state)
         carried.stage.write(replace(PLACE, position_s=2.0))
         for turn in range(3):
             carried.carrier.turn(110.0 + RETRY_S * turn)
@@ -281,5 +282,5 @@ def test_power_cuts_at_any_moment_lose_nothing_that_was_synced(tmp_path: Path) -
                 assert writer.stdout is not None
                 for _ in range(1 + cut * cut):
                     newest = int(writer.stdout.readline())
-                disks.cut_power(folder)
+                cut_off(folder)
                 newest = max([newest, *map(int, writer.stdout.read().split())])

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from appliance.show.choice import sync_folder
+from appliance.show.durable import sync_folder
 from appliance.stage.journal.journal_error import JournalError
 from appliance.stage.journal.reading import DAMAGED, EXPORTED, header_of, segments_of
 from appliance.stage.journal.segments import SUFFIX

@@ -8,7 +8,7 @@ import os
 from collections import deque
 from pathlib import Path
 
-from appliance.show.choice import sync_folder
+from appliance.show.durable import sync_folder
 from appliance.stage.journal.chunks import count_ticks
 
 SUFFIX = ".segment"
