@@ -9,7 +9,8 @@ from typing import get_args
 
 from appliance.control.orders import Order, OrderSender, Place
 
-PATIENCE_S = 0.5
+PATIENCE_S = 0.5  # as long an order may wait to be carried out
+ANSWER_S = 0.1  # what was carried out at the last moment is answered within this
 WAITING = 64  # orders that may wait for a place; then the oldest gives way
 AT_ONCE, EVERY_S = 4, 0.02  # four orders a tick at most: a flood cannot touch the tick
 
@@ -77,7 +78,7 @@ class Errands:
 
     def due(self, now: float) -> float:
         """Monotonic seconds at which go_on has something to do without any answer; infinite: nothing."""
-        times = [errand.order.until for errand in self._sent.values()]
+        times = [errand.order.until + ANSWER_S for errand in self._sent.values()]
         times += [max(way.fills_at, now) for way in self._ways.values() if way.waiting]
         return min(times, default=float("inf"))
 
@@ -103,7 +104,7 @@ class Errands:
             while way.waiting and way.waiting[0].order.until < now:
                 errand = way.waiting.popleft()
                 errand.then(False, _SILENT[errand.place])
-        for ask in [ask for ask, errand in self._sent.items() if errand.order.until < now]:
+        for ask in [ask for ask, errand in self._sent.items() if errand.order.until + ANSWER_S < now]:
             errand = self._sent.pop(ask)
             if not errand.order.quiet:
                 errand.then(False, _SILENT[errand.place])

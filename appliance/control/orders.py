@@ -10,7 +10,8 @@ import json
 import math
 import os
 import socket
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -63,18 +64,23 @@ class Answer:
 class OrderInbox:
     """A place's end: orders wait in its socket until it takes them. Raises OSError without a place for it."""
 
-    def __init__(self, folder: Path, place: Place) -> None:
+    def __init__(self, folder: Path, place: Place, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._socket = _Mailbox(folder, place)
+        self._monotonic = monotonic
 
     def fileno(self) -> int:
         """For whoever sleeps until something comes."""
         return self._socket.fileno()
 
-    def take(self, now: float) -> Order | None:
-        """The oldest order that is still wanted, or None; never blocks, never raises."""
+    def take(self) -> Order | None:
+        """The oldest order that is still wanted, or None; never blocks, never raises.
+
+        The clock is read after the order has come: a process that hung for a while in the middle of its turn
+        still holds a time of before.
+        """
         while (received := self._socket.take()) is not None:
             order = _parsed(received)
-            if order is not None and now <= order.until:
+            if order is not None and self._monotonic() <= order.until:
                 return order
         return None
 

@@ -135,7 +135,7 @@ class Run:
             if self._wish.seconds is not None and now - begun >= self._wish.seconds:
                 return
             self._press_keys()
-            self._obey(now)
+            self._obey()
             self._show(now)
             if self._meter.pictures == 1:
                 notifier.ready("The display shows pictures.")
@@ -190,11 +190,11 @@ class Run:
             self._controls.wants_fullscreen = False
             self._window.toggle_fullscreen()
 
-    def _obey(self, now: float) -> None:
+    def _obey(self) -> None:
         if self._inbox is None:
             return
         for _ in range(_ORDERS_A_PICTURE):
-            order = self._inbox.take(now)
+            order = self._inbox.take()
             if order is None:
                 return
             self._inbox.answer(order, *self._controls.obey(order))

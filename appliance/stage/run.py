@@ -168,7 +168,7 @@ class Stage:
     def _obey(self, now: float) -> None:
         """Carry out what show control has asked for meanwhile, and tell it what came of that."""
         done: list[tuple[Order, bool, str]] = []
-        while len(done) < _ORDERS_A_TICK and (order := self.inbox.take(now)) is not None:
+        while len(done) < _ORDERS_A_TICK and (order := self.inbox.take()) is not None:
             done.append((order, *self._carry_out(order, now)))
         if done:
             self.resuming.note(self.cast, self.iterations, self.tick.frame.tick)  # before anybody is told

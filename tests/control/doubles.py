@@ -96,7 +96,7 @@ class StageDouble:
         while not self._is_over.wait(0.005):
             if self.dances:
                 self._share()
-            while self.obeys and (order := self._inbox.take(time.monotonic())) is not None:
+            while self.obeys and (order := self._inbox.take()) is not None:
                 self.orders.append(order)
                 self._inbox.answer(order, *self.answer(order))
 
@@ -118,7 +118,7 @@ class InboxDouble:
 
     def _live(self) -> None:
         while not self._is_over.wait(0.005):
-            while (order := self._inbox.take(time.monotonic())) is not None:
+            while (order := self._inbox.take()) is not None:
                 self.orders.append(order)
                 self._inbox.answer(order, True, f"{order.name} it is.")
 

@@ -192,7 +192,8 @@ def test_a_killed_box_leaves_a_journal_that_can_be_read(show: Path, tmp_path: Pa
         await_journal(journal, 1)
         last = box.frames(60)[-1][0]
         assert box.end(signal.SIGKILL) == -signal.SIGKILL
-    assert await_journal(journal, last + 1)["tick"][-1] >= last  # up to the frame that nobody saw any more
+    # A tick is noted once its frame has left: the one that it was killed in may be missing, and no other.
+    assert await_journal(journal, last)["tick"][-1] >= last - 1
 
 
 def await_journal(path: Path, ticks: int) -> np.ndarray:

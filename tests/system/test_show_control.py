@@ -47,6 +47,21 @@ SPINNING = (
     "main(['play', *sys.argv[1:]])",
 )
 
+# Becomes a box that stands still in the middle of its 100th tick: its turn goes on with a time of before.
+STANDING = (
+    sys.executable,
+    "-c",
+    "import os, signal, sys\n"
+    "from appliance.cli import main\n"
+    "from appliance.stage.tick import Tick\n"
+    "run = Tick.run\n"
+    "def stand(self, slot):\n"
+    "    run(self, slot)\n"
+    "    if slot.tick == 100: os.kill(os.getpid(), signal.SIGSTOP)\n"
+    "Tick.run = stand\n"
+    "main(['play', *sys.argv[1:]])",
+)
+
 
 @pytest.fixture(scope="module")
 def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -177,10 +192,16 @@ def hangs(box: Box) -> None:
     box.process.send_signal(signal.SIGSTOP)
 
 
-def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(show: Path, tmp_path: Path) -> None:
-    with playing(show, tmp_path) as box, asking(box) as asker:
+@pytest.mark.parametrize("command", [PLAY, STANDING], ids=["anywhere", "within a tick"])
+def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(
+    show: Path, tmp_path: Path, command: Sequence[str]
+) -> None:
+    with playing(show, tmp_path, command=command) as box, asking(box) as asker:
         box.frames(20)
-        hangs(box)
+        if command is PLAY:
+            hangs(box)
+        else:
+            until(lambda: status(asker)["state"] == "hung")
         assert asker.ask("/panic")[2] == 1
         assert house(tmp_path).panic
         until(lambda: status(asker)["state"] == "hung")
