@@ -9,7 +9,7 @@ from appliance.control.notify import Notifier
 from appliance.control.stop_signals import stop_signals
 
 _WORDS = "The technician's page comes with a later release. Nothing listens here."
-_LOOK_S = 1.0
+_LOOK_S = 0.2  # at power-off the stage waits for it
 
 
 def main() -> int:

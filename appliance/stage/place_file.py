@@ -20,7 +20,9 @@ SLOT_BYTES = 4096
 SLOTS = 2
 EVERY_S = 0.45  # with turns of half a second: each of them, and never more than a second is lost
 RETRY_S = 10.0
-_END_LOOKS, _END_LOOK_S = 50, 0.02  # the machine goes down: the stage says within a second that it ends
+# The machine goes down: whoever starts after the stage ends before it (the lights may take 4 s), then the
+# stage says that its show ended (it may take 3 s).
+END_S, _END_LOOK_S = 8.0, 0.02
 
 _MAGIC = b"bkplace1"
 _HEAD = struct.Struct("<8sQII")  # magic, number, payload's bytes, CRC-32 of everything in the slot but itself
@@ -100,8 +102,16 @@ class PlaceCarrier:
     failed: how often the disk did not take it; complaint: why it does not take it now, a sentence, else "".
     """
 
-    def __init__(self, runtime: Path, state: Path, say: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        runtime: Path,
+        state: Path,
+        say: Callable[[str], None],
+        monotonic: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
         """runtime: the folder where the box's processes meet; state: the one on the disk."""
+        self._monotonic, self._sleep = monotonic, sleep
         self._reader = PlaceReader(runtime)
         self._file = PlaceFile(state / FILE)
         self._state, self._say = state, say
@@ -118,13 +128,16 @@ class PlaceCarrier:
     def last_turn(self) -> None:
         """Before the process ends: what is newest.
 
-        A machine that goes down ends all at once: a stage that lives has a second to say that its show ended.
+        Where the machine goes down, a stage that lives may still dance for a while: it ends after the others.
+        Until it says that its show has ended, its place is carried as ever: the power may fail meanwhile.
         """
-        for _ in range(_END_LOOKS):
+        until = self._monotonic() + END_S
+        while (now := self._monotonic()) < until:
             place = self._reader.read()
             if place is None or place.ended or not self._reader.stage_lives():
                 break
-            time.sleep(_END_LOOK_S)
+            self.turn(now)
+            self._sleep(_END_LOOK_S)
         self._carry()
         self._reader.close()
         self._file.close()

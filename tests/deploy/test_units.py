@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from appliance.stage.place_file import END_S
+
 SYSTEM = Path(__file__).resolve().parents[2] / "deploy" / "system"
 UNITS = SYSTEM / "usr/lib/systemd/system"
 SHARED = UNITS / "bunraku-.service.d/10-shared.conf"
@@ -131,6 +133,15 @@ def test_nobody_keeps_the_stage_from_dancing() -> None:
     for name in SERVICES:
         assert "bunraku-stage.service" not in settings(name).get("Before", [])
         assert "network-online.target" not in " ".join(settings(name).get("After", []))
+
+
+def test_the_keeper_outlasts_an_orderly_end_of_all_others() -> None:
+    """Whoever starts after the stage ends before it. An end that is not kept is taken for a power cut."""
+    stops_s = {name: seconds(settings(name)["TimeoutStopSec"][0]) for name in LASTING}
+    after_stage = [name for name in LASTING if "bunraku-stage.service" in settings(name).get("After", [])]
+    assert len(after_stage) == 4
+    longest_s = max(stops_s[name] for name in after_stage) + stops_s["bunraku-stage.service"]
+    assert longest_s < END_S < stops_s["bunraku-keeper.service"]
 
 
 def test_the_target_starts_everything_that_is_there_at_power_on() -> None:
