@@ -32,7 +32,7 @@ MINUTES ?= 60
 
 .DEFAULT_GOAL := help
 .PHONY: help run release studio firmware test firmware-test fuzz-corpus lint bench lock clean soak boot-figures \
-    image test-vm debian-for-image debian-for-vm debian-for-firmware debian-for-tests debian-for-boot debian-for-soak
+    boot-root image test-vm debian-for-image debian-for-vm debian-for-firmware debian-for-tests debian-for-boot debian-for-soak
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -48,10 +48,14 @@ firmware: debian-for-firmware ## build the wearable's firmware for this machine:
 	@$(call build,firmware,wearable)
 	@echo "Built build/firmware/libwearable.so"
 
-test: $(VENV)/.ready-to-test debian-for-tests debian-for-boot lint firmware firmware-test ## style, types, contracts, all tests
+test: $(VENV)/.ready-to-test debian-for-tests debian-for-boot ## style, types, contracts, all tests
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target firmware-test lint boot-root
 	@$(BIN)/pytest $(TEST_ARGS)
 
-firmware-test: debian-for-tests ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
+boot-root: $(VENV)/.ready-to-test debian-for-boot
+	@$(BIN)/python -m tests.boot.root
+
+firmware-test: debian-for-tests firmware ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
 	@echo "Wearable: host tests with sanitizers"
 	@$(call build,firmware,core_tests)
 	@build/firmware/core_tests --no-intro

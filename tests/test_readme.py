@@ -7,6 +7,8 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,16 +62,9 @@ def own_network() -> list[str]:
 BLOCKS = {page: blocks_of(page) for page in PAGES}
 
 
-@pytest.fixture(scope="module", params=PAGES)
-def page(request: pytest.FixtureRequest) -> str:
-    name: str = request.param
-    return name
-
-
 @pytest.fixture(scope="module")
-def checkout(page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the checkout for one page, with this environment as its ready-made .venv."""
-    copy = tmp_path_factory.mktemp("checkout")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Future[None]]]:
+    """All pages, two at a time: each has a checkout, a network and a runtime folder of its own."""
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
         cwd=ROOT,
@@ -79,14 +74,23 @@ def checkout(page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     if listed.returncode != 0:
         pytest.skip("this is no git checkout")
-    for name in filter(lambda name: (ROOT / name).is_file(), listed.stdout.splitlines()):
+    files = [name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
+    with ThreadPoolExecutor(2 if own_network() else 1) as lanes:
+        yield {
+            page: lanes.submit(run_page, page, files, tmp_path_factory.mktemp("checkout"))
+            for page in sorted(PAGES, key=lambda page: len(BLOCKS[page]), reverse=True)
+        }
+
+
+def fill(copy: Path, files: Sequence[str]) -> None:
+    """Make it a copy of the checkout, with this environment as its ready-made .venv."""
+    for name in files:
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, copy / name)
     (copy / ".venv").mkdir()
     (copy / ".venv" / "bin").symlink_to(Path(sys.executable).parent)
     for stamp in (".ready-to-run", ".ready-to-test"):  # after the copies: nothing is installed again
         (copy / ".venv" / stamp).touch()
-    return copy
 
 
 def environment_of(checkout: Path) -> dict[str, str]:
@@ -100,8 +104,9 @@ def environment_of(checkout: Path) -> dict[str, str]:
     return environment
 
 
-def test_every_command_of_a_page_works(page: str, checkout: Path) -> None:
-    assert BLOCKS[page], f"{page} shows no command"
+def run_page(page: str, files: Sequence[str], checkout: Path) -> None:
+    """Each block in the order of the page; AssertionError for the first that does not work."""
+    fill(checkout, files)
     environment = environment_of(checkout)
     for block in BLOCKS[page]:
         script = "\n".join(RECURSIVE.sub(r"make --dry-run \1", line) for line in block.text.splitlines())
@@ -115,6 +120,12 @@ def test_every_command_of_a_page_works(page: str, checkout: Path) -> None:
         )
         assert done.returncode == 0, f"{block}\n{block.text}\n{done.stdout}\n{done.stderr}"
         assert "Traceback" not in done.stderr, f"{block}\n{block.text}\n{done.stderr}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_of_a_page_works(page: str, pages: dict[str, Future[None]]) -> None:
+    assert BLOCKS[page], f"{page} shows no command"
+    pages[page].result()
 
 
 def test_the_readme_names_every_command_and_no_other() -> None:

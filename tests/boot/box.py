@@ -15,7 +15,7 @@ from appliance.stage.place import Place, PlaceReader
 from tests.boot.disk import DataDisk
 from tests.boot.hall import Hall, box_file
 from tests.boot.machine import PATIENCE_S, Machine, PowerOn
-from tests.boot.pauses import Seen, pause_after
+from tests.boot.pauses import FPS, Seen, pause_after
 
 STAGE = "bunraku-stage"
 _WRITTEN_AT = 1_700_000_000  # else each box has a new box file, which has to be checked
@@ -68,6 +68,17 @@ class Box:
         found = pause_after(self.hall.audience.frames, at)
         assert found is not None
         return found
+
+    def danced_s(self, since: float, tick: int) -> float:
+        """How far the phrase went on from a time (seconds since 1970) until a tick of the stage of then.
+
+        A late frame is the last pose once more: the phrase stands still meanwhile.
+        """
+        audience = self.hall.audience
+        audience.watch()
+        return (
+            sum(not frame.late for frame in audience.frames if frame.at >= since and frame.tick <= tick) / FPS
+        )
 
     def place(self) -> Place:
         """Where the dance is, as the stage has it in memory."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 BUNRAKU_ID = 990  # the box's user and group on every installation
-_RELEASED_WITHIN_S = 20.0
+_RELEASED_WITHIN_S = 60.0
 
 
 @dataclass(frozen=True)

@@ -94,7 +94,7 @@ class Hall:
         padded = address.encode() + b"\0" * (4 - len(address) % 4)
         self.desk.sendto(padded + b",\0\0\0", (BOX, CONTROL))
         return self.answers(
-            lambda answers: any(where in ("/end", "/reply") for where, _ in answers), patience_s
+            lambda answers: any(where in ("/end", "/reply", "/pong") for where, _ in answers), patience_s
         )
 
     def answers(
@@ -110,7 +110,8 @@ class Hall:
         return found
 
     def dance_with_sensor(self) -> None:
-        """A dancer switches the wearable on; it moves until the hall closes."""
+        """A dancer switches the wearable on; it moves until it is switched off or the hall closes."""
+        self.switch_sensor_off()
         emulate = [sys.executable, "-m", "hw_sim", "emulate", "--sensor", SENSOR, "--motion", "dance"]
         emulate += ["--keys", str(self.folder / "sensors.keys"), "--host", BOX, "--port", str(SENSORS)]
         with (self.folder / "sensor.txt").open("ab") as words:

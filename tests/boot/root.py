@@ -1,4 +1,7 @@
-"""The root that boots: built as the image's is, from the working tree, and kept until an input changes."""
+"""The root that boots: built as the image's is, from the working tree, and kept until an input changes.
+
+`python -m tests.boot.root` builds it before the tests want it, where a box can boot at all.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.boot import rights
 from tests.conftest import ROOT
 
 MKROOT = ROOT / "deploy" / "image" / "mkroot.sh"
@@ -70,3 +74,8 @@ def _run(*words: str) -> None:
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
     done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, f"{' '.join(words)}: {done.returncode}\n{done.stdout}{done.stderr}"
+
+
+if __name__ == "__main__":
+    reason = rights.why_not()
+    print(f"The box's root: {reason or root_image()}", flush=True)

@@ -25,6 +25,7 @@ pytestmark = pytest.mark.boot
 
 
 def test_ports_that_listen_are_those_of_the_box_file(dancing: Box) -> None:
+    dancing.await_unit("bunraku-control")
     opened = set()
     for kind in ("udp", "tcp"):
         for line in dancing.machine.run(
@@ -39,6 +40,7 @@ def test_ports_that_listen_are_those_of_the_box_file(dancing: Box) -> None:
 def test_the_firewall_lets_in_what_the_box_file_opens_and_nothing_else(dancing: Box) -> None:
     machine = dancing.machine
     dancing.await_unit("bunraku-firewall")
+    dancing.await_unit("bunraku-control")
     assert dancing.hall.ask("/ping"), "a listed desk is shut out"
     assert _heard(dancing, inside=True), "this test cannot tell what gets in"
     assert not _heard(dancing, inside=False), machine.run("nft", "list", "ruleset")

@@ -58,12 +58,16 @@ def test_a_broken_show_on_the_stick_is_refused_with_file_and_line(box: Box, tmp_
 
 def test_a_stick_that_is_pulled_while_it_is_read(box: Box, tmp_path: Path, figures: Figures) -> None:
     show = show_on(tmp_path / "content", "Half read")
-    (show / "zz-long.bvh").write_bytes(os.urandom(100 << 20))
-    stick = Stick.made(tmp_path / "stick.img", tmp_path / "content", megabytes=160)
+    (show / "zz-long.bvh").write_bytes(os.urandom(200 << 20))
+    stick = Stick.made(tmp_path / "stick.img", tmp_path / "content", megabytes=260)
+    box.disk.grown(1024)
     box.power_on(stick=stick.image)
     shows = box.machine.path("/data/bunraku/shows")
     box.machine.await_that(lambda: list(shows.glob("*part*/zz-long.bvh")), "the stick is not read")
+    box.machine.run("systemctl", "kill", "--signal=STOP", "bunraku-preflight")
+    assert list(shows.glob("*part*/zz-long.bvh")), "it was read before it could be pulled"
     stick.pull()
+    box.machine.run("systemctl", "kill", "--signal=CONT", "bunraku-preflight")
     first = box.await_frames()[0]
     figures.note(
         "power-on with a stick that is pulled to first frame",
