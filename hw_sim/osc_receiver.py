@@ -8,6 +8,8 @@ import struct
 import time
 from types import TracebackType
 
+from hw_sim.receive_buffer import widen
+
 Argument = int | float | str | bytes | bool | None
 Received = tuple[float, str, list[Argument]]
 
@@ -31,7 +33,7 @@ class OscReceiver:
 
     def __init__(self, host: str, port: int = 0) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        widen(self._socket, RECEIVE_BUFFER_BYTES)
         try:
             self._socket.bind((host, port))
         except OSError:

@@ -9,8 +9,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import TracebackType
 
+from hw_sim.receive_buffer import widen
+
 GROUP, PORT = "236.10.10.10", 56565
 MAX_PACKET = 1500
+RECEIVE_BUFFER_BYTES = 4 << 20  # seconds of frames: a slow reader loses none, so what is missing was not sent
 
 Vector = tuple[float, float, float]
 
@@ -84,6 +87,7 @@ class PsnReceiver:
 
     def __init__(self, interface: str, group: str = GROUP, port: int = PORT) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        widen(self._socket, RECEIVE_BUFFER_BYTES)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self._socket.bind((group, port))

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
+from hw_sim.receive_buffer import widen
+
 Packet = TypeVar("Packet")
 
 RECEIVE_BUFFER_BYTES = 4 << 20  # minutes of universes: a slow reader loses none
@@ -26,7 +28,7 @@ class DatagramReceiver(Generic[Packet]):
         self.malformed = 0
         self.complaint = ""
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        widen(self.socket, RECEIVE_BUFFER_BYTES)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self.socket.bind((host, port))

@@ -9,11 +9,12 @@ import time
 
 from hw_sim.osc_receiver import MalformedOscError, decode
 from hw_sim.peers import FRAME, HOST
+from hw_sim.receive_buffer import widen
 from hw_sim.soak.delays import SLOT_MS, Delays, Seconds
 
 SILENT_S = 0.5  # what the projector calls a pause
 # Linux, asm-generic/socket.h: a time stamp for each datagram, and how many found no room.
-_SO_RCVBUFFORCE, _SO_TIMESTAMPNS, _SO_RXQ_OVFL = 33, 35, 40
+_SO_TIMESTAMPNS, _SO_RXQ_OVFL = 35, 40
 _BUFFER_BYTES = 8 << 20
 _CLOSE_ENOUGH_S = 50e-6  # two clocks read one after the other; longer, and something came in between
 
@@ -29,11 +30,9 @@ class FrameWatch:
     def __init__(self, late_ms: float) -> None:
         self._late_ms = late_ms
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        for option, value in ((_SO_RCVBUFFORCE, _BUFFER_BYTES), (_SO_TIMESTAMPNS, 1), (_SO_RXQ_OVFL, 1)):
-            try:
-                self._socket.setsockopt(socket.SOL_SOCKET, option, value)
-            except PermissionError:
-                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
+        widen(self._socket, _BUFFER_BYTES)
+        for option in (_SO_TIMESTAMPNS, _SO_RXQ_OVFL):
+            self._socket.setsockopt(socket.SOL_SOCKET, option, 1)
         self._socket.bind((HOST, 0))
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
