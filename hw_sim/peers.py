@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -23,6 +24,8 @@ STARTS_WITHIN_S = 60.0
 ENDS_WITHIN_S = 10.0
 FRAME = b"/bunraku/frame\0"
 PRIORITY = 50  # below the box's: the receiver's clock readings matter, the box's ticks matter more
+_PORTS = range(20000, 32000)  # below Linux' net.ipv4.ip_local_port_range
+_CHANCE = random.SystemRandom()  # whoever sets a seed, two runs beside each other do not choose the same
 STEP_EVERY_S = 0.6
 STEP_DEGREES = 40.0
 
@@ -143,12 +146,14 @@ def listening_closely() -> Iterator[None]:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
-def free_ports(count: int) -> list[int]:
-    """UDP ports that nobody uses just now."""
+def free_ports(count: int, kind: socket.SocketKind = socket.SOCK_DGRAM) -> list[int]:
+    """Ports that nobody uses just now, UDP ones as a rule; none that the kernel gives to who asks for any."""
     with contextlib.ExitStack() as opened:
-        sockets = [
-            opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)
-        ]
-        for one in sockets:
-            one.bind((HOST, 0))
-        return [one.getsockname()[1] for one in sockets]
+        ports: list[int] = []
+        while len(ports) < count:
+            port = _CHANCE.choice(_PORTS)
+            one = opened.enter_context(socket.socket(socket.AF_INET, kind))
+            with contextlib.suppress(OSError):  # somebody has it
+                one.bind(("0.0.0.0", port))
+                ports.append(port)
+        return ports

@@ -6,7 +6,7 @@ import random
 import socket
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import NamedTuple
 from unittest import mock
@@ -18,8 +18,8 @@ from hw_sim import motions
 from hw_sim.emulated_sensor import sensor_axes
 from hw_sim.firmware import NETWORK, PASSWORD, provision
 from hw_sim.firmware_library import TO_ALL, CompiledWearable, State
+from hw_sim.peers import HOST, free_ports
 
-HOST = "127.0.0.1"
 # Seconds of virtual time begin here: far from any machine's monotonic clock, so that the kernel's stamps on
 # datagrams never look like times of this evening.
 EPOCH_S = 1e8
@@ -172,9 +172,7 @@ def lockstep(
     tick_s: how often the box drains and tends, a multiple of STEP_S.
     """
     chance = random.Random(f"lockstep {seed}")
-    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as reserved:
-        reserved.bind((HOST, 0))
-        port = reserved.getsockname()[1]
+    [port] = free_ports(1)
     keys = [SensorKey(name, 0x5000 + number, chance.randbytes(16)) for number, name in enumerate(names)]
     sensors = [
         LockstepSensor(key, motion_of(number), 1000 * seed + number, port) for number, key in enumerate(keys)

@@ -17,6 +17,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from hw_sim.peers import free_ports
 from tests.system.namespace import Namespace
 
 STARTS_WITHIN_S = 30.0
@@ -59,7 +60,7 @@ class Olad:
         if not any(self._folder.iterdir()):
             self._configure()
         with self._inside():
-            self.port, rpc = _free_tcp_ports(2)
+            self.port, rpc = free_ports(2, socket.SOCK_STREAM)
         words = ["olad", "-c", str(self._folder), "-p", str(self.port), "-r", str(rpc), "-l", "3"]
         words += ["--no-register-with-dns-sd", *(("-i", "lo") if self._network else ())]
         with self._log.open("ab") as log:
@@ -175,11 +176,3 @@ def shared_folder() -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="widgets-") as name:
         Path(name).chmod(0o755)
         yield Path(name)
-
-
-def _free_tcp_ports(count: int) -> list[int]:
-    with contextlib.ExitStack() as opened:
-        sockets = [opened.enter_context(socket.socket()) for _ in range(count)]
-        for one in sockets:
-            one.bind(("127.0.0.1", 0))
-        return [one.getsockname()[1] for one in sockets]

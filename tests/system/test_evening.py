@@ -14,8 +14,9 @@ import pytest
 from appliance.sensor import wire
 from hw_sim import motions
 from hw_sim.firmware_library import State
+from hw_sim.peers import HOST
 from tests.system.evening import NAMES, Evening, play
-from tests.system.lockstep import EPOCH_S, HOST, LockstepSensor, lockstep
+from tests.system.lockstep import EPOCH_S, LockstepSensor, lockstep
 
 GRAVITY = np.array([0.0, 0.0, 1.0])
 # One waiting update of the fusion, 10 ms of a hand at 400 degrees a second, and its noise.
