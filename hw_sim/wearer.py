@@ -10,8 +10,9 @@ EASE_S = 1.0  # from standing into the motion
 class Wearer:
     """A hand that moves; its orientation is in stage axes.
 
-    Stands as in the rest pose until the sensor has been heard for `stand_still_s`, and then goes over into
-    the motion. With 0 it follows the motion from the start and does not wait to be heard.
+    Stands as in the rest pose until the sensor has been heard for `stand_still_s` (infinite: until it is told
+    to `begin`), and then goes over into the motion. With 0 it follows the motion from the start and does not
+    wait to be heard.
     """
 
     def __init__(self, motion: Motion, stand_still_s: float = 0.0) -> None:
@@ -29,6 +30,10 @@ class Wearer:
         """A reading leaves for the box: only the first one counts."""
         if self._begun is None:
             self._begun = at + self._stand_still_s
+
+    def begin(self, now: float) -> None:
+        """Whoever stands dances from now on."""
+        self._begun = now
 
     def orientation(self, at: float) -> Quaternion:
         """How the hand stands."""

@@ -46,7 +46,7 @@ def listed(box: Box, is_enough: Callable[[list[dict[str, Any]]], bool]) -> list[
     command = [sys.executable, "-m", "appliance.cli", "sensors", "--json", "--box", str(box_file)]
     until = time.monotonic() + PATIENCE_S
     while True:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
         assert done.returncode == 0, done.stderr
         sensors: list[dict[str, Any]] = json.loads(done.stdout)["sensors"]
         if is_enough(sensors):
@@ -58,17 +58,22 @@ def test_switched_on_it_is_used_and_standing_still_gives_the_neutral_pose(show: 
     sent: dict[int, Sent] = {}
     with playing(show, tmp_path, settings=JOURNAL) as box:
         box.frames(1)
-        with Wearables([box.key], box.sensors, on_sent=lambda one: sent.update({one.sample.sequence: one})):
+        with Wearables(
+            [box.key], box.sensors, on_sent=lambda one: sent.update({one.sample.sequence: one})
+        ) as wearables:
             box.frame_that(reading())
             box.await_words("Sensor left-wrist: neutral pose taken. Dance.")
             assert box.words.index("stands still for a breath now") < box.words.index("neutral pose taken")
-            box.frame_that(reading(250))
+            still_from = box.frames(1)[-1][2]
+            still_until = box.frame_that(reading(still_from + 30))[2]
+            wearables.dance()
+            box.frame_that(reading(still_until + 150))
             assert box.end() == 0
     ticks = read_journal(tmp_path / "run.journal").ticks
-    standing = ticks[(ticks["sensor_sequence"] >= 60) & (ticks["sensor_sequence"] <= 90)]
+    standing = ticks[(ticks["sensor_sequence"] >= still_from) & (ticks["sensor_sequence"] <= still_until)]
     assert np.abs(standing["pose"][:, SHOULDER, 0]).min() > 0.999
     # What the hand does against its neutral pose is what the joint does, about the same axes.
-    dancing = ticks[ticks["sensor_sequence"] > 170]
+    dancing = ticks[ticks["sensor_sequence"] > still_until + 70]
     hands = np.array([sent[int(number)].sample.orientation for number in dancing["sensor_sequence"]])
     assert np.abs(hands[:, 0]).min() < 0.95
     assert np.median(np.abs((dancing["targets"][:, 0] * hands).sum(1))) > 0.9995
@@ -81,6 +86,7 @@ def test_killed_and_started_anew_it_uses_the_readings_and_the_neutral_pose_again
         box.frames(1)
         with Wearables([box.key], box.sensors) as wearables:
             box.await_words("neutral pose taken")
+            wearables.dance()
             before = box.frame_that(reading())[2]
             box.kill_and_restart()
             after = box.frame_that(reading())[2]
@@ -93,8 +99,9 @@ def test_killed_and_started_anew_it_uses_the_readings_and_the_neutral_pose_again
 
 def test_after_a_power_cut_the_neutral_pose_is_used_again(show: Path, tmp_path: Path) -> None:
     """The sensor has a battery; what the box loses is its memory."""
-    with playing(show, tmp_path) as box, Wearables([box.key], box.sensors):
+    with playing(show, tmp_path) as box, Wearables([box.key], box.sensors) as wearables:
         box.await_words("neutral pose taken")
+        wearables.dance()
         until = time.monotonic() + PATIENCE_S
         while not (tmp_path / "sensors.memory").exists():
             assert time.monotonic() < until
@@ -102,7 +109,8 @@ def test_after_a_power_cut_the_neutral_pose_is_used_again(show: Path, tmp_path: 
         box.end(signal.SIGKILL)
         with (tmp_path / "runtime" / "keeper.lock").open() as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)  # the keeper ends with its box
-        shutil.rmtree(tmp_path / "runtime")
+        while (tmp_path / "runtime").exists():  # so does show control, which takes its own files away
+            shutil.rmtree(tmp_path / "runtime", ignore_errors=True)
         box.kill_and_restart()
         box.await_words("Sensor left-wrist: the neutral pose taken before is used on. Dance.")
         assert box.end() == 0
@@ -128,7 +136,7 @@ def test_lost_for_longer_than_a_link_lasts_it_pairs_again(show: Path, tmp_path: 
     with playing(show, tmp_path) as box:
         box.frames(1)
         with Wearables([box.key], box.sensors) as wearables:
-            box.frame_that(reading(20))
+            last = box.frame_that(reading(20))[2]
             wearables.radios[0].in_reach = False
             until = time.monotonic() + PATIENCE_S
             while wearables.sensors[0].is_linked:  # three seconds without the box
@@ -145,10 +153,12 @@ def test_switched_off_and_on_its_joint_goes_on_without_standing_still(show: Path
         box.frames(1)
         with Wearables([box.key], box.sensors) as wearables:
             box.await_words("neutral pose taken")
+            wearables.dance()
             boot_nonce = wearables.sensors[0].boot_nonce
+            before = box.frame_that(reading())[2]
             wearables.do(lambda now: wearables.sensors[0].switch_off(now, 1.0))
+            box.frame_that(lambda frame: 0 <= frame[2] < before)  # it counts from zero
             box.await_words("Sensor left-wrist is on again: its joint goes on where it was.")
-            box.frame_that(lambda frame: 0 <= frame[2] < 100)  # it counts from zero
             assert wearables.sensors[0].boot_nonce != boot_nonce
             assert box.end() == 0
 
@@ -177,17 +187,16 @@ def test_eight_sensors_at_once_and_the_list_of_them(tmp_path: Path) -> None:
     with playing(show, tmp_path, names=EIGHT) as box:
         box.frames(1)
         with Wearables(list(box.keys.values()), box.sensors):
-            sensors = listed(box, lambda them: all(one["rate_hz"] > 40 for one in them))
+            sensors = listed(
+                box, lambda them: all(one["rate_hz"] > 40 and one["age_s"] < 1.0 for one in them)
+            )
             assert [one["name"] for one in sensors] == EIGHT
             assert {one["state"] for one in sensors} == {"linked"}
             assert len({one["way"] for one in sensors}) == 8
-            for one in sensors:
-                assert one["firmware"] == "1.0.0"
-                assert one["age_s"] < 1.0
+            assert {one["firmware"] for one in sensors} == {"1.0.0"}
             for name in EIGHT[: len(MOVING)]:
                 box.await_words(f"Sensor {name}: neutral pose taken")
-            measured = listed(box, lambda them: all(one["round_trip_s"] for one in them))
-            assert all(0 < one["round_trip_s"] < 1.0 for one in measured)
+            listed(box, lambda them: all(0 < (one["round_trip_s"] or 0) < 1.0 for one in them))
             assert box.end() == 0
     assert "Traceback" not in box.words
 

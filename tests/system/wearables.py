@@ -1,7 +1,8 @@
-"""Emulated wearables for the real box, in a thread: to be switched off, carried out of reach, plugged in."""
+"""Emulated wearables for the real box, in a thread: to dance, be switched off, carried away, plugged in."""
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
@@ -20,7 +21,6 @@ from hw_sim.senders import SerialSender, UdpSender
 from hw_sim.wearer import Wearer
 
 HOST = "127.0.0.1"
-STAND_STILL_S = 2.0
 
 
 class Radio(UdpSender):
@@ -38,7 +38,11 @@ class Radio(UdpSender):
 
 
 class Wearables:
-    """A context: the sensors run from its beginning to its end, on a venue's network."""
+    """A context: the sensors run from its beginning to its end, on a venue's network.
+
+    Their wearers stand still until they are told to `dance`: the box takes the neutral pose, however often
+    the readings pause meanwhile.
+    """
 
     def __init__(
         self,
@@ -49,9 +53,8 @@ class Wearables:
         motion: Callable[[int], Motion] = dance,
         on_sent: Callable[[Sent], None] | None = None,
     ) -> None:
-        self.sensors = [
-            EmulatedSensor(key, Wearer(motion(number), STAND_STILL_S)) for number, key in enumerate(keys)
-        ]
+        self._wearers = [Wearer(motion(number), math.inf) for number in range(len(keys))]
+        self.sensors = [EmulatedSensor(key, wearer) for key, wearer in zip(keys, self._wearers, strict=True)]
         self.radios = [Radio(HOST, port) for _ in keys]
         ways: list[dict[Way, Sender]] = [{Way.NETWORK: radio} for radio in self.radios]
         if cable is not None:
@@ -70,6 +73,11 @@ class Wearables:
     ) -> None:
         self._ended.set()
         self._thread.join()
+
+    def dance(self) -> None:
+        """All of them, from the next moment on."""
+        for wearer in self._wearers:
+            self.do(wearer.begin)
 
     def do(self, wish: Callable[[float], None]) -> None:
         """In the sensors' own thread, with the time of the moment."""
