@@ -27,6 +27,7 @@ SETTLED_SHARE = 0.2  # of the run: what a process takes until then is its start
 MOST_GROWTH_MB, MOST_HANDLES = 6.0, 2
 LOOK_S = 1.0
 HEARD_S = 1.0  # a lamp shows a height that the joint had at most so long ago
+FOLLOWED_SHARE = 0.9  # of the looks: lights or olad may be held up for longer than that
 OFF_BY = 3  # of 255: rounding, and the height between two frames
 LAST_FRAME_S = 5.0
 STALL_S, NAP_S = 0.02, 0.005
@@ -124,16 +125,21 @@ class Measurement:
     def figures(self, seconds: float, statuses: dict[str, int], stalls: Stalls) -> dict[str, Any]:
         """All of it, as JSON, once the stage has ended and every receiver had time for the last frame."""
         until = time.monotonic() + LAST_FRAME_S
+        self.hear(0.2)
         heard = {**self._heard, "oscdump": _dumped(self._venue.dump)}
         while len({one.ticks[-1] for one in heard.values() if one.ticks}) > 1 and time.monotonic() < until:
             self.hear(0.2)
             heard["oscdump"] = _dumped(self._venue.dump)
         positions = Heard(self._frames)
         receivers = {
-            name: {"frames": len(one.ticks), "missing": one.missing, "late": one.late}
-            for name, one in heard.items()
+            name: {
+                "frames": len(one.ticks),
+                "missing": one.missing,
+                "late": one.late,
+                "lost": self._venue.lost(name),
+            }
+            for name, one in {**heard, "PosiStageNet": positions}.items()
         }
-        receivers["PosiStageNet"] = {"frames": len(positions.ticks), "missing": positions.missing, "late": 0}
         malformed = sum(one.malformed for one in (*self._venue.osc.values(), self._venue.positions))
         return {
             "seconds": round(seconds, 1),
@@ -190,18 +196,20 @@ class Measurement:
 def faults(figures: dict[str, Any], judge_growth: bool = True) -> list[str]:
     """What is wrong; empty when all is well. Growth cannot be judged in a run of seconds.
 
-    A slot that the stage itself skipped, because this machine stood still, is none that a receiver missed.
+    A slot that the stage itself skipped, because this machine stood still, is none that a receiver missed,
+    and neither is one whose datagram found the receiver's socket full.
     """
     skipped = sum(int(number) for line in figures["stage"] for number in re.findall(r"skipped (\d+)", line))
     found = [
-        f"{name}: {one['missing']} of {one['frames']} frames missing, {skipped} skipped by the stage"
+        f"{name}: {one['missing']} of {one['frames']} frames missing, {skipped} skipped by the stage, "
+        f"{one['lost']} datagrams lost here"
         for name, one in figures["receivers"].items()
-        if one["missing"] > skipped or not one["frames"]
+        if one["missing"] > skipped + one["lost"] or not one["frames"]
     ]
     found += [
         f"lamp {name}: followed in {lamp['followed']} of {lamp['looks']} looks, {lamp['levels']} levels"
         for name, lamp in figures["lamps"].items()
-        if lamp["followed"] < lamp["looks"] or lamp["levels"] < 2
+        if lamp["followed"] < FOLLOWED_SHARE * lamp["looks"] or lamp["levels"] < 2
     ]
     found += [f"{name} ended with status {status}" for name, status in figures["statuses"].items() if status]
     if figures["malformed"]:

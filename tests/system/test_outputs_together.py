@@ -24,10 +24,13 @@ def test_nothing_is_missing_and_everything_follows(figures: dict[str, Any]) -> N
 
 
 def test_every_receiver_heard_the_same_dance(figures: dict[str, Any]) -> None:
-    counts = {name: one["frames"] for name, one in figures["receivers"].items()}
-    assert set(counts) == {"ai-toolbox", "vmc", "oscdump", "PosiStageNet"}
-    assert len(set(counts.values())) == 1, counts
-    assert min(counts.values()) > 5 * SECONDS
+    receivers = figures["receivers"]
+    assert set(receivers) == {"ai-toolbox", "vmc", "oscdump", "PosiStageNet"}
+    most = max(one["frames"] for one in receivers.values())
+    for one in receivers.values():
+        # Who was held up until its socket was full has lost a datagram or more of each frame that is missing.
+        assert most - one["lost"] <= one["frames"], receivers
+    assert min(one["frames"] for one in receivers.values()) > 5 * SECONDS
 
 
 def test_every_process_was_watched_and_leaks_no_handles(figures: dict[str, Any]) -> None:
@@ -48,11 +51,11 @@ def test_what_goes_wrong_is_found(figures: dict[str, Any]) -> None:
         **figures,
         "malformed": 2,
         "stage": ["Danced 900 ticks: late 0, longest tick 2.0 ms, skipped 2."],
-        "receivers": {**figures["receivers"], "vmc": {"frames": 900, "missing": 3, "late": 0}},
+        "receivers": {**figures["receivers"], "vmc": {"frames": 900, "missing": 4, "late": 0, "lost": 1}},
         "lamps": {**figures["lamps"], "1": {"looks": 9, "followed": 8, "levels": 5}},
         "memory_mb": {**figures["memory_mb"], "lights": (50.0, 90.0)},
         "statuses": {**figures["statuses"], "stage": -9},
     }
     said = "\n".join(faults(worse))
-    for words in ("vmc: 3 of 900", "lamp 1: followed in 8 of 9", "stage ended", "2 datagrams", "50 to 90"):
+    for words in ("vmc: 4 of 900", "lamp 1: followed in 8 of 9", "stage ended", "2 datagrams", "50 to 90"):
         assert words in said

@@ -24,6 +24,7 @@ from tests.system.namespace import Namespace
 from tests.system.olad import Olad
 
 SENSOR = "left-wrist"
+STAND_STILL_S = 20.0  # the neutral pose takes 1.5 s; a busy machine makes pauses, and it begins again
 LAMPS = {1: ("lHand", 2.0), 2: ("rFoot", 1.0)}  # universe: the joint whose height it shows, metres of full
 ART_NET_IN = {"2-1-I-0": 1, "2-1-I-1": 2}
 BUNRAKU = (sys.executable, "-m", "appliance.cli")
@@ -39,13 +40,15 @@ def why_not() -> str | None:
 
 @dataclass
 class Venue:
-    """Everything that runs. `processes`: by name; `words`: the folder with what each of them said."""
+    """Everything that runs. `processes`: by name; `dump`: what oscdump prints; `ports`: of the receivers."""
 
     folder: Path
+    network: Namespace
     daemon: Olad
     osc: dict[str, OscReceiver]
     positions: PsnReceiver
     dump: Path
+    ports: dict[str, int]
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
     def said(self, name: str) -> str:
@@ -59,6 +62,11 @@ class Venue:
             words = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b".", b"\0").split(b"\0")
             found |= {name: pid for name in ("control", "lights") if name.encode() in words}
         return found
+
+    def lost(self, name: str) -> int:
+        """Datagrams for a receiver that found its socket full: it was held up, and the box has sent them."""
+        with self.network.entered():
+            return sum(int(row.split()[-1]) for row in _sockets(self.ports[name]))
 
     def end(self) -> dict[str, int]:
         """Ask the box's own processes to end; their exit statuses."""
@@ -100,10 +108,13 @@ def venue(folder: Path, picture: str = "320x180") -> Iterator[Venue]:
             },
         }
         box.write_text(yaml.safe_dump(settings))
-        running = Venue(folder, daemon, osc, psn, folder / "oscdump.txt")
-        _dump(running, network, dump_port, opened)
+        ports = {dialect: receiver.port for dialect, receiver in osc.items()}
+        ports |= {"oscdump": dump_port, "PosiStageNet": psn_port}
+        running = Venue(folder, network, daemon, osc, psn, folder / "oscdump.txt", ports)
+        _dump(running, opened)
         stage = [*BUNRAKU, "play", "--show", str(show), "--box", str(box)]
         emulator = [sys.executable, "-m", "hw_sim", "emulate", "--sensor", SENSOR, "--motion", "dance"]
+        emulator += ["--stand-still", str(STAND_STILL_S)]
         emulator += ["--keys", str(folder / "sensors.keys"), "--port", str(sensors)]
         projector = [*BUNRAKU, "project", "--box", str(box), "--offscreen", picture]
         for name, words in (("stage", stage), ("sensor", emulator), ("projector", projector)):
@@ -141,25 +152,26 @@ def lit_show(folder: Path) -> Path:
     return folder
 
 
-def _dump(running: Venue, network: Namespace, port: int, opened: contextlib.ExitStack) -> None:
+def _dump(running: Venue, opened: contextlib.ExitStack) -> None:
     """The real oscdump, of which the lines about frames are kept."""
+    port = running.ports["oscdump"]
     with running.dump.open("wb") as kept:
-        dump = subprocess.Popen(network.command("oscdump", str(port)), stdout=subprocess.PIPE)
+        dump = subprocess.Popen(running.network.command("oscdump", str(port)), stdout=subprocess.PIPE)
         opened.callback(_stop, dump)
         keep = subprocess.Popen(["grep", "--line-buffered", "/bunraku/frame"], stdin=dump.stdout, stdout=kept)
         opened.callback(_stop, keep)
     running.processes["oscdump"] = dump
     until = time.monotonic() + PATIENCE_S
-    with network.entered():
-        while port in _free(port):
+    with running.network.entered():
+        while not _sockets(port):
             assert dump.poll() is None and time.monotonic() < until, "oscdump does not listen"
             time.sleep(0.02)
 
 
-def _free(port: int) -> list[int]:
-    """The port if nobody has bound it in this network."""
-    bound = Path("/proc/thread-self/net/udp").read_text() + Path("/proc/thread-self/net/udp6").read_text()
-    return [] if f":{port:04X} " in bound else [port]
+def _sockets(port: int) -> list[str]:
+    """What the kernel tells of those that are bound to this UDP port, in the network of this thread."""
+    tables = [Path(f"/proc/thread-self/net/{table}").read_text().splitlines() for table in ("udp", "udp6")]
+    return [row for rows in tables for row in rows if row.split()[1].endswith(f":{port:04X}")]
 
 
 def _start(opened: contextlib.ExitStack, command: Sequence[str], words: Path) -> subprocess.Popen[bytes]:
