@@ -7,6 +7,7 @@ import numpy as np
 from appliance.control.house import House
 from appliance.lights.colour import mixed
 from appliance.lights.dance import Dance
+from appliance.lights.head import LONGEST_STEP_S
 from appliance.lights.mapping import Mapping, Wishes, faded, mappings_of
 from appliance.lights.patch import Patch, Values
 from appliance.outputs.frame_reader import SeenFrame
@@ -16,14 +17,21 @@ from appliance.show.lights import LightsConfig, SafeConfig
 
 SAFE_FADE_S = 1.0  # into the safe look and back; panic is at once
 LEAVING_FADE_S = 0.7
+USUAL_RATE_HZ = 40.0
 LOST_S = 1.0  # without a fresh frame for so long the stage counts as lost
 MOST_LAYERS = 4  # mappings that fade into each other when the next one is called before the last is there
 
 
 class Rig:
-    """Fixtures, mappings and the safe look. It begins in the safe look and fades in with the first frame."""
+    """Fixtures, mappings and the safe look. It begins in the safe look and fades in with the first frame.
 
-    def __init__(self, config: LightsConfig, patch: Patch, skeleton: Skeleton) -> None:
+    rate_hz: how often passes are meant to come. One that comes much later was held up, most often with the
+    whole machine: it goes on by LONGEST_STEP_S, and no more counts against a stage that was held up as well.
+    """
+
+    def __init__(
+        self, config: LightsConfig, patch: Patch, skeleton: Skeleton, rate_hz: float = USUAL_RATE_HZ
+    ) -> None:
         self.patch = patch
         self.dance = Dance(skeleton)
         self.safety = 1.0  # 0: the dance alone; 1: the safe look alone
@@ -33,7 +41,8 @@ class Rig:
         self._mappings = mappings_of(config.mappings, patch)
         self._layers: list[_Layer] = []
         self._called: tuple[str, float] | None = None
-        self._fresh_at = -np.inf
+        self._unseen_s = np.inf  # how old the newest frame is, without what held up this process
+        self._longest_step_s = max(LONGEST_STEP_S, 1.5 / rate_hz)
         self._then: float | None = None
         self._leaving = False
 
@@ -41,17 +50,19 @@ class Rig:
         """From now on passes fade to the safe look, whatever dances."""
         self._leaving = True
 
-    def is_lost(self, now: float) -> bool:
+    @property
+    def is_lost(self) -> bool:
         """Whether the stage has shown nothing for LOST_S."""
-        return now - self._fresh_at > LOST_S
+        return self._unseen_s > LOST_S
 
     def pass_(self, frame: SeenFrame | None, generation: int, house: House, now: float) -> dict[int, bytes]:
         """512 levels for each universe at `now`, monotonic seconds; `generation` is that of the stage."""
-        seconds = 0.0 if self._then is None else max(now - self._then, 0.0)
+        seconds = 0.0 if self._then is None else min(max(now - self._then, 0.0), self._longest_step_s)
         self._then = now
+        self._unseen_s += seconds
         if frame is not None:
             self.dance.see(frame, generation, now)
-            self._fresh_at = frame.frame_time
+            self._unseen_s = min(self._unseen_s, now - frame.frame_time)
         self._secure(house, now, seconds)
         wishes = self._wishes(house, now, seconds)
         safety = self.safety
@@ -78,7 +89,7 @@ class Rig:
             self.safety = 1.0
         elif self._leaving:
             self.safety = min(self.safety + seconds / LEAVING_FADE_S, 1.0)
-        elif self.is_lost(now) or house.is_safe(now):
+        elif self.is_lost or house.is_safe(now):
             self.safety = min(self.safety + seconds / SAFE_FADE_S, 1.0)
         else:
             self.safety = max(self.safety - seconds / SAFE_FADE_S, 0.0)

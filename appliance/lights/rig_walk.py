@@ -45,7 +45,7 @@ def walk_rig(
         for sentence in unwired(show, box):
             say(sentence)
         say(f"{len(to_see)} steps of {step_s:g} s or more; Ctrl-C ends the walk, and all goes dark.")
-        walk(patch, to_see, step_s, send, say, stopped)
+        walk(patch, to_see, step_s, box.lights.rate_hz, send, say, stopped)
         for universe in universes:
             if universe.wire.trouble:
                 say(universe.wire.trouble)

@@ -50,7 +50,7 @@ class Lights:
         config = rig_here(show, box, box_file)
         patch = Patch(config.fixtures, show.directory)
         self.show, self.box = show, box
-        self.rig = Rig(config, patch, show.skeleton)
+        self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz)
         self.universes = wired(patch, box)
         self._stage, self._house, self._say, self._fallbacks = stage, house, say, fallbacks
         self._stranger: int | None = None
@@ -79,7 +79,7 @@ class Lights:
             pulse(now)
             if now >= report_at:
                 report_at = now + _REPORT_S
-                self._report(now)
+                self._report()
             deadline = _wait_for(deadline, period_s)
         self.rig.leave()
         give_up = time.monotonic() + _GIVE_UP_S
@@ -115,9 +115,9 @@ class Lights:
             )
         return None
 
-    def _report(self, now: float) -> None:
+    def _report(self) -> None:
         """Once a second: what has changed with the stage and the wires."""
-        lost = self.rig.is_lost(now)
+        lost = self.rig.is_lost
         if lost and not self._was_lost:
             self._fallbacks.set(STAGE_UNSEEN.name, True)
             self._say(

@@ -14,6 +14,7 @@ from appliance.show.fixture_profile import DIMMER, PAN, TILT
 from appliance.show.light_rules import AIM
 from appliance.show.lights import UNIVERSE_CHANNELS
 
+LONGEST_STEP_S = 0.04  # of a pass; one that was held up goes on from where it was, past no peak
 _ROOM = 2.2  # ways from end to end that a head has time for, of which it goes two
 CHEST_M = 1.2  # where heads are told to point at the end: over the stage's origin, as high as a chest
 
@@ -121,24 +122,27 @@ def walk(
     patch: Patch,
     to_see: Sequence[Step],
     step_s: float,
+    rate_hz: float,
     show: Callable[[dict[int, bytes]], float],
     say: Callable[[str], None],
     stopped: Callable[[], bool],
 ) -> None:
-    """Take the steps, `step_s` each or as long as heads need.
+    """Take the steps, `step_s` each or as long as heads need, at `rate_hz`.
 
     `show` sends levels, waits for the next pass and gives the time then.
     """
     moving, fixture = Walk(patch), ""
+    longest_s = max(LONGEST_STEP_S, 1.5 / rate_hz)
     now = show(moving.dark())
     for step in to_see:
         if step.fixture != fixture:
             fixture = step.fixture
             say(introduction(patch, fixture))
         say(f"  {step.attribute}, {step.words}")
-        begun = before = now
+        walked_s = seconds = 0.0
         duration_s = moving.duration_s(step, step_s)
-        while not stopped() and now - begun < duration_s:
-            levels = moving.levels(step, (now - begun) / duration_s, now - before)
-            before, now = now, show(levels)
+        while not stopped() and walked_s < duration_s:
+            before, now = now, show(moving.levels(step, walked_s / duration_s, seconds))
+            seconds = min(now - before, longest_s)
+            walked_s += seconds
     show(moving.dark())

@@ -10,7 +10,8 @@ import pytest
 
 from appliance.control.house import House
 from appliance.lights.rig import LEAVING_FADE_S, LOST_S, SAFE_FADE_S, Rig
-from tests.lights.rigs import frame, lights, rig
+from appliance.lights.patch import Patch
+from tests.lights.rigs import SKELETON, frame, lights, rig
 
 PERIOD_S = 0.025
 PAR = {"name": "par", "profile": "led-par", "address": 1}
@@ -196,6 +197,53 @@ def test_after_a_pause_of_the_whole_machine_nothing_jumps_but_time() -> None:
     night.now += 30.0
     night.dance(hand=(-3, 0, 2))
     assert np.abs(night.rig.patch.heads.angles - before).max() <= 200 * 0.1 + 1e-6
+
+
+def slow(rate_hz: float) -> Rig:
+    """A rig that dances, with few passes a second."""
+    config = lights([PAR], FULL)
+    made = Rig(config, Patch(config.fixtures, None), SKELETON, rate_hz)
+    made.safety = 0.0
+    return made
+
+
+@pytest.mark.parametrize("held_up_s", [0.9, 1.5, 5.0])
+def test_a_machine_that_was_held_up_whole_dims_nothing_and_counts_nothing(held_up_s: float) -> None:
+    """The lights wake some passes before the stage does."""
+    night = evening()
+    night.dance(2.0)
+    night.now += held_up_s
+    shown = night.hang(0.5) + night.dance(0.5)
+    assert {dimmers(levels)[0] for levels in shown} == {255}
+    assert not night.rig.is_lost
+
+
+def test_lights_that_were_held_up_while_the_stage_died_fade_as_ever() -> None:
+    night = evening()
+    night.dance(1.0)
+    night.now += 5.0
+    shown = [dimmers(levels)[0] / 255 for levels in night.hang(LOST_S + 1.5 * SAFE_FADE_S)]
+    assert np.abs(np.diff(shown)).max() < 0.05
+    assert shown[-1] == 0.0 and night.rig.is_lost
+
+
+def test_lights_that_are_held_up_on_their_way_to_the_safe_look_do_not_jump_there() -> None:
+    night = evening()
+    night.dance(1.0)
+    night.hang(LOST_S + 0.3 * SAFE_FADE_S)
+    before = dimmers(night.hang(0.0)[0])[0]
+    night.now += 5.0
+    assert 0 < before - dimmers(night.hang(0.0)[0])[0] < 255 * 0.11
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 2.0, 5.0, 8.0])
+def test_at_a_slow_rate_a_lost_stage_is_seen_and_faded_from_in_the_same_time(rate_hz: float) -> None:
+    made, period_s, safe_at = slow(rate_hz), 1.0 / rate_hz, np.inf
+    for number in range(round(4.0 * rate_hz)):
+        now = 1.0 + number * period_s
+        made.pass_(frame(50), 1, House(), now)
+        safe_at = min(safe_at, now if made.safety >= 1.0 else np.inf)
+    assert LOST_S + SAFE_FADE_S - 1e-6 <= safe_at - 1.0 <= LOST_S + SAFE_FADE_S + 1.1 * period_s
 
 
 def test_unknown_mappings_leave_the_first_in_force() -> None:

@@ -42,7 +42,7 @@ def walked(patch: Patch, fixtures: tuple[str, ...] = (), attribute: str | None =
         shown.append(levels)
         return len(shown) / 40.0
 
-    walk(patch, list(steps(patch, fixtures, attribute)), 1.0, show, said.append, lambda: False)
+    walk(patch, list(steps(patch, fixtures, attribute)), 1.0, 40.0, show, said.append, lambda: False)
     return shown, said
 
 
@@ -81,6 +81,45 @@ def test_pan_goes_to_both_ends_and_aim_points_at_the_stage() -> None:
         moving.levels(step, 0.5, 0.025)
     wanted = np.array([0, 1.2, 0]) - [2, 4, 0]
     np.testing.assert_allclose(patch.heads.beams()[0], wanted / np.linalg.norm(wanted), atol=1e-3)
+
+
+def held_up(patch: Patch, attribute: str) -> Any:
+    """Levels (passes, 512) of a walk of which each tenth pass comes a second late."""
+    shown: list[list[int]] = []
+    now = 0.0
+
+    def show(levels: dict[int, bytes]) -> float:
+        nonlocal now
+        shown.append(list(levels[1]))
+        now += 0.025 if len(shown) % 10 else 1.0
+        return now
+
+    walk(patch, list(steps(patch, (), attribute)), 0.4, 40.0, show, lambda _: None, lambda: False)
+    return np.array(shown)
+
+
+def test_a_walk_that_is_held_up_jumps_over_no_peak() -> None:
+    assert held_up(patch_of(PAR), "red")[:, 1].max() > 230
+
+
+def test_a_head_that_is_held_up_reaches_both_ends_and_goes_no_faster() -> None:
+    patch = patch_of(HEAD)
+    levels = held_up(patch, "pan")[1:-1]
+    pan = (levels[:, 20] * 256 + levels[:, 21]) / 65535 * 540
+    assert np.ptp(pan) > 530
+    assert np.abs(np.diff(pan)).max() <= patch.heads.axes.slew.max() * 0.041
+
+
+def test_a_walk_at_a_slow_rate_takes_no_longer() -> None:
+    shown: list[dict[int, bytes]] = []
+
+    def show(levels: dict[int, bytes]) -> float:
+        shown.append(levels)
+        return len(shown) / 5.0
+
+    patch = patch_of(PAR)
+    walk(patch, list(steps(patch, (), "red")), 2.0, 5.0, show, lambda _: None, lambda: False)
+    assert len(shown) == 2 + 10
 
 
 def test_an_introduction_names_universe_and_channels() -> None:
