@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from appliance.control.house import House
-from appliance.lights.rig import LEAVING_FADE_S, LOST_S, SAFE_FADE_S, Rig
 from appliance.lights.patch import Patch
+from appliance.lights.rig import LEAVING_FADE_S, LOST_S, SAFE_FADE_S, Rig
 from tests.lights.rigs import SKELETON, frame, lights, rig
 
 PERIOD_S = 0.025
