@@ -16,6 +16,7 @@ from appliance.projector.controls import Controls
 from appliance.projector.final_pass import FinalPass, picture_size
 from appliance.projector.interpolation import Interpolation
 from appliance.projector.moment import Moment
+from appliance.projector.pacing import USUAL_RATE
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.picture.wall import Wall
 from appliance.projector.presence import STALE_S, Presence
@@ -58,7 +59,7 @@ class Projector:
         self._gl, self._config, self._make_painter = gl, config, make_painter
         self._reader, self._house, self._controls, self._say = reader, house, controls, say
         self._final = FinalPass(gl, config)
-        self._presence = Presence()
+        self._presence = Presence(config.rate or USUAL_RATE)
         self._generation = 0
         self._poses: Interpolation | None = None
         self._painter: Painter | None = None
@@ -67,6 +68,11 @@ class Projector:
         self._is_black = False  # since that show waits
         self.shown: str | None = None  # the look of the last picture; None: none, or two that cross-fade
         self.is_preparing = False  # which takes as long as it takes
+
+    @property
+    def sees_stage(self) -> bool:
+        """Whether what is shown is fresh; what held up this process as well does not count against it."""
+        return self._presence.sees_stage
 
     def draw(
         self,

@@ -2,25 +2,40 @@
 
 from __future__ import annotations
 
+import math
+
+from appliance.projector.pacing import USUAL_RATE
+
 STALE_S = 0.5
 FADE_S = 0.5
-_LONGEST_S = 0.25  # between two pictures: who stood still for longer still fades in, in two steps
+_LONGEST_S = 0.25  # between two pictures: who was held up for longer still fades in, in two steps
 
 
 class Presence:
-    """A level from 0 to 1 that follows whether fresh frames come; it starts in the dark."""
+    """A level from 0 to 1 that follows whether fresh frames come; it starts in the dark.
 
-    def __init__(self) -> None:
+    rate: how many pictures a second are meant. What held up this process, most often with the whole machine,
+    counts neither for the fade nor against a stage that was held up as well.
+    """
+
+    def __init__(self, rate: float = USUAL_RATE) -> None:
         self.level = 0.0
+        self._longest_s = max(_LONGEST_S, 1.5 / rate)
+        self._unseen_s = math.inf  # how old the newest frame is, without what held up this process
         self._before: float | None = None
+
+    @property
+    def sees_stage(self) -> bool:
+        """Whether the last picture had a fresh frame."""
+        return self._unseen_s < STALE_S
 
     def step(self, newest: float | None, now: float) -> float:
         """The level at `now`; `newest`: when the newest frame was, None without one (monotonic seconds)."""
-        elapsed_s = 0.0 if self._before is None else max(0.0, now - self._before)
+        elapsed_s = 0.0 if self._before is None else min(max(0.0, now - self._before), self._longest_s)
         self._before = now
-        is_fresh = newest is not None and now - newest < STALE_S
-        if is_fresh:
-            self.level = min(1.0, self.level + min(elapsed_s, _LONGEST_S) / FADE_S)
+        self._unseen_s = math.inf if newest is None else min(self._unseen_s + elapsed_s, now - newest)
+        if self.sees_stage:
+            self.level = min(1.0, self.level + elapsed_s / FADE_S)
         else:
             self.level = max(0.0, self.level - elapsed_s / FADE_S)
         return self.level

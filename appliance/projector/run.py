@@ -224,7 +224,7 @@ class Run:
     def _tell(self, now: float, stage: str, share: float) -> None:
         """For the box's other processes; a stage that was never seen is none that is away."""
         if self._reader.facts is not None:
-            self._fallbacks.set(STAGE_UNSEEN.name, stage != "fresh")
+            self._fallbacks.set(STAGE_UNSEEN.name, stage != "fresh" and not self._projector.sees_stage)
         self._fallbacks.set(PICTURES_SMALLER.name, share < 1.0)
         self._company.tell(now)
 

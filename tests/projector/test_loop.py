@@ -115,6 +115,18 @@ def test_fades_to_black_when_the_stage_hangs_and_comes_back(evening: Evening) ->
     assert TellingPainter.made == 1
 
 
+def test_a_machine_that_was_held_up_whole_shows_no_black(evening: Evening) -> None:
+    """The projector wakes a few pictures before the stage does."""
+    evening.begin()
+    assert evening.colour(1.0)[0] == 255
+    stage, evening.stage = evening.stage, None
+    evening.now += 2.0
+    assert {evening.colour()[0] for _ in range(6)} == {255}
+    assert evening.projector.sees_stage
+    evening.stage = stage
+    assert {evening.colour()[0] for _ in range(30)} == {255}
+
+
 def test_a_stage_that_is_restarted_soon_is_hardly_seen(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from appliance.projector.presence import Presence
+from appliance.projector.presence import FADE_S, STALE_S, Presence
 
 RATE = 60
 
@@ -45,6 +45,41 @@ def test_a_short_gap_is_not_seen() -> None:
 def test_a_slow_display_fades_as_fast() -> None:
     presence = Presence()
     assert levels(presence, np.arange(0, 0.7, 0.2)) == pytest.approx([0.0, 0.4, 0.8, 1.0])
+
+
+@pytest.mark.parametrize("held_up_s", [0.5, 1.0, 5.0])
+def test_a_machine_that_was_held_up_whole_is_not_seen(held_up_s: float) -> None:
+    """The projector wakes some pictures before the stage does."""
+    presence = Presence()
+    levels(presence, np.arange(0, 1, 1 / RATE))
+    times = 1.0 + held_up_s + np.arange(0, 0.2, 1 / RATE)
+    assert set(levels(presence, times, newest=1.0)) == {1.0} and presence.sees_stage
+
+
+def test_a_stage_that_died_while_the_projector_was_held_up_fades_as_ever() -> None:
+    presence = Presence()
+    levels(presence, np.arange(0, 1, 1 / RATE))
+    found = levels(presence, np.arange(6, 7.1, 1 / RATE), newest=1.0)
+    assert np.diff(found).min() > -0.05
+    assert found[0] == 1.0 and found[-1] == 0.0 and not presence.sees_stage
+
+
+def test_who_is_held_up_on_the_way_to_black_does_not_jump_there() -> None:
+    presence = Presence()
+    levels(presence, np.arange(0, 1, 1 / RATE))
+    before = levels(presence, np.arange(1, 1.6, 1 / RATE), newest=1.0)[-1]
+    assert 0.7 < before < 0.9
+    assert before - presence.step(1.0, 6.0) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("rate", [1.0, 2.0, 3.0])
+def test_few_pictures_a_second_fade_out_in_the_same_time(rate: float) -> None:
+    presence = Presence(rate)
+    times = np.arange(0, 6, 1 / rate)
+    levels(presence, times)
+    found = levels(presence, times + 6.0, newest=6.0)
+    black_after_s = times[found.index(0.0)]
+    assert STALE_S <= black_after_s <= STALE_S + FADE_S + 1 / rate
 
 
 def test_another_show_begins_in_the_dark() -> None:
