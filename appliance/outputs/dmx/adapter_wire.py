@@ -91,6 +91,7 @@ class AdapterWire:
                 self._feed(self._open_adapter())
             except Exception as error:  # whatever a driver raises: the lights come back when the device does
                 self._failed(error)
+            self.is_open = False  # now that there is a reason to be read
             if self._closing:
                 self.dropped += self._newest is not None
                 return
@@ -103,11 +104,10 @@ class AdapterWire:
         due = time.monotonic()
         try:
             while (data := self._next(due)) is not None:
-                adapter.write(data)
+                _written(adapter, data)
                 self.sent += 1
                 due = max(due + (self._period_s or 0.0), time.monotonic())
         finally:
-            self.is_open = False
             adapter.close()
 
     def _next(self, due: float) -> bytes | None:
@@ -132,3 +132,11 @@ class AdapterWire:
     def _failed(self, error: Exception) -> None:
         number = error.errno if isinstance(error, OSError) else None
         self.last_error = _IN_WORDS.get(number or 0, str(error))
+
+
+def _written(adapter: Adapter, data: bytes) -> None:
+    """Write, and once more before the adapter is given up: drivers blame it when this process was held up."""
+    try:
+        adapter.write(data)
+    except OSError:
+        adapter.write(data)

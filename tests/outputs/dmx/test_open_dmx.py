@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import pty
+import select
 import struct
 import termios
 import time
@@ -17,7 +18,7 @@ import pytest
 
 from appliance.outputs.dmx import open_dmx
 from appliance.outputs.dmx.open_dmx import OpenDmx, open_dmx_wire
-from tests.outputs.dmx.conftest import config, universe
+from tests.outputs.dmx.conftest import PATIENCE_S, config, universe
 
 Until = Callable[[Callable[[], bool]], None]
 
@@ -81,19 +82,25 @@ def cable(tmp_path: Path) -> Iterator[tuple[int, Path]]:
     os.close(master)
 
 
+def heard(master: int) -> bytes:
+    """What comes next; the time limit is for a broken program alone."""
+    assert select.select([master], [], [], PATIENCE_S)[0], "nothing came"
+    return os.read(master, 4096)
+
+
 def test_a_universe_is_told_again_and_again(cable: tuple[int, Path]) -> None:
     master, path = cable
     wire = open_dmx_wire(config("open-dmx", device=str(path)))
     wire.send(universe(), 0.0)
     received = b""
     while len(received) < 6 * 513:
-        received += os.read(master, 4096)
+        received += heard(master)
     assert received[: 6 * 513] == (b"\0" + universe()) * 6
     assert wire.dropped == 0
     wire.send(bytes(512), 0.0)
     wire.close(0.0)
     while not received.endswith(bytes(513)):
-        received += os.read(master, 4096)
+        received += heard(master)
 
 
 def test_nothing_is_told_before_there_is_something(cable: tuple[int, Path], until: Until) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from serial.serialutil import Timeout
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
@@ -35,7 +37,8 @@ def test_a_universe_arrives_framed(widget: UsbProWidget, until: Until) -> None:
         for tick in range(20):
             wire.send(universe(tick), 0.0)
             until(lambda tick=tick: widget.levels == universe(tick))
-        assert (wire.sent, wire.dropped, wire.is_open, wire.trouble) == (20, 0, True, None)
+        until(lambda: wire.sent == 20)
+        assert (wire.dropped, wire.is_open, wire.trouble) == (0, True, None)
         wire.close(0.0)
     assert {len(packet) for _, packet in widget.universes} == {513}
     assert {packet[0] for _, packet in widget.universes} == {0}
@@ -84,8 +87,9 @@ def test_pulled_out_mid_universe_and_back(widget: UsbProWidget, until: Until) ->
     until(lambda: widget.levels == universe(1))
     widget.pull_out()
     wire.send(universe(2), 0.0)
-    until(lambda: not wire.is_open)
+    until(lambda: bool(wire.last_error))
     assert "unplugged" in wire.last_error
+    until(lambda: not wire.is_open)
     widget.plug_in()  # a new universe is not needed: it shows the last one by itself
     until(lambda: widget.levels == universe(2))
     assert wire.is_open
@@ -100,7 +104,7 @@ def test_garbage_from_the_widget_changes_nothing(widget: UsbProWidget, until: Un
             widget.say(bytes(range(256)) * 8 + b"\x7e\x05\xff\xff")
             wire.send(universe(tick), 0.0)
             until(lambda tick=tick: widget.levels == universe(tick))
-        assert wire.sent == 40
+        until(lambda: wire.sent == 40)
         assert widget.broken == 0
         wire.close(0.0)
 
@@ -143,6 +147,69 @@ def test_another_program_has_it(widget: UsbProWidget, until: Until) -> None:
         assert second.last_error == "another program uses it"
         second.close(0.0)
         first.close(0.0)
+
+
+def test_a_machine_that_is_held_up_while_it_writes_blames_no_widget(
+    widget: UsbProWidget, until: Until, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All has left when the driver looks at its clock again, and finds that its time is over."""
+    now, real = 0.0, os.write
+
+    def held_up(descriptor: int, data: bytes) -> int:
+        nonlocal now
+        now += 5.0 if len(taken) == 3 and data[0] == 0x7E else 0.0
+        taken.append(real(descriptor, data))
+        return taken[-1]
+
+    taken: list[int] = []
+    monkeypatch.setattr(Timeout, "TIME", staticmethod(lambda: now))
+    monkeypatch.setattr(os, "write", held_up)
+    with widget:
+        wire = wire_to(widget)
+        for tick in range(10):
+            wire.send(universe(tick), 0.0)
+            until(lambda tick=tick: wire.sent == tick + 1)
+        assert now == 5.0
+        assert (wire.last_error, widget.broken, widget.levels) == ("", 0, universe(9))
+        wire.close(0.0)
+
+
+class Adapter:
+    """One that fails as often as it is told."""
+
+    def __init__(self, fails: int) -> None:
+        self.fails, self.shown, self.closed = fails, [], 0
+
+    def write(self, data: bytes) -> None:
+        if self.fails:
+            self.fails -= 1
+            raise AdapterError("it is slow")
+        self.shown.append(data)
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+@pytest.mark.parametrize(("fails", "closed"), [(1, 0), (2, 1)])
+def test_an_adapter_is_given_up_when_it_fails_twice(fails: int, closed: int, until: Until) -> None:
+    adapter = Adapter(fails)
+    wire = AdapterWire("slow", lambda: adapter)
+    wire.send(universe(), 0.0)
+    until(lambda: wire.sent == 1)
+    assert (adapter.closed, adapter.shown) == (closed, [universe()])
+    assert wire.last_error == ("it is slow" if closed else "")
+    wire.close(0.0)
+
+
+def test_who_sees_that_a_wire_is_not_open_reads_why(until: Until) -> None:
+    adapter = Adapter(2)
+    wire = AdapterWire("slow", lambda: adapter)
+    adapter.close = lambda: seen.append((wire.is_open, wire.last_error))  # type: ignore[method-assign]
+    seen: list[tuple[bool, str]] = []
+    wire.send(universe(), 0.0)
+    until(lambda: wire.sent == 1)
+    assert seen[0] != (False, "")
+    wire.close(0.0)
 
 
 def test_a_driver_s_own_fault_does_not_end_the_thread(until: Until) -> None:
