@@ -55,6 +55,10 @@ class Box:
             found += [arguments for _, address, arguments in self.receiver.poll(0.05) if "frame" in address]
         return found
 
+    def last_frames(self) -> list[list[Any]]:
+        """Those that the process, which has ended, had sent and nobody has taken yet."""
+        return [arguments for _, address, arguments in self.receiver.poll() if "frame" in address]
+
     def frame_that(self, is_wanted: Callable[[list[Any]], bool]) -> list[Any]:
         """The next frame message that is as wanted."""
         until = time.monotonic() + PATIENCE_S
