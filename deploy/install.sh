@@ -34,14 +34,15 @@ say() { echo "install: $*"; }
 fail() { echo "install: $*" >&2; exit 1; }
 
 KEPT=2
+# A release has so long, and so many starts of its stage, to dance; more starts than it takes to put two shows aside
+# that do not dance.
 STARTS_WITHIN_S=20
+STARTS_TRIED=10
 STAYS_S=3
-# At power-on a release on the data partition has so long, and so many starts of its stage, to dance for a moment;
-# more starts than it takes to put two shows aside that do not dance. After so many power-ons in which it never
-# came to that, it is not tried again.
+# At power-on a release on the data partition has so long to dance for a moment. After so many power-ons in which it
+# never came to that, it is not tried again.
 DANCES_WITHIN_S=120
 DANCES_FOR_S=5
-STARTS_TRIED=10
 POWER_ONS_TRIED=5
 once=/run/bunraku-release # bunraku-release.service looks for it
 home=/opt/bunraku
@@ -382,15 +383,17 @@ read_system_files() {
 
 # True when the stage dances and goes on dancing; in an image there is nothing to start.
 starts() {
-    local pid deadline=$((SECONDS + STARTS_WITHIN_S))
+    local pid before counted deadline=$((SECONDS + STARTS_WITHIN_S))
     runs_here || return 0
     read_system_files
-    timeout "$STARTS_WITHIN_S" systemctl restart bunraku.target || true
-    until is_active; do
+    before=$(main_pid)
+    counted=$(restarts) # of the stage that is to end: from then on it counts anew
+    systemctl restart --no-block bunraku.target || true
+    until pid=$(main_pid) && is_active && [ "$pid" != "$before" ]; do
         [ "$SECONDS" -lt "$deadline" ] || return 1
+        [ "$(restarts)" -lt "$STARTS_TRIED" ] || [ "$(restarts)" = "$counted" ] || return 1
         sleep 0.2
     done
-    pid=$(main_pid)
     sleep "$STAYS_S"
     is_active && [ "$(main_pid)" = "$pid" ]
 }
