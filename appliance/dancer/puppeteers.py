@@ -17,6 +17,7 @@ from appliance.pose import quaternion
 HOLD_S = 0.1  # a sensor may be silent for so long before its joint is given back
 GIVE_BACK_S = 1.0
 TAKE_S = 0.5
+LONGEST_STEP_S = 0.12  # a stage that stood still for longer (six slots) goes on from where it was
 
 
 @dataclass(slots=True)
@@ -49,8 +50,11 @@ class Puppeteer(ABC):
         return self._target.weight > 0.0
 
     def pull(self, now: float) -> Target:
-        """The target at this moment; it stands still where the time does not go on."""
-        elapsed = 0.0 if self._pulled_at is None else max(0.0, now - self._pulled_at)
+        """The target at this moment; it stands still where the time does not go on.
+
+        It never moves further than in LONGEST_STEP_S: who was not asked for longer stood still meanwhile.
+        """
+        elapsed = 0.0 if self._pulled_at is None else min(max(0.0, now - self._pulled_at), LONGEST_STEP_S)
         self._pulled_at = now
         self._point(self._target.orientation, now, elapsed)
         if self.enabled and self._holds(now):
@@ -142,7 +146,7 @@ class WornSensor(Puppeteer):
 
     def silent_s(self, now: float) -> float:
         """Seconds since the last reading; infinite before the first one."""
-        return math.inf if self._heard_at is None else now - self._heard_at
+        return math.inf if self._heard_at is None else max(0.0, now - self._heard_at)
 
     def _holds(self, now: float) -> bool:
         return self.silent_s(now) <= HOLD_S

@@ -283,11 +283,13 @@ def test_control_from_another_thread_while_it_runs(swaying: Recording) -> None:
             playback.excerpt(0.0, rng.uniform(1, 4))
             playback.rate = rng.uniform(-2, 2)
 
-    thread = threading.Thread(target=control)
+    thread = threading.Thread(target=control, daemon=True)
     thread.start()
-    poses, _ = played(playback, 2000)
-    stop.set()
-    thread.join()
+    try:
+        poses, _ = played(playback, 2000)
+    finally:
+        stop.set()
+        thread.join()
     assert np.abs(np.linalg.norm(poses, axis=-1) - 1).max() < 1e-5
 
 

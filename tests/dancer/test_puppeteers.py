@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from appliance.dancer.hands import HandError, Hands
-from appliance.dancer.puppeteers import FixedOrientation, Remote, TurningAxis, WornSensor
+from appliance.dancer.puppeteers import LONGEST_STEP_S, FixedOrientation, Remote, TurningAxis, WornSensor
 from appliance.pose import quaternion
 from tests.dancer.conftest import random_quaternions
 
@@ -88,6 +88,40 @@ def test_after_a_silence_the_joint_is_taken_again_and_led_to_the_new_readings() 
     assert weight == pytest.approx(1.0)
     assert max(turns) < 2 * 1.2 / 25  # 1.2 rad, spread evenly over half a second
     assert quaternion.angle_between(orientation, np.array(RIGHT)) < 1e-3
+
+
+@pytest.mark.parametrize("stop_s", [0.2, 0.7, 5.0])
+def test_a_stage_that_stood_still_goes_on_from_where_it_was(stop_s: float) -> None:
+    """Readings that wait meanwhile may be heard a tick later: no hand is let go in one step, or jumps."""
+    sensor = worn(1.0)
+    shown = [(1.0, np.array(LEFT, np.float32))]
+    for tick in range(60):
+        now = 1.0 + stop_s + tick * TICK_S
+        if tick:
+            sensor.hear(RIGHT, now)
+        target = sensor.pull(now)
+        shown.append((target.weight, target.orientation.copy()))
+    weights = np.array([weight for weight, _ in shown])
+    turns = np.array([turn for _, turn in shown])
+    assert weights.min() > 0.9
+    assert weights[-1] == 1.0
+    apart = 1.2 if stop_s > 0.5 else 1.2 * 0.5 / stop_s
+    assert quaternion.angle_between(turns[1:], turns[:-1]).max() < 1.1 * apart * TICK_S / 0.5
+    assert quaternion.angle_between(turns[-1], np.array(RIGHT)) < 1e-3
+
+
+def test_readings_that_are_heard_right_after_a_stop_are_led_to_as_well() -> None:
+    sensor = worn(1.0)
+    sensor.hear(RIGHT, 1.7)
+    turned = quaternion.angle_between(sensor.pull(1.7).orientation, np.array(LEFT))
+    assert turned == pytest.approx(1.2 * LONGEST_STEP_S / 0.5, rel=0.01)
+
+
+def test_a_turning_axis_does_not_jump_over_a_stop() -> None:
+    turning = TurningAxis("head", (0.0, 1.0, 0.0), 4.0)
+    before = turning.pull(1.0).orientation.copy()
+    after = turning.pull(2.0).orientation
+    assert quaternion.angle_between(after, before) <= math.tau / 4.0 * LONGEST_STEP_S + 1e-3
 
 
 def test_while_it_is_heard_the_target_is_the_newest_reading_at_once() -> None:
@@ -222,14 +256,16 @@ def test_a_remote_set_from_another_thread_is_never_seen_half() -> None:
         while not stop.is_set():
             remote.hold(random_quaternions(rng).tolist())
 
-    thread = threading.Thread(target=move)
+    thread = threading.Thread(target=move, daemon=True)
     thread.start()
     lengths = []
-    for tick in range(3000):
-        hands.pull(tick * TICK_S)
-        lengths.append(float(np.linalg.norm(hands.targets[3])))
-    stop.set()
-    thread.join()
+    try:
+        for tick in range(3000):
+            hands.pull(tick * TICK_S)
+            lengths.append(float(np.linalg.norm(hands.targets[3])))
+    finally:
+        stop.set()
+        thread.join()
     assert np.array(lengths) == pytest.approx(1.0, abs=1e-5)
 
 
