@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,7 +13,7 @@ from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, open_link
 from appliance.sensor.ways import udp
-from appliance.sensor.ways.udp import PortError, UdpIntake, is_own
+from appliance.sensor.ways.udp import SO_TIMESTAMPNS, TIMESPEC, PortError, UdpIntake, is_own
 from tests.sensor.flood import flood
 from tests.sensor.peers import KEYS, Wearable
 
@@ -106,6 +107,100 @@ def test_times_that_are_invented_are_kept(link: SensorLink, radio: Radio) -> Non
         radio.socket.send(radio.wearable.reading())
         (reading,) = link.drain(now)
         assert reading.arrival == now
+
+
+class Clocks:
+    """Both clocks of a box; it is held up for `held_up_s` before its wall clock is read."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now, self.wall_minus_monotonic, self.held_up_s = 1000.0, 1.7e9, 0.0
+        monkeypatch.setattr(udp, "time", SimpleNamespace(monotonic=lambda: self.now, time=self._wall))
+        self.intake = UdpIntake("127.0.0.1", 0)
+
+    def drain(self) -> None:
+        assert list(self.intake.receive(self.now)) == []
+
+    def arrival(self, stamped: float, now: float) -> float:
+        """What becomes of a datagram that the kernel stamped at this moment of the monotonic clock."""
+        seconds = int(stamped + self.wall_minus_monotonic)
+        nanoseconds = round((stamped + self.wall_minus_monotonic - seconds) * 1e9)
+        told = [(socket.SOL_SOCKET, SO_TIMESTAMPNS, TIMESPEC.pack(seconds, nanoseconds))]
+        return self.intake._arrival(told, now)
+
+    def _wall(self) -> float:
+        self.now += self.held_up_s
+        return self.now + self.wall_minus_monotonic
+
+
+@pytest.fixture
+def clocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Clocks]:
+    clocks = Clocks(monkeypatch)
+    clocks.drain()
+    yield clocks
+    clocks.intake.close()
+
+
+@pytest.mark.parametrize("stop_s", [0.3, 1.5, 4.9])
+def test_what_came_during_a_stop_came_when_it_did(clocks: Clocks, stop_s: float) -> None:
+    """Also what is as old as the stop: read as new, it would be danced."""
+    clocks.now += stop_s
+    clocks.drain()
+    now = clocks.now
+    assert clocks.arrival(1000.01, now) == pytest.approx(1000.01, abs=1e-5)
+    assert clocks.arrival(now - 0.02, now) == pytest.approx(now - 0.02, abs=1e-5)
+    clocks.now += 0.02
+    clocks.drain()  # and nothing of the stop is left
+    assert clocks.arrival(clocks.now - 1.5, clocks.now) == clocks.now
+
+
+def test_a_stop_after_the_tick_has_read_its_time_makes_nothing_older(clocks: Clocks) -> None:
+    began = clocks.now
+    clocks.now += 0.8
+    assert clocks.arrival(began + 0.6, began) == pytest.approx(began + 0.6, abs=1e-5)
+    assert clocks.arrival(began + 0.9, began) == began  # still to come: the wall clock was set
+
+
+def test_a_stop_between_two_clocks_moves_no_arrival(clocks: Clocks) -> None:
+    clocks.held_up_s = 0.5
+    clocks.drain()
+    clocks.held_up_s = 0.0
+    assert clocks.arrival(clocks.now - 0.1, clocks.now) == pytest.approx(clocks.now - 0.1, abs=1e-5)
+
+
+@pytest.mark.parametrize("held_up_s", [0.0, 0.05])
+def test_a_wall_clock_that_is_set_is_followed(clocks: Clocks, held_up_s: float) -> None:
+    for step_s in (3600.0, -0.3, -7200.0, 0.2):
+        clocks.wall_minus_monotonic += step_s
+        clocks.held_up_s = held_up_s
+        clocks.drain()
+        clocks.held_up_s = 0.0
+        clocks.drain()
+        assert clocks.arrival(clocks.now - 0.1, clocks.now) == pytest.approx(clocks.now - 0.1, abs=1e-5)
+
+
+def test_after_a_stop_the_newest_of_all_that_waits_counts(link: SensorLink, radio: Radio) -> None:
+    radio.pair(link)
+    began = time.monotonic()
+    link.drain(began)
+    for _ in range(80):  # of 1.6 s
+        radio.socket.send(radio.wearable.reading())
+    assert [one.sequence for one in link.drain(began + 1.6)] == [radio.wearable.sequence]
+    assert "drain_limit" not in link.counts
+
+
+def test_a_tick_after_a_stop_takes_a_bounded_share_too(link: SensorLink, radio: Radio) -> None:
+    radio.pair(link)
+    began = time.monotonic()
+    link.drain(began)
+    for after_s, most in ((0.02, 33), (1.03, 96), (1.05, 33)):
+        for _ in range(150):
+            radio.socket.send(radio.wearable.reading())
+        before = link.counts["accepted"]
+        link.drain(began + after_s)
+        assert link.counts["accepted"] - before == most
+        for _ in range(5):
+            link.drain(began + after_s)  # the rest
+        assert link.drain(began + after_s) == ()
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00", b"BK", bytes(42), bytes(65_000)], ids=len)

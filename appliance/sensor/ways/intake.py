@@ -8,6 +8,8 @@ from typing import Any, Protocol, TypeAlias
 
 from appliance.sensor import wire
 
+LONGEST_STOP_S = 5.0  # a box that stood still for longer is not expected to make up for it
+
 Origin: TypeAlias = tuple[Any, ...]  # whom an intake heard: (host, port) of a datagram, (device,) of a cable
 
 
@@ -18,8 +20,9 @@ class Intake(Protocol):
     counts: Counter[str]
 
     def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
-        """What waits, up to a bound of the intake's own: packet, arrival (monotonic, <= now), whence.
+        """What waits, up to a bound of the intake's own: packet, arrival (monotonic), whence.
 
+        An arrival is after `now` where the box was held up since it read that time.
         A packet's bytes are valid until the next one.
         """
         ...

@@ -14,7 +14,7 @@ import serial
 
 from appliance.sensor import wire
 from appliance.sensor.framing import END, Deframer, frame
-from appliance.sensor.ways.intake import Origin
+from appliance.sensor.ways.intake import LONGEST_STOP_S, Origin
 
 FIRST_RETRY_S = 0.1
 LONGEST_RETRY_S = 2.0
@@ -46,10 +46,10 @@ class SerialIntake:
         self._thread.start()
 
     def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
-        """Packets that have come, and their arrivals (monotonic seconds, <= now). Never waits."""
+        """Packets that have come, and their arrivals (monotonic seconds). Never waits."""
         for _ in range(len(self._packets)):
             packet, arrival = self._packets.popleft()
-            yield packet, min(arrival, now), self._origin
+            yield packet, arrival if arrival < now + LONGEST_STOP_S else now, self._origin
 
     def send(self, packet: bytes, origin: Origin) -> None:
         """Hand one packet to the thread. Dropped and counted without a cable, or when it cannot keep up."""
@@ -116,6 +116,9 @@ class SerialIntake:
         """One frame between two zero bytes: the first ends whatever was written before."""
         try:
             port.write(END + frame(packet))
-        except serial.SerialTimeoutException:  # nobody reads at the other end: what waits is stale
-            self.counts["send_error"] += 1 + len(self._unsent)
-            self._unsent.clear()
+        except serial.SerialTimeoutException:
+            self.counts["send_error"] += 1
+            _, takes_more, _ = select.select([], [port.fileno()], [], 0.0)
+            if not takes_more:  # nobody reads at the other end: what waits is stale
+                self.counts["send_error"] += len(self._unsent)
+                self._unsent.clear()

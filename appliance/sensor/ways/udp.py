@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterator
 from typing import Any
 
 from appliance.sensor import wire
-from appliance.sensor.ways.intake import Origin
+from appliance.sensor.ways.intake import LONGEST_STOP_S, Origin
 
 # Linux, include/uapi/asm-generic/socket.h: the kernel stamps each datagram as it comes in, on the wall clock.
 SO_TIMESTAMPNS = 35
@@ -25,6 +25,7 @@ OWN_BUFFER_BYTES = 96 * 1024  # room for some 250 of one sensor: the burst after
 # A drain takes at most so many: in a flood 1.5 ms of a tick.
 COMMON_PER_DRAIN = 256
 OWN_PER_DRAIN = 32
+OWN_PER_SECOND = 64  # of a stop, in which the box did not drain: what a sensor sends, and some more
 
 
 class PortError(OSError):
@@ -64,6 +65,8 @@ class UdpIntake:
         self._buffers = [self._buffer]
         self._ancillary_bytes = socket.CMSG_SPACE(TIMESPEC.size)
         self._monotonic_minus_wall = 0.0
+        self._received_at: float | None = None
+        self._oldest_s = OLDEST_S
 
     @property
     def address_is_absent(self) -> bool:
@@ -73,18 +76,22 @@ class UdpIntake:
         return self._waits_for_address
 
     def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
-        """Waiting datagrams, their arrivals (monotonic seconds, <= now) and senders; linked sensors' first.
+        """Waiting datagrams, their arrivals (monotonic seconds) and senders; linked sensors' first.
 
+        After a stop, in which nobody drained, all that linked sensors sent meanwhile: the newest counts.
+        An arrival is after `now` where the box was held up since it read that time.
         The bytes are valid until the next one. Never waits, never raises: the network's errors are counted.
         """
-        self._monotonic_minus_wall = (
-            time.monotonic() - time.time()
-        )  # anew each time: the wall clock may be set
+        self._compare_clocks()
+        stop_s = 0.0 if self._received_at is None else min(max(0.0, now - self._received_at), LONGEST_STOP_S)
+        self._received_at = now
+        self._oldest_s = OLDEST_S + stop_s
+        most = OWN_PER_DRAIN + int(OWN_PER_SECOND * stop_s)
         for own in self._own.values():
-            yield from self._drain(own, OWN_PER_DRAIN, now)
+            yield from self._drain(own, most, now)
         while self._left:
             own = self._left.pop()
-            yield from self._drain(own, OWN_PER_DRAIN, now)
+            yield from self._drain(own, most, now)
             own.close()
         for received in self._drain(self._socket, COMMON_PER_DRAIN, now):
             if received[2] in self._own:
@@ -148,12 +155,26 @@ class UdpIntake:
         self.counts["drain_limit"] += 1
 
     def _arrival(self, ancillary: list[tuple[int, int, bytes]], now: float) -> float:
-        """The kernel's stamp on the box's clock. A wall clock that was set meanwhile, or no stamp: `now`."""
+        """The kernel's stamp on the box's clock. A wall clock that was set meanwhile, or no stamp: `now`.
+
+        What came while the box was held up, since it read `now`, is no older for that.
+        """
         if not ancillary or len(ancillary[0][2]) != TIMESPEC.size:
             return now
         seconds, nanoseconds = TIMESPEC.unpack(ancillary[0][2])
         arrival: float = seconds + nanoseconds * 1e-9 + self._monotonic_minus_wall
-        return arrival if now - OLDEST_S < arrival < now else now
+        if now - self._oldest_s < arrival < now:
+            return arrival
+        came_since = now <= arrival < now + LONGEST_STOP_S and arrival <= time.monotonic()
+        return arrival if came_since else now
+
+    def _compare_clocks(self) -> None:
+        """Anew each time: the wall clock may be set. What was known stays as far as these readings allow it:
+        the box may be held up between two of them.
+        """
+        before, wall, after = time.monotonic(), time.time(), time.monotonic()
+        known = self._monotonic_minus_wall
+        self._monotonic_minus_wall = min(max(known, before - wall), after - wall)
 
 
 def bind_early(one: socket.socket, address: tuple[Any, ...]) -> bool:
