@@ -14,6 +14,9 @@ from appliance.stage.wearing import Wearing
 
 SENSOR_ORDERS = frozenset(("neutral", "heading", "strobe", "reload"))
 STROBE_S = 10.0
+_NOT_HEARD_NOW = (
+    "No sensor is heard at this moment: nothing is changed. Look at its light and battery, then ask again."
+)
 
 Outcome = tuple[bool, str]
 
@@ -75,10 +78,12 @@ def obey_for_sensors(order: Order, cast: Cast, wearing: Wearing, now: float) -> 
     except ValueError as error:
         return False, str(error)
     if order.name == "neutral":
-        wearing.take_neutral(sensor or None, now)
-        return True, "The neutral pose is taken at the next stillness: stand still now."
-    wearing.reset_heading(sensor or None, now)
-    return True, "Where the dancer faces now is the front."
+        is_asked = wearing.take_neutral(sensor or None, now)
+        words = "The neutral pose is taken at the next stillness: stand still now."
+    else:
+        is_asked = wearing.reset_heading(sensor or None, now)
+        words = "Where the dancer faces now is the front."
+    return (True, words) if is_asked else (False, _NOT_HEARD_NOW)
 
 
 def _admit(order: Order, cast: Cast) -> str:

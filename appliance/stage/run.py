@@ -38,6 +38,8 @@ _ORDERS_A_TICK = 4  # show control sends no more in that time
 _WARM_UP_MARGIN_MS = 0.5
 _FIRST_FRAME_IN_S = 0.001
 _LONGEST_WARM_UP_MS = 3.0  # a network this heavy comes from memory each time: warming it up gains nothing
+_HUNG_SLOTS = 3  # skipped before a tick: what sensors sent meanwhile may not all be heard in it
+_LONGEST_TICK_S = 0.1  # held up for longer, a tick knows too little of the sensors to take an order
 _FORGET_PHASE_S = 5.0  # a sensor silent for longer may come back anywhere: the phase is learnt anew
 
 
@@ -53,6 +55,7 @@ class Stage:
     ) -> None:
         self.show, self.box, self.box_file = show, box, box_file
         self.say, self._now = say, 0.0
+        self._comes_from_stop = False
         self.health = Health()
         with ExitStack() as opened:
             self.sharing = Sharing(box)
@@ -125,13 +128,15 @@ class Stage:
         while not stopped() and (seconds is None or clock.now() - begun < seconds):
             slot = clock.wait(shift_s, self.lead_s, self.tick.warm_up if self.lead_s else None)
             self._now = slot.started
+            # the first tick after a stop alone: a machine that is slow all the time is looked at too
+            self._comes_from_stop = slot.skipped >= _HUNG_SLOTS and not self._comes_from_stop
             self.tick.run(slot)
             self._note(slot)
-            self._obey(slot.started)
+            self._obey(slot.started, clock.now)
             if self.recorder is not None and self.recorder.wants_keyframe:
                 self.recorder.keyframe(self.tick.state())
             shift_s = self._follow_sensor(slot)
-            if self.health.is_due(slot.started):
+            if self.health.is_due(slot.started) and not self._comes_from_stop:
                 self._report(slot.started)
         self.resuming.end()
         self.notifier.stopping()
@@ -148,7 +153,8 @@ class Stage:
         if health.ticks == 1:
             self.notifier.ready()
         self.notifier.ping(slot.started)
-        self.fallbacks.watch(slot.started)
+        if not self._comes_from_stop:
+            self.fallbacks.watch(slot.started)
         self.resuming.note(self.cast, self.iterations, slot.tick)
         if self.recorder is not None:
             flags = late * LATE | tick.frame.late * RESENT | tick.network_failed * NOT_FINITE
@@ -165,15 +171,21 @@ class Stage:
             self.lock.forget()
         return self.lock.shift_s(slot.deadline)
 
-    def _obey(self, now: float) -> None:
-        """Carry out what show control has asked for meanwhile, and tell it what came of that."""
+    def _obey(self, started: float, monotonic: Callable[[], float]) -> None:
+        """Carry out what show control has asked for meanwhile, and tell it what came of that.
+
+        Right after a stop, also one within this tick (it began at `started`), nothing is taken: what is known
+        of the sensors is old, and the next tick has heard them.
+        """
+        if self._comes_from_stop or monotonic() - started > _LONGEST_TICK_S:
+            return
         done: list[tuple[Order, bool, str]] = []
         while len(done) < _ORDERS_A_TICK and (order := self.inbox.take()) is not None:
-            done.append((order, *self._carry_out(order, now)))
+            done.append((order, *self._carry_out(order, monotonic())))
         if done:
             self.resuming.note(self.cast, self.iterations, self.tick.frame.tick)  # before anybody is told
         if any(not order.quiet for order, _, _ in done):
-            self._tell(now)  # whoever asks next hears of it
+            self._tell(started)  # whoever asks next hears of it
         for answer in done:
             self.inbox.answer(*answer)
 

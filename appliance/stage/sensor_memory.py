@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from appliance.sensor.memory_text import DamagedMemoryError, Worn, memory_text, remembered, with_profile
@@ -41,9 +41,9 @@ class SensorMemory:
         """The newest neutral pose of a joint with this sensor, if there ever was one."""
         return self._neutral.get((sensor, joint))
 
-    def keep_neutral(self, sensor: str, joint: str, pose: NeutralPose) -> None:
-        """Remember a neutral pose."""
-        self._neutral[sensor, joint] = pose
+    def keep_neutral(self, sensor: str, poses: Mapping[str, NeutralPose]) -> None:
+        """Remember the neutral poses of a sensor's joints; a start finds all of them, or none."""
+        self._neutral.update({(sensor, joint): pose for joint, pose in poses.items()})
         self._write()
 
     @property

@@ -84,14 +84,23 @@ class Wearing:
             raise ValueError(f"No hand of this show is held by a sensor '{sensor}'. {cure}")
         return worn if sensor is None else [sensor]
 
-    def take_neutral(self, sensor: str | None, now: float) -> None:
-        """Asked for by a person: take the neutral pose of a sensor (all: None) at the next stillness."""
-        for wearer, _ in self._asked(sensor, now):
-            self._wait_for(wearer, ASKED_STILL_S, now + ASKED_WITHIN_S)
+    def take_neutral(self, sensor: str | None, now: float) -> bool:
+        """Asked for by a person: take the neutral pose of a sensor (all: None) at the next stillness.
 
-    def reset_heading(self, sensor: str | None, now: float) -> None:
-        """Asked for by a person: the dancer (all: None) faces the front as in the neutral pose, right now."""
-        for wearer, reading in self._asked(sensor, now):
+        Whether anybody was asked; as `named` raises.
+        """
+        asked = self._asked(sensor, now)
+        for wearer, _ in asked:
+            self._wait_for(wearer, ASKED_STILL_S, now + ASKED_WITHIN_S)
+        return bool(asked)
+
+    def reset_heading(self, sensor: str | None, now: float) -> bool:
+        """Asked for by a person: the dancer (all: None) faces the front as in the neutral pose, right now.
+
+        Whether anybody was asked; as `named` raises.
+        """
+        asked = self._asked(sensor, now)
+        for wearer, reading in asked:
             poses = [with_heading_reset(hand.pose, reading.orientation) for hand in wearer.hands]
             if any(pose is None for pose in poses):
                 self._news.append(
@@ -101,6 +110,7 @@ class Wearing:
                 continue
             self._wear(wearer, [pose for pose in poses if pose is not None])
             self._news.append(f"Sensor {wearer.name}: this is the front now. Dance.")
+        return bool(asked)
 
     def neutral_of(self, sensor: str) -> str:
         """'taken' (since its power-on), 'wanted', 'kept' (from before), 'assumed', or '' for a stranger."""
@@ -188,26 +198,20 @@ class Wearing:
         self._link.wants_neutral.discard(wearer.name)
 
     def _wear(self, wearer: Wearer, poses: Iterable[NeutralPose]) -> None:
-        """Put a pose on each of the sensor's joints, and keep it for the next start."""
+        """Put a pose on each of the sensor's joints, and keep them for the next start, all or none."""
+        taken: dict[str, NeutralPose] = {}
         for hand, pose in zip(wearer.hands, poses, strict=True):
             hand.wear(pose)
             if pose.boot_nonce != NO_BOOT:
-                self._memory.keep_neutral(wearer.name, hand.joint.joint, pose)
+                taken[hand.joint.joint] = pose
+        if taken:
+            self._memory.keep_neutral(wearer.name, taken)
 
     def _asked(self, sensor: str | None, now: float) -> list[tuple[Wearer, SensorReading]]:
-        """The sensors that a person means, with a fresh reading; of the others it is said why not."""
-        try:
-            names = self.named(sensor)
-        except ValueError as error:
-            self._news.append(str(error))
-            return []
-        asked = []
-        for wearer in (self._wearers[name] for name in names):
-            if wearer.reading is not None and now - wearer.reading.arrival <= FRESH_S:
-                asked.append((wearer, wearer.reading))
-            elif sensor is not None:
-                self._news.append(
-                    f"Sensor {sensor} is silent: how it is worn cannot be told. The dancer moves freely. "
-                    "Switch it on, then ask again."
-                )
-        return asked
+        """The sensors that a person means, with a fresh reading: who is silent shows nothing to go by."""
+        wearers = (self._wearers[name] for name in self.named(sensor))
+        return [
+            (wearer, wearer.reading)
+            for wearer in wearers
+            if wearer.reading is not None and now - wearer.reading.arrival <= FRESH_S
+        ]

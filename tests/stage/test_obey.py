@@ -11,7 +11,7 @@ import pytest
 from appliance.control.orders import Order
 from appliance.pose import quaternion
 from appliance.sensor.keys import SensorKey
-from appliance.sensor.link import SensorLink, SensorState
+from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.cast import Cast, assemble
@@ -147,11 +147,24 @@ def test_commands_about_sensors_are_done_or_refused_in_words(
 ) -> None:
     assert isinstance(worn.link, HeardLink)
     wearing = Wearing(worn, SensorMemory(None, print), print)
+    wearing.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, 99.6, 99.6, 90, 255))
     outcome = obey_for_sensors(order, worn, wearing, 100.0)
     assert outcome[0] == done
     assert words in outcome[1]
     assert worn.link.strobed == ([order.text] if order.name == "strobe" and done else [])
     assert worn.link.admitted == order.keys
+
+
+@pytest.mark.parametrize("name", ["neutral", "heading"])
+@pytest.mark.parametrize("sensor", ["left-wrist", ""])
+def test_whoever_asks_a_sensor_that_is_linked_and_not_heard_now_is_told_that_nothing_is_done(
+    worn: Cast, name: str, sensor: str
+) -> None:
+    wearing = Wearing(worn, SensorMemory(None, print), print)
+    wearing.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, 99.4, 99.4, 90, 255))
+    done, words = obey_for_sensors(Order(name, text=sensor), worn, wearing, 100.0)
+    assert not done
+    assert words.startswith("No sensor is heard at this moment: nothing is changed.")
 
 
 def test_a_show_without_sensors_has_no_neutral_pose(cast: Cast) -> None:

@@ -12,6 +12,7 @@ import yaml
 from appliance.commands.replay import replay_journal
 from appliance.pose.bvh import write_bvh
 from appliance.show.show import load_show
+from appliance.stage.clock import TICK_S
 from appliance.stage.journal.comparison import Comparison
 from appliance.stage.journal.journal_error import JournalError
 from appliance.stage.journal.keyframe import packed, unpacked
@@ -197,6 +198,21 @@ def test_another_show_is_refused_in_words(run: Run, tmp_path: Path) -> None:
     (tmp_path / "show").rename(tmp_path / "elsewhere")
     with pytest.raises(JournalError, match=r"is not where it was.*--show"):
         replay_journal(tmp_path / "journal", None, 0.0, None)
+
+
+def test_an_order_that_nobody_heard_and_a_stop_dance_again_as_they_did(show: Path, tmp_path: Path) -> None:
+    night = Night(show, tmp_path / "runtime")
+    night.dance(130, reading(STILL))
+    night.dance(40)
+    done, words = night.order("heading")
+    assert not done and "at this moment" in words
+    night.slot.tick += 60  # the machine was held up
+    night.slot.deadline += 60 * TICK_S
+    night.dance(400, reading(TURNED))
+    [run] = read_journal(night.kept(tmp_path / "journal")).runs
+    _, comparison = danced(run, show)
+    assert comparison.first is None
+    assert comparison.ticks == len(run.ticks) == 570
 
 
 def test_two_starts_of_the_stage_are_two_runs(show: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from appliance.sensor.memory_text import IMU_ID_BYTES, LARGEST, MOST_PROFILES
 from appliance.sensor.neutral import NeutralPose
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.sensor_memory_block import FILE_NAME, forget_memory
+from appliance.stage.sensor_memory_block import FILE_NAME, MemoryWriter, forget_memory
 from appliance.stage.sensor_memory_carrier import RETRY_S, MemoryCarrier
 
 POSE = NeutralPose((0.5, -0.5, 0.5, 0.5), 0.25, 0xFFFFFFFF)
@@ -57,9 +57,9 @@ def test_what_is_kept_is_there_the_next_night(box: Box) -> None:
     memory = box.memory()
     assert memory.neutral("left-wrist", "lShldr") is None
     assert memory.profiles == {}
-    memory.keep_neutral("left-wrist", "lShldr", OTHER)
-    memory.keep_neutral("left-wrist", "lShldr", POSE)
-    memory.keep_neutral("left-wrist", "odd: joint #1", OTHER)
+    memory.keep_neutral("left-wrist", {"lShldr": OTHER})
+    memory.keep_neutral("left-wrist", {"lShldr": POSE})
+    memory.keep_neutral("left-wrist", {"odd: joint #1": OTHER})
     memory.keep_profile(IMU, OFFSETS)
     assert memory.neutral("left-wrist", "lShldr") == POSE
     box.keeper.turn(100.0)
@@ -75,26 +75,40 @@ def test_what_is_kept_is_there_the_next_night(box: Box) -> None:
 
 def test_a_stage_that_is_killed_has_lost_nothing_though_no_disk_took_it(box: Box) -> None:
     memory = box.memory()
-    memory.keep_neutral("left-wrist", "lShldr", POSE)
+    memory.keep_neutral("left-wrist", {"lShldr": POSE})
     memory.keep_profile(IMU, OFFSETS)
     memory.close()  # all that the kernel does for a process that is gone
     assert not box.state.exists()
     again = box.memory()
     assert again.neutral("left-wrist", "lShldr") == POSE
     assert again.profiles == {IMU: OFFSETS}
-    again.keep_neutral("left-wrist", "lHand", OTHER)
+    again.keep_neutral("left-wrist", {"lHand": OTHER})
     box.keeper.turn(100.0)
     assert box.on_disk.neutral("left-wrist", "lShldr") == POSE
     again.close()
 
 
+def test_a_sensors_joints_are_kept_all_or_none(box: Box, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stage that is killed between two of them would ask its dancer to stand still in mid-dance."""
+    written: list[str] = []
+    real = MemoryWriter.write
+    monkeypatch.setattr(MemoryWriter, "write", lambda self, text: (written.append(text), real(self, text))[1])
+    memory = box.memory()
+    memory.keep_neutral("left-wrist", {"lShldr": POSE, "lHand": POSE})
+    assert len(written) == 1
+    memory.close()
+    again = box.memory()
+    assert again.neutral("left-wrist", "lShldr") == again.neutral("left-wrist", "lHand") == POSE
+    again.close()
+
+
 def test_memory_of_another_state_folder_is_not_taken(box: Box, tmp_path: Path) -> None:
     memory = box.memory()
-    memory.keep_neutral("left-wrist", "lShldr", POSE)
+    memory.keep_neutral("left-wrist", {"lShldr": POSE})
     memory.close()
     other = SensorMemory(tmp_path / "other", silent, box.runtime)
     assert other.neutral("left-wrist", "lShldr") is None
-    other.keep_neutral("left-wrist", "lShldr", OTHER)
+    other.keep_neutral("left-wrist", {"lShldr": OTHER})
     box.keeper.turn(100.0)
     assert not box.state.exists()
     other.close()
@@ -114,7 +128,7 @@ def test_the_file_is_its_owners_alone_and_nothing_stays_beside_it(box: Box, tmp_
 
 def test_more_calibrations_than_a_house_has_imus_do_not_fill_the_file(box: Box) -> None:
     memory = box.memory()
-    memory.keep_neutral("left-wrist", "lShldr", POSE)
+    memory.keep_neutral("left-wrist", {"lShldr": POSE})
     for number in range(2000):
         memory.keep_profile(number.to_bytes(IMU_ID_BYTES, "big"), OFFSETS)
     box.keeper.turn(100.0)
@@ -132,7 +146,7 @@ def test_nothing_new_writes_nothing(box: Box) -> None:
     box.keeper.turn(100.0)
     assert not box.state.exists()
     memory = box.memory()
-    memory.keep_neutral("a", "b", POSE)
+    memory.keep_neutral("a", {"b": POSE})
     box.keeper.turn(101.0)
     before = (box.state / FILE_NAME).stat()
     for turn in range(3):
@@ -145,7 +159,7 @@ def test_nothing_new_writes_nothing(box: Box) -> None:
 def test_a_box_that_ends_leaves_the_disks_word_to_count(box: Box) -> None:
     """A person may then edit or remove the file; but what the disk has not taken stays in memory."""
     memory = box.memory()
-    memory.keep_neutral("a", "b", POSE)
+    memory.keep_neutral("a", {"b": POSE})
     memory.close()
     forget_memory(box.runtime, box.state)
     assert box.memory().neutral("a", "b") == POSE
@@ -159,7 +173,7 @@ def test_more_than_a_file_may_hold_is_said_once(box: Box) -> None:
     said: list[str] = []
     memory = box.memory(said.append)
     for number in range(30):
-        memory.keep_neutral("a", f"{number}" * 10_000, POSE)
+        memory.keep_neutral("a", {f"{number}" * 10_000: POSE})
         assert memory.neutral("a", f"{number}" * 10_000) == POSE
     assert len(said) == 1 and "cannot be kept" in said[0]
     memory.close()
@@ -167,7 +181,7 @@ def test_more_than_a_file_may_hold_is_said_once(box: Box) -> None:
 
 def test_without_a_folder_it_remembers_for_the_run(tmp_path: Path) -> None:
     memory = SensorMemory(None, silent)
-    memory.keep_neutral("a", "b", POSE)
+    memory.keep_neutral("a", {"b": POSE})
     memory.keep_profile(IMU, OFFSETS)
     assert memory.neutral("a", "b") == POSE
     assert memory.profiles == {IMU: OFFSETS}
@@ -205,7 +219,7 @@ def test_a_damaged_file_is_set_aside_and_said_once(box: Box, text: str) -> None:
     [words] = said
     assert "damaged" in words
     assert (box.state / f"{FILE_NAME}.broken").read_text() == text
-    memory.keep_neutral("a", "b", POSE)
+    memory.keep_neutral("a", {"b": POSE})
     box.keeper.turn(100.0)
     memory.close()
     assert box.on_disk.neutral("a", "b") == POSE
@@ -222,7 +236,7 @@ def test_a_disk_that_takes_nothing_is_said_once_and_tried_again(box: Box) -> Non
     box.state.write_text("a file where the folder should be")
     memory = box.memory()
     for number in range(3):
-        memory.keep_neutral("a", f"joint {number}", POSE)
+        memory.keep_neutral("a", {f"joint {number}": POSE})
         assert memory.neutral("a", f"joint {number}") == POSE
         box.keeper.turn(100.0 + RETRY_S * number)
     assert len(box.said) == 1 and box.keeper.complaint == box.said[0]
@@ -236,7 +250,7 @@ def test_a_disk_that_takes_nothing_is_said_once_and_tried_again(box: Box) -> Non
 
 def test_a_write_cut_short_leaves_the_old_file(box: Box, monkeypatch: pytest.MonkeyPatch) -> None:
     memory = box.memory()
-    memory.keep_neutral("a", "b", POSE)
+    memory.keep_neutral("a", {"b": POSE})
     box.keeper.turn(100.0)
     before = (box.state / FILE_NAME).read_bytes()
 
@@ -244,7 +258,7 @@ def test_a_write_cut_short_leaves_the_old_file(box: Box, monkeypatch: pytest.Mon
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    memory.keep_neutral("a", "b", OTHER)
+    memory.keep_neutral("a", {"b": OTHER})
     box.keeper.turn(101.0)
     assert (box.state / FILE_NAME).read_bytes() == before
     assert "No space left" in box.said[0]
@@ -254,7 +268,7 @@ def test_a_write_cut_short_leaves_the_old_file(box: Box, monkeypatch: pytest.Mon
 
 def test_a_disk_that_is_mounted_late_gets_it_too(box: Box) -> None:
     memory = box.memory()
-    memory.keep_neutral("a", "b", POSE)
+    memory.keep_neutral("a", {"b": POSE})
     box.keeper.turn(100.0)
     box.state.rename(box.state.with_name("covered"))
     box.state.mkdir()
@@ -268,7 +282,7 @@ def test_a_runtime_folder_without_room_is_said_once_and_the_show_goes_on(box: Bo
     box.runtime.write_text("")
     said: list[str] = []
     memory = box.memory(said.append)
-    memory.keep_neutral("a", "b", POSE)
+    memory.keep_neutral("a", {"b": POSE})
     assert memory.neutral("a", "b") == POSE
     assert len(said) == 1 and "`runtime:` in the box file" in said[0]
     memory.close()

@@ -362,17 +362,41 @@ def test_upside_down_no_heading_is_reset(evening: Evening) -> None:
     assert (stage.target() == before).all()
 
 
-def test_asking_for_a_stranger_or_a_silent_sensor_is_answered(evening: Evening) -> None:
+def test_who_asks_for_a_stranger_or_a_silent_sensor_learns_that_nobody_is_asked(evening: Evening) -> None:
     stage = evening()
-    stage.wearing.take_neutral(None, stage.now)  # nobody is there: nothing to say
-    stage.wearing.take_neutral("left-wirst", stage.now)
-    stage.wearing.reset_heading(SENSOR, stage.now)
-    stage.wearing.look(stage.now)
-    assert len(stage.said) == 2
-    assert "'left-wirst'" in stage.said[0] and "Did you mean 'left-wrist'?" in stage.said[0]
-    assert "silent" in stage.said[1]
+    with pytest.raises(ValueError, match=r"'left-wirst'.*Did you mean 'left-wrist'\?"):
+        stage.wearing.take_neutral("left-wirst", stage.now)
+    for asked in (SENSOR, None):
+        assert not stage.wearing.take_neutral(asked, stage.now)
+        assert not stage.wearing.reset_heading(asked, stage.now)
     assert stage.wearing.neutral_of("left-wirst") == ""
     assert stage.wearing.neutral_of(SENSOR) == "assumed"
+    stage.stand(2.0, about_up(40.0))
+    stage.silence(0.6)
+    before = len(stage.said)
+    assert not stage.wearing.take_neutral(SENSOR, stage.now)
+    assert not stage.wearing.reset_heading(None, stage.now)
+    stage.wearing.look(stage.now)
+    assert len(stage.said) == before and not stage.wants
+
+
+def test_who_is_heard_is_asked_though_another_sensor_is_silent(evening: Evening) -> None:
+    stage = evening([HAND, {"sensor": "right-wrist", "joint": "lForeArm"}])
+    stage.dance(1.0)
+    assert stage.wearing.take_neutral(None, stage.now)
+    assert not stage.wearing.take_neutral("right-wrist", stage.now)
+    assert stage.cast.link.wants_neutral == {SENSOR}
+
+
+def test_the_poses_of_all_joints_of_a_sensor_are_kept_in_one_write(
+    evening: Evening, memory: SensorMemory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept: list[dict[str, NeutralPose]] = []
+    monkeypatch.setattr(memory, "keep_neutral", lambda sensor, poses: kept.append(poses))
+    stage = evening([HAND, {"sensor": SENSOR, "joint": "lForeArm"}])
+    stage.stand(2.5, about_up(40.0))
+    pose = NeutralPose(about_up(40.0), 0.0, BOOT)
+    assert kept == [{"lShldr": pose, "lForeArm": pose}]
 
 
 def test_an_arrow_that_points_down_is_complained_of_and_the_lid_tells_the_front(evening: Evening) -> None:

@@ -1,0 +1,172 @@
+"""The stage's loop on the test's clock: a machine that holds it up for a while, at whatever instruction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from appliance.control.orders import Order
+from appliance.sensor.link import SensorLink, SensorReading, SensorState
+from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
+from appliance.show.show import load_show
+from appliance.stage import run
+from appliance.stage.clock import TICK_S, TickClock
+from appliance.stage.fallback import SENSOR_SILENT
+from appliance.stage.run import Stage
+from tests.stage.bundles import write_show
+from tests.stage.fakes import FakeTime
+
+RAISED = (0.8, 0.6, 0.0, 0.0)
+
+
+class Cable(SensorLink):
+    """A sensor's cable: what came during a stop is read after the tick that ends it, by another thread."""
+
+    def __init__(self) -> None:
+        super().__init__({}, ())
+        self.talks = True
+        self._drained_at = 0.0
+        self._sequence = 0
+
+    def drain(self, now: float) -> Sequence[SensorReading]:
+        before, self._drained_at = self._drained_at, now
+        if not self.talks or now - before > 1.5 * TICK_S:
+            return ()
+        self._sequence += 1
+        return [SensorReading("left-wrist", RAISED, self._sequence, 0, now, now - 0.001, 90, 255)]
+
+    def states(self, now: float) -> list[SensorState]:
+        return [SensorState("left-wrist", 0, "linked", "", 50.0, 0, None, 0.0, 90, 255, "", "", 0, 1, "")]
+
+
+class Inbox:
+    """Orders that wait; whoever takes one is held up for `held_up_s` meanwhile."""
+
+    def __init__(self, time: FakeTime, *orders: Order) -> None:
+        self.waiting, self.answers = list(orders), list[tuple[str, bool, str]]()
+        self.held_up_s = 0.0
+        self._time = time
+
+    def take(self) -> Order | None:
+        if not self.waiting:
+            return None
+        self._time.work(self.held_up_s)
+        return self.waiting.pop(0)
+
+    def answer(self, order: Order, done: bool, words: str) -> None:
+        self.answers.append((order.name, done, words))
+
+
+class Evening:
+    """A whole stage on a clock that sleeps too long where it is told to: `stops`, seconds by tick."""
+
+    def __init__(self, bundle: Path, runtime: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.time, self.cable = FakeTime(self._overshoot_s), Cable()
+        self.stops: dict[int, float] = {}
+        self.each_s = 0.0
+        self.said: list[str] = []
+        self.weights: list[float] = []
+        box = BoxConfig(
+            sensors=SensorsConfig(udp=None),
+            outputs=OutputsConfig(osc=[]),
+            runtime=runtime,
+            realtime=RealtimeConfig(enabled=False),
+        )
+        monkeypatch.setattr(
+            run, "TickClock", lambda: TickClock(monotonic=self.time.monotonic, sleep=self.time.sleep)
+        )
+        self.stage = Stage(load_show(bundle), box, self.said.append)
+        self.stage.cast.link.close()
+        self.stage.cast.link = self.cable
+        self.stage.tick._monotonic = self.time.monotonic
+        self.stage.lead_s = 0.0  # one sleep a tick
+        self.inbox = Inbox(self.time)
+        self.stage.inbox = self.inbox  # type: ignore[assignment]
+
+    @property
+    def silences(self) -> int:
+        return sum(one.times for one in self.stage.fallbacks.told(0.0) if one.name == SENSOR_SILENT.name)
+
+    def dance(self, seconds: float) -> None:
+        self.stage.dance(seconds, lambda: self.weights.append(self._weight) or False)  # type: ignore[func-returns-value]
+
+    @property
+    def _weight(self) -> float:
+        return float(self.stage.cast.hands.weights[self.stage.cast.hand_places[0]])
+
+    def _overshoot_s(self) -> float:
+        return self.each_s + self.stops.get(self.stage.health.ticks, 0.0)
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_show(tmp_path_factory.mktemp("show"))
+
+
+@pytest.fixture
+def evening(bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Evening]:
+    (tmp_path / "runtime").mkdir(mode=0o700)
+    evening = Evening(bundle, tmp_path / "runtime", monkeypatch)
+    with closing(evening.stage):
+        yield evening
+
+
+@pytest.mark.parametrize("stop_s", [0.085, 0.3, 0.9, 1.6, 5.0])
+def test_after_a_stop_no_sensor_is_said_to_be_silent_and_no_hand_lets_go(
+    evening: Evening, stop_s: float
+) -> None:
+    evening.stops = {100: stop_s, 160: stop_s}
+    evening.dance(5.0 + 2 * stop_s)
+    assert evening.silences == 0
+    assert not [words for words in evening.said if "silent" in words]
+    assert min(evening.weights[50:]) > 0.9
+    assert evening.stage.health.skipped >= 2 * int(stop_s / TICK_S) - 2
+
+
+@pytest.mark.parametrize("each_s", [0.0, 0.07])
+def test_a_sensor_that_falls_silent_is_told_of_on_a_slow_machine_too(evening: Evening, each_s: float) -> None:
+    evening.each_s = each_s
+    evening.stage.dance(1.0, lambda: False)
+    evening.cable.drain(evening.time.now)
+    evening.stage.cast.hear(SensorReading("left-wrist", RAISED, 1, 0, 0.0, evening.time.now, 90, 255))
+    evening.cable.talks = False
+    evening.stage.dance(4.0, lambda: False)
+    assert evening.silences >= 1
+    assert [words for words in evening.said if words.startswith("Sensor left-wrist silent for")]
+
+
+def test_a_tick_that_was_held_up_leaves_orders_to_the_next_one(evening: Evening) -> None:
+    """What it knows of the sensors is of before the stop: a heading would be reset by that."""
+    evening.dance(1.0)
+    evening.inbox.waiting = [Order("heading")]
+    began = evening.time.now
+    evening.time.work(0.3)
+    evening.stage._obey(began, evening.time.monotonic)
+    assert evening.inbox.waiting and not evening.inbox.answers
+    evening.stage._comes_from_stop = True
+    evening.stage._obey(evening.time.now, evening.time.monotonic)
+    assert evening.inbox.waiting and not evening.inbox.answers
+    evening.dance(0.1)
+    assert [(name, done) for name, done, _ in evening.inbox.answers] == [("heading", True)]
+
+
+def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(
+    evening: Evening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stop between the tick and the order is not taken from what the dancer is given for it."""
+    noted: list[float] = []
+    assert evening.stage.recorder is not None
+    evening.dance(1.0)
+    monkeypatch.setattr(evening.stage.recorder, "event", lambda kind, now, **facts: noted.append(now))
+    evening.inbox.waiting, evening.inbox.held_up_s = [Order("neutral"), Order("heading")], 0.3
+    began = evening.time.now
+    evening.stage._obey(began, evening.time.monotonic)
+    assert noted == pytest.approx([began + 0.3, began + 0.6])
+    (_, asked, _), (_, reset, words) = evening.inbox.answers
+    assert (asked, reset) == (True, False)  # the reading is of before both stops, and by now too old
+    assert "heard at this moment" in words
+    waits_until = evening.stage.wearing.state()["left-wrist"]["waits_until"]
+    assert waits_until == pytest.approx(began + 0.3 + 3.0)
