@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence, Set
 
 from appliance.sensor import wire
@@ -18,7 +19,6 @@ class Watch:
     def __init__(self, cast: Cast) -> None:
         self._cast = cast
         self._silent: set[str] = set()
-        self._heard: set[str] = set()
         self._ways: dict[str, str] = {}
         self._complaints: set[str] = set()
         self._low: set[str] = set()
@@ -72,11 +72,10 @@ class Watch:
         for name, joints in self._cast.worn.items():
             silent_s = joints[0].silent_s(now)
             if silent_s <= SILENT_S:
-                self._heard.add(name)
                 if name in self._silent:
                     self._silent.remove(name)
                     yield f"Sensor {name} is back. It takes its joint again."
-            elif name in self._heard and name not in self._silent and name in known:
+            elif silent_s < math.inf and name not in self._silent and name in known:
                 self._silent.add(name)
                 yield (
                     f"Sensor {name} silent for {silent_s:.1f} s. The dancer moves freely. Check its battery."

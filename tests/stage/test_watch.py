@@ -50,6 +50,17 @@ def test_a_silent_sensor_and_its_return(cast: Cast) -> None:
     assert list(watch.news(13.1)) == ["Sensor left-wrist is back. It takes its joint again."]
 
 
+def test_a_sensor_that_is_heard_and_lost_between_two_looks_is_silent_too(cast: Cast) -> None:
+    watch = Watch(cast)
+    assert list(watch.news(10.0, [sensor(state="absent", way="")])) == []
+    hear(cast, 10.2)
+    lost = [sensor(state="lost", way="")]
+    assert list(watch.news(11.0, lost)) == [
+        "Sensor left-wrist silent for 0.8 s. The dancer moves freely. Check its battery."
+    ]
+    assert list(watch.news(12.0, lost)) == []
+
+
 def test_a_revoked_sensor_has_no_battery_to_be_checked(cast: Cast) -> None:
     watch = Watch(cast)
     hear(cast, 11.0)
