@@ -7,6 +7,7 @@ import fcntl
 import mmap
 import os
 import struct
+import time
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +22,7 @@ _SHAPE = struct.Struct("<II")
 _CHECK = struct.Struct("<I")  # CRC-32 of header and shapes
 _MOST_RINGS = 8
 _LONGEST = _HEADER.size + _MOST_RINGS * _SHAPE.size + _CHECK.size
+_LOCK_TRIES, _LOCK_RETRY_S = 10, 0.01  # who looks whether a writer lives holds the lock for a moment
 
 
 class RingFileWriter:
@@ -34,16 +36,18 @@ class RingFileWriter:
 
     @classmethod
     def new(cls, path: Path, kind: str, version: int, shapes: Sequence[Shape]) -> RingFileWriter:
-        """A file that readers do not find before `publish`. Raises OSError where there is no room for it."""
+        """A file that readers do not find before `publish`. Raises OSError where there is no room for it.
+
+        What writers left there that were killed before they published goes.
+        """
+        _clear_up(path)
         temporary = _temporary(path)
         header = _header(kind, version, shapes)
         rings = _rings(shapes)
         with contextlib.ExitStack() as failing:
-            flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
-            descriptor = os.open(temporary, flags, 0o600)
+            descriptor = _made(temporary)
             failing.callback(temporary.unlink, missing_ok=True)
             failing.callback(os.close, descriptor)
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             os.posix_fallocate(descriptor, 0, rings[-1].end)  # a full disk is found here, not by a tick
             os.pwrite(descriptor, header, 0)
             made = cls(path, descriptor, rings)
@@ -65,7 +69,7 @@ class RingFileWriter:
             failing.callback(os.close, descriptor)
             if os.pread(descriptor, len(header), 0) != header or not _are_whole(descriptor, rings):
                 return None
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(descriptor)
             found = cls(path, descriptor, rings)
             failing.pop_all()
         return found
@@ -199,3 +203,39 @@ def _are_whole(descriptor: int, rings: Sequence[Ring]) -> bool:
 
 def _temporary(path: Path) -> Path:
     return path.with_name(f".{path.name}.{os.getpid()}")
+
+
+def _made(temporary: Path) -> int:
+    """A file of ours, empty and locked; made anew where somebody who clears up took it before it was locked."""
+    flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
+    while True:
+        descriptor = os.open(temporary, flags, 0o600)
+        with contextlib.ExitStack() as leaving:
+            leaving.callback(os.close, descriptor)
+            _lock(descriptor)
+            if os.fstat(descriptor).st_nlink:
+                leaving.pop_all()
+                return descriptor
+
+
+def _lock(descriptor: int) -> None:
+    """Be its writer; raises BlockingIOError where another one lives."""
+    for _ in range(_LOCK_TRIES - 1):
+        with contextlib.suppress(BlockingIOError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        time.sleep(_LOCK_RETRY_S)
+    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _clear_up(path: Path) -> None:
+    """Remove what was never published, of writers that do not live. Never raises."""
+    beginning = f".{path.name}."
+    for left in path.parent.glob(f"{beginning}*"):
+        if not left.name.removeprefix(beginning).isdigit():
+            continue
+        with contextlib.suppress(OSError), contextlib.ExitStack() as looking:
+            descriptor = os.open(left, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
+            looking.callback(os.close, descriptor)
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            left.unlink()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import math
 import os
 import signal
@@ -9,11 +10,14 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from appliance.outputs import ring_file
+from appliance.outputs.ring_file import RingFileWriter
 from appliance.stage.place import FILE, LARGEST, Place, PlaceReader, PlaceWriter, boot_id, packed, unpacked
 
 PLACE = Place(
@@ -119,15 +123,87 @@ def test_a_writer_killed_in_the_middle_leaves_the_newest_whole_place(tmp_path: P
     for _ in range(4):
         command = [sys.executable, "-c", WRITER, str(tmp_path), str(newest), packed(PLACE).hex()]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:
-            assert writer.stdout is not None
-            told = int(writer.stdout.readline())
-            writer.send_signal(signal.SIGKILL)
+            try:
+                assert writer.stdout is not None
+                told = int(writer.stdout.readline())
+            finally:
+                writer.send_signal(signal.SIGKILL)
         reader = PlaceReader(tmp_path)
         place = reader.read()
         reader.close()
         assert place is not None and place.tick >= told > newest
         assert place == replace(PLACE, tick=place.tick)
         newest = place.tick
+
+
+def test_who_looks_whether_the_stage_lives_does_not_keep_the_next_one_from_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It holds the file's lock for a moment, and may stand still in that moment."""
+    PlaceWriter(tmp_path).close()
+    looking = os.open(tmp_path / FILE, os.O_RDONLY)
+    fcntl.flock(looking, fcntl.LOCK_SH)
+    waited: list[float] = []
+
+    def sleep(seconds: float) -> None:
+        waited.append(seconds)
+        if len(waited) == 5:
+            fcntl.flock(looking, fcntl.LOCK_UN)
+
+    monkeypatch.setattr(ring_file, "time", SimpleNamespace(sleep=sleep))
+    writer = PlaceWriter(tmp_path)
+    assert len(waited) == 5
+    with pytest.raises(BlockingIOError):  # that one lives
+        PlaceWriter(tmp_path)
+    assert sum(waited) < 0.5
+    writer.close()
+    os.close(looking)
+
+
+BEGINNER = """
+import os, signal, sys
+from pathlib import Path
+from appliance.outputs.ring_file import RingFileWriter
+RingFileWriter.new(Path(sys.argv[1]), "place", 1, [(2, 1000)])
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_killed_writer_never_published_goes_and_no_living_ones_file(tmp_path: Path) -> None:
+    path, kind = tmp_path / FILE, [(2, 1000)]
+    subprocess.run([sys.executable, "-c", BEGINNER, str(path)], check=False)
+    [left] = tmp_path.iterdir()
+    assert left.name.startswith(f".{FILE}.")
+    living = tmp_path / f".{FILE}.1"
+    living.write_bytes(b"")
+    others = [tmp_path / f".{FILE}.new", tmp_path / f".{FILE}.old.1", tmp_path / f"{FILE}.1"]
+    for other in others:
+        other.write_bytes(b"")
+    with living.open("rb") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        file = RingFileWriter.new(path, "place", 1, kind)
+        file.publish()
+    assert {*tmp_path.iterdir()} == {path, living, *others}
+    file.close()
+
+
+def test_a_writer_whose_file_was_cleared_away_before_it_was_locked_makes_another_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, locked = fcntl.flock, list[int]()
+
+    def flock(descriptor: int, how: int) -> None:
+        if not locked:
+            [unlocked] = tmp_path.iterdir()
+            unlocked.unlink()
+        locked.append(descriptor)
+        real(descriptor, how)
+
+    monkeypatch.setattr(ring_file, "fcntl", SimpleNamespace(**{**vars(fcntl), "flock": flock}))
+    file = RingFileWriter.new(tmp_path / FILE, "place", 1, [(2, 1000)])
+    file.publish()
+    file.close()
+    assert [one.name for one in tmp_path.iterdir()] == [FILE]
 
 
 def test_every_byte_of_the_file_may_be_wrong(tmp_path: Path) -> None:
