@@ -93,8 +93,10 @@ class Resuming:
         """Raises ValueError where this show has no such place."""
         if place.show != self._show:
             raise ValueError(f"Before, the show was '{place.show}'.")
+        # What has stopped the phrase went with the power, and nobody would order it to start.
+        rate = place.rate or (cast.motion.rate if self._after_power_cut else 0.0)
         cast.motion.start_at(
-            place.phrase, place.excerpt, place.position_s, place.rate, (place.x, place.z, place.heading)
+            place.phrase, place.excerpt, place.position_s, rate, (place.x, place.z, place.heading)
         )
         cast.grounding.strayed = place.strayed
         for puppeteer in cast.hands.puppeteers:
