@@ -71,13 +71,15 @@ def keep_on(
     monotonic: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> None:
-    """Turn by turn until `stopped`, then one last turn; `after_turn`: for the watchdog."""
+    """Turn by turn until `stopped`, then one last turn; `after_turn`: for the watchdog.
+
+    Each is given the time at which it begins: the disk may have held up those before it.
+    """
     while not stopped():
-        now = monotonic()
+        until = monotonic() + TURN_S
         for carrier in carriers:
-            carrier.turn(now)
-        after_turn(now)
-        until = now + TURN_S
+            carrier.turn(monotonic())
+        after_turn(monotonic())
         while not stopped() and (rest_s := until - monotonic()) > 0.0:
             sleep(min(rest_s, _LOOK_S))
     for carrier in carriers:

@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from appliance.outputs.runtime_folder import Claim
 from appliance.show.box import BoxConfig
+from appliance.stage.clock import TICK_S
 from appliance.stage.journal.carrier import RETRY_S
 from appliance.stage.journal.reading import read_journal
 from appliance.stage.journal.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
@@ -49,6 +51,19 @@ def fill(disk: Path, but: int = 0) -> Path:
         except OSError:
             file.truncate(file.tell() - but)
             return ballast
+
+
+def note(night: Night, ticks: int) -> None:
+    """So many ticks that cost no dance; their poses pack no smaller than those of one."""
+    noise = np.random.default_rng(0)
+    for _ in range(ticks):
+        night.tick.frame.pose[...] = noise.random(night.tick.frame.pose.shape)
+        night.slot.tick += 1
+        night.slot.deadline += TICK_S
+        night.slot.started = night.slot.deadline
+        night.recorder.note_tick(night.slot, night.tick, 0)
+        if night.recorder.wants_keyframe:
+            night.recorder.keyframe(night.tick.state())
 
 
 def test_a_full_disk_is_said_once_and_the_newest_follows_when_there_is_room(night: Night, disk: Path) -> None:
@@ -101,12 +116,12 @@ def test_a_disk_that_is_not_there_is_waited_for(night: Night, tmp_path: Path) ->
 def test_the_oldest_go_where_room_is_short_but_never_the_newest_minute(night: Night, disk: Path) -> None:
     carrier, folder = night.carrier(disk / "journal"), disk / "journal"
     for second in range(170):
-        night.dance(50)
+        note(night, 50)
         carrier.turn(float(second))
     assert len(segment_paths(folder)) == 3
     fill(disk, but=int(LEAST_FREE_SHARE * DISK_BYTES) + 100_000)
     for second in range(170, 330):
-        night.dance(50)
+        note(night, 50)
         carrier.turn(float(second))
         if second % 10 == 9:
             ticks = read_journal(folder).ticks["tick"]
@@ -129,6 +144,25 @@ def test_the_keeper_turns_until_it_is_stopped_and_then_once_more() -> None:
 
     keep_on([Carried()], lambda: time.now > 1001.2, lambda now: None, time.monotonic, time.sleep)
     assert happened == ["turn at 0.0", "turn at 0.5", "turn at 1.0", "last turn"]
+
+
+def test_whatever_the_disk_takes_each_is_given_the_time_at_which_it_begins() -> None:
+    """A beat with the time from before a slow disk would tell of a keeper that died."""
+    time, begun, beats = FakeTime(), list[float](), list[float]()
+
+    class Slow:
+        complaint = ""
+
+        def turn(self, now: float) -> None:
+            begun.append(now)
+            time.work(2.0)
+
+        def last_turn(self) -> None:
+            pass
+
+    keep_on([Slow(), Slow()], lambda: time.now > 1005.0, beats.append, time.monotonic, time.sleep)
+    assert begun == [1000.0, 1002.0, 1004.0, 1006.0]
+    assert beats == [1004.0, 1008.0]
 
 
 def test_what_a_keeper_did_not_live_to_carry_is_carried_after_the_dance(night: Night, tmp_path: Path) -> None:
