@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -52,10 +54,12 @@ class FrameReader:
     """Reads the shared frame of whichever stage runs; never waits, never raises, never disturbs the stage.
 
     facts: of the newest stage, None before the first one. generation: a number that changes with each new
-    stage. Frames and facts of a stage that is gone stay until there is another one.
+    stage. Frames and facts of a stage that is gone stay until there is another one. `now` may be long ago: a
+    reader can be held up between its clock and its look.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._monotonic = monotonic
         self._file = RingFileReader(folder / FILE, KIND, FORMAT, WRITER)
         self._looked_at = -math.inf
         self._writer_lives = False
@@ -147,7 +151,8 @@ class FrameReader:
             return None
         tick, frame_time, left, sequence, arrival, flags, _ = FRAME_HEAD.unpack_from(payload)
         numbers = np.frombuffer(payload, "<f4", -1, layout.root_at)
-        if frame_time > now + _AHEAD_S or not np.isfinite(numbers).all():
+        is_ahead = frame_time > now + _AHEAD_S and frame_time > self._monotonic() + _AHEAD_S
+        if is_ahead or not np.isfinite(numbers).all():
             return None
         return SeenFrame(
             tick,

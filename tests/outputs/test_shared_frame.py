@@ -383,7 +383,7 @@ def test_a_frame_left_from_before_the_machine_started_anew_is_nobodys(tmp_path: 
     writer, frame = FrameWriter(tmp_path, facts_of(small(3))), JointFrame(3)
     frame.frame_time = NOW
     writer.write(frame)
-    reader = FrameReader(tmp_path)
+    reader = FrameReader(tmp_path, lambda: 60.0)
     assert reader.newest(NOW - 0.1) is not None  # a picture is drawn for a time a little before
     assert reader.newest(60.0) is None
     assert reader.frames(5, 60.0) == []
