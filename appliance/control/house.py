@@ -99,7 +99,7 @@ class House:
 class HouseReader:
     """Reads the house of a runtime folder; the defaults before anybody wrote one: the show simply runs.
 
-    A house that is gone stays in force until there is another one: whatever emptied the folder, panic stays
+    A house that is gone stays in force until another one is written: whatever emptied the folder, panic stays
     panic, and what is dark does not flash up while a box ends.
     """
 
@@ -111,7 +111,7 @@ class HouseReader:
     def read(self) -> House:
         """How the house is now. Never waits, never raises."""
         payload = self._block.read()
-        if payload != self._payload:
+        if payload is not None and payload != self._payload:
             self._payload, self._house = payload, _parsed(payload)
         return self._house
 
@@ -147,10 +147,8 @@ def _part(now: float, since: float, fade_s: float) -> float:
     return min(max((now - since) / fade_s, 0.0), 1.0)
 
 
-def _parsed(payload: bytes | None) -> House:
+def _parsed(payload: bytes) -> House:
     """A house of another version of this program keeps what both know."""
-    if payload is None:
-        return House()
     known = {one.name for one in fields(House)}
     try:
         values: dict[str, Any] = json.loads(payload)

@@ -122,6 +122,18 @@ def test_panic_works_in_a_folder_that_somebody_emptied(tmp_path: Path) -> None:
     assert reader.read().panic
 
 
+def test_a_new_file_lifts_no_panic_before_anything_is_written_in_it(tmp_path: Path) -> None:
+    """Whoever made it may be stopped right then."""
+    reader = HouseReader(tmp_path)
+    HouseWriter(tmp_path).write(House(panic=True))
+    assert reader.read().panic
+    (tmp_path / FILE).unlink()
+    writer = HouseWriter(tmp_path)
+    assert reader.read().panic
+    writer.write(House())
+    assert not reader.read().panic
+
+
 def test_the_longest_names_of_a_show_fit(tmp_path: Path) -> None:
     name = "\N{PERFORMING ARTS}" * 64
     house = House(True, look=name, look_before=name, lights=name, lights_before=name, cue=name)
