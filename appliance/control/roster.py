@@ -40,4 +40,6 @@ def roster_messages(health: Mapping[str, Any], key_file: str, now: float) -> Ite
     for line in lines:
         yield SENSOR, *line
     looked_at = health.get("looked_at")
-    yield END, len(lines), UNKNOWN_S if looked_at is None else now - float(looked_at), key_file
+    # The stage may have looked after this process read its clock.
+    age_s = UNKNOWN_S if looked_at is None else max(0.0, now - float(looked_at))
+    yield END, len(lines), age_s, key_file

@@ -16,28 +16,30 @@ class Standstill:
     def __init__(self, sight: StageSight, errands: Errands) -> None:
         self._sight, self._errands = sight, errands
         self._generation = -1
-        self._stands = False
+        self._stands: bool | None = False  # by our order; None: one was given, and nobody has answered yet
         self._next_try = 0.0
 
     def go(self, house: House, now: float) -> None:
         """The show is about to go on: the stage is asked first, if it may stand."""
-        if self._stands or not house.going or self._sight.state(now) == "stopped":
+        if self._stands is not False or not house.going or self._sight.state(now) == "stopped":
             self._order("start", now)
 
     def look(self, house: House, now: float) -> None:
         """See to it; call it often."""
-        if self._sight.generation != self._generation:
-            self._generation, self._stands = self._sight.generation, False  # a new stage dances
-            self._next_try = now
+        if self._sight.generation != self._generation and (told := self._sight.health()):
+            self._generation, self._next_try = self._sight.generation, now
+            if told.get("state") != "stopped":  # else it goes on as it was: standing
+                self._stands = False
         if now < self._next_try:
             return
-        if house.going and self._stands:
+        if house.going and self._stands is not False:
             self._order("start", now)
         elif not house.going and not self._stands and house.going_level(now) <= 0.0:
             self._order("stop", now)
 
     def _order(self, name: str, now: float) -> None:
         self._next_try = now + _AGAIN_S
+        self._stands = None
 
         def then(done: bool, words: str) -> None:
             if done:
