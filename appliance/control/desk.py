@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from appliance.control.command import Command, command
-from appliance.control.errands import Errands
+from appliance.control.errands import Errands, Then
 from appliance.control.house import House
 from appliance.control.house_commands import CHANGES, PARTS, in_cue, known, let_go, next_cue, of_this_show
 from appliance.control.key_file import KeyFile
@@ -58,6 +59,14 @@ _ORDERS: Mapping[str, tuple[Place, str]] = {
 }
 
 
+class _Undone(NamedTuple):
+    """A cue that the stage of this generation did not do, as far as it said so."""
+
+    cue: str
+    generation: int
+    then: Then
+
+
 class Desk:
     """`tell` sends a message to who asked; `publish` shows the house to all who read it.
 
@@ -72,15 +81,18 @@ class Desk:
         keys: KeyFile,
         tell: Callable[[Address, Message], None],
         publish: Callable[[House], None],
+        monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self.house = house
         self.refused = 0
         self.reason = ""
         self._sight, self._errands, self._keys = sight, errands, keys
-        self._tell, self._publish = tell, publish
+        self._tell, self._publish, self._monotonic = tell, publish, monotonic
         self._standstill = Standstill(sight, errands)
         self._generation = -1
         self._is_new_stage = False
+        self._began_in = ""  # the cue in which the newest stage began
+        self._undone: _Undone | None = None  # the newest cue, if it was not done
         self._heard = 0
         self._set_by = dict.fromkeys(PARTS, 0)  # the newest command that has set it
 
@@ -112,10 +124,11 @@ class Desk:
         if facts is not None and self._sight.generation != self._generation:
             self._generation = self._sight.generation
             self._set(of_this_show(self.house, facts))
-            self._is_new_stage = True
+            self._is_new_stage, self._began_in = True, ""
         if self._is_new_stage and facts is not None and (health := self._sight.health()):
-            self._is_new_stage = False
-            self._come_back(facts, str(health.get("cue", "")), now)
+            self._is_new_stage, self._began_in = False, str(health.get("cue", ""))
+            self._come_back(facts, self._began_in, now)
+        self._catch_up()
         self._standstill.look(self.house, now)
 
     def status(self, strangers: int, now: float) -> Status:
@@ -131,6 +144,14 @@ class Desk:
         if cue is not None and not self.house.cue:
             parts = [part for part in ("look", "lights") if not self._set_by[part]]
             self._set(in_cue(self.house, {**cue, "fade_s": 0.0}, parts, now))
+
+    def _catch_up(self) -> None:
+        """A stage that died before it answered had done its cue if the next one goes on in it."""
+        undone = self._undone
+        if undone is None or undone.generation == self._generation:
+            return
+        if undone.cue == self._began_in != self.house.cue:
+            undone.then(True, "The stage was started anew in it.")
 
     def _carry_out(self, order: Command, asker: Address, now: float) -> None:
         """Raises ValueError for what cannot be done."""
@@ -166,13 +187,14 @@ class Desk:
         names = None if facts is None else [cue["name"] for cue in facts.cues]
         name = known("cue", order.text, names) if order.text else next_cue(self.house, facts)
         cue = next(cue for cue in facts.cues if cue["name"] == name) if facts else {}
-        heard = self._heard
+        heard, generation = self._heard, self._generation
 
         def then(done: bool, words: str) -> None:
+            self._undone = None if done else _Undone(name, generation, then)
             if done:
                 parts = [part for part in PARTS if self._set_by[part] <= heard]
                 self._set_by |= dict.fromkeys(parts, heard)
-                self._set(in_cue(self.house, cue, parts, now))
+                self._set(in_cue(self.house, cue, parts, self._monotonic()))
             self._end(asker, "/cue", done, f"Cue {name}. {words}".rstrip() if done else words)
 
         self._errands.begin("stage", Order("cue", text=name), now, then)
@@ -188,8 +210,7 @@ class Desk:
         is_stream = command.address.startswith(_STREAMS)
 
         def then(done: bool, words: str) -> None:
-            if not (done and is_stream):
-                self._end(asker, command.address, done, words)
+            self._end(asker, command.address, done, words)
 
         order = Order(name, values, text, keys, quiet=is_stream)
         self._errands.begin(place, order, now, then)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import get_args
 
-from appliance.control.orders import Order, OrderSender, Place
+from appliance.control.orders import Answer, Order, OrderSender, Place
 
 PATIENCE_S = 0.5  # as long an order may wait to be carried out
 ANSWER_S = 0.1  # what was carried out at the last moment is answered within this
+LATE_S = 10.0  # as long it may still turn out that what was told as not done was carried out
 WAITING = 64  # orders that may wait for a place; then the oldest gives way
 AT_ONCE, EVERY_S = 4, 0.02  # four orders a tick at most: a flood cannot touch the tick
 
@@ -47,13 +49,17 @@ class _Way:
 
 
 class Errands:
-    """Sends orders at a bounded pace, and tells what came of each once; of quiet ones, refusals alone."""
+    """Sends orders at a bounded pace, and tells what came of each once; of quiet ones, refusals alone.
+
+    Who was held up in the middle of an order answers too late: that it was done then corrects what was told.
+    """
 
     def __init__(self, sender: OrderSender) -> None:
         self._sender = sender
         self._ways: dict[Place, _Way] = {place: _Way() for place in get_args(Place)}
         self._sent: dict[int, _Errand] = {}
-        self._asks = 0
+        self._given_up: dict[int, _Errand] = {}
+        self._asks = int.from_bytes(os.urandom(6), "little")  # answers to an earlier process are none of ours
 
     def begin(self, place: Place, order: Order, now: float, then: Then) -> None:
         """Have an order carried out within PATIENCE_S; `then` hears of it, later or at once."""
@@ -69,9 +75,7 @@ class Errands:
     def go_on(self, now: float) -> None:
         """Take answers, send what waits, and end what nobody answered."""
         while (answer := self._sender.take()) is not None:
-            errand = self._sent.pop(answer.ask, None)
-            if errand is not None:
-                errand.then(answer.done, answer.words)
+            self._hear(answer)
         for place in self._ways:
             self._send(place, now)
         self._give_up(now)
@@ -81,6 +85,13 @@ class Errands:
         times = [errand.order.until + ANSWER_S for errand in self._sent.values()]
         times += [max(way.fills_at, now) for way in self._ways.values() if way.waiting]
         return min(times, default=float("inf"))
+
+    def _hear(self, answer: Answer) -> None:
+        if (errand := self._sent.pop(answer.ask, None)) is not None:
+            if not (answer.done and errand.order.quiet):
+                errand.then(answer.done, answer.words)
+        elif (late := self._given_up.pop(answer.ask, None)) is not None and answer.done:
+            late.then(True, answer.words)
 
     def _send(self, place: Place, now: float) -> None:
         way = self._ways[place]
@@ -99,12 +110,13 @@ class Errands:
                 errand.then(False, _ABSENT[place])
 
     def _give_up(self, now: float) -> None:
-        """End what is older than anyone waits for; a quiet order that was sent is taken for done."""
+        """End what is older than anyone waits for."""
         for way in self._ways.values():
             while way.waiting and way.waiting[0].order.until < now:
                 errand = way.waiting.popleft()
                 errand.then(False, _SILENT[errand.place])
         for ask in [ask for ask, errand in self._sent.items() if errand.order.until + ANSWER_S < now]:
-            errand = self._sent.pop(ask)
-            if not errand.order.quiet:
-                errand.then(False, _SILENT[errand.place])
+            errand = self._given_up[ask] = self._sent.pop(ask)
+            errand.then(False, _SILENT[errand.place])
+        for ask in [ask for ask, errand in self._given_up.items() if errand.order.until + LATE_S < now]:
+            del self._given_up[ask]

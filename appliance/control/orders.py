@@ -39,7 +39,7 @@ class Order:
     mirror (0|1), grid (0|1), info (0|1).
 
     text: a joint may be a number. keys: what a reload has read. ask: who waits for an answer; 0: nobody.
-    quiet: only a refusal is wanted, not that it was done (streams of orders).
+    quiet: the asker is told of a refusal alone, not that it was done (streams of orders).
     until: monotonic seconds; after it the asker was told that it is not done, and it is not to be done.
     """
 
@@ -86,7 +86,7 @@ class OrderInbox:
 
     def answer(self, order: Order, done: bool, words: str) -> None:
         """Tell who asked, if anyone waits; never blocks, never raises."""
-        if order.ask and not (done and order.quiet):
+        if order.ask:
             answer = {"ask": order.ask, "done": done, "words": words}
             self._socket.send(ANSWERS, json.dumps(answer).encode())
 

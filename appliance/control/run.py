@@ -33,9 +33,11 @@ _REST_S = 0.002  # after so many at once: a flood leaves the processor to others
 class ControlProcess:
     """Everything open. Raises OSError where the folder takes no file, or another one is at work there."""
 
-    def __init__(self, settings: Settings, say: Callable[[str], None], now: float) -> None:
-        folder = Path(settings.folder)
-        self._say = say
+    def __init__(
+        self, settings: Settings, say: Callable[[str], None], monotonic: Callable[[], float] = time.monotonic
+    ) -> None:
+        folder, now = Path(settings.folder), monotonic()
+        self._say, self._monotonic = say, monotonic
         with ExitStack() as opened:
             self.port = Port(socket.socket(fileno=settings.descriptor), settings.senders)
             opened.callback(self.port.close)
@@ -50,7 +52,7 @@ class ControlProcess:
             self._heartbeat = Heartbeat(settings.heartbeat, now)
             opened.callback(self._heartbeat.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
-            self.desk = Desk(house, sight, self._errands, keys, self.port.send, writer.write)
+            self.desk = Desk(house, sight, self._errands, keys, self.port.send, writer.write, monotonic)
             self._poll = select.poll()
             for one in (self.port, sender):
                 self._poll.register(one.fileno(), select.POLLIN)
@@ -65,20 +67,24 @@ class ControlProcess:
         self._poll.register(wake, select.POLLIN)
         notifier.ready("Commands are heard.")
         while not ended():
-            self._poll.poll(1000.0 * self._sleep_s(time.monotonic()))
-            self.turn(time.monotonic())
-            notifier.ping(time.monotonic())
+            self._poll.poll(1000.0 * self._sleep_s(self._monotonic()))
+            self.turn()
+            notifier.ping(self._monotonic())
         notifier.stopping()
 
-    def turn(self, now: float) -> None:
-        """Everything that waits or is due; monotonic seconds."""
+    def turn(self) -> None:
+        """Everything that waits or is due.
+
+        The clock is read after each datagram has come: this process may have been held up while it took it.
+        """
         taken = 0
         while taken < _AT_ONCE and (found := self.port.take()) is not None:
             received, asker = found
             taken += 1
             if received:
-                self.desk.hear(received, asker, now)
-        self._errands.go_on(now)
+                self.desk.hear(received, asker, self._monotonic())
+        self._errands.go_on(self._monotonic())
+        now = self._monotonic()
         self.desk.look(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.desk.status(self.port.strangers, now), now)
@@ -109,7 +115,7 @@ def control(settings: Settings, say: Callable[[str], None]) -> int:
     """Show control until SIGTERM, Ctrl-C or a closed terminal; the exit status."""
     logging.disable(logging.CRITICAL)  # python-osc logs what it cannot read, in the sender's own signs
     with _waking_stop_signals() as (ended, wake):
-        process = ControlProcess(settings, say, time.monotonic())
+        process = ControlProcess(settings, say)
         try:
             process.run(ended, wake, Notifier())
         finally:

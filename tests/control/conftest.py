@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from appliance.control import errands
 from appliance.sensor.keys import create_keys
 from tests.control.doubles import Asker, ControlInThread, StageDouble
 
@@ -31,7 +32,9 @@ def stage(folder: Path) -> Iterator[StageDouble]:
 
 
 @pytest.fixture
-def control(folder: Path, key_file: Path) -> Iterator[ControlInThread]:
+def control(folder: Path, key_file: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ControlInThread]:
+    """Its orders live for as long as a busy machine may hold up a double; test_orders has the real time."""
+    monkeypatch.setattr(errands, "PATIENCE_S", 15.0)
     control = ControlInThread(folder, key_file)
     yield control
     control.close()

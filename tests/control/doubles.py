@@ -57,6 +57,16 @@ def facts(**changes: Any) -> Facts:
     return Facts(**values | changes)
 
 
+class Clock:
+    """Stands at `now` until a test moves it."""
+
+    def __init__(self, now: float = 1000.0) -> None:
+        self.now = now
+
+    def __call__(self) -> float:
+        return self.now
+
+
 class StageDouble:
     """A context. `dances`: whether frames come; `obeys`: whether it takes orders; `answer`: what it makes of
     one. `orders` are those that it took."""
@@ -144,7 +154,7 @@ class ControlInThread:
         settings = Settings(
             str(folder), bound.detach(), tuple(senders), tuple(heartbeat), str(key_file or "")
         )
-        self.process = ControlProcess(settings, self.said.append, time.monotonic())
+        self.process = ControlProcess(settings, self.said.append)
         self.port = self.process.port.number
         self._is_over = threading.Event()
         self._reading, self._writing = socket.socketpair()

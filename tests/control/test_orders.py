@@ -14,22 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from appliance.control.errands import ANSWER_S, AT_ONCE, EVERY_S, PATIENCE_S, WAITING, Errands
+from appliance.control.errands import ANSWER_S, AT_ONCE, EVERY_S, LATE_S, PATIENCE_S, WAITING, Errands
 from appliance.control.orders import Answer, Order, OrderInbox, OrderSender
 from appliance.sensor.keys import SensorKey
-from tests.control.doubles import until
+from tests.control.doubles import Clock, until
 
 NOW = 1000.0
 KEY = SensorKey("left-wrist", 0x1A2B3C4D, bytes(range(16)))
-
-
-class Clock:
-    """Stands at `now` until a test moves it."""
-
-    now = NOW
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @pytest.fixture
@@ -41,7 +32,7 @@ def sender(folder: Path) -> Iterator[OrderSender]:
 
 @pytest.fixture
 def clock() -> Clock:
-    return Clock()
+    return Clock(NOW)
 
 
 @pytest.fixture
@@ -74,15 +65,14 @@ def test_an_order_arrives_whole(sender: OrderSender, inbox: OrderInbox, order: O
     assert KEY.key.hex() not in repr(taken)
 
 
-def test_an_answer_comes_back_to_who_asked_and_a_quiet_order_is_answered_when_refused_alone(
-    sender: OrderSender, inbox: OrderInbox
-) -> None:
+def test_an_answer_comes_back_to_who_asked(sender: OrderSender, inbox: OrderInbox) -> None:
     inbox.answer(Order("start"), False, "nobody waits")
-    inbox.answer(Order("start", ask=1, quiet=True), True, "done")
     assert sender.take() is None
+    inbox.answer(Order("start", ask=1, quiet=True), True, "done")
     inbox.answer(Order("start", ask=2, quiet=True), False, "no")
     inbox.answer(Order("start", ask=3), True, "yes")
-    assert [sender.take(), sender.take(), sender.take()] == [
+    assert [sender.take() for _ in range(4)] == [
+        Answer(1, True, "done"),
         Answer(2, False, "no"),
         Answer(3, True, "yes"),
         None,
@@ -228,7 +218,6 @@ def test_a_stage_that_does_not_answer_is_told_after_half_a_second_and_once(
     assert errands.due(NOW) == math.inf
     clock.now += PATIENCE_S + 0.02
     assert inbox.take() is None  # as it was told
-    inbox.answer(Order("cue", ask=1), True, "too late")
     errands.go_on(NOW + 1.0)
     assert len(heard.all) == 1
 
@@ -247,6 +236,61 @@ def test_what_is_carried_out_at_the_last_moment_is_told_as_done(
     assert heard.all == [(True, "Cue storm.")]
 
 
+@pytest.mark.parametrize("quiet", [False, True])
+@pytest.mark.parametrize(
+    ("late_s", "done", "corrected"),
+    [
+        (0.2, True, [(True, "Cue storm.")]),
+        (LATE_S, True, [(True, "Cue storm.")]),
+        (LATE_S + 1.0, True, []),
+        (0.2, False, []),
+    ],
+)
+def test_what_was_told_as_not_done_is_corrected_when_it_was_done_after_all(
+    sender: OrderSender,
+    inbox: OrderInbox,
+    quiet: bool,
+    late_s: float,
+    done: bool,
+    corrected: list[tuple[bool, str]],
+) -> None:
+    """The stage was held up in the middle of the order, which it had taken in time."""
+    errands, heard = Errands(sender), Heard()
+    errands.begin("stage", Order("cue", text="storm", quiet=quiet), NOW, heard)
+    order = inbox.take()
+    assert order is not None
+    for now in (order.until + ANSWER_S + 0.01, order.until + late_s - 0.01):
+        errands.go_on(now)
+    [(told, words)] = heard.all
+    assert not told and "does not answer" in words
+    for _ in range(2):
+        inbox.answer(order, done, "Cue storm.")
+        errands.go_on(order.until + late_s)
+    assert heard.all[1:] == corrected
+
+
+def test_an_answer_to_a_show_control_that_died_is_not_taken_for_one_to_the_next(
+    folder: Path, inbox: OrderInbox
+) -> None:
+    orders, heard = [], Heard()
+    for _ in range(2):
+        sender = OrderSender(folder)
+        errands = Errands(sender)
+        errands.begin("stage", Order("cue", text="storm"), NOW, heard)
+        orders.append(inbox.take())
+        if len(orders) == 1:
+            sender.close()
+    before, now = orders
+    assert before is not None and now is not None
+    inbox.answer(before, True, "what the first one asked for")
+    errands.go_on(NOW)
+    assert heard.all == []
+    inbox.answer(now, True, "Cue storm.")
+    errands.go_on(NOW)
+    assert heard.all == [(True, "Cue storm.")]
+    sender.close()
+
+
 def test_what_waits_for_a_full_socket_is_told_too(sender: OrderSender, inbox: OrderInbox) -> None:
     while sender.send("stage", Order("start", until=NOW)) == "sent":
         pass
@@ -257,13 +301,12 @@ def test_what_waits_for_a_full_socket_is_told_too(sender: OrderSender, inbox: Or
     assert "does not answer" in heard.all[0][1]
 
 
-def test_an_answer_ends_an_errand_and_silence_ends_a_quiet_one(
-    sender: OrderSender, inbox: OrderInbox
-) -> None:
+def test_of_quiet_orders_refusals_and_silence_are_told_alone(sender: OrderSender, inbox: OrderInbox) -> None:
     errands, heard, quiet = Errands(sender), Heard(), Heard()
     errands.begin("stage", Order("cue", text="storm"), NOW, heard)
     errands.begin("stage", Order("rate", (1.0,), quiet=True), NOW, quiet)
     errands.begin("stage", Order("rate", (9.0,), quiet=True), NOW, quiet)
+    errands.begin("stage", Order("jump", (1.0,), quiet=True), NOW, quiet)
     for done in (True, True, False):
         order = inbox.take()
         assert order is not None
@@ -271,7 +314,9 @@ def test_an_answer_ends_an_errand_and_silence_ends_a_quiet_one(
     until(lambda: (errands.go_on(NOW), bool(quiet.all))[1])
     errands.go_on(NOW + 1.0)
     assert heard.all == [(True, "cue True")]
-    assert quiet.all == [(False, "rate False")]
+    refused, silent = quiet.all
+    assert refused == (False, "rate False")
+    assert not silent[0] and "does not answer" in silent[1]
 
 
 def test_without_anybody_there_it_is_told_at_once(sender: OrderSender) -> None:
