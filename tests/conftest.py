@@ -6,6 +6,11 @@ import itertools
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# Property tests are not timed: a busy machine must not fail them.
+settings.register_profile("untimed", settings.get_profile(settings.get_current_profile_name()), deadline=None)
+settings.load_profile("untimed")
 
 ROOT = Path(__file__).resolve().parents[1]
 _folders = itertools.count()

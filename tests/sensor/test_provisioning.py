@@ -29,6 +29,12 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "sensors.keys"
 
 
+@pytest.fixture(autouse=True)
+def short_settling(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The wearable of these tests answers at once, and each question was asked once."""
+    monkeypatch.setattr(wearable_console, "_QUIET_S", 0.02)
+
+
 def provisioned(
     fake: FakeWearable, path: Path, settings: Settings = SETTINGS, takes_over: bool = False
 ) -> tuple[Provisioned, list[str]]:
@@ -215,7 +221,7 @@ def test_a_port_where_nothing_answers_is_told_apart(path: Path) -> None:
 
 
 def test_an_imu_that_is_just_starting_is_waited_for_and_one_that_is_missing_is_told() -> None:
-    with FakeWearable(ids_before_imu=2) as fake, WearableConsole(fake.port) as console:
+    with FakeWearable(ids_before_imu=1) as fake, WearableConsole(fake.port) as console:
         assert console.identify().imu_id
     with FakeWearable(ids_before_imu=1000) as fake, WearableConsole(fake.port) as console:
         assert not console.identify().imu_id

@@ -205,10 +205,13 @@ def test_a_look_costs_little_and_a_watch_makes_nothing(stage: StageFallbacks, da
 
     hear(danced, 1.0)
     stage.watch(1.0)
-    before = sys.getallocatedblocks()
-    for _ in range(1000):
-        stage.watch(1.05)
-    assert sys.getallocatedblocks() - before < 50
+    grown = []
+    for _ in range(3):  # others of this process leave something now and then
+        before = sys.getallocatedblocks()
+        for _ in range(1000):
+            stage.watch(1.05)
+        grown.append(sys.getallocatedblocks() - before)
+    assert min(grown) < 50
 
 
 ROOT = Path(__file__).resolve().parents[2]
