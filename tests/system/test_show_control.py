@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import select
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ import pytest
 import yaml
 
 from appliance.control.house import House, HouseReader
+from appliance.outputs.frame_reader import FrameReader
 from appliance.stage.journal.reading import read_journal
 from hw_sim.peers import HOST, free_ports
 from tests.control.doubles import Asker, until
@@ -47,17 +50,20 @@ SPINNING = (
     "main(['play', *sys.argv[1:]])",
 )
 
-# Becomes a box that stands still in the middle of its 100th tick: its turn goes on with a time of before.
+# Becomes a box that stands still once, in the middle of its 100th tick or the first one after that is not
+# skipped: its turn goes on with a time of before.
 STANDING = (
     sys.executable,
     "-c",
     "import os, signal, sys\n"
     "from appliance.cli import main\n"
     "from appliance.stage.tick import Tick\n"
-    "run = Tick.run\n"
+    "run, stood = Tick.run, []\n"
     "def stand(self, slot):\n"
     "    run(self, slot)\n"
-    "    if slot.tick == 100: os.kill(os.getpid(), signal.SIGSTOP)\n"
+    "    if slot.tick >= 100 and not stood:\n"
+    "        stood.append(slot.tick)\n"
+    "        os.kill(os.getpid(), signal.SIGSTOP)\n"
     "Tick.run = stand\n"
     "main(['play', *sys.argv[1:]])",
 )
@@ -96,7 +102,19 @@ def status(asker: Asker) -> dict[str, Any]:
     """The first arguments of /bunraku/status by name, and the later ones that tests look at."""
     message, _ = asker.ask_all("/status")
     names = {1: "state", 9: "coding", 10: "interaction", 13: "cue", 14: "look", 16: "level", 17: "panic"}
-    return {name: message[place] for place, name in names.items()}
+    now = {name: message[place] for place, name in names.items()}
+    return now | {"level": round(now["level"], 3)}
+
+
+def await_status(asker: Asker, **wanted: Any) -> None:
+    """Until it is all so at once: of a stage that is held up for half a second, it says that it hangs."""
+    until(lambda: wanted.items() <= status(asker).items())
+
+
+def await_stage(folder: Path, state: str) -> None:
+    """Until the stage itself says so: show control knows of a stop before the phrase stands."""
+    with contextlib.closing(FrameReader(folder / "runtime")) as reader:
+        until(lambda: (reader.health() or {}).get("state") == state)
 
 
 def control_of(pid: int) -> int:
@@ -127,9 +145,17 @@ def test_real_osc_tools_command_the_box_and_hear_its_heartbeat(show: Path, tmp_p
                 lines = [line for line in heard.read_text().splitlines() if "/bunraku/status" in line]
                 return any(all(word in line for word in words) for line in lines)
 
+            def says_after(*command: str, words: str) -> bool:
+                """Or else it must be sent again: a stage that is held up for too long refuses an order."""
+                send(*command)
+                soon = time.monotonic() + 2.0
+                while not says(words) and time.monotonic() < soon:
+                    time.sleep(0.05)
+                return says(words)
+
             until(lambda: says('"dancing" "A test"'))
-            send("/iterations", "ii", "5", "4")
-            send("/cue", "s", "storm")
+            until(lambda: says_after("/iterations", "ii", "5", "4", words=' 5 4 "main"'))
+            until(lambda: says_after("/cue", "s", "storm", words='"storm" "ink"'))
             send("/master", "f", "0.25")
             until(lambda: says('"dancing"', '"storm" "ink"', " 0.250000 0 0 "))
             send("/blackout", "T")
@@ -140,6 +166,8 @@ def test_real_osc_tools_command_the_box_and_hear_its_heartbeat(show: Path, tmp_p
             send("/go")
             send("/stop", "f", "0.1")
             until(lambda: says('"stopped"'))
+            await_stage(tmp_path, "stopped")
+            box.receiver.poll()
             box.frames(20)
             assert box.end() == 0
         beats = [
@@ -148,7 +176,7 @@ def test_real_osc_tools_command_the_box_and_hear_its_heartbeat(show: Path, tmp_p
         ]
         assert np.median(np.diff(beats)) == pytest.approx(1.0, abs=0.2)
     finally:
-        listener.terminate()
+        listener.kill()
         listener.wait()
     ticks = read_journal(tmp_path / "run.journal").ticks
     assert (4, 3) in set(zip(ticks["coding_iterations"], ticks["interaction_iterations"], strict=True))
@@ -157,25 +185,20 @@ def test_real_osc_tools_command_the_box_and_hear_its_heartbeat(show: Path, tmp_p
 
 def test_cues_stop_and_go_reach_the_dance_and_are_answered(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path, settings=JOURNAL) as box, asking(box) as asker:
-        assert asker.ask("/cue")[2:] == [1, "Cue calm."]
-        assert asker.ask("/cue")[2:] == [1, "Cue storm."]
+        assert asker.order("/cue")[2:] == [1, "Cue calm."]
+        assert asker.order("/cue")[2:] == [1, "Cue storm."]
         assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0]
-        until(lambda: (status(asker)["coding"], status(asker)["interaction"]) == (4, 3))
-        now = status(asker)
-        assert (now["state"], now["cue"], now["look"], round(now["level"], 3)) == (
-            "dancing",
-            "storm",
-            "ink",
-            0.5,
-        )
+        await_status(asker, state="dancing", coding=4, interaction=3, cue="storm", look="ink", level=0.5)
         assert "Did you mean 'storm'?" in asker.ask("/cue", "strom")[3]
-        assert "Did you mean 'lShldr'?" in asker.ask("/hold", "lSholder", 1)[3]
-        assert asker.ask("/hold", "lShldr", 1)[2] == 1
+        assert "Did you mean 'lShldr'?" in asker.order("/hold", "lSholder", 1)[3]
+        assert asker.order("/hold", "lShldr", 1)[2] == 1
         asker.ask("/stop", 0)
-        until(lambda: status(asker)["state"] == "stopped")
+        await_status(asker, state="stopped")
+        await_stage(tmp_path, "stopped")
         box.receiver.poll()
         box.frames(30)
         assert asker.ask("/go")[2] == 1
+        await_stage(tmp_path, "dancing")
         box.receiver.poll()
         box.frames(60)
         assert box.end() == 0
@@ -201,28 +224,29 @@ def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(
         if command is PLAY:
             hangs(box)
         else:
-            until(lambda: status(asker)["state"] == "hung")
+            await_status(asker, state="hung")
         assert asker.ask("/panic")[2] == 1
         assert house(tmp_path).panic
-        until(lambda: status(asker)["state"] == "hung")
+        await_status(asker, state="hung")
         assert status(asker)["panic"] == 1
         assert "The stage does not answer" in asker.ask("/cue", "storm")[3]
         assert "The stage does not answer" in asker.ask("/iterations", 9, 9)[3]
+        box.receiver.poll()
         box.process.send_signal(signal.SIGCONT)
         box.frames(20)
-        until(lambda: status(asker)["state"] == "panic")
+        await_status(asker, state="panic")
         assert house(tmp_path).panic
         now = status(asker)
         assert (now["cue"], now["coding"]) == ("", 3)  # what was told not to be done is not done later
         assert asker.ask("/go")[2] == 1
-        assert status(asker)["state"] == "dancing"
+        await_status(asker, state="dancing")
         assert box.end() == 0
 
 
 def test_panic_works_while_the_stage_spins(show: Path, tmp_path: Path) -> None:
     settings = {"realtime": {"enabled": False}}  # it would take a whole core of the tests' machine
     with playing(show, tmp_path, command=SPINNING, settings=settings) as box, asking(box) as asker:
-        until(lambda: status(asker)["state"] == "hung")
+        await_status(asker, state="hung")
         assert asker.ask("/panic")[2] == 1
         assert house(tmp_path).panic
         box.process.kill()
@@ -234,7 +258,7 @@ def test_a_killed_box_leaves_nobody_behind_and_panic_is_in_force_when_it_comes_b
     with playing(show, tmp_path) as box:
         with asking(box) as asker:
             control = control_of(box.process.pid)
-            asker.ask("/cue", "storm")
+            assert asker.order("/cue", "storm")[2] == 1
             asker.ask("/panic")
         box.end(signal.SIGKILL)
         until(lambda: is_free(box.control))
@@ -245,8 +269,7 @@ def test_a_killed_box_leaves_nobody_behind_and_panic_is_in_force_when_it_comes_b
             box.await_words("the show goes on in the cue 'storm'")
             assert status(asker)["panic"] == 1
             assert asker.ask("/go")[2] == 1
-            until(lambda: status(asker)["state"] == "dancing")
-            assert status(asker)["cue"] == "storm"
+            await_status(asker, state="dancing", cue="storm")
             assert box.end() == 0
     assert "Traceback" not in box.words
 
@@ -316,21 +339,20 @@ def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_bo
     """As units of their own: `bunraku play --alone` and `bunraku control`."""
     control = [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")]
     with playing(show, tmp_path, "--alone") as box:
-        box.frames(1)
-        assert "commands by a process of their own" in box.words
+        box.await_words("commands by a process of their own")
         with process(control, tmp_path / "control.txt") as first:
             with asking(box) as asker:
-                until(lambda: status(asker)["state"] == "dancing")
+                await_status(asker, state="dancing")
                 box.end(signal.SIGKILL)
-                until(lambda: status(asker)["state"] == "absent")
+                await_status(asker, state="absent")
                 assert asker.ask("/panic")[2] == 1
                 box.kill_and_restart()
-                until(lambda: status(asker)["state"] == "panic")
+                await_status(asker, state="panic")
             first.send_signal(signal.SIGKILL)
             first.wait()
         assert house(tmp_path).panic
         with process(control, tmp_path / "control.txt") as second, asking(box) as asker:
-            assert status(asker)["state"] == "panic"
+            await_status(asker, state="panic")
             with process(control, tmp_path / "third.txt") as third:
                 assert third.wait(PATIENCE_S) == 2
             assert "cannot be opened for commands" in (tmp_path / "third.txt").read_text()
@@ -357,12 +379,15 @@ def test_a_socket_that_systemd_has_opened_is_taken(tmp_path: Path) -> None:
     )
     command = [sys.executable, "-c", starter, str(tmp_path / "box.yaml")]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as started:
-        assert started.stdout is not None
-        asker = Asker(int(started.stdout.readline()))
-        assert asker.ask("/ping") == ["/pong"]
-        asker.close()
-        started.terminate()
-        assert started.wait(PATIENCE_S) == 0
+        try:
+            assert started.stdout is not None
+            assert select.select([started.stdout], [], [], PATIENCE_S)[0], "it does not start"
+            with contextlib.closing(Asker(int(started.stdout.readline()))) as asker:
+                assert asker.ask("/ping") == ["/pong"]
+            started.terminate()
+            assert started.wait(PATIENCE_S) == 0
+        finally:
+            started.kill()
 
 
 def test_a_descriptor_that_is_no_port_is_refused(tmp_path: Path) -> None:
