@@ -87,8 +87,8 @@ def test_a_killed_stage_leaves_the_safe_look_and_the_dance_returns_with_the_next
         LightsProcess(tmp_path) as lights,
     ):
         lamp.await_dance()
-        box.end(signal.SIGKILL)
         killed = time.monotonic()
+        box.end(signal.SIGKILL)
         lamp.await_safe()
         assert time.monotonic() - killed > 1.0  # it waits for a second, and fades for another
         lights.await_words("No frame from the stage")
@@ -124,9 +124,11 @@ def terminal_that_stands_still() -> Iterator[int]:
         while True:
             os.write(writing, bytes(1 << 16))
     os.set_blocking(writing, True)
-    yield writing
-    os.close(reading)
-    os.close(writing)
+    try:
+        yield writing
+    finally:
+        os.close(reading)
+        os.close(writing)
 
 
 def test_a_terminal_that_stands_still_holds_up_neither_dance_nor_safe_look(tmp_path: Path) -> None:
@@ -167,9 +169,10 @@ def test_killed_lights_are_started_again_by_the_box(tmp_path: Path) -> None:
         ]
         assert len(running) == 1
         os.kill(running[0], signal.SIGKILL)
+        box.await_words("Lights: 3 fixtures", count=2)
+        lamp.look()
         lamp.levels.clear()
         lamp.await_dance()
-        assert box.words.count("Lights: 3 fixtures") == 2
 
 
 def test_a_killed_box_takes_its_lights_with_it_and_they_end_dark(tmp_path: Path) -> None:

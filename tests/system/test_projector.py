@@ -6,24 +6,20 @@ import contextlib
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
-from pythonosc.osc_message import OscMessage
-from pythonosc.osc_message_builder import OscMessageBuilder
 
 from appliance.projector.projector_error import NO_DISPLAY, NO_PLACE
 from appliance.show.bundle import default_show_path
-from hw_sim.peers import HOST
+from tests.control.doubles import Asker
 from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, Box, playing
 
@@ -55,6 +51,13 @@ class Projection:
         for path in found[:-1]:
             path.unlink()
         return np.asarray(Image.open(found[-1]).convert("RGB")) if found else None
+
+    def await_words(self, words: str) -> None:
+        """Until it has said this."""
+        until = time.monotonic() + PATIENCE_S
+        while words not in self.words:
+            assert time.monotonic() < until and self.process.poll() is None, self.words
+            time.sleep(0.02)
 
     def await_picture(self, is_wanted: Callable[[np.ndarray], bool]) -> None:
         """Until such a picture is on the wall."""
@@ -93,20 +96,6 @@ def box(tmp_path: Path) -> Iterator[Box]:
         yield box
 
 
-def ask(port: int, address: str, *values: Any) -> list[Any]:
-    """Send a command and wait for its reply: address, done, words."""
-    message = OscMessageBuilder(address)
-    for value in values:
-        message.add_arg(value)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
-        one.settimeout(PATIENCE_S)
-        one.sendto(message.build().dgram, (HOST, port))
-        while True:
-            reply = OscMessage(one.recv(65536))
-            if reply.address == "/reply":
-                return list(reply.params)
-
-
 def test_started_first_it_waits_in_the_dark_and_outlives_two_stages(tmp_path: Path) -> None:
     box_file = tmp_path / "box.yaml"
     box_file.write_text("runtime: runtime\n")  # as in the box file that the box gets
@@ -114,6 +103,7 @@ def test_started_first_it_waits_in_the_dark_and_outlives_two_stages(tmp_path: Pa
         projection.await_black()
         with playing(write_show(tmp_path / "show", hands=[]), tmp_path) as box:
             projection.await_dance()
+            projection.await_words("No graphics card draws here")
             box.end(signal.SIGKILL)
             projection.await_black()
         (tmp_path / "another").mkdir()
@@ -144,18 +134,21 @@ def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path
 
 
 def test_panic_and_alignment_by_osc(box: Box, tmp_path: Path) -> None:
-    with projecting(tmp_path / "box.yaml", tmp_path) as projection:
+    with (
+        projecting(tmp_path / "box.yaml", tmp_path) as projection,
+        contextlib.closing(Asker(box.control)) as asker,
+    ):
         projection.await_dance()
-        assert ask(box.control, "/panic", 1)[1] == 1
+        assert asker.ask("/panic", 1)[2] == 1
         projection.await_black()
-        assert ask(box.control, "/go")[1] == 1
+        assert asker.ask("/go")[2] == 1
         projection.await_dance()
 
-        assert ask(box.control, "/projector/grid", 1)[1:] == [1, "The grid is on the wall."]
+        assert asker.order("/projector/grid", 1)[2:] == [1, "The grid is on the wall."]
         corners = (0.5, 0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0)
-        assert ask(box.control, "/projector/corners", *corners)[1] == 1
+        assert asker.order("/projector/corners", *corners)[2] == 1
         projection.await_picture(lambda seen: seen[40:].max() > 100 and not seen[:36].any())
-        done, words = ask(box.control, "/projector/corner", 1, 1.0, 1.0)[1:]
+        done, words = asker.order("/projector/corner", 1, 1.0, 1.0)[2:]
         assert not done and "fold" in words
         projection.end()
     with projecting(tmp_path / "box.yaml", tmp_path) as projection:
@@ -167,7 +160,9 @@ def test_without_a_display_it_says_so(tmp_path: Path) -> None:
         pytest.skip("this machine has a display of its own")
     without = {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}
     environment = {name: value for name, value in os.environ.items() if name not in without}
-    done = subprocess.run(PROJECT, capture_output=True, text=True, env=environment, check=False)
+    done = subprocess.run(
+        PROJECT, capture_output=True, text=True, env=environment, check=False, timeout=PATIENCE_S
+    )
     assert done.returncode == NO_DISPLAY
     assert re.fullmatch(r"bunraku: There is no display .* Plug the projector in .*\n", done.stderr)
 
@@ -179,6 +174,7 @@ def test_no_room_for_pictures(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
         check=False,
+        timeout=PATIENCE_S,
     )
     assert done.returncode == NO_PLACE
     assert "pictures cannot be written there" in done.stderr and "Traceback" not in done.stderr
@@ -193,5 +189,6 @@ def test_no_room_for_pictures(tmp_path: Path) -> None:
     ],
 )
 def test_options_that_make_no_sense(arguments: tuple[str, ...], words: str) -> None:
-    done = subprocess.run([*PROJECT, *arguments], capture_output=True, text=True, check=False)
+    command = [*PROJECT, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
     assert done.returncode == 2 and words in done.stderr.replace("\n", " ")
