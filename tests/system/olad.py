@@ -83,18 +83,25 @@ class Olad:
         """Ends it; what was patched stays for the next start."""
         if self._process is not None:
             self._process.terminate()
-            self._process.wait(10)
+            try:
+                self._process.wait(10)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
         self._process = None
 
     def __enter__(self) -> Self:
-        self.start()
+        try:
+            self.start()
+        except BaseException:
+            self._end()
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.stop()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._end()
 
     @property
     def log(self) -> str:
@@ -133,6 +140,10 @@ class Olad:
     @property
     def _log(self) -> Path:
         return self._folder / "olad.log"
+
+    def _end(self) -> None:
+        self.stop()
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     def _inside(self) -> contextlib.AbstractContextManager[None]:
         return self._network.entered() if self._network else contextlib.nullcontext()
