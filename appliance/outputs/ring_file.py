@@ -206,7 +206,7 @@ def _temporary(path: Path) -> Path:
 
 
 def _made(temporary: Path) -> int:
-    """A file of ours, empty and locked; made anew where somebody who clears up took it before it was locked."""
+    """A file of ours, empty and locked; made anew where who clears up took it before it was locked."""
     flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
     while True:
         descriptor = os.open(temporary, flags, 0o600)
