@@ -35,6 +35,8 @@ class Snoop:
     @contextmanager
     def looking(self) -> Iterator[None]:
         self._thread.start()
-        yield
-        self._is_over.set()
-        self._thread.join()
+        try:
+            yield
+        finally:
+            self._is_over.set()
+            self._thread.join()
