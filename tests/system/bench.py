@@ -85,10 +85,11 @@ class Bench:
                     said = self._wearable.take_serial()
                     self._use_radio(radio)
                     self.state = State(self._wearable.status.state)
+                    is_pulled = bool(self.pulls_at) and self.pulls_at in told
                     with contextlib.suppress(BlockingIOError):
-                        if said and self._master >= 0:
+                        if said and self._master >= 0 and not is_pulled:  # what it says now arrives nowhere
                             os.write(self._master, said)
-                if self.pulls_at and self.pulls_at in told:
+                if is_pulled:
                     self.pull_out()
                     self.pulls_at, waiting, told = b"", b"", b""
 

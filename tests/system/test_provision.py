@@ -44,12 +44,22 @@ def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def bunraku(*words: str, stdin: str = "", status: int = 0) -> str:
-    done = subprocess.run(
-        [*BUNRAKU, *words], input=stdin, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == status, done.stdout + done.stderr
-    assert "Traceback" not in done.stderr
-    return done.stdout + done.stderr
+    """What a command says that ends with this status; a box that was held up for too long is told again."""
+    command, said, until = words, "", time.monotonic() + PATIENCE_S
+    while True:
+        done = subprocess.run(
+            [*BUNRAKU, *command], input=stdin, capture_output=True, text=True, timeout=120, check=False
+        )
+        said += done.stdout + done.stderr
+        assert "Traceback" not in done.stderr
+        if done.returncode == status or "not answer" not in said or time.monotonic() > until:
+            assert done.returncode == status, said
+            return said
+        if words[:2] not in (
+            ("sensors", "strobe"),
+            ("sensors", "neutral"),
+        ):  # the key file is changed already
+            command = ("sensors", "reload", "--box", words[words.index("--box") + 1])
 
 
 def provision(bench: Bench, *words: str, status: int = 0, password: str = PASSWORD + "\n") -> str:
@@ -222,12 +232,16 @@ def test_the_password_is_asked_for_on_the_terminal_and_not_shown(tmp_path: Path)
         master, slave = pty.openpty()
         process = subprocess.Popen([*ON_A_TERMINAL, *command], stdin=slave, stdout=slave, stderr=slave)
         os.close(slave)
-        shown = read_until(master, b"open network): ")
-        assert not termios.tcgetattr(master)[3] & termios.ECHO
-        os.write(master, PASSWORD.encode() + b"\n")
-        shown += read_until(master, b"head is ready")
-        assert process.wait(PATIENCE_S) == 0
-        os.close(master)
+        try:
+            shown = read_until(master, b"open network): ")
+            assert not termios.tcgetattr(master)[3] & termios.ECHO
+            os.write(master, PASSWORD.encode() + b"\n")
+            shown += read_until(master, b"head is ready")
+            assert process.wait(PATIENCE_S) == 0
+        finally:
+            process.kill()
+            process.wait()
+            os.close(master)
         assert PASSWORD.encode() in bench.flash()
     assert PASSWORD.encode() not in shown
     assert load_keys(keys)["head"].key.hex().encode() not in shown
