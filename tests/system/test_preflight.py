@@ -23,6 +23,7 @@ from appliance.show.show import load_show
 from appliance.stage.prepared import FOLDER, SUFFIX
 from tests.stage.bundles import write_show
 
+PATIENCE_S = 120.0
 PREFLIGHT = (sys.executable, "-m", "appliance.commands.preflight")
 HEAVY = (
     "numpy",
@@ -66,7 +67,7 @@ class Machine:
 
     def preflight(self, *more: str) -> subprocess.CompletedProcess[str]:
         command = [*PREFLIGHT, *self.arguments, *more]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
 
     @property
     def choice(self) -> Choice:
@@ -213,7 +214,12 @@ def test_two_preflights_at_once_take_turns(machine: Machine) -> None:
         subprocess.Popen([*PREFLIGHT, *machine.arguments, *more], stdout=subprocess.DEVNULL)
         for more in ((), ("--late",))
     ]
-    assert [process.wait() for process in both] == [0, 0]
+    try:
+        assert [process.wait(PATIENCE_S) for process in both] == [0, 0]
+    finally:
+        for process in both:
+            process.kill()
+            process.wait()
     assert machine.preflight().returncode == 0
     assert machine.dances == "Spring"
     assert not [path for path in machine.data.rglob("*") if ".part" in path.name]

@@ -19,6 +19,7 @@ from appliance.show.choice import CHOSEN, Choice, Pair, alone_in
 from tests.control.doubles import facts
 from tests.stage.bundles import FIGURE, write_show
 
+PATIENCE_S = 60.0
 NEW, BEFORE = "new+", "before+"
 
 
@@ -225,8 +226,8 @@ def test_a_broken_chosen_show_gives_way_on_the_real_stage(evening: Evening, tmp_
     play = [sys.executable, "-m", "appliance.start", "play", "--alone", "--seconds", "0.3"]
     play += ["--chosen", str(evening.run / CHOSEN)]
     for _ in range(3):
-        assert subprocess.run(play, capture_output=True, check=False).returncode == 2
-    done = subprocess.run(play, capture_output=True, text=True, check=False)
+        assert subprocess.run(play, capture_output=True, check=False, timeout=PATIENCE_S).returncode == 2
+    done = subprocess.run(play, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "is put aside" in done.stdout
     assert "A test" in done.stdout

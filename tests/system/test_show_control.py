@@ -393,7 +393,8 @@ def test_a_socket_that_systemd_has_opened_is_taken(tmp_path: Path) -> None:
 def test_a_descriptor_that_is_no_port_is_refused(tmp_path: Path) -> None:
     (tmp_path / "box.yaml").write_text("runtime: runtime\n")
     command = [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")]
-    done = subprocess.run([*command, "--socket-fd", "77"], capture_output=True, text=True, check=False)
+    no_socket = [*command, "--socket-fd", "77"]
+    done = subprocess.run(no_socket, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
     assert done.returncode == 2
     assert "is no open socket" in done.stderr
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as stream:
@@ -402,6 +403,7 @@ def test_a_descriptor_that_is_no_port_is_refused(tmp_path: Path) -> None:
             capture_output=True,
             text=True,
             check=False,
+            timeout=PATIENCE_S,
             pass_fds=[stream.fileno()],
         )
     assert "is not UDP over IPv4" in done.stderr
@@ -426,6 +428,7 @@ def test_what_is_wrong_with_its_settings_is_one_clear_line(
         capture_output=True,
         text=True,
         check=False,
+        timeout=PATIENCE_S,
     )
     assert done.returncode == status
     assert complaint in done.stderr
