@@ -15,6 +15,7 @@ from rich.live import Live
 from rich.text import Text
 
 from appliance.commands.asking import NoBoxError, Roll, RunningBox
+from appliance.commands.doctor.patient import living_stage
 from appliance.commands.sensor_table import SensorTable, known_table, plain_values, unheard
 from appliance.control.this_box import box_here
 from appliance.sensor.key_editing import KeyEditing, editing
@@ -25,6 +26,8 @@ from appliance.stage.stage_error import StageError
 DEFAULT_KEYS = Path("sensors.keys")
 NOT_TAKEN = 1
 _OLD_ROLL_S = 3.0
+_RESTART_S = 3.0  # show control that died is back within 1 s, on a machine that is busy
+_AGAIN_S = 0.1
 _PIPE_WIDTH = 160
 
 
@@ -138,16 +141,34 @@ def read_again(place: Venue) -> int:
 
 
 def reload(place: Venue) -> tuple[bool, str]:
-    """Have the running box read the key file again: whether it is as it should be, and a sentence."""
-    try:
-        roll = place.running.roll()
-        if roll.key_file is not None and roll.key_file.resolve() != place.keys.resolve():
-            return False, f"{_other_file(roll.key_file)} and knows nothing of this change. {_THAT_BOX}"
-        answer = place.running.ask("/sensors/reload")
-    except NoBoxError as error:
-        if not place.running.has_port:
-            return True, "The box has no control port to be told by: the change counts when it starts again."
-        return True, f"{error} The change counts when it starts."
+    """Have the running box read the key file again: whether it is as it should be, and a sentence.
+
+    Where a stage lives, silence is no answer: show control may be on its way back, and is asked again.
+    """
+    until = time.monotonic() + _RESTART_S
+    while True:
+        try:
+            return _told_to_reload(place)
+        except NoBoxError as error:
+            if not place.running.has_port:
+                words = "The box has no control port to be told by: the change counts when it starts again."
+                return True, words
+            if living_stage(place.box) is None:
+                return True, f"{error} The change counts when it starts."
+        if time.monotonic() >= until:
+            return (
+                False,
+                "A box dances here, but its show control did not answer. Run: bunraku sensors reload.",
+            )
+        time.sleep(_AGAIN_S)
+
+
+def _told_to_reload(place: Venue) -> tuple[bool, str]:
+    """What `reload` gives when a box answers; raises NoBoxError when none does."""
+    roll = place.running.roll()
+    if roll.key_file is not None and roll.key_file.resolve() != place.keys.resolve():
+        return False, f"{_other_file(roll.key_file)} and knows nothing of this change. {_THAT_BOX}"
+    answer = place.running.ask("/sensors/reload")
     return answer.done, f"The running box {'took it' if answer.done else 'did not take it'}. {answer.words}"
 
 

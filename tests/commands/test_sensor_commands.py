@@ -21,6 +21,8 @@ import yaml
 from rich.console import Console
 
 from appliance.cli import main
+from appliance.commands import sensors
+from appliance.commands.asking import NoBoxError, Roll
 from appliance.commands.asking import RunningBox as AskedBox
 from appliance.commands.sensor_table import SensorTable
 from appliance.control.orders import Order
@@ -55,6 +57,7 @@ class RunningBox:
         self.control = ControlInThread(runtime, key_file or folder / "sensors.keys")
         self.box_file = folder / "box.yaml"
         settings = {
+            "runtime": str(runtime),
             "sensors": {"keys": "sensors.keys"},
             "control": {"host": "0.0.0.0", "port": self.control.port, "senders": ["10.0.0.1"]},
         }
@@ -236,6 +239,65 @@ def test_a_box_that_does_not_take_it_costs_the_exit_status(
     with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
         assert "head is revoked" in out
         assert "did not take it. reload it is." in out
+
+
+class Clock:
+    """Time that passes only while somebody waits."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.mark.parametrize("silent", [1, 20])
+def test_show_control_that_is_on_its_way_back_is_asked_again(
+    box: RunningBox, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], silent: int
+) -> None:
+    asked, roll = [0], AskedBox.roll
+
+    def silent_first(running: AskedBox) -> Roll:
+        asked[0] += 1
+        if asked[0] <= silent:
+            raise NoBoxError("No box answers.")
+        return roll(running)
+
+    monkeypatch.setattr(AskedBox, "roll", silent_first)
+    monkeypatch.setattr(sensors, "time", Clock())
+    with ends(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert "The running box took it." in out
+    assert [order.name for order in box.obeyed] == ["reload"]
+
+
+def test_a_stage_that_dances_without_show_control_has_not_taken_it(
+    box: RunningBox, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = Clock()
+    monkeypatch.setattr(AskedBox, "_replies", lambda *_: (one for one in ()))
+    monkeypatch.setattr(sensors, "time", clock)
+    with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert "head is revoked" in out
+        assert "A box dances here, but its show control did not answer." in out
+    assert clock.now > 102.0
+    assert box.obeyed == []
+
+
+def test_where_no_stage_lives_nobody_waits_for_show_control(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = Clock()
+    monkeypatch.setattr(sensors, "time", clock)
+    create_keys(tmp_path / "sensors.keys", ["head"])
+    box_file = tmp_path / "box.yaml"
+    settings = {"runtime": str(tmp_path / "none"), "sensors": {"keys": "sensors.keys"}}
+    box_file.write_text(yaml.safe_dump({**settings, "control": {"port": 1}}))
+    with ends(capsys, 0, "revoke", "head", "--box", str(box_file)) as (out, _):
+        assert "No box answers on 127.0.0.1:1. The change counts when it starts." in out
+    assert clock.now == 100.0
 
 
 def test_a_box_with_another_key_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
