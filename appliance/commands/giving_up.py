@@ -23,6 +23,8 @@ def within(seconds: float, do: Callable[[], bytes]) -> bytes:
     child = os.fork()
     if child == 0:
         _answer(writing, do)
+    with contextlib.suppress(OSError):
+        os.setpgid(child, child)  # as it does itself, but perhaps not before its time is up
     os.close(writing)
     how = os.WNOHANG
     try:
