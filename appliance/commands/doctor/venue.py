@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -50,14 +51,18 @@ def _holders(patient: Patient, port: int) -> list[tuple[str, str]]:
     inodes = {f"socket:[{row[9]}]" for row in rows if len(row) > 9 and row[1].endswith(f":{port:04X}")}
     found = []
     for folder in patient.found("/proc/[0-9]*") if inodes else []:
-        try:
-            links = {str(Path(entry.path).readlink()) for entry in os.scandir(patient.at(folder / "fd"))}
-        except OSError:
-            continue
-        if links & inodes:
+        if inodes & set(_links(patient.at(folder / "fd"))):
             command = (patient.text(folder / "cmdline") or "").replace("\0", " ")
             found.append((f"{patient.text(folder / 'comm')} (process {folder.name})", command))
     return found or [("another user's program", "")] * bool(inodes)
+
+
+def _links(folder: Path) -> Iterator[str]:
+    """What the links in a folder lead to, without those that are gone when they are read."""
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(folder):
+            with contextlib.suppress(OSError):
+                yield str(Path(entry.path).readlink())
 
 
 def network(patient: Patient) -> Iterator[Finding]:
