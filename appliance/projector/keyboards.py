@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import math
 import os
 import struct
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +29,8 @@ _NAMES = (
     | {2: "1", 3: "2", 4: "3", 5: "4", 12: "-", 13: "=", 74: "Keypad -", 78: "Keypad +"}
     | {16: "Q", 19: "R", 23: "I", 33: "F", 34: "G", 35: "H", 46: "C", 50: "M"}
 )
+_REFUSED_S = 0.5  # udev opens a new device to its users some time after the kernel has made it
+_SETTLED_S = 1.0  # after a change once more: a folder's time stamp is as coarse as the kernel's tick
 _MOST_EVENTS = 64  # at once, from one keyboard
 
 
@@ -44,10 +48,11 @@ class Keyboards:
     is_refused: whether there are devices, none of which this user may read.
     """
 
-    def __init__(self, devices: Path = DEVICES) -> None:
-        self._devices = devices
+    def __init__(self, devices: Path = DEVICES, *, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._devices, self._now = devices, monotonic
         self._open: dict[Path, int] = {}
         self._changed: int | None = None
+        self._settled_at = self._again_at = math.inf  # when to look although nothing changed
         self._shifts: set[tuple[int, int]] = set()
         self.is_refused = False
         self._look()
@@ -83,14 +88,18 @@ class Keyboards:
             yield Key(_NAMES[code], bool(self._shifts))
 
     def _look(self) -> None:
-        """Open what was plugged in since the folder last changed."""
+        """Open what was plugged in since the folder last changed, and what was refused so far."""
+        now = self._now()
         try:
             changed = self._devices.stat().st_mtime_ns
         except OSError:
             return
-        if changed == self._changed:
+        if changed != self._changed:
+            self._changed, self._settled_at = changed, now + _SETTLED_S
+        elif now < self._again_at:
             return
-        self._changed = changed
+        if now >= self._settled_at:
+            self._settled_at = math.inf
         refused = 0
         for path in self._devices.glob("event*"):
             if path not in self._open:
@@ -103,6 +112,7 @@ class Keyboards:
                     self._open[path] = descriptor
                 else:
                     os.close(descriptor)
+        self._again_at = min(self._settled_at, now + _REFUSED_S if refused else math.inf)
         self.is_refused = refused > 0 and not self._open
 
     def _forget(self, path: Path) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import struct
-import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -49,8 +49,34 @@ def devices(tmp_path: Path) -> Iterator[Path]:
 
 
 def plugged(folder: Path, name: str = "event0") -> Device:
-    time.sleep(0.01)  # a folder's time stamp is as fine as the kernel's tick
-    return Device(folder / name)
+    """A device that was not there before; the folder's time tells, however coarse it is."""
+    before, device = folder.stat().st_mtime_ns, Device(folder / name)
+    os.utime(folder, ns=(before, before + 1_000_000))
+    return device
+
+
+class Clock:
+    """Time that passes as a test wishes."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class Refusals:
+    """The kernel's door: shut, as before udev has seen a new device."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.is_shut, self.tries, self._open = True, 0, os.open
+        monkeypatch.setattr(os, "open", self)
+
+    def __call__(self, *arguments: Any) -> int:
+        self.tries += 1
+        if self.is_shut:
+            raise PermissionError
+        return self._open(*arguments)
 
 
 def test_keys_with_shift_and_repeats(devices: Path) -> None:
@@ -93,6 +119,41 @@ def test_devices_that_may_not_be_read(devices: Path, monkeypatch: pytest.MonkeyP
         patched.setattr(os, "open", refused)
         keyboards = Keyboards(devices)
     assert keyboards.is_refused
+
+
+def test_a_device_that_is_opened_to_this_user_a_little_later(
+    devices: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel makes it for root alone; udev's next touch does not change the folder."""
+    clock = Clock()
+    keyboards = Keyboards(devices, monotonic=clock)
+    device = plugged(devices)
+    door = Refusals(monkeypatch)
+    for _ in range(60):
+        assert list(keyboards.pressed()) == []
+        clock.now += 0.1
+    assert 8 <= door.tries <= 16
+    door.is_shut = False
+    clock.now += 0.5
+    list(keyboards.pressed())
+    device.write((C, 1))
+    assert list(keyboards.pressed()) == [Key("C")]
+    keyboards.close()
+
+
+def test_a_second_device_within_the_same_tick_of_the_kernel(devices: Path) -> None:
+    clock = Clock()
+    keyboards = Keyboards(devices, monotonic=clock)
+    plugged(devices, "event0")
+    list(keyboards.pressed())
+    tick = devices.stat().st_mtime_ns
+    second = Device(devices / "event1")
+    os.utime(devices, ns=(tick, tick))
+    clock.now += 1.0
+    list(keyboards.pressed())
+    second.write((C, 1))
+    assert list(keyboards.pressed()) == [Key("C")]
+    keyboards.close()
 
 
 def test_a_pipe_is_no_keyboard(devices: Path, monkeypatch: pytest.MonkeyPatch) -> None:
