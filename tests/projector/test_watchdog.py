@@ -23,13 +23,14 @@ from appliance.projector.run import Run, Wish
 from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
 
-watchdog.PATIENCE_S, watchdog._LOOK_S = 0.6, 0.1
+watchdog._LOOK_S = 0.1
 shown, show = [], Window.show
 
 def hang(window):
     shown.append(show(window))
     if len(shown) > 3:
         print("hangs", flush=True)
+        watchdog.PATIENCE_S = 0.6
         while True:
             ctypes.CDLL(None).pause()
 
@@ -75,16 +76,30 @@ def test_a_process_that_was_stopped_blames_no_display() -> None:
 
 def test_the_guard_gives_up_once_and_ends_with_what_it_guards(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watchdog, "_LOOK_S", 0.01)
-    clock, gave_up = [100.0], threading.Event()
+    seen, gave_up = [0.0], threading.Event()
+    now, is_well = 100.0, []
+
+    def clock() -> float:
+        seen.append(now)
+        return now
+
+    def await_looks() -> None:
+        """Until the guard has looked twice at this time: it takes a clock that leaps for a standstill."""
+        until = time.monotonic() + 20.0
+        while seen.count(now) < 2:
+            assert time.monotonic() < until
+            time.sleep(0.002)
+
     patience = Patience()
     patience.swapped(100.0)
-    with guarded(patience, lambda: False, gave_up.set, lambda: clock[0]):
-        time.sleep(0.1)
+    with guarded(patience, lambda: False, gave_up.set, clock, is_well.append):
+        await_looks()
+        for now in (101.5, 103.0, 104.5):  # noqa: B007
+            await_looks()
         assert not gave_up.is_set()
-        for _ in range(4):
-            clock[0] += 1.5
-            time.sleep(0.05)
-        assert gave_up.wait(5.0)
+        now = 106.0
+        assert gave_up.wait(20.0)
+    assert is_well[-1] == 104.5
     assert "watchdog" not in [thread.name for thread in threading.enumerate()]
 
 

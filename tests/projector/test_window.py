@@ -207,12 +207,12 @@ def test_smaller_pictures_are_said_once_and_told_by_the_figures(
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
     said: list[str] = []
     shares: list[float] = []
-    run = Run(box, None, Wish("offscreen", (64, 36), seconds=1.5, shows_info=True), said.append)
+    run = Run(box, None, Wish("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
     monkeypatch.setattr(Resolution, "share", property(lambda _: 0.5))
     monkeypatch.setattr(Resolution, "drawn", lambda *_: True)
     monkeypatch.setattr(run._projector, "draw", lambda *arguments: shares.append(arguments[-1]))
     try:
-        run.project(lambda: False)
+        run.project(lambda: any("64x36 at 50%" in line for line in said))
     finally:
         run.close()
     (sentence,) = (line for line in said if "sees the dance in 32x18" in line)
