@@ -7,6 +7,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from hw_sim.osc_receiver import OscReceiver, Received
 from tests.outputs.conftest import fill
 
 LOOPBACK = "127.0.0.1"
+PATIENCE_S = 30.0
 
 
 @pytest.fixture
@@ -172,6 +174,7 @@ with OscReceiver("127.0.0.1") as peer:
     for _ in range(400):
         outputs.send(frame)
         arrived += len(peer.poll())
+    arrived += len(peer.poll(0.2))
     print(arrived, outputs.receivers[-1].dropped)
     shared = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     shared.setblocking(False)
@@ -224,12 +227,17 @@ def oscdump() -> Iterator[tuple[int, subprocess.Popen[str]]]:
         pytest.fail("the program 'oscdump' is missing: install the Debian package liblo-tools")
     port = free_port()
     process = subprocess.Popen([program, "-L", str(port)], stdout=subprocess.PIPE, text=True)
-    while not listens(port):
-        assert process.poll() is None, "oscdump ended by itself"
-        os.sched_yield()
-    yield port, process
-    process.terminate()
-    process.communicate()
+    gives_up = threading.Timer(PATIENCE_S, process.kill)  # so that no reading of its lines lasts for ever
+    gives_up.start()
+    try:
+        while not listens(port):
+            assert process.poll() is None, "oscdump ended, or does not listen"
+            os.sched_yield()
+        yield port, process
+    finally:
+        gives_up.cancel()
+        process.kill()
+        process.communicate()
 
 
 def listens(port: int) -> bool:
@@ -260,7 +268,9 @@ def test_oscdump_reads_every_message(
             twin.send(frame)
             expected += ours.poll(timeout=5.0)
             while len(dumped) < len(expected):
-                dumped.append(process.stdout.readline().split()[1:])
+                line = process.stdout.readline()
+                assert line, "oscdump hears too little"
+                dumped.append(line.split()[1:])
         twin.close()
     outputs.close()
     assert outputs.receivers[0].dropped == 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -98,11 +97,12 @@ def test_a_place_is_taken_once_until_it_is_given_back(tmp_path: Path) -> None:
 def test_a_process_that_is_killed_gives_its_place_back(tmp_path: Path) -> None:
     command = [sys.executable, "-c", HOLDS, str(tmp_path)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
-        assert holder.stdout is not None and holder.stdout.readline() == "held\n"
-        with pytest.raises(AlreadyHereError):
-            Claim(tmp_path, "stage")
-        holder.send_signal(signal.SIGKILL)
-        holder.wait()
+        try:
+            assert holder.stdout is not None and holder.stdout.readline() == "held\n"
+            with pytest.raises(AlreadyHereError):
+                Claim(tmp_path, "stage")
+        finally:
+            holder.kill()
     Claim(tmp_path, "stage").close()
 
 

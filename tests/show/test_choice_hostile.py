@@ -184,6 +184,7 @@ def test_a_reader_that_hangs_holds_up_nobody_once_its_preflight_has_given_up(tmp
     with alone_in(tmp_path):
         child = os.fork()
         if child == 0:
+            os.close(writing)
             os.read(reading, 1)  # as on a stick that does not answer
             os._exit(0)
         with pytest.raises(BlockingIOError), alone_in(tmp_path):
