@@ -12,10 +12,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorLink, SensorReading, open_link
 from appliance.sensor.ways.udp import UdpIntake
+from hw_sim.__main__ import main
 from tests.hw_sim.null_modem import NullModem
 
 pytestmark = pytest.mark.realtime
@@ -23,9 +25,25 @@ pytestmark = pytest.mark.realtime
 PATIENCE_S = 30.0
 
 
-def emulate(*options: object, **process: object) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "hw_sim", "emulate", *map(str, options)]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **process)  # type: ignore[call-overload,no-any-return]
+Emulate = Callable[..., subprocess.Popen[str]]
+
+
+@pytest.fixture
+def emulate() -> Iterator[Emulate]:
+    """Starts it with these options; it does not outlive the test."""
+    started: list[subprocess.Popen[str]] = []
+
+    def start(*options: object) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", "hw_sim", "emulate", *map(str, options)]
+        started.append(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+        if process.stderr is not None:
+            process.stderr.close()
 
 
 @pytest.fixture
@@ -65,18 +83,25 @@ def hear_until(link: SensorLink, is_enough: Callable[[list[SensorReading]], bool
     return readings
 
 
-def test_the_box_hears_what_the_log_says_was_sent(link: SensorLink, keys_path: Path, tmp_path: Path) -> None:
+def test_the_box_hears_what_the_log_says_was_sent(
+    emulate: Emulate, link: SensorLink, keys_path: Path, tmp_path: Path
+) -> None:
     log = tmp_path / "sent.csv"
     process = emulate(
-        "--keys", keys_path, "--port", port_of(link), "--seconds", 2.2, "--log", log, "--stand-still", 0,
+        "--keys", keys_path, "--port", port_of(link), "--log", log, "--stand-still", 0,
         "--sensor", "left-wrist=dance", "--sensor", "head=still",
     )  # fmt: skip
-    readings = hear_until(link, lambda _: process.poll() is not None) + tick(link)
+    readings = hear_until(
+        link, lambda heard: len(heard) > 100 and len({reading.sensor for reading in heard}) == 2
+    )
+    process.terminate()
+    readings += hear_until(link, lambda _: process.poll() is not None)
+    while last := tick(link):
+        readings += last
     assert process.returncode == 0
     assert {reading.sensor for reading in readings} == {"left-wrist", "head"}
     with log.open() as file:
         sent = {(row["sensor"], int(row["sequence"])): row for row in csv.DictReader(file)}
-    assert len(sent) > 100
     for reading in readings:
         row = sent[reading.sensor, reading.sequence]
         assert reading.arrival >= float(row["sent_s"]) - 0.001
@@ -84,11 +109,14 @@ def test_the_box_hears_what_the_log_says_was_sent(link: SensorLink, keys_path: P
         alike = sum(a * float(row[name]) for a, name in zip(reading.orientation, "wzxy", strict=True))
         assert abs(alike) > 0.9999
     counts = {reason: count for reason, count in link.counts.items() if count}
-    assert counts.pop("accepted") == len(sent)
-    assert set(counts) <= {"lost", "hello"}
+    # A reader that stood still may take the later of two sockets first, and more at once than one drain does.
+    assert counts.pop("accepted") + counts.pop("reordered", 0) == len(sent)
+    assert set(counts) <= {"lost", "hello", "drain_limit"}
 
 
-def test_each_sensor_speaks_from_an_address_of_its_own(link: SensorLink, keys_path: Path) -> None:
+def test_each_sensor_speaks_from_an_address_of_its_own(
+    emulate: Emulate, link: SensorLink, keys_path: Path
+) -> None:
     process = emulate("--keys", keys_path, "--port", port_of(link))
     hear_until(link, lambda readings: len({reading.sensor for reading in readings}) == 2)
     ways = [state.way for state in link.states(time.monotonic())]
@@ -98,7 +126,9 @@ def test_each_sensor_speaks_from_an_address_of_its_own(link: SensorLink, keys_pa
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_ends_it_cleanly(link: SensorLink, keys_path: Path, number: signal.Signals) -> None:
+def test_a_signal_ends_it_cleanly(
+    emulate: Emulate, link: SensorLink, keys_path: Path, number: signal.Signals
+) -> None:
     process = emulate("--keys", keys_path, "--port", port_of(link))
     hear_until(link, bool)
     process.send_signal(number)
@@ -108,7 +138,9 @@ def test_a_signal_ends_it_cleanly(link: SensorLink, keys_path: Path, number: sig
     assert "Traceback" not in said
 
 
-def test_over_a_cable_that_is_pulled_out_and_plugged_in_again(keys_path: Path, tmp_path: Path) -> None:
+def test_over_a_cable_that_is_pulled_out_and_plugged_in_again(
+    emulate: Emulate, keys_path: Path, tmp_path: Path
+) -> None:
     with NullModem(tmp_path) as cable:
         link = open_link(load_keys(keys_path), serial=[(str(cable.far), 115200)])
         process = emulate(
@@ -126,7 +158,7 @@ def test_over_a_cable_that_is_pulled_out_and_plugged_in_again(keys_path: Path, t
         link.close()
 
 
-def test_the_first_run_writes_a_key_file_for_its_owner_alone(tmp_path: Path) -> None:
+def test_the_first_run_writes_a_key_file_for_its_owner_alone(emulate: Emulate, tmp_path: Path) -> None:
     path = tmp_path / "new.keys"
     process = emulate("--keys", path, "--count", 3, "--seconds", 0.1, "--port", 9)
     _, said = process.communicate(timeout=30)
@@ -140,7 +172,6 @@ def test_the_first_run_writes_a_key_file_for_its_owner_alone(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--sensor", "left-wirst"], "Did you mean 'left-wrist'?"),
         (["--sensor", "head=waltz"], "there are: turning, dance, still, step, trace"),
         (["--sensor", "head", "--sensor", "head"], "different sensors"),
         (["--sensor", "head", "--count", "1"], "either --sensor or --count"),
@@ -158,14 +189,22 @@ def test_the_first_run_writes_a_key_file_for_its_owner_alone(tmp_path: Path) -> 
 def test_a_wish_that_cannot_be_met_is_one_clear_line(
     keys_path: Path, options: list[str], message: str
 ) -> None:
-    process = emulate("--keys", keys_path, "--seconds", 0, *options)
+    arguments = ["emulate", "--keys", str(keys_path), "--seconds", "0", *options]
+    done = CliRunner().invoke(main, arguments)
+    assert done.exit_code == 2
+    assert message in done.stderr
+    assert len(done.output.strip().splitlines()) == 1
+
+
+def test_so_it_is_for_who_runs_it_as_a_process(emulate: Emulate, keys_path: Path) -> None:
+    process = emulate("--keys", keys_path, "--seconds", 0, "--sensor", "left-wirst")
     _, said = process.communicate(timeout=30)
     assert process.returncode == 2
-    assert message in said
+    assert "Did you mean 'left-wrist'?" in said
     assert len(said.strip().splitlines()) == 1
 
 
-def test_no_box_and_no_cable_are_no_reason_to_end(keys_path: Path, tmp_path: Path) -> None:
+def test_no_box_and_no_cable_are_no_reason_to_end(emulate: Emulate, keys_path: Path, tmp_path: Path) -> None:
     process = emulate(
         "--keys", keys_path, "--serial", tmp_path / "absent", "--sensor", "head", "--seconds", 0.3
     )
