@@ -83,9 +83,18 @@ class Box:
             self.process = started(self.command, words)
 
     def end(self, number: int = signal.SIGTERM) -> int:
-        """Send a signal and give the exit status."""
+        """Send a signal and give the exit status.
+
+        Show control of a killed box ends by itself: while it holds the port, the next box would be refused.
+        """
+        companions = [pid for pid in children(self.process.pid) if _says(pid, "appliance.control")]
         self.process.send_signal(number)
-        return self.process.wait(PATIENCE_S)
+        status = self.process.wait(PATIENCE_S)
+        until = time.monotonic() + PATIENCE_S
+        while any(_says(pid, "appliance.control") for pid in companions):
+            assert time.monotonic() < until, self.words
+            time.sleep(0.005)
+        return status
 
 
 @contextlib.contextmanager
@@ -131,6 +140,23 @@ def started(command: Sequence[str], words: IO[bytes] | int) -> subprocess.Popen[
         stderr=subprocess.STDOUT,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
+
+
+def children(pid: int) -> list[int]:
+    """The processes that this one has started and that live."""
+    found: list[int] = []
+    for task in Path(f"/proc/{pid}/task").glob("*/children"):
+        with contextlib.suppress(OSError):  # a thread that has ended meanwhile
+            found += map(int, task.read_text().split())
+    return found
+
+
+def _says(pid: int, word: str) -> bool:
+    """Whether its command line has this word; one that has ended has none."""
+    try:
+        return word.encode() in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+    except OSError:
+        return False
 
 
 def is_free(port: int) -> bool:

@@ -12,7 +12,7 @@ import pytest
 from appliance.commands.firewall import rules
 from appliance.show.box import load_box
 from tests.stage.bundles import write_show
-from tests.system.box import playing
+from tests.system.box import children, playing
 
 LISTED = re.compile(r"^UNCONN\s+\d+\s+\d+\s+(\S+?)(?:%\w+)?:(\d+)\s", re.MULTILINE)
 
@@ -93,8 +93,7 @@ def test_what_the_rules_let_in_is_what_a_running_box_listens_to(tmp_path: Path) 
 
 def listened_to(pid: int) -> set[int]:
     """UDP ports of a box and its companions that are open to more than this machine."""
-    children = Path(f"/proc/{pid}/task").glob("*/children")
-    pids = {pid, *(int(one) for file in children for one in file.read_text().split())}
+    pids = {pid, *children(pid)}
     ports = set()
     listed = subprocess.run(["ss", "-lunpH"], capture_output=True, text=True, check=True).stdout
     for line in listed.splitlines():

@@ -17,7 +17,7 @@ from pythonosc.udp_client import SimpleUDPClient
 from hw_sim.dmx.usb_pro import UsbProWidget
 from hw_sim.peers import HOST
 from tests.stage.bundles import write_show
-from tests.system.box import PATIENCE_S, PLAY, playing
+from tests.system.box import PATIENCE_S, PLAY, children, playing
 from tests.system.lit import DIMMER, PAN, PAR, RIG, SAFE, LightsProcess, node
 
 pytestmark = pytest.mark.realtime
@@ -160,11 +160,9 @@ def test_killed_lights_are_started_again_by_the_box(tmp_path: Path) -> None:
     show = show_with(tmp_path, DARK)
     with node() as (lamp, port), playing(show, tmp_path, settings=artnet(port, 1, 2)) as box:
         lamp.await_dance()
-        children = Path(f"/proc/{box.process.pid}/task")
         running = [
-            int(child)
-            for task in children.iterdir()
-            for child in (task / "children").read_text().split()
+            child
+            for child in children(box.process.pid)
             if b"lights" in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
         ]
         assert len(running) == 1

@@ -216,7 +216,10 @@ def await_journal(path: Path, tick: int) -> np.ndarray:
     return read_journal(path).ticks
 
 
-def test_emulated_sensors_come_and_go_with_the_run(show: Path, tmp_path: Path) -> None:
+def test_emulated_sensors_come_and_go_with_the_run(
+    show: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))  # its folder stays behind if it has to be killed
     picture = tmp_path / "dance.png"
     with playing(show, tmp_path, "--emulate", "--filmstrip", str(picture)) as box:
         box.frame_that(lambda frame: frame[2] > 5)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from appliance.dancer.puppeteers import HOLD_S, TAKE_S
 from appliance.stage.journal.reading import read_journal
 from hw_sim.emulator import Sent
 from tests.hw_sim.null_modem import NullModem
@@ -38,6 +39,24 @@ def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def reading(above: int = -1) -> Callable[[list[Any]], bool]:
     """A frame that carries a reading with a higher number than this."""
     return lambda frame: frame[2] > above
+
+
+def await_fluent(box: Box, count: int) -> None:
+    """Until so many frames in a row have come of which each fifth at least carries another reading."""
+    row, same, newest = 0, 0, -1
+    until = time.monotonic() + PATIENCE_S
+    while row < count:
+        assert time.monotonic() < until, box.words
+        for frame in box.frames(1):
+            same, newest = (same + 1 if frame[2] == newest else 0), frame[2]
+            row = row + 1 if same < 4 else 0
+
+
+def since_a_pause_s(ticks: np.ndarray) -> np.ndarray:
+    """For each tick, how long no readings have been missing: no pause that lets go of a joint."""
+    arrivals, started = ticks["sensor_arrival"], ticks["started"]
+    ended = np.append(started[0], np.where(np.diff(arrivals) > HOLD_S, started[1:], started[0]))
+    return np.asarray(started - np.maximum.accumulate(ended))
 
 
 def listed(box: Box, is_enough: Callable[[list[dict[str, Any]]], bool]) -> list[dict[str, Any]]:
@@ -68,15 +87,18 @@ def test_switched_on_it_is_used_and_standing_still_gives_the_neutral_pose(show: 
             still_until = box.frame_that(reading(still_from + 30))[2]
             wearables.dance()
             box.frame_that(reading(still_until + 150))
+            await_fluent(box, 80)
             assert box.end() == 0
     ticks = read_journal(tmp_path / "run.journal").ticks
     standing = ticks[(ticks["sensor_sequence"] >= still_from) & (ticks["sensor_sequence"] <= still_until)]
     assert np.abs(standing["pose"][:, SHOULDER, 0]).min() > 0.999
     # What the hand does against its neutral pose is what the joint does, about the same axes.
-    dancing = ticks[ticks["sensor_sequence"] > still_until + 70]
+    dancing = ticks[ticks["sensor_sequence"] > still_until + 50]
     hands = np.array([sent[int(number)].sample.orientation for number in dancing["sensor_sequence"]])
     assert np.abs(hands[:, 0]).min() < 0.95
-    assert np.median(np.abs((dancing["targets"][:, 0] * hands).sum(1))) > 0.9995
+    fluent = since_a_pause_s(dancing) > TAKE_S + 0.1  # after one it is led over
+    assert fluent.sum() > 20
+    assert np.median(np.abs((dancing["targets"][:, 0] * hands).sum(1)[fluent])) > 0.9995
 
 
 def test_killed_and_started_anew_it_uses_the_readings_and_the_neutral_pose_again(

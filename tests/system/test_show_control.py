@@ -223,8 +223,7 @@ def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(
         box.frames(20)
         if command is PLAY:
             hangs(box)
-        else:
-            await_status(asker, state="hung")
+        until(lambda: "State:\tT" in Path(f"/proc/{box.process.pid}/status").read_text())
         assert asker.ask("/panic")[2] == 1
         assert house(tmp_path).panic
         await_status(asker, state="hung")
@@ -246,6 +245,7 @@ def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(
 def test_panic_works_while_the_stage_spins(show: Path, tmp_path: Path) -> None:
     settings = {"realtime": {"enabled": False}}  # it would take a whole core of the tests' machine
     with playing(show, tmp_path, command=SPINNING, settings=settings) as box, asking(box) as asker:
+        box.frame_that(lambda frame: frame[0] >= 100)
         await_status(asker, state="hung")
         assert asker.ask("/panic")[2] == 1
         assert house(tmp_path).panic

@@ -20,6 +20,7 @@ from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports
 from hw_sim.posistagenet import PsnReceiver
 from tests.system import namespace, olad
+from tests.system.box import children
 from tests.system.namespace import Namespace
 from tests.system.olad import Olad
 
@@ -58,7 +59,7 @@ class Venue:
     def pids(self) -> dict[str, int]:
         """All processes by name, the stage's companions among them."""
         found = {name: process.pid for name, process in self.processes.items()}
-        for pid in _children(found["stage"]):
+        for pid in children(found["stage"]):
             words = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b".", b"\0").split(b"\0")
             found |= {name: pid for name in ("control", "lights") if name.encode() in words}
         return found
@@ -196,10 +197,3 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
         process.wait()
     if process.stdout is not None:
         process.stdout.close()
-
-
-def _children(pid: int) -> list[int]:
-    found = []
-    for tasks in Path(f"/proc/{pid}/task").glob("*/children"):
-        found += [int(child) for child in tasks.read_text().split()]
-    return found
