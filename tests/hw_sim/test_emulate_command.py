@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import signal
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,32 +16,12 @@ from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorLink, SensorReading, open_link
 from appliance.sensor.ways.udp import UdpIntake
 from hw_sim.__main__ import main
+from tests.hw_sim.conftest import Emulate
 from tests.hw_sim.null_modem import NullModem
 
 pytestmark = pytest.mark.realtime
 
 PATIENCE_S = 30.0
-
-
-Emulate = Callable[..., subprocess.Popen[str]]
-
-
-@pytest.fixture
-def emulate() -> Iterator[Emulate]:
-    """Starts it with these options; it does not outlive the test."""
-    started: list[subprocess.Popen[str]] = []
-
-    def start(*options: object) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "hw_sim", "emulate", *map(str, options)]
-        started.append(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
-        return started[-1]
-
-    yield start
-    for process in started:
-        process.kill()
-        process.wait()
-        if process.stderr is not None:
-            process.stderr.close()
 
 
 @pytest.fixture

@@ -20,9 +20,10 @@ from hw_sim.firmware import BOX, NETWORK, PASSWORD, FirmwareSensor, ask, provisi
 from hw_sim.firmware_library import CompiledWearable, FirmwareMissingError, State, load_library
 from hw_sim.network import VENUE, VenueNetwork
 from hw_sim.wearer import Wearer
+from tests.hw_sim.conftest import Emulate
 from tests.hw_sim.joined import Show
 from tests.hw_sim.null_modem import NullModem
-from tests.hw_sim.test_emulate_command import emulate, hear_until, port_of
+from tests.hw_sim.test_emulate_command import hear_until, port_of
 
 KEY = SensorKey("left-wrist", 0x0A0B0C0D, bytes(range(16)))
 SECOND_US = 1_000_000
@@ -265,7 +266,7 @@ def test_hellos_go_to_all_each_half_second_until_a_box_answers(wearable: Compile
 
 
 @pytest.mark.realtime
-def test_as_processes_over_real_sockets(tmp_path: Path) -> None:
+def test_as_processes_over_real_sockets(emulate: Emulate, tmp_path: Path) -> None:
     path = tmp_path / "sensors.keys"
     create_keys(path, ["left-wrist", "head"])
     link = open_link(load_keys(path), udp=("127.0.0.1", 0))
@@ -278,7 +279,7 @@ def test_as_processes_over_real_sockets(tmp_path: Path) -> None:
 
 
 @pytest.mark.realtime
-def test_as_a_process_over_a_real_tty(tmp_path: Path) -> None:
+def test_as_a_process_over_a_real_tty(emulate: Emulate, tmp_path: Path) -> None:
     path = tmp_path / "sensors.keys"
     create_keys(path, ["head"])
     with NullModem(tmp_path) as cable:
