@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import signal
 import socket
@@ -140,6 +141,18 @@ def started(command: Sequence[str], words: IO[bytes] | int) -> subprocess.Popen[
         stderr=subprocess.STDOUT,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
+
+
+def await_end_of_keeper(runtime: Path) -> None:
+    """It ends with its box and lets go of its lock; a power cut would have taken it in the same moment."""
+    until = time.monotonic() + PATIENCE_S
+    with (runtime / "keeper.lock").open() as lock:
+        while True:
+            with contextlib.suppress(BlockingIOError):
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return
+            assert time.monotonic() < until, "the keeper outlives its box"
+            time.sleep(0.02)
 
 
 def children(pid: int) -> list[int]:

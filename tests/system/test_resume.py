@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import shutil
 import signal
@@ -17,7 +16,7 @@ import pytest
 from appliance.stage.place import FILE, Place, PlaceReader
 from appliance.stage.place_file import PlaceFile, read_place
 from tests.stage.bundles import write_show
-from tests.system.box import PATIENCE_S, Box, playing
+from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
 
 PLAY = (sys.executable, "-m", "appliance.start", "play")
 PHRASE_S, TICK_S = 3.0, 0.02
@@ -124,7 +123,7 @@ def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path)
         box.frames(60)
         await_carried(tmp_path)
         box.end(signal.SIGKILL)
-        await_end_of_keeper(tmp_path)
+        await_end_of_keeper(tmp_path / "runtime")
         at_cut = place_in(tmp_path)
         on_disk = read_place(tmp_path / "state" / FILE)
         assert on_disk is not None and not on_disk.ended and on_disk.tick <= at_cut.tick
@@ -152,12 +151,6 @@ def await_carried(folder: Path) -> None:
     while read_place(folder / "state" / FILE) == before:
         assert time.monotonic() < until
         time.sleep(0.02)
-
-
-def await_end_of_keeper(folder: Path) -> None:
-    """It ends with the box; a power cut would have taken it in the same moment."""
-    with (folder / "runtime" / "keeper.lock").open() as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
 
 
 def _as_of_another_boot(path: Path, place: Place) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import shutil
 import signal
@@ -21,7 +20,7 @@ from appliance.stage.journal.reading import read_journal
 from hw_sim.emulator import Sent
 from tests.hw_sim.null_modem import NullModem
 from tests.stage.bundles import FIGURE, MOVING, write_show
-from tests.system.box import PATIENCE_S, Box, playing
+from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
 from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
@@ -129,10 +128,8 @@ def test_after_a_power_cut_the_neutral_pose_is_used_again(show: Path, tmp_path: 
             assert time.monotonic() < until
             time.sleep(0.02)
         box.end(signal.SIGKILL)
-        with (tmp_path / "runtime" / "keeper.lock").open() as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # the keeper ends with its box
-        while (tmp_path / "runtime").exists():  # so does show control, which takes its own files away
-            shutil.rmtree(tmp_path / "runtime", ignore_errors=True)
+        await_end_of_keeper(tmp_path / "runtime")
+        shutil.rmtree(tmp_path / "runtime")
         box.kill_and_restart()
         box.await_words("Sensor left-wrist: the neutral pose taken before is used on. Dance.")
         assert box.end() == 0
