@@ -12,8 +12,9 @@ from appliance.control.speaker import Speaker
 from appliance.control.stop_signals import stop_signals
 from appliance.outputs.runtime_folder import Claim, runtime_folder
 from appliance.show.box import load_box
-from appliance.stage.keeper import carriers, keep_on
+from appliance.stage.keeper import END_BESIDE_S, END_S, carriers, keep_on
 from appliance.stage.keeper_health import KeeperHealth
+from appliance.stage.place import PlaceReader
 
 
 def keep_box(
@@ -35,6 +36,7 @@ def keep_box(
         closing(Speaker()) as speaker,
         closing(Claim(runtime, "keeper")),
         closing(Notifier()) as notifier,
+        closing(PlaceReader(runtime)) as place,
     ):
         kept = carriers(
             box, runtime, journal or box.journal.folder, minutes or box.journal.minutes, speaker.say
@@ -48,7 +50,13 @@ def keep_box(
             notifier.ping(now)
             health.tell(kept, now)
 
-        keep_on(kept, stopped, after_turn)
+        keep_on(
+            kept,
+            stopped,
+            after_turn,
+            goes_on=place.goes_on,
+            end_s=END_BESIDE_S if chosen is None else END_S,
+        )
         notifier.stopping()
         health.end(time.monotonic())
     return 0

@@ -18,6 +18,9 @@ from appliance.stage.place_file import PlaceCarrier
 from appliance.stage.sensor_memory_carrier import MemoryCarrier
 
 TURN_S = 0.5
+# The machine goes down: whoever starts after the stage ends before it (the lights may take 4 s), then the
+# stage says that its show has ended (it may take 3 s). Beside a stage of one's own it says so at once.
+END_S, END_BESIDE_S = 8.0, 1.0
 _LOOK_S = 0.05  # how often it looks whether it is to end
 
 
@@ -44,7 +47,7 @@ def carriers(
     """
     kept: list[Carrier] = []
     if box.state_folder is not None:
-        kept.append(PlaceCarrier(runtime, box.state_folder, say))  # its last turn waits for the stage's end
+        kept.append(PlaceCarrier(runtime, box.state_folder, say))
         kept.append(MemoryCarrier(runtime, box.state_folder, say))
     if journal is not None:
         kept.append(JournalCarrier(runtime, journal, minutes, say))
@@ -70,17 +73,29 @@ def keep_on(
     after_turn: Callable[[float], None] = lambda now: None,
     monotonic: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
+    goes_on: Callable[[], bool] = lambda: False,
+    end_s: float = END_S,
 ) -> None:
     """Turn by turn until `stopped`, then one last turn; `after_turn`: for the watchdog.
 
-    Each is given the time at which it begins: the disk may have held up those before it.
+    A show that still `goes_on` then is carried until its end, for `end_s` at most: an end that is not on the
+    disk would be taken for a power cut. Each is given the time at which it begins: the disk may have held up
+    those before it.
     """
-    while not stopped():
+    asked_at: float | None = None
+
+    def is_over() -> bool:
+        nonlocal asked_at
+        if asked_at is None and stopped():
+            asked_at = monotonic()
+        return asked_at is not None and (not goes_on() or monotonic() - asked_at >= end_s)
+
+    while not is_over():
         until = monotonic() + TURN_S
         for carrier in carriers:
             carrier.turn(monotonic())
         after_turn(monotonic())
-        while not stopped() and (rest_s := until - monotonic()) > 0.0:
+        while not is_over() and (rest_s := until - monotonic()) > 0.0:
             sleep(min(rest_s, _LOOK_S))
     for carrier in carriers:
         carrier.last_turn()

@@ -137,6 +137,11 @@ class PlaceReader:
         payload = self._block.read()
         return None if payload is None else unpacked(payload)
 
+    def goes_on(self) -> bool:
+        """Whether a show is on: a stage lives, and has not said that its show has ended. Never raises."""
+        place = self.read()
+        return place is not None and not place.ended and self.stage_lives()
+
     def stage_lives(self) -> bool:
         """Whether the stage that wrote what was read last is still there."""
         return self._block.writer_lives()

@@ -6,7 +6,6 @@ import contextlib
 import errno
 import os
 import struct
-import time
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,9 +19,6 @@ SLOT_BYTES = 4096
 SLOTS = 2
 EVERY_S = 0.45  # with turns of half a second: each of them, and never more than a second is lost
 RETRY_S = 10.0
-# The machine goes down: whoever starts after the stage ends before it (the lights may take 4 s), then the
-# stage says that its show ended (it may take 3 s).
-END_S, _END_LOOK_S = 8.0, 0.02
 
 _MAGIC = b"bkplace1"
 _HEAD = struct.Struct("<8sQII")  # magic, number, payload's bytes, CRC-32 of everything in the slot but itself
@@ -102,16 +98,8 @@ class PlaceCarrier:
     failed: how often the disk did not take it; complaint: why it does not take it now, a sentence, else "".
     """
 
-    def __init__(
-        self,
-        runtime: Path,
-        state: Path,
-        say: Callable[[str], None],
-        monotonic: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
-    ) -> None:
+    def __init__(self, runtime: Path, state: Path, say: Callable[[str], None]) -> None:
         """runtime: the folder where the box's processes meet; state: the one on the disk."""
-        self._monotonic, self._sleep = monotonic, sleep
         self._reader = PlaceReader(runtime)
         self._file = PlaceFile(state / FILE)
         self._state, self._say = state, say
@@ -126,18 +114,7 @@ class PlaceCarrier:
             self._due = now + self._carry()
 
     def last_turn(self) -> None:
-        """Before the process ends: what is newest.
-
-        Where the machine goes down, a stage that lives may still dance for a while: it ends after the others.
-        Until it says that its show has ended, its place is carried as ever: the power may fail meanwhile.
-        """
-        until = self._monotonic() + END_S
-        while (now := self._monotonic()) < until:
-            place = self._reader.read()
-            if place is None or place.ended or not self._reader.stage_lives():
-                break
-            self.turn(now)
-            self._sleep(_END_LOOK_S)
+        """Before the process ends: what is newest."""
         self._carry()
         self._reader.close()
         self._file.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +17,14 @@ from appliance.stage.clock import TICK_S
 from appliance.stage.journal.carrier import RETRY_S
 from appliance.stage.journal.reading import read_journal
 from appliance.stage.journal.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
-from appliance.stage.keeper import keep_on, keep_rest
+from appliance.stage.keeper import END_S, TURN_S, keep_on, keep_rest
+from appliance.stage.place import Place, PlaceReader, PlaceWriter
 from tests.stage.bundles import write_show
 from tests.stage.fakes import FakeTime
 from tests.stage.night import Night
 
 DISK_BYTES = 8 << 20
+PLACE = Place("A show", "main", 1.5, (0.0, 30.0))
 
 
 @pytest.fixture
@@ -144,6 +147,49 @@ def test_the_keeper_turns_until_it_is_stopped_and_then_once_more() -> None:
 
     keep_on([Carried()], lambda: time.now > 1001.2, lambda now: None, time.monotonic, time.sleep)
     assert happened == ["turn at 0.0", "turn at 0.5", "turn at 1.0", "last turn"]
+
+
+def end_of(place: PlaceWriter, runtime: Path, ends_at: float, end_s: float = END_S) -> list[float]:
+    """When a keeper that is stopped at 0.7 s turns, the last time at its end; its stage ends at `ends_at`."""
+    time, turned = FakeTime(), list[float]()
+
+    class Carried:
+        complaint = ""
+
+        def turn(self, now: float) -> None:
+            turned.append(round(now - 1000.0, 2))
+
+        def last_turn(self) -> None:
+            self.turn(time.now)
+
+    def sleep(seconds: float) -> None:
+        time.sleep(seconds)
+        place.write(replace(PLACE, position_s=time.now - 1000.0, ended=time.now > 1000.0 + ends_at))
+
+    place.write(PLACE)
+    with closing(PlaceReader(runtime)) as reader:
+        clock = {"monotonic": time.monotonic, "sleep": sleep}
+        keep_on([Carried()], lambda: time.now > 1000.69, goes_on=reader.goes_on, end_s=end_s, **clock)
+    return turned
+
+
+def test_a_show_is_carried_to_its_end_which_comes_after_lights_that_fade(tmp_path: Path) -> None:
+    """The power may fail meanwhile, and what happens until then belongs into the journal."""
+    with closing(PlaceWriter(tmp_path)) as place:
+        turned = end_of(place, tmp_path, ends_at=5.0)
+        assert turned[-1] == pytest.approx(5.05, abs=0.06)
+        assert max(np.diff(turned)) == pytest.approx(TURN_S)
+        assert end_of(place, tmp_path, ends_at=0.2)[-1] == pytest.approx(0.7, abs=0.06)
+
+
+def test_a_show_that_does_not_end_is_not_waited_for_for_ever(tmp_path: Path) -> None:
+    place = PlaceWriter(tmp_path)
+    assert end_of(place, tmp_path, ends_at=99.0)[-1] == pytest.approx(0.7 + END_S, abs=0.06)
+    assert end_of(place, tmp_path, ends_at=99.0, end_s=1.0)[-1] == pytest.approx(1.7, abs=0.06)
+    place.write(PLACE)
+    place.close()
+    with closing(PlaceReader(tmp_path)) as reader:
+        assert not reader.goes_on(), "the stage is gone: nobody will say that its show has ended"
 
 
 def test_whatever_the_disk_takes_each_is_given_the_time_at_which_it_begins() -> None:

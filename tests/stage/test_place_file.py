@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,20 +41,6 @@ def written(path: Path, *ticks: int) -> None:
     file.close()
 
 
-class Evening:
-    """A clock for a carrier's last turn. sleep: what happens meanwhile, given how long it has waited (s)."""
-
-    def __init__(self, meanwhile: Callable[[float], None]) -> None:
-        self.waited_s, self._meanwhile = 0.0, meanwhile
-
-    def __call__(self) -> float:
-        return 100.0 + self.waited_s
-
-    def sleep(self, seconds: float) -> None:
-        self.waited_s += seconds
-        self._meanwhile(self.waited_s)
-
-
 class Carried:
     """A carrier with its folders, a stage's end of the place, and what was said."""
 
@@ -63,12 +49,7 @@ class Carried:
         self.said: list[str] = []
         self.stage = PlaceWriter(runtime)
         self.state = state
-        self.runtime = runtime
         self.carrier = PlaceCarrier(runtime, state, self.said.append)
-
-    def end_by(self, evening: Evening) -> None:
-        """A last turn by this clock."""
-        PlaceCarrier(self.runtime, self.state, self.said.append, evening, evening.sleep).last_turn()
 
     @property
     def on_disk(self) -> Place | None:
@@ -180,55 +161,6 @@ def test_the_last_turn_carries_what_is_newest(carried: Carried) -> None:
     carried.stage.write(replace(PLACE, position_s=2.0, ended=True))
     carried.carrier.last_turn()
     assert carried.on_disk == replace(PLACE, position_s=2.0, ended=True)
-
-
-def test_the_last_turn_waits_for_a_stage_that_ends_after_lights_that_fade(carried: Carried) -> None:
-    """The place is carried meanwhile: the power may fail before the stage has ended."""
-    on_disk: list[Place | None] = []
-
-    def dance_on(waited_s: float) -> None:
-        on_disk.append(carried.on_disk)
-        carried.stage.write(replace(PLACE, position_s=2.0 + waited_s, ended=waited_s > 5.0))
-
-    evening = Evening(dance_on)
-    carried.stage.write(at(1))
-    carried.end_by(evening)
-    assert carried.on_disk is not None and carried.on_disk.ended
-    assert len(set(on_disk)) >= 10, "a power cut would have lost more than half a second"
-    assert evening.waited_s < 5.1
-
-
-def test_the_last_turn_does_not_wait_for_ever(carried: Carried) -> None:
-    evening = Evening(lambda _: None)
-    carried.stage.write(at(5))
-    carried.end_by(evening)
-    assert carried.on_disk == at(5)
-    assert evening.waited_s < 10.0
-
-
-def test_the_last_turn_of_a_dead_stage_does_not_wait(carried: Carried) -> None:
-    evening = Evening(lambda _: None)
-    carried.stage.write(at(5))
-    carried.stage.close()
-    carried.end_by(evening)
-    assert carried.on_disk == at(5)
-    assert evening.waited_s == 0.0
-
-
-def test_a_folder_that_is_a_file_is_said_once_and_tried_again(carried: Carried) -> None:
-    carried.state.write_bytes(b"")
-    carried.stage.write(at(1))
-    for turn in range(4):
-        carried.carrier.turn(100.0 + RETRY_S * turn)
-    assert carried.carrier.failed == 4
-    assert len(carried.said) == 1
-    assert "cannot be written" in carried.said[0] and "`state:`" in carried.said[0]
-    assert carried.carrier.complaint == carried.said[0]
-    carried.state.unlink()
-    carried.carrier.turn(200.0)
-    assert carried.on_disk == at(1)
-    assert carried.carrier.complaint == ""
-    assert "again" in carried.said[1]
 
 
 @needs_mounts
