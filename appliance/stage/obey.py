@@ -14,9 +14,6 @@ from appliance.stage.wearing import Wearing
 
 SENSOR_ORDERS = frozenset(("neutral", "heading", "strobe", "reload"))
 STROBE_S = 10.0
-_NOT_HEARD_NOW = (
-    "No sensor is heard at this moment: nothing is changed. Look at its light and battery, then ask again."
-)
 
 Outcome = tuple[bool, str]
 
@@ -83,7 +80,12 @@ def obey_for_sensors(order: Order, cast: Cast, wearing: Wearing, now: float) -> 
     else:
         is_asked = wearing.reset_heading(sensor or None, now)
         words = "Where the dancer faces now is the front."
-    return (True, words) if is_asked else (False, _NOT_HEARD_NOW)
+    if is_asked:
+        return True, words
+    names = ", ".join(wearing.named(sensor or None))
+    return False, (
+        f"Not heard at this moment: {names}. Nothing is changed. Look at its light and battery, ask again."
+    )
 
 
 def _admit(order: Order, cast: Cast) -> str:

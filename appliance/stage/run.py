@@ -55,7 +55,7 @@ class Stage:
     ) -> None:
         self.show, self.box, self.box_file = show, box, box_file
         self.say, self._now = say, 0.0
-        self._comes_from_stop = False
+        self._comes_from_stop = self._held_up = False
         self.health = Health()
         with ExitStack() as opened:
             self.sharing = Sharing(box)
@@ -175,9 +175,11 @@ class Stage:
         """Carry out what show control has asked for meanwhile, and tell it what came of that.
 
         Right after a stop, also one within this tick (it began at `started`), nothing is taken: what is known
-        of the sensors is old, and the next tick has heard them.
+        of the sensors is old, and the next tick has heard them. Where every tick takes so long, orders are
+        what may mend it.
         """
-        if self._comes_from_stop or monotonic() - started > _LONGEST_TICK_S:
+        was_held_up, self._held_up = self._held_up, monotonic() - started > _LONGEST_TICK_S
+        if self._comes_from_stop or (self._held_up and not was_held_up):
             return
         done: list[tuple[Order, bool, str]] = []
         while len(done) < _ORDERS_A_TICK and (order := self.inbox.take()) is not None:

@@ -153,6 +153,16 @@ def test_a_tick_that_was_held_up_leaves_orders_to_the_next_one(evening: Evening)
     assert [(name, done) for name, done, _ in evening.inbox.answers] == [("heading", True)]
 
 
+def test_a_box_whose_every_tick_takes_too_long_can_be_told_to_do_less(evening: Evening) -> None:
+    evening.each_s = 0.11
+    evening.dance(2.0)
+    evening.inbox.waiting = [Order("iterations", (1.0, 1.0)), Order("heading")]
+    run_tick = evening.stage.tick.run
+    evening.stage.tick.run = lambda slot: (run_tick(slot), evening.time.work(0.11))[0]  # type: ignore[method-assign]
+    evening.dance(2.0)
+    assert [(name, done) for name, done, _ in evening.inbox.answers][:1] == [("iterations", True)]
+
+
 def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(
     evening: Evening, monkeypatch: pytest.MonkeyPatch
 ) -> None:
