@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from appliance.control.command import Command, command
@@ -30,7 +31,8 @@ PHRASE_FADE_S = 2.0
 _ANSWERS = frozenset((REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END))
 _LISTED = ("/cues/", "/phrases/", "/looks/", "/hands/", "/fallbacks/")
 _ONCE_A_BUNDLE = frozenset((*QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
-_STREAMS = ("/player/", "/mocap/")  # answered only when refused
+_STREAMS = ("/player/", "/mocap/")  # answered only when refused, or when nobody carried them out
+_BY_HAND = ("/player/start", "/player/stop", "/player/rate")
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
 
 _ORDERS: Mapping[str, tuple[Place, str]] = {
@@ -207,13 +209,10 @@ class Desk:
             values = values or (PHRASE_FADE_S,)
         elif command.address == "/sensors/reload":
             keys = self._keys.keys()
-        is_stream = command.address.startswith(_STREAMS)
-
-        def then(done: bool, words: str) -> None:
-            self._end(asker, command.address, done, words)
-
-        order = Order(name, values, text, keys, quiet=is_stream)
-        self._errands.begin(place, order, now, then)
+        elif command.address in _BY_HAND:
+            self._standstill.leave()
+        order = Order(name, values, text, keys, quiet=command.address.startswith(_STREAMS))
+        self._errands.begin(place, order, now, partial(self._end, asker, command.address))
 
     def _tell_roster(self, asker: Address, now: float) -> None:
         if not self._sight.lives(now):

@@ -40,7 +40,7 @@ class Order:
 
     text: a joint may be a number. keys: what a reload has read. ask: who waits for an answer; 0: nobody.
     quiet: the asker is told of a refusal alone, not that it was done (streams of orders).
-    until: monotonic seconds; after it the asker was told that it is not done, and it is not to be done.
+    until: monotonic seconds; after it it is not to be done: the asker is told so a moment later.
     """
 
     name: str

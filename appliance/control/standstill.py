@@ -37,6 +37,11 @@ class Standstill:
         elif not house.going and not self._stands and house.going_level(now) <= 0.0:
             self._order("stop", now)
 
+    def leave(self) -> None:
+        """Somebody plays and stops the phrase by hand: an order that nobody has answered is not repeated."""
+        if self._stands is None:
+            self._stands = False
+
     def _order(self, name: str, now: float) -> None:
         self._next_try = now + _AGAIN_S
         self._stands = None
