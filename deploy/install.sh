@@ -383,15 +383,15 @@ read_system_files() {
 
 # True when the stage dances and goes on dancing; in an image there is nothing to start.
 starts() {
-    local pid before counted deadline=$((SECONDS + STARTS_WITHIN_S))
+    local pid before deadline=$((SECONDS + STARTS_WITHIN_S))
     runs_here || return 0
     read_system_files
     before=$(main_pid)
-    counted=$(restarts) # of the stage that is to end: from then on it counts anew
+    systemctl reset-failed bunraku-stage || true # what it counted until now is not this one's
     systemctl restart --no-block bunraku.target || true
     until pid=$(main_pid) && is_active && [ "$pid" != "$before" ]; do
         [ "$SECONDS" -lt "$deadline" ] || return 1
-        [ "$(restarts)" -lt "$STARTS_TRIED" ] || [ "$(restarts)" = "$counted" ] || return 1
+        [ "$(restarts)" -lt "$STARTS_TRIED" ] || return 1
         sleep 0.2
     done
     sleep "$STAYS_S"

@@ -51,7 +51,7 @@ def test_a_release_that_does_not_start_gives_way_to_the_old_one(
     image: Path, box: Box, tmp_path: Path, figures: Figures
 ) -> None:
     said = _install(box, image, tmp_path, "9.9.2", _CANNOT_START)
-    assert "status 1" in said, said
+    assert "status 1" in said and "which dances" in said, said
     assert box.await_frames(50, time.time())
     figures.note("update that does not start: time without frames", longest_pause_s(box.hall.audience.frames))
     current = box.machine.run("readlink", "/opt/bunraku/current")
