@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from appliance.control.house import House
+from appliance.control.pace import Pace
 from appliance.lights.colour import mixed
 from appliance.lights.dance import Dance
 from appliance.lights.head import LONGEST_STEP_S
@@ -25,8 +26,9 @@ MOST_LAYERS = 4  # mappings that fade into each other when the next one is calle
 class Rig:
     """Fixtures, mappings and the safe look. It begins in the safe look and fades in with the first frame.
 
-    rate_hz: how often passes are meant to come. One that comes much later was held up, most often with the
-    whole machine: it goes on by LONGEST_STEP_S, and no more counts against a stage that was held up as well.
+    rate_hz: how often passes are meant to come. One that comes much later than those before was held up, most
+    often with the whole machine: it goes on by LONGEST_STEP_S, and no more counts against a stage that was
+    held up as well.
     """
 
     def __init__(
@@ -42,8 +44,7 @@ class Rig:
         self._layers: list[_Layer] = []
         self._called: tuple[str, float] | None = None
         self._unseen_s = np.inf  # how old the newest frame is, without what held up this process
-        self._longest_step_s = max(LONGEST_STEP_S, 1.5 / rate_hz)
-        self._then: float | None = None
+        self._pace = Pace(LONGEST_STEP_S, rate_hz)
         self._leaving = False
 
     def leave(self) -> None:
@@ -57,8 +58,7 @@ class Rig:
 
     def pass_(self, frame: SeenFrame | None, generation: int, house: House, now: float) -> dict[int, bytes]:
         """512 levels for each universe at `now`, monotonic seconds; `generation` is that of the stage."""
-        seconds = 0.0 if self._then is None else min(max(now - self._then, 0.0), self._longest_step_s)
-        self._then = now
+        seconds = self._pace.step_s(now)
         self._unseen_s += seconds
         if frame is not None:
             self.dance.see(frame, generation, now)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from appliance.control.pace import Pace
 from appliance.projector.pacing import USUAL_RATE
 
 STALE_S = 0.5
@@ -15,14 +16,13 @@ class Presence:
     """A level from 0 to 1 that follows whether fresh frames come; it starts in the dark.
 
     rate: how many pictures a second are meant. What held up this process, most often with the whole machine,
-    counts neither for the fade nor against a stage that was held up as well.
+    counts neither for the fade nor against a stage that was held up as well; that it is slow does.
     """
 
     def __init__(self, rate: float = USUAL_RATE) -> None:
         self.level = 0.0
-        self._longest_s = max(_LONGEST_S, 1.5 / rate)
+        self._pace = Pace(_LONGEST_S, rate)
         self._unseen_s = math.inf  # how old the newest frame is, without what held up this process
-        self._before: float | None = None
 
     @property
     def sees_stage(self) -> bool:
@@ -31,8 +31,7 @@ class Presence:
 
     def step(self, newest: float | None, now: float) -> float:
         """The level at `now`; `newest`: when the newest frame was, None without one (monotonic seconds)."""
-        elapsed_s = 0.0 if self._before is None else min(max(0.0, now - self._before), self._longest_s)
-        self._before = now
+        elapsed_s = self._pace.step_s(now)
         self._unseen_s = math.inf if newest is None else min(self._unseen_s + elapsed_s, now - newest)
         if self.sees_stage:
             self.level = min(1.0, self.level + elapsed_s / FADE_S)

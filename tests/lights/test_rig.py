@@ -246,6 +246,19 @@ def test_at_a_slow_rate_a_lost_stage_is_seen_and_faded_from_in_the_same_time(rat
     assert LOST_S + SAFE_FADE_S - 1e-6 <= safe_at - 1.0 <= LOST_S + SAFE_FADE_S + 1.1 * period_s
 
 
+def test_passes_that_do_not_keep_up_see_a_lost_stage_and_fade_in_the_same_time() -> None:
+    made, period_s, safe_at, now = slow(40.0), 0.3, np.inf, 1.0
+    for _ in range(10):
+        now += period_s
+        made.pass_(frame(round(now / 0.02)), 1, House(), now)
+    last_frame, died_at = frame(round(now / 0.02)), now
+    while now < died_at + 4.0:
+        now += period_s
+        made.pass_(last_frame, 1, House(), now)
+        safe_at = min(safe_at, now if made.safety >= 1.0 else np.inf)
+    assert LOST_S + SAFE_FADE_S - 0.02 <= safe_at - died_at <= LOST_S + SAFE_FADE_S + 1.1 * period_s
+
+
 def test_unknown_mappings_leave_the_first_in_force() -> None:
     night = evening()
     night.house = House(lights="of another show", lights_before="nor this")

@@ -82,6 +82,16 @@ def test_few_pictures_a_second_fade_out_in_the_same_time(rate: float) -> None:
     assert STALE_S <= black_after_s <= STALE_S + FADE_S + 1 / rate
 
 
+@pytest.mark.parametrize("period_s", [0.3, 0.5, 1.0])
+def test_a_machine_that_does_not_keep_up_fades_out_in_the_same_time(period_s: float) -> None:
+    presence = Presence()
+    times = np.arange(0, 6, period_s)
+    levels(presence, times)
+    found = levels(presence, 6.0 + times, newest=6.0)
+    black_after_s = times[found.index(0.0)]
+    assert STALE_S <= black_after_s <= STALE_S + FADE_S + period_s / 2
+
+
 def test_another_show_begins_in_the_dark() -> None:
     presence = Presence()
     levels(presence, np.arange(0, 1, 1 / RATE))
