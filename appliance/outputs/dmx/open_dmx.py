@@ -6,8 +6,15 @@ import time
 
 import serial
 
-from appliance.outputs.dmx.adapter_wire import AdapterWire
-from appliance.outputs.dmx.serial_port import close_port, find_device, is_bare_ftdi, open_port, write
+from appliance.outputs.dmx.adapter_wire import AdapterError, AdapterWire
+from appliance.outputs.dmx.serial_port import (
+    close_port,
+    find_device,
+    is_bare_ftdi,
+    open_port,
+    throw_away,
+    write,
+)
 from appliance.show.dmx import DmxConfig
 
 BAUD = 250_000  # ANSI E1.11 section 8: 4 us a bit, 8N2
@@ -33,8 +40,13 @@ class OpenDmx:
         time.sleep(BREAK_S)
         self._port.break_condition = False
         time.sleep(MARK_AFTER_BREAK_S)
-        write(self._port, _START_CODE + data[: self._channels])
-        time.sleep(self._lasts_s)
+        try:
+            write(self._port, _START_CODE + data[: self._channels])
+        except AdapterError:
+            throw_away(self._port)  # else it would follow the next break, which waits for nothing
+            raise
+        finally:
+            time.sleep(self._lasts_s)
 
     def close(self) -> None:
         """Close the port."""

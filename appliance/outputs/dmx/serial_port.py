@@ -65,6 +65,12 @@ def write(port: serial.Serial, data: bytes) -> None:
         raise AdapterError("it was unplugged") from None
 
 
+def throw_away(port: serial.Serial) -> None:
+    """What it was given and has not taken yet. Raises nothing."""
+    with contextlib.suppress(OSError, termios.error):
+        port.reset_output_buffer()
+
+
 def close_port(port: serial.Serial) -> None:
     """Close once the last universe has left; what a hung adapter has not taken is thrown away.
 

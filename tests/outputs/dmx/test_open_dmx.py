@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import serial
 
 from appliance.outputs.dmx import open_dmx
+from appliance.outputs.dmx.adapter_wire import AdapterError
 from appliance.outputs.dmx.open_dmx import OpenDmx, open_dmx_wire
 from tests.outputs.dmx.conftest import PATIENCE_S, config, universe
 
@@ -61,6 +63,31 @@ def test_break_mark_and_slots_are_as_long_as_dmx_wants(monkeypatch: pytest.Monke
         after - data >= 513 * 44e-6 for data, after in zip(times["data"], times["break"][1:], strict=False)
     )
     assert {data for what, _, data in port.events if what == "data"} == {b"\0" + universe()}
+
+
+def test_what_a_hanging_cable_has_not_taken_is_thrown_away_before_the_next_break(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Hanging(Port):
+        """Takes some slots, and then for too long none."""
+
+        def write(self, data: bytes) -> int:
+            super().write(data)
+            raise serial.SerialTimeoutException("Write timeout")
+
+        def reset_output_buffer(self) -> None:
+            self.events.append(("thrown away", time.monotonic(), b""))
+            raise OSError("unplugged")
+
+    port = Hanging()
+    monkeypatch.setattr(open_dmx, "open_port", lambda *_, **__: port)
+    cable = OpenDmx("cable", 512)
+    for _ in range(2):
+        with pytest.raises(AdapterError, match="it takes no more data"):
+            cable.write(universe())
+    assert [what for what, _, _ in port.events] == 2 * ["break", "mark", "emptied", "data", "thrown away"]
+    thrown_at, next_break_at = port.events[4][1], port.events[5][1]
+    assert next_break_at - thrown_at >= 513 * 44e-6  # what the chip has taken leaves it meanwhile
 
 
 def test_the_port_speaks_250000_baud_with_two_stop_bits(monkeypatch: pytest.MonkeyPatch) -> None:
