@@ -51,6 +51,7 @@ class Keyboards:
     def __init__(self, devices: Path = DEVICES, *, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._devices, self._now = devices, monotonic
         self._open: dict[Path, int] = {}
+        self._others: set[Path] = set()  # no keyboards, as the folder is now
         self._changed: int | None = None
         self._settled_at = self._again_at = math.inf  # when to look although nothing changed
         self._shifts: set[tuple[int, int]] = set()
@@ -96,13 +97,15 @@ class Keyboards:
             return
         if changed != self._changed:
             self._changed, self._settled_at = changed, now + _SETTLED_S
+            self._others.clear()
         elif now < self._again_at:
             return
         if now >= self._settled_at:
             self._settled_at = math.inf
+            self._others.clear()
         refused = 0
         for path in self._devices.glob("event*"):
-            if path not in self._open:
+            if path not in self._open and path not in self._others:
                 try:
                     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
                 except OSError:
@@ -112,6 +115,7 @@ class Keyboards:
                     self._open[path] = descriptor
                 else:
                     os.close(descriptor)
+                    self._others.add(path)
         self._again_at = min(self._settled_at, now + _REFUSED_S if refused else math.inf)
         self.is_refused = refused > 0 and not self._open
 

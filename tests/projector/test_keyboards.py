@@ -141,6 +141,35 @@ def test_a_device_that_is_opened_to_this_user_a_little_later(
     keyboards.close()
 
 
+def test_what_is_no_keyboard_is_left_alone_while_another_device_is_refused(
+    devices: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each look is in the middle of the pictures."""
+    clock, tries, real = Clock(), [], os.open
+
+    def tried(path: Path, *flags: int) -> int:
+        tries.append(path.name)
+        if path.name == "event0":
+            raise PermissionError
+        return real(path, *flags)
+
+    monkeypatch.setattr(module, "is_keyboard", lambda _: False)
+    plugged(devices, "event0")
+    plugged(devices, "event1")
+    monkeypatch.setattr(os, "open", tried)
+    keyboards = Keyboards(devices, monotonic=clock)
+    for _ in range(60):
+        list(keyboards.pressed())
+        clock.now += 0.1
+    assert tries.count("event0") >= 8
+    assert tries.count("event1") == 2  # once more when the folder has settled
+    monkeypatch.setattr(module, "is_keyboard", lambda _: True)
+    os.utime(devices, ns=(0, devices.stat().st_mtime_ns + 1_000_000))
+    list(keyboards.pressed())
+    assert tries.count("event1") == 3
+    keyboards.close()
+
+
 def test_a_second_device_within_the_same_tick_of_the_kernel(devices: Path) -> None:
     clock = Clock()
     keyboards = Keyboards(devices, monotonic=clock)
