@@ -14,12 +14,13 @@ from typing import Any, get_type_hints
 from pythonosc.osc_message import OscMessage
 
 from appliance.control.desk import SENSORS_REPLY as REPLY
+from appliance.control.errands import PATIENCE_S as ERRAND_S
 from appliance.control.packet import Message, datagram, readable
 from appliance.control.port import Address
 from appliance.control.roster import END, SENSOR, RosterLine
 from appliance.show.box import BoxConfig
 
-PATIENCE_S = 2.0  # show control answers within 0.5 s, and later while it starts
+PATIENCE_S = 2.0  # show control answers within 0.6 s, and later while it starts
 _LARGEST_DATAGRAM = 4096
 _LINE = tuple(get_type_hints(RosterLine).values())
 _ENDING = (int, float, str)
@@ -67,12 +68,20 @@ class RunningBox:
         return self._control is not None
 
     def ask(self, address: str, *arguments: str) -> Answer:
-        """Have one command carried out. Raises NoBoxError."""
+        """Have one command carried out. Raises NoBoxError.
+
+        That nobody carried it out in time may be corrected by a second reply, which is waited for.
+        """
+        answer, asked = None, time.monotonic()
         with contextlib.closing(self._replies((address, *arguments))) as replies:
             for reply in replies:
                 if reply.address == REPLY and len(reply.params) == 3 and reply.params[0] == address:
-                    return Answer(bool(reply.params[1]), readable(str(reply.params[2])))
-        raise self._nobody()
+                    answer = Answer(bool(reply.params[1]), readable(str(reply.params[2])))
+                    if answer.done or time.monotonic() - asked < ERRAND_S:  # refused, for good
+                        return answer
+        if answer is None:
+            raise self._nobody()
+        return answer
 
     def roll(self) -> Roll:
         """How all its sensors are. Raises NoBoxError."""

@@ -22,7 +22,7 @@ from rich.console import Console
 
 from appliance.cli import main
 from appliance.commands import sensors
-from appliance.commands.asking import NoBoxError, Roll
+from appliance.commands.asking import Answer, NoBoxError, Roll
 from appliance.commands.asking import RunningBox as AskedBox
 from appliance.commands.sensor_table import SensorTable
 from appliance.control.orders import Order
@@ -210,6 +210,25 @@ def test_commands_reach_the_box_and_its_answer_is_printed(
     box.done = False
     with ends(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
         assert err == f"bunraku: {name} it is.\n"
+
+
+def test_a_stage_that_was_held_up_in_the_middle_of_a_command_is_believed_in_the_end(box: RunningBox) -> None:
+    desk = box.control.process.desk
+
+    def late(order: Order) -> tuple[bool, str]:
+        until(lambda: desk.refused == 1)  # by then it was said that the stage does not answer
+        return True, "It is."
+
+    box.stage.answer = late
+    asked = AskedBox(("127.0.0.1", box.control.port), patience_s=20.0)
+    assert asked.ask("/sensors/strobe", "left-wrist") == Answer(True, "It is.")
+
+
+def test_a_stage_that_never_answers_is_told_once_patience_is_over(box: RunningBox) -> None:
+    box.stage.obeys = False
+    asked = AskedBox(("127.0.0.1", box.control.port), patience_s=3.0)
+    answer = asked.ask("/sensors/strobe", "left-wrist")
+    assert not answer.done and "does not answer" in answer.words
 
 
 def test_changes_of_the_key_file_reach_the_box(
