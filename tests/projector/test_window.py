@@ -6,7 +6,9 @@ import contextlib
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from PIL import Image
 
 from appliance.projector import context as context_module
 from appliance.projector.context import GlContext, offscreen
+from appliance.projector.fallback import STAGE_UNSEEN
 from appliance.projector.keyboards import Key
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, ProjectorError
@@ -24,6 +27,8 @@ from appliance.projector.sdl import sdl2
 from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
+from tests.projector.stage_double import StageDouble
+from tests.stage.bundles import write_show
 
 PICTURE = """
 import os, sys
@@ -219,6 +224,35 @@ def test_smaller_pictures_are_said_once_and_told_by_the_figures(
     assert "Pictures of 64x36 take longer" in sentence and "box file fixes it" in sentence
     assert any("64x36 at 50%" in line for line in said)
     assert set(shares) == {0.5}
+
+
+def test_a_stage_that_was_held_up_with_the_projector_is_no_black_picture(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), None, Wish("offscreen", (64, 36)), print)
+    now = time.monotonic()
+
+    def is_black_told() -> bool:
+        run._report(now)
+        return any(one.name == STAGE_UNSEEN.name and one.active for one in run._fallbacks.told(now))
+
+    def draw(pictures: int, stage: StageDouble | None = None) -> None:
+        nonlocal now
+        for _ in range(pictures):
+            now += 1 / 60
+            if stage is not None:
+                stage.write(now)
+            run._projector.draw(now, run._context.gl.screen, (64, 36))
+
+    with closing(run), closing(StageDouble(folder, write_show(tmp_path / "show"))) as stage:
+        draw(60, stage)
+        assert not is_black_told()
+        now += 2.0
+        draw(1)
+        assert run._reader.state(now) == "stale" and not is_black_told()
+        draw(60)
+        assert is_black_told()
+        draw(60, stage)
+        assert not is_black_told()
 
 
 def test_keys_have_the_names_that_are_printed_on_them() -> None:
