@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import socket
 import sys
+import time
 from pathlib import Path
 
 from appliance.control.port import open_port
@@ -16,6 +18,7 @@ from appliance.show.control import ControlConfig
 from appliance.stage.stage_error import StageError
 
 _FIRST_OF_SYSTEMD = 3  # sd_listen_fds(3)
+_FREED_WITHIN_S, _LOOK_S = 2.0, 0.05
 
 
 def control_box(box_file: Path | None, descriptor: int | None) -> None:
@@ -39,15 +42,26 @@ def control_box(box_file: Path | None, descriptor: int | None) -> None:
 
 
 def open_control_port(control: ControlConfig) -> socket.socket:
-    """The port's socket, bound. Raises StageError with what to do when it is taken."""
-    try:
-        return open_port(control.host, control.port)
-    except OSError as error:
-        raise StageError(
-            f"UDP port {control.port} on {control.host} cannot be opened for commands ({error.strerror}). "
-            "Nobody would hear commands, so nothing is started. Is a second bunraku running? Stop it, or "
-            "give another port under control: in the box file, or `control: null` for none."
-        ) from error
+    """The port's socket, bound. Raises StageError with what to do when it is taken.
+
+    The show control of a box that was killed may hold it for a moment still.
+    """
+    until = time.monotonic() + _FREED_WITHIN_S
+    while True:
+        try:
+            return open_port(control.host, control.port)
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE or time.monotonic() >= until:
+                raise _taken(control, error) from error
+        time.sleep(_LOOK_S)
+
+
+def _taken(control: ControlConfig, error: OSError) -> StageError:
+    return StageError(
+        f"UDP port {control.port} on {control.host} cannot be opened for commands ({error.strerror}). "
+        "Nobody would hear commands, so nothing is started. Is a second bunraku running? Stop it, or "
+        "give another port under control: in the box file, or `control: null` for none."
+    )
 
 
 def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
