@@ -61,10 +61,10 @@ window.close()
 
 @contextlib.contextmanager
 def virtual_display() -> Iterator[str]:
-    """A real X server on no screen."""
+    """A real X server on no screen; it does not begin anew, deaf meanwhile, when a window is closed."""
     reading, writing = os.pipe()
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "640x480x24", "-nolisten", "tcp"],
+        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "640x480x24", "-nolisten", "tcp", "-noreset"],
         pass_fds=[writing],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
