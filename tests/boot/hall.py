@@ -18,6 +18,7 @@ import yaml
 
 from appliance.sensor.keys import create_keys
 from hw_sim.osc_receiver import decode
+from hw_sim.receive_buffer import widen
 from tests.boot.pauses import Seen
 from tests.system.namespace import Cable, Namespace
 
@@ -26,7 +27,6 @@ SENSOR = "left-wrist"
 SENSORS, CONTROL, FRAMES = 9750, 9002, 9004
 _TIMESTAMPS = 35  # SO_TIMESTAMPNS
 _BUFFER_BYTES = 64 << 20  # minutes of frames: nobody has to read while the box is being killed
-_SO_RCVBUFFORCE = 33
 
 
 class Audience:
@@ -34,7 +34,7 @@ class Audience:
 
     def __init__(self, port: int = FRAMES) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _BUFFER_BYTES)
+        widen(self._socket, _BUFFER_BYTES)
         self._socket.setsockopt(socket.SOL_SOCKET, _TIMESTAMPS, 1)
         self._socket.bind((HALL, port))
         self._socket.setblocking(False)

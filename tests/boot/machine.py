@@ -17,6 +17,7 @@ from typing import TypeVar
 from tests.boot.disk import DataDisk
 from tests.deploy.cut import cut_off
 from tests.system.namespace import Namespace
+from tests.system.processes import children
 
 NSPAWN = Path(__file__).parent / "nspawn.sh"
 PATIENCE_S = 60.0  # for a machine that is busy with other things; nothing here waits without a reason
@@ -165,7 +166,7 @@ class Machine:
         until = time.monotonic() + PATIENCE_S
         while time.monotonic() < until:
             assert self.process.poll() is None, (self.folder / "console.txt").read_text(errors="replace")
-            for child in _children(self.process.pid):
+            for child in children(self.process.pid):
                 if _numbered(child)[1:] == [1]:
                     return child
             time.sleep(0.002)
@@ -203,16 +204,6 @@ def _die_with_the_tests() -> None:
     ctypes.CDLL(None).prctl(_PDEATHSIG, signal.SIGKILL)
 
 
-def _children(pid: int) -> list[int]:
-    with contextlib.suppress(OSError):
-        return [
-            int(child)
-            for tasks in Path(f"/proc/{pid}/task").glob("*/children")
-            for child in tasks.read_text().split()
-        ]
-    return []
-
-
 def _numbered(pid: int) -> list[int]:
     """A process' numbers: outside first, then in each namespace further in."""
     with contextlib.suppress(OSError):
@@ -229,7 +220,7 @@ def _outside(pid1: int, inside: int) -> int:
         pid = waiting.pop()
         if _numbered(pid)[1:] == [inside]:
             return pid
-        waiting += _children(pid)
+        waiting += children(pid)
     return 0
 
 

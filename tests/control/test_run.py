@@ -68,6 +68,13 @@ def called(inbox: OrderInbox) -> Order:
     return order
 
 
+def call(cue: str, process: ControlProcess, inbox: OrderInbox, asker: Asker) -> Order:
+    """Ask for a cue: what the stage is ordered, and has taken."""
+    asker.tell("/cue", cue)
+    process.turn()
+    return called(inbox)
+
+
 def begin(folder: Path, cue: str) -> FrameWriter:
     """A stage that goes on in a cue."""
     stage = FrameWriter(folder, facts())
@@ -122,9 +129,7 @@ def test_a_fade_begins_when_its_command_has_come(
 def test_the_fades_of_a_cue_begin_when_the_stage_has_answered(
     process: ControlProcess, clock: Clock, inbox: OrderInbox, asker: Asker
 ) -> None:
-    asker.tell("/cue", "storm")
-    process.turn()
-    order = called(inbox)
+    order = call("storm", process, inbox, asker)
     clock.now += PATIENCE_S
     inbox.answer(order, True, "")
     process.turn()
@@ -135,9 +140,7 @@ def test_the_fades_of_a_cue_begin_when_the_stage_has_answered(
 def test_a_cue_that_is_answered_too_late_is_followed_and_told_but_for_what_was_set_meanwhile(
     process: ControlProcess, clock: Clock, inbox: OrderInbox, asker: Asker
 ) -> None:
-    asker.tell("/cue", "storm")
-    process.turn()
-    order = called(inbox)
+    order = call("storm", process, inbox, asker)
     clock.now += GIVEN_UP_S
     asker.tell("/look", "lines")
     process.turn()
@@ -164,14 +167,10 @@ def test_a_cue_is_followed_if_the_stage_died_before_it_answered_and_the_next_one
     began_in: str,
     followed: str,
 ) -> None:
-    asker.tell("/cue", "1")
-    process.turn()
-    inbox.answer(called(inbox), True, "")
+    inbox.answer(call("1", process, inbox, asker), True, "")
     process.turn()
     assert asker.hear()[3] == "Cue 1."  # type: ignore[index]
-    asker.tell("/cue", "storm")
-    process.turn()
-    called(inbox)
+    call("storm", process, inbox, asker)
     stage.close()
     clock.now += away_s
     process.turn()
@@ -191,9 +190,7 @@ def test_a_cue_that_nobody_has_done_is_not_followed_though_a_stage_once_began_in
 ) -> None:
     stage.write_health({"state": "dancing", "cue": "storm"})
     process.turn()
-    asker.tell("/cue", "1")
-    process.turn()
-    inbox.answer(called(inbox), True, "")
+    inbox.answer(call("1", process, inbox, asker), True, "")
     asker.tell("/cue", "storm")
     process.turn()
     clock.now += GIVEN_UP_S

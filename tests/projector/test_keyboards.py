@@ -12,6 +12,7 @@ import pytest
 
 from appliance.projector import keyboards as module
 from appliance.projector.keyboards import Key, Keyboards
+from tests.control.doubles import Clock
 
 Q, C, LEFT, SHIFT, A = 16, 46, 105, 42, 30
 KEY, SYNC = 1, 0
@@ -53,16 +54,6 @@ def plugged(folder: Path, name: str = "event0") -> Device:
     before, device = folder.stat().st_mtime_ns, Device(folder / name)
     os.utime(folder, ns=(before, before + 1_000_000))
     return device
-
-
-class Clock:
-    """Time that passes as a test wishes."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 class Refusals:

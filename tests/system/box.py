@@ -20,6 +20,7 @@ import yaml
 from appliance.sensor.keys import SensorKey, create_keys
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports
+from tests.system.processes import children_that_say, says
 
 PATIENCE_S = 60.0  # for a machine that is busy with other things; nothing here waits without a reason
 PLAY = (sys.executable, "-m", "appliance.cli", "play")
@@ -88,11 +89,11 @@ class Box:
 
         Show control of a killed box ends by itself: while it holds the port, the next box would be refused.
         """
-        companions = [pid for pid in children(self.process.pid) if _says(pid, "appliance.control")]
+        companions = children_that_say(self.process.pid, "appliance.control")
         self.process.send_signal(number)
         status = self.process.wait(PATIENCE_S)
         until = time.monotonic() + PATIENCE_S
-        while any(_says(pid, "appliance.control") for pid in companions):
+        while any(says(pid, "appliance.control") for pid in companions):
             assert time.monotonic() < until, self.words
             time.sleep(0.005)
         return status
@@ -153,23 +154,6 @@ def await_end_of_keeper(runtime: Path) -> None:
                 return
             assert time.monotonic() < until, "the keeper outlives its box"
             time.sleep(0.02)
-
-
-def children(pid: int) -> list[int]:
-    """The processes that this one has started and that live."""
-    found: list[int] = []
-    for task in Path(f"/proc/{pid}/task").glob("*/children"):
-        with contextlib.suppress(OSError):  # a thread that has ended meanwhile
-            found += map(int, task.read_text().split())
-    return found
-
-
-def _says(pid: int, word: str) -> bool:
-    """Whether its command line has this word; one that has ended has none."""
-    try:
-        return word.encode() in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-    except OSError:
-        return False
 
 
 def is_free(port: int) -> bool:

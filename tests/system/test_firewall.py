@@ -12,7 +12,8 @@ import pytest
 from appliance.commands.firewall import rules
 from appliance.show.box import load_box
 from tests.stage.bundles import write_show
-from tests.system.box import children, playing
+from tests.system.box import playing
+from tests.system.processes import children
 
 LISTED = re.compile(r"^UNCONN\s+\d+\s+\d+\s+(\S+?)(?:%\w+)?:(\d+)\s", re.MULTILINE)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from appliance.stage.place import PlaceReader
 from tests.control.doubles import Asker
 from tests.stage.bundles import swaying_phrase, write_show
 from tests.system.box import PATIENCE_S, Box, playing
+from tests.system.processes import children_that_say
 from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
@@ -126,12 +128,12 @@ def test_a_keeper_that_hangs_or_dies_costs_no_tick_of_the_journal(show: Path, tm
     journal = tmp_path / "run.journal"
     with playing(show, tmp_path, settings=JOURNAL) as box:
         await_keeper(journal)
-        [keeper] = children(box, "keep")
+        [keeper] = children_that_say(box.process.pid, "keep")
         keeper_stopped = box.frames(1)[0][0]
-        subprocess.run(("kill", "-STOP", keeper), check=True)
+        os.kill(keeper, signal.SIGSTOP)
         frames = box.frames(100)
         assert frames[-1][0] >= keeper_stopped + 100
-        subprocess.run(("kill", "-KILL", keeper), check=True)
+        os.kill(keeper, signal.SIGKILL)
         box.await_words("The keeper was killed")
         until_another(journal)
         assert box.end() == 0
@@ -145,14 +147,6 @@ def until_another(journal: Path) -> None:
     until = time.monotonic() + PATIENCE_S
     while len(segment_paths(journal)) < 2 and time.monotonic() < until:
         time.sleep(0.05)
-
-
-def children(box: Box, command: str) -> list[str]:
-    """Processes that this box has started for a command."""
-    listed = subprocess.run(
-        ("ps", "-o", "pid=,args=", "--ppid", str(box.process.pid)), capture_output=True, text=True, check=True
-    )
-    return [line.split()[0] for line in listed.stdout.splitlines() if f" {command} " in f"{line} "]
 
 
 def test_a_file_in_the_place_of_the_journal_is_refused(show: Path, tmp_path: Path) -> None:

@@ -17,8 +17,9 @@ from pythonosc.udp_client import SimpleUDPClient
 from hw_sim.dmx.usb_pro import UsbProWidget
 from hw_sim.peers import HOST
 from tests.stage.bundles import write_show
-from tests.system.box import PATIENCE_S, PLAY, children, playing
+from tests.system.box import PATIENCE_S, PLAY, playing
 from tests.system.lit import DIMMER, PAN, PAR, RIG, SAFE, LightsProcess, node
+from tests.system.processes import children_that_say
 
 pytestmark = pytest.mark.realtime
 
@@ -160,11 +161,7 @@ def test_killed_lights_are_started_again_by_the_box(tmp_path: Path) -> None:
     show = show_with(tmp_path, DARK)
     with node() as (lamp, port), playing(show, tmp_path, settings=artnet(port, 1, 2)) as box:
         lamp.await_dance()
-        running = [
-            child
-            for child in children(box.process.pid)
-            if b"lights" in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
-        ]
+        running = children_that_say(box.process.pid, "lights")
         assert len(running) == 1
         os.kill(running[0], signal.SIGKILL)
         box.await_words("Lights: 3 fixtures", count=2)

@@ -27,6 +27,7 @@ from hw_sim.peers import HOST, free_ports
 from tests.control.doubles import Asker, until
 from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, PLAY, Box, is_free, playing
+from tests.system.processes import children_that_say
 
 pytestmark = pytest.mark.realtime
 
@@ -119,9 +120,7 @@ def await_stage(folder: Path, state: str) -> None:
 
 def control_of(pid: int) -> int:
     """The process of show control among a box's children."""
-    listing = ["ps", "-o", "pid=,args=", "--ppid", str(pid)]
-    children = subprocess.run(listing, capture_output=True, text=True, check=True).stdout.splitlines()
-    [found] = [int(child.split()[0]) for child in children if "appliance.control" in child]
+    [found] = children_that_say(pid, "appliance.control")
     return found
 
 

@@ -20,9 +20,9 @@ from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports
 from hw_sim.posistagenet import PsnReceiver
 from tests.system import namespace, olad
-from tests.system.box import children
 from tests.system.namespace import Namespace
 from tests.system.olad import Olad
+from tests.system.processes import children
 
 SENSOR = "left-wrist"
 STAND_STILL_S = 20.0  # the neutral pose takes 1.5 s; a busy machine makes pauses, and it begins again
