@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.dancer.puppeteers import Puppeteer
+from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
 from appliance.pose.skeleton import UnknownJointError
 
@@ -18,10 +19,13 @@ class HandError(ValueError):
 
 
 class Hands:
-    """Who holds which of the M moving joints: mask (M,), targets (M, 4) and weights (M,)."""
+    """Who holds which of the M moving joints: mask (M,), targets (T, M, 4) and weights (M,).
 
-    def __init__(self, puppeteers: Sequence[Puppeteer], joints: Sequence[str]) -> None:
-        """joints: the M moving joints of the network. Raises HandError."""
+    targets: one orientation for each pose of the window, the present one first.
+    """
+
+    def __init__(self, puppeteers: Sequence[Puppeteer], joints: Sequence[str], window: int = 8) -> None:
+        """joints: the M moving joints of the network; window: its T poses. Raises HandError."""
         self.puppeteers = tuple(puppeteers)
         self._places: list[int] = []
         for puppeteer in puppeteers:
@@ -30,21 +34,26 @@ class Hands:
                 raise HandError(f"Two hands hold '{puppeteer.joint}'. Give each joint to one hand only.")
             self._places.append(place)
         self.mask: NDArray[np.bool_] = np.zeros(len(joints), dtype=np.bool_)
-        self.targets = np.tile(quaternion.IDENTITY, (len(joints), 1))
+        self.targets = np.tile(quaternion.IDENTITY, (window, len(joints), 1))
         self.weights = np.zeros(len(joints), dtype=np.float32)
-        self._before = self.targets.copy()
+        self._present = self.targets[0].copy()
+        self._before = self._present.copy()
         self._signs = np.empty((len(joints), 1), dtype=np.float32)
 
-    def pull(self, now: float) -> None:
-        """Write all targets of this moment; their signs do not jump from one tick to the next."""
-        np.copyto(self._before, self.targets)
+    def pull(self, now: float, window: FloatArray) -> None:
+        """Write all targets of this moment; their signs do not jump from one tick to the next.
+
+        window (T, M, 4): the phrase's own poses of the moving joints.
+        """
+        np.copyto(self._before, self._present)
         for place, puppeteer in zip(self._places, self.puppeteers, strict=True):
             target = puppeteer.pull(now)
-            self.targets[place] = target.orientation
+            self._present[place] = target.orientation
             self.weights[place] = target.weight
-        np.einsum("mk,mk->m", self.targets, self._before, out=self._signs[:, 0])
+        np.einsum("mk,mk->m", self._present, self._before, out=self._signs[:, 0])
         np.copysign(1.0, self._signs, out=self._signs)
-        np.multiply(self.targets, self._signs, out=self.targets)
+        np.multiply(self._present, self._signs, out=self._present)
+        np.copyto(self.targets, self._present)
         np.greater(self.weights, 0.0, out=self.mask)
 
     def state(self) -> dict[str, Any]:
@@ -61,6 +70,7 @@ class Hands:
         for puppeteer, kept in zip(self.puppeteers, state["puppeteers"], strict=True):
             puppeteer.restore(kept)
         self.mask[:], self.targets[:], self.weights[:] = state["mask"], state["targets"], state["weights"]
+        np.copyto(self._present, self.targets[0])
 
 
 def _place(joint: str, joints: Sequence[str]) -> int:

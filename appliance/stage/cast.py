@@ -126,7 +126,7 @@ def assemble(
         motion=motion,
         blending=Blending(len(puppet.joints), puppet.window, show.config.dancer.hop),
         grounding=Grounding(show.skeleton, floor),
-        hands=Hands(puppeteers, puppet.joints),
+        hands=Hands(puppeteers, puppet.joints, puppet.window),
         cues={cue.name: cue for cue in show.config.cues},
         hand_places=[puppet.joints.index(hand.joint) for hand in show.config.hands],
         worn=worn,

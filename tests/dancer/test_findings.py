@@ -58,8 +58,8 @@ class Dancer:
         grounding = Grounding(self.recording.skeleton, self.floor)
         rows = []
         for tick in range(ticks):
-            hands.pull(tick * 0.02)
             window = puppet.select(motion.window())
+            hands.pull(tick * 0.02, window)
             blending.add(puppet.dance(window, hands.mask, hands.targets, hands.weights, coding, interaction))
             assert not puppet.is_broken
             pose = motion.window()[0].copy()

@@ -17,6 +17,7 @@ from tests.dancer.conftest import random_quaternions
 
 TICK_S = 0.02
 JOINTS = ("hip", "lShldr", "rShldr", "head")
+WINDOW = np.tile(quaternion.IDENTITY, (8, len(JOINTS), 1))
 LEFT = tuple(quaternion.from_axis_angle([0, 1, 0], 0.5).tolist())
 RIGHT = tuple(quaternion.from_axis_angle([0, 1, 0], -0.7).tolist())
 
@@ -261,8 +262,8 @@ def test_a_remote_set_from_another_thread_is_never_seen_half() -> None:
     lengths = []
     try:
         for tick in range(3000):
-            hands.pull(tick * TICK_S)
-            lengths.append(float(np.linalg.norm(hands.targets[3])))
+            hands.pull(tick * TICK_S, WINDOW)
+            lengths.append(np.linalg.norm(hands.targets[:, 3], axis=-1))
     finally:
         stop.set()
         thread.join()
@@ -274,12 +275,13 @@ def test_hands_gather_mask_targets_and_weights() -> None:
     hands = Hands([FixedOrientation("head", RIGHT, weight=0.5), sensor, Remote("rShldr")], JOINTS)
     for tick in range(51, 100):
         sensor.hear(LEFT, tick * TICK_S)
-        hands.pull(tick * TICK_S)
+        hands.pull(tick * TICK_S, WINDOW)
     assert hands.mask.tolist() == [False, True, False, True]
     assert hands.weights == pytest.approx([0.0, 1.0, 0.0, 0.5])
-    assert hands.targets[1] == pytest.approx(LEFT)
-    assert hands.targets[3] == pytest.approx(RIGHT)
-    assert np.linalg.norm(hands.targets, axis=1) == pytest.approx(1.0)
+    assert hands.targets.shape == (8, len(JOINTS), 4)
+    assert hands.targets[:, 1] == pytest.approx(np.tile(LEFT, (8, 1)))
+    assert hands.targets[:, 3] == pytest.approx(np.tile(RIGHT, (8, 1)))
+    assert np.linalg.norm(hands.targets, axis=-1) == pytest.approx(1.0)
     assert (hands.mask.dtype, hands.targets.dtype, hands.weights.dtype) == (bool, np.float32, np.float32)
 
 
@@ -291,9 +293,9 @@ def test_targets_have_no_sign_jumps_whatever_sign_the_readings_have() -> None:
     for tick in range(400):
         reading = quaternion.from_axis_angle([0, 0, 1], 0.03 * tick).astype(np.float32)
         sensor.hear(reading * rng.choice([-1, 1]), tick * TICK_S)
-        hands.pull(tick * TICK_S)
+        hands.pull(tick * TICK_S, WINDOW)
         if before is not None:
-            assert np.sum(before * hands.targets, axis=1).min() > 0.9
+            assert np.sum(before * hands.targets, axis=-1).min() > 0.9
         before = hands.targets.copy()
 
 

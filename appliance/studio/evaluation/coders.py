@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.show.network import WINDOW
 from appliance.show.show import load_show
 from appliance.studio.studio_error import StudioError
 
@@ -65,7 +66,7 @@ class OnnxCoder:
         joints = len(self.joints)
         self._free: dict[str, Any] = {
             "mask": np.zeros(joints, dtype=bool),
-            "targets": self.rest,
+            "targets": np.tile(self.rest, (WINDOW, 1, 1)),
             "weights": np.zeros(joints, dtype=np.float32),
         }
 
@@ -76,7 +77,7 @@ class OnnxCoder:
     def run(
         self, window: Poses, coding_iterations: int, interaction_iterations: int = 0, **held: Any
     ) -> tuple[Poses, Poses]:
-        """One window (8, M, 4) -> poses and latent; held: mask, targets, weights of held joints."""
+        """One window (8, M, 4) -> poses and latent; held: mask (M,), targets (8, M, 4), weights (M,)."""
         counts = {
             "coding_iterations": np.array(coding_iterations, dtype=np.int64),
             "interaction_iterations": np.array(interaction_iterations, dtype=np.int64),
