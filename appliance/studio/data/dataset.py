@@ -165,6 +165,19 @@ def moving_joints(takes: Sequence[Take]) -> tuple[int, ...]:
     return tuple(int(j) for j in np.flatnonzero(widest > MOVING_DEGREES))
 
 
+def limb_lengths(skeleton: Skeleton) -> NDArray[np.float64]:
+    """(J,): from each joint to the furthest joint or end below it, along the bones, in metres."""
+    longest = np.zeros(len(skeleton))
+    for joint, offset in skeleton.ends:
+        longest[joint] = max(longest[joint], float(np.linalg.norm(offset)))
+    for joint in reversed(range(len(skeleton))):  # parents stand before their children
+        parent = skeleton.parents[joint]
+        if parent >= 0:
+            reach = longest[joint] + float(np.linalg.norm(skeleton.offsets[joint]))
+            longest[parent] = max(longest[parent], reach)
+    return longest
+
+
 def mirror_pairs(skeleton: Skeleton) -> NDArray[np.intp]:
     """(J,): for each joint its counterpart on the other side (itself for the spine)."""
     others = []
