@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,14 +37,19 @@ class MissingPicturesError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class _Row:
-    """Poses drawn beside each other: local rotations (N, J, 4), roots (N, 3) metres, a label, a colour."""
+class Strip:
+    """Poses drawn beside each other: local rotations (N, J, 4), roots (N, 3) metres, which of them, a label.
+
+    held: joints in colour; stamps: words below the chosen ones, left out: their seconds.
+    """
 
     poses: Array
     roots: Array
     chosen: np.ndarray[Any, np.dtype[np.int64]]
-    label: str
-    colour: Array
+    label: str = ""
+    colour: Array = field(default_factory=lambda: IVORY)
+    held: tuple[int, ...] = ()
+    stamps: tuple[str, ...] | None = None
 
 
 def draw_filmstrip(
@@ -67,11 +72,23 @@ def draw_filmstrip(
     first, instant by instant (original above reconstruction). Two rows unless said otherwise.
     Raises MissingPicturesError where matplotlib is missing, ValueError where there is no pose.
     """
-    matplotlib_figure, canvas = _matplotlib()
     if not len(poses):
         raise ValueError("a filmstrip needs at least one pose")
     strips = _rows(np.asarray(poses, float), np.asarray(roots, float), columns, rows or 2, against, labels)
-    stage = _Stage(skeleton, strips, frozenset(held), fps)
+    strips = [replace(strip, held=tuple(held)) for strip in strips]
+    words = ", ".join(skeleton.names[joint] for joint in held)
+    return draw_strips(path, skeleton, strips, fps, title, f"held: {words}" if words else "")
+
+
+def draw_strips(
+    path: Path | str, skeleton: Skeleton, strips: Sequence[Strip], fps: float, title: str, coloured: str = ""
+) -> Path:
+    """Draw strips below each other into a PNG and return its path; coloured: what the coloured joints are.
+
+    fps: poses a second. Raises MissingPicturesError where matplotlib is missing.
+    """
+    matplotlib_figure, canvas = _matplotlib()
+    stage = _Stage(skeleton, strips, fps)
     height, width = stage.floor.shape[:2]
     figure = matplotlib_figure(figsize=(width / 100, height / 100), dpi=100)
     axes = figure.add_axes((0, 0, 1, 1))
@@ -80,7 +97,7 @@ def draw_filmstrip(
     axes.imshow(np.clip(stage.floor, 0, 1), **place, zorder=0)
     _draw_trails(axes, stage.trails)
     axes.imshow(np.clip(_straight(stage.figures), 0, 1), **place, zorder=2)
-    _write(axes, stage, title, ", ".join(skeleton.names[joint] for joint in held))
+    _write(axes, stage, title, coloured)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     canvas(figure).print_png(path)
@@ -99,21 +116,21 @@ def _matplotlib() -> tuple[Any, Any]:
 
 def _rows(
     poses: Array, roots: Array, columns: int, rows: int, against: Array | None, labels: tuple[str, str]
-) -> list[_Row]:
+) -> list[Strip]:
     if against is None:
         count = min(columns * rows, len(poses))
         chosen = np.linspace(0, len(poses) - 1, count).round().astype(np.int64)
-        return [_Row(poses, roots, chosen[i : i + columns], "", IVORY) for i in range(0, count, columns)]
+        return [Strip(poses, roots, chosen[i : i + columns]) for i in range(0, count, columns)]
     chosen = np.linspace(0, len(poses) - 1, min(columns, len(poses))).round().astype(np.int64)
     other = np.asarray(against, float)
-    return [_Row(poses, roots, chosen, labels[0], IVORY), _Row(other, roots, chosen, labels[1], SLATE)]
+    return [Strip(poses, roots, chosen, labels[0]), Strip(other, roots, chosen, labels[1], SLATE)]
 
 
 class _Stage:
     """The picture in layers: the floor with its shadows, the trails, the figures; and where words belong."""
 
-    def __init__(self, skeleton: Skeleton, rows: list[_Row], held: frozenset[int], fps: float) -> None:
-        self.skeleton, self.held, self.fps = skeleton, held, fps
+    def __init__(self, skeleton: Skeleton, rows: Sequence[Strip], fps: float) -> None:
+        self.skeleton, self.fps = skeleton, fps
         self.body = Body(skeleton)
         self.scale = HEIGHT_PX / self.body.height
         self.times: list[tuple[float, float, str]] = []
@@ -129,7 +146,7 @@ class _Stage:
         for number, row in enumerate(rows):
             self._draw_row(row, HEADER_PX + number * self.row_px)
 
-    def _highest(self, rows: list[_Row]) -> float:
+    def _highest(self, rows: Sequence[Strip]) -> float:
         """How far anything reaches above the floor, metres."""
         reaches = []
         for row in rows:
@@ -137,12 +154,12 @@ class _Stage:
             reaches.append(float(positions[..., 1].max()) - self._floor(row))
         return max(reaches) + 0.09 * self.body.height
 
-    def _floor(self, row: _Row) -> float:
+    def _floor(self, row: Strip) -> float:
         """Height of the floor, metres: where the lowest joint of most instants is."""
         positions, _ = self.skeleton.forward_kinematics(row.poses[row.chosen], row.roots[row.chosen])
         return float(np.percentile(positions[..., 1].min(axis=-1), 20)) - 0.017 * self.body.height
 
-    def _draw_row(self, row: _Row, top: int) -> None:
+    def _draw_row(self, row: Strip, top: int) -> None:
         rows = slice(top, top + self.row_px)
         self.floor[rows] = _empty_stage(self.floor.shape[1], self.row_px, self.floor_px)
         floor = self._floor(row)
@@ -150,11 +167,12 @@ class _Stage:
             centre = MARGIN_PX + (column + 0.5) * COLUMN_PX
             self._figure(row, int(index), centre, floor, rows)
             self._trail(row, int(index), centre, floor, top)
-            self.times.append((centre, top + self.floor_px + FOOTER_PX, f"{index / self.fps:.1f} s"))
+            stamp = row.stamps[column] if row.stamps else f"{index / self.fps:.1f} s"
+            self.times.append((centre, top + self.floor_px + FOOTER_PX, stamp))
         if row.label:
             self.labels.append((top + 12, row.label))
 
-    def _figure(self, row: _Row, index: int, centre: float, floor: float, rows: slice) -> None:
+    def _figure(self, row: Strip, index: int, centre: float, floor: float, rows: slice) -> None:
         """Lay one figure and its shadow into their layers."""
         ground = row.roots[index] * [1, 0, 1] + [0, floor, 0]
         positions, world = self.skeleton.forward_kinematics(row.poses[index], row.roots[index])
@@ -165,7 +183,7 @@ class _Stage:
         _over(self.floor[rows], left, self._shadow(on_stage, frame))
         in_view = replace(cones, start=cones.start @ _view().T, end=cones.end @ _view().T)
         colours = np.tile(row.colour, (len(cones.joint), 1))
-        colours[np.isin(cones.joint, list(self.held))] = VERMILION
+        colours[np.isin(cones.joint, row.held)] = VERMILION
         _over(self.figures[rows], left, render(in_view, colours, frame))
 
     def _shadow(self, cones: Cones, frame: Frame) -> Array:
@@ -178,13 +196,13 @@ class _Stage:
         shadow[2 * first : 2 * first + len(dark), : dark.shape[1], 3] = SHADOW * dark
         return shadow
 
-    def _trail(self, row: _Row, index: int, centre: float, floor: float, top: int) -> None:
+    def _trail(self, row: Strip, index: int, centre: float, floor: float, top: int) -> None:
         """The way that the end of each held bone has gone, as pixels from old to new."""
         first = max(0, index - round(TRAIL_S * self.fps))
         here = row.roots[index] * [1, 0, 1] + [0, floor, 0]
         span = slice(first, index + 1)
         positions, _ = self.skeleton.forward_kinematics(row.poses[span], row.roots[span])
-        for joint in self.held:
+        for joint in row.held:
             child = next((c for c, p in enumerate(self.skeleton.parents) if p == joint), joint)
             seen = (positions[:, child] - here) @ _view().T * self.scale
             pixels = np.stack([centre + seen[:, 0], top + self.floor_px - seen[:, 1]], axis=-1)
@@ -247,14 +265,14 @@ def _draw_trails(axes: Any, trails: list[Array]) -> None:
         )
 
 
-def _write(axes: Any, stage: _Stage, title: str, held: str) -> None:
+def _write(axes: Any, stage: _Stage, title: str, coloured: str) -> None:
     """Title, legend, labels of the rows and time stamps."""
     axes.set_xlim(0, stage.floor.shape[1])
     axes.set_ylim(stage.floor.shape[0], 0)
     axes.text(MARGIN_PX, 42, title or "Filmstrip", color=INK, fontsize=19, va="center")
-    if held:
+    if coloured:
         axes.plot([MARGIN_PX + 6], [78], "o", color=VERMILION, markersize=8, zorder=3)
-        axes.text(MARGIN_PX + 22, 78, f"held: {held}", color=FAINT, fontsize=11, va="center")
+        axes.text(MARGIN_PX + 22, 78, coloured, color=FAINT, fontsize=11, va="center")
     for x, y, text in stage.times:
         axes.text(x, y, text, color=FAINT, fontsize=9.5, ha="center", va="center")
     for y, text in stage.labels:

@@ -64,6 +64,10 @@ def train(
     true_fps: Annotated[
         list[str] | None, typer.Option(help="PATTERN=FPS where a header is wrong ('salsa_*=60'); repeatable.")
     ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(help="Files in which nothing is a capture error ('solo_*'); repeatable."),
+    ] = None,
     phrase: Phrase = None,
     name: Annotated[
         str | None, typer.Option(help="What the show is called; left out: as its folder.")
@@ -90,6 +94,7 @@ def train(
                 catalogue=catalogue,
                 held_out=tuple(held_out or ()),
                 true_fps=tuple(true_fps or ()),
+                keep=tuple(keep or ()),
                 phrase=phrase,
                 name=name,
             )

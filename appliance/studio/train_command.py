@@ -18,7 +18,8 @@ from appliance.studio.autoencoder.training_run import TrainingRun, parameters
 from appliance.studio.data import sources
 from appliance.studio.data.sources import Sources
 from appliance.studio.evaluation.coders import load_checkpoint
-from appliance.studio.evaluation.findings import findings
+from appliance.studio.evaluation.findings import MASKED_PICTURE, findings
+from appliance.studio.evaluation.masked import draw_masked
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
 
@@ -42,6 +43,7 @@ class Wish:
     catalogue: Path | None = None
     held_out: tuple[str, ...] = ()
     true_fps: tuple[str, ...] = ()
+    keep: tuple[str, ...] = ()
     phrase: Path | None = None
     name: str | None = None
 
@@ -63,6 +65,9 @@ def run(wish: Wish) -> bool:
         training.restore(state)
         training.origin = source.as_state()
     wish.out.mkdir(parents=True, exist_ok=True)
+    takes = [*dataset.training, *dataset.held_out]
+    if any(take.errors for take in takes):
+        draw_masked(wish.out / MASKED_PICTURE, takes)
     console.print(_plan(training, device), highlight=False)
     if not TrainingRun(training, wish.out, console).run():
         again = f"bunraku train --resume --out {shlex.quote(str(wish.out))}"
@@ -118,7 +123,7 @@ def _beginning(wish: Wish, checkpoint: Path) -> tuple[Settings, Sources, dict[st
     settings = Settings(
         network=wish.network, latent=wish.latent, width=wish.width, depth=wish.depth, seed=wish.seed
     )
-    source = sources.given(wish.recordings, wish.catalogue, wish.held_out, wish.true_fps)
+    source = sources.given(wish.recordings, wish.catalogue, wish.held_out, wish.true_fps, wish.keep)
     return _paced(settings, wish), source, None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,12 @@ PASSING_S = 0.5  # so long it may pass nearer: on the way there and back
 TOUCHING_S = 0.1  # between a stretch and the jump that put the joint there
 LIMB_END = 0.15  # of the skeleton's reach: what hangs below a head, hand or foot is no longer than this
 BLOCK = 256
+SLACK_S = 0.02  # people copy seconds from a picture
 
 JUMP, APART, MARKED = "jump", "apart", "marked"
 REASONS = {
     JUMP: "moves as no body does",
-    APART: "was put by a snap where it is at no other time",
+    APART: "stands as it does at no other time",
     MARKED: "masked by the catalogue",
 }
 
@@ -84,6 +85,24 @@ def find_capture_errors(
             span = (stretch.first / fps, (stretch.end - 1) / fps)
             errors[stretch.take].append(CaptureError(name, *span, APART, float(np.median(away))))
     return [sorted(one, key=lambda error: error.start_s) for one in errors]
+
+
+def without(errors: Sequence[CaptureError], kept: Sequence[tuple[float, float]]) -> list[CaptureError]:
+    """What is left of errors where spans of seconds are known to be sound."""
+    left = list(errors)
+    for start, end in kept:
+        left = [
+            replace(one, start_s=first, end_s=last)
+            for one in left
+            for first, last in _outside((one.start_s, one.end_s), start - SLACK_S, end + SLACK_S)
+        ]
+    return left
+
+
+def _outside(span: tuple[float, float], start: float, end: float) -> list[tuple[float, float]]:
+    if end < span[0] or span[1] < start:
+        return [span]
+    return [(first, last) for first, last in ((span[0], start), (end, span[1])) if first < last]
 
 
 def sound_frames(count: int, fps: float, errors: Sequence[CaptureError]) -> NDArray[np.bool_]:

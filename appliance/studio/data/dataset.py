@@ -14,7 +14,13 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import leading_tpose_frames, read_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.studio.data.capture_errors import CaptureError, find_capture_errors, sound_frames
+from appliance.studio.data.capture_errors import (
+    MARKED,
+    CaptureError,
+    find_capture_errors,
+    sound_frames,
+    without,
+)
 from appliance.studio.data.catalogue import CATALOGUES, Catalogue, find_catalogue, read_catalogue
 
 __all__ = [
@@ -105,7 +111,7 @@ def load_dataset(
         raise DatasetError("Every take is held out: nothing is left to train on.")
     moving = moving_joints(takes)
     errors = find_capture_errors([recorded for _, recorded in read], moving)
-    takes = [_masked(take, found) for take, found in zip(takes, errors, strict=True)]
+    takes = [_masked(take, found, catalogue) for take, found in zip(takes, errors, strict=True)]
     training = tuple(take for take in takes if take.take not in held)
     return Dataset(skeleton, moving, training, tuple(take for take in takes if take.take in held))
 
@@ -118,7 +124,7 @@ def load_take(file: Path, catalogue: Catalogue, usual: Mapping[str, Pose] | None
     take, recorded = _read(file, catalogue)
     skeleton = recorded.skeleton
     known = {skeleton.index(name): pose for name, pose in (usual or {}).items() if name in skeleton.names}
-    return _masked(take, find_capture_errors([recorded], moving_joints([take]), known)[0])
+    return _masked(take, find_capture_errors([recorded], moving_joints([take]), known)[0], catalogue)
 
 
 def _read(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
@@ -133,8 +139,11 @@ def _read(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
     return Take(file.stem, catalogue.take_of(file.stem), resampled, sound, header.fps, fps), recording
 
 
-def _masked(take: Take, errors: Sequence[CaptureError]) -> Take:
-    return replace(take, sound=sound_frames(len(take.recording), FPS, errors), errors=tuple(errors))
+def _masked(take: Take, found: Sequence[CaptureError], catalogue: Catalogue) -> Take:
+    """The take without its errors, where people have not said that they are none, or named others."""
+    told = [CaptureError("", start, end, MARKED) for start, end in catalogue.masked(take.name)]
+    errors = (*without(found, catalogue.kept(take.name)), *told)
+    return replace(take, sound=sound_frames(len(take.recording), FPS, errors), errors=errors)
 
 
 def mean_pose(takes: Sequence[Take]) -> NDArray[np.float64]:

@@ -8,6 +8,8 @@ import numpy as np
 
 from appliance.studio.data.dataset import FPS, Dataset, Take, window_starts
 
+MASKED_PICTURE = "pictures/masked.png"
+
 
 def findings(dataset: Dataset) -> list[str]:
     """Files, rates, what is held out, what is masked, which joints stand still."""
@@ -22,7 +24,7 @@ def findings(dataset: Dataset) -> list[str]:
         f"{len(moving)} of {len(names)} joints move: {', '.join(moving)}."
         + (f" Still everywhere, kept as they stand: {', '.join(still)}." if still else ""),
         *_rates(takes),
-        _masked(takes),
+        *_masked(takes),
     ]
     if dataset.held_out:
         held = ", ".join(sorted(take.name for take in dataset.held_out))
@@ -48,16 +50,29 @@ def _rates(takes: Sequence[Take]) -> list[str]:
     ]
 
 
-def _masked(takes: Sequence[Take]) -> str:
+def _masked(takes: Sequence[Take]) -> list[str]:
+    """How much, where and at which joints; how people see it and say that it is none."""
     counts = {take.name: int(np.count_nonzero(~take.sound)) for take in takes}
     total, frames = sum(counts.values()), sum(len(take.sound) for take in takes)
     if not total:
-        return "No frame had to be masked."
-    most = sorted((name for name in counts if counts[name]), key=lambda name: -counts[name])
-    named = _few([f"{name} ({counts[name]})" for name in most])
-    return (
-        f"Masked as capture errors: {total:,} of {frames:,} frames ({100 * total / frames:.1f} %): {named}."
-    )
+        return ["No frame had to be masked."]
+    worst = sorted((take for take in takes if counts[take.name]), key=lambda take: -counts[take.name])
+    named = _few([f"{take.name} ({counts[take.name]:,}: {_joints(take)})" for take in worst])
+    return [
+        f"Masked as capture errors: {total:,} of {frames:,} frames ({100 * total / frames:.1f} %) in "
+        f"{_count(len(worst), 'recording')}: {named}.",
+        f"{MASKED_PICTURE} shows the worst. What is no error: --keep '{worst[0].name}', or keep: with its "
+        "seconds in catalogue.yaml.",
+    ]
+
+
+def _joints(take: Take) -> str:
+    """The joints at fault, those first that are so for longest."""
+    seconds: dict[str, float] = {}
+    for error in take.errors:
+        name = error.joint or "by the catalogue"
+        seconds[name] = seconds.get(name, 0.0) + error.end_s - error.start_s
+    return _few(sorted(seconds, key=lambda name: -seconds[name]), 2)
 
 
 def _few(names: Sequence[str], most: int = 4) -> str:
