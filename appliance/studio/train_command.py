@@ -18,7 +18,7 @@ from appliance.studio.autoencoder.training_run import TrainingRun, parameters
 from appliance.studio.data import sources
 from appliance.studio.data.sources import Sources
 from appliance.studio.evaluation.coders import load_checkpoint
-from appliance.studio.evaluation.findings import MASKED_PICTURE, findings
+from appliance.studio.evaluation.findings import MASKED_PICTURE, findings, require_windows
 from appliance.studio.evaluation.masked import draw_masked
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
@@ -59,15 +59,15 @@ def run(wish: Wish) -> bool:
     dataset = source.load(reading(console))
     for line in findings(dataset):
         console.print(f"- {line}", highlight=False)
+    if any(take.errors for take in dataset.takes):
+        draw_masked(wish.out / MASKED_PICTURE, dataset.takes)
+    require_windows(dataset, settings.batch)
     training = Training(dataset, settings, device)
     training.origin = source.as_state()
     if state is not None:
         training.restore(state)
         training.origin = source.as_state()
     wish.out.mkdir(parents=True, exist_ok=True)
-    takes = [*dataset.training, *dataset.held_out]
-    if any(take.errors for take in takes):
-        draw_masked(wish.out / MASKED_PICTURE, takes)
     console.print(_plan(training, device), highlight=False)
     if not TrainingRun(training, wish.out, console).run():
         again = f"bunraku train --resume --out {shlex.quote(str(wish.out))}"

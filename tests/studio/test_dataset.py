@@ -12,8 +12,10 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.data import dataset
-from appliance.studio.data.dataset import Catalogue, DatasetError, load_dataset, load_take
-from tests.studio.tiny import STILL, moving, skeleton, swaying, write_recordings
+from appliance.studio.data.catalogue import Catalogue, find_catalogue
+from appliance.studio.data.dataset import DatasetError, load_dataset, load_take
+from appliance.studio.data.mirror import mirror_pairs
+from tests.studio.tiny import STILL, moving, swaying, write_recordings
 
 
 def test_both_partners_of_a_take_are_held_out_together(tmp_path: Path) -> None:
@@ -49,17 +51,12 @@ def test_a_glitch_is_masked_at_its_place_in_true_time(tmp_path: Path) -> None:
     assert len(dataset.windows([take], moving())) == len(starts)
 
 
-def test_extremities_are_the_moving_joints_at_the_ends() -> None:
-    names = {skeleton().names[j] for j in dataset.extremities(skeleton(), moving())}
-    assert names == {"head", "rHand", "lHand", "rFoot", "lFoot"}
-
-
 def assert_mirrored(recording: Recording, but: set[str], asymmetry_m: float = 1e-5) -> None:
     """Forward kinematics of the mirrored dance = the mirrored places of the other side's joints."""
     seen, _ = recording.skeleton.forward_kinematics(recording.poses, recording.roots)
     image = dataset.mirrored(recording)
     places, _ = image.skeleton.forward_kinematics(image.poses, image.roots)
-    pairs = dataset.mirror_pairs(recording.skeleton)
+    pairs = mirror_pairs(recording.skeleton)
     kept = [j for j, name in enumerate(recording.skeleton.names) if name not in but]
     assert {int(pairs[j]) for j in kept} == set(kept)
     assert any(pairs[j] != j for j in kept)
@@ -72,7 +69,7 @@ def test_the_mirror_image_is_a_mirror_image() -> None:
 
 def test_the_mirror_image_of_a_recorded_dancer_is_one(recordings_dir: Path) -> None:
     file = recordings_dir / "train" / "salsa_25.bvh"
-    take = load_take(file, dataset.find_catalogue(file.parent, [file]))
+    take = load_take(file, find_catalogue(file.parent, [file]))
     assert take.true_fps == 60 and take.header_fps == pytest.approx(120, abs=0.01)
     assert_mirrored(take.recording, but=set(), asymmetry_m=0.006)  # her head sits 5 mm off the middle
 

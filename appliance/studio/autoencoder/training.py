@@ -76,7 +76,8 @@ class Training(Course[Report]):
         self.body = rotation.MovingSkeleton(dataset.skeleton, dataset.moving, torch.tensor(still)).to(
             self.device
         )
-        self.train_windows = self._heading_free(windows(dataset.training, dataset.moving, settings.mirror))
+        mirror = settings.mirror and dataset.mirrors
+        self.train_windows = self._heading_free(windows(dataset.training, dataset.moving, mirror))
         self.held_windows = torch.tensor(windows(dataset.held_out, dataset.moving)).to(self.device)
         self.optimizer = torch.optim.Adam(
             self.autoencoder.parameters(), lr=settings.learning_rate, fused=True

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.pose.skeleton import Skeleton
+from appliance.studio.data.bones import limb_ends
 from appliance.studio.data.jumps import Runs, bend_limits, bends, jumps, runs, visible
 
 SNAP = 0.5  # of a jump's limit: no error by itself, but a way in which a joint is put into a wrong place
@@ -20,7 +20,6 @@ AWAY_DEGREES = 60.0  # any other joint that a jump brings there and a jump takes
 GAP_DEGREES = 30.0  # to where the joint is at all other times: it never passes there
 PASSING_S = 0.5  # so long it may pass nearer: on the way there and back
 TOUCHING_S = 0.1  # between a stretch and the jump that put the joint there
-LIMB_END = 0.15  # of the skeleton's reach: what hangs below a head, hand or foot is no longer than this
 BLOCK = 256
 SLACK_S = 0.02  # people copy seconds from a picture
 
@@ -111,19 +110,6 @@ def sound_frames(count: int, fps: float, errors: Sequence[CaptureError]) -> NDAr
     for error in errors:
         sound[max(int(np.floor(error.start_s * fps)), 0) : int(np.ceil(error.end_s * fps)) + 1] = False
     return sound
-
-
-def limb_ends(skeleton: Skeleton) -> set[int]:
-    """Heads, hands, feet and what is smaller: by their names, or because little hangs below them."""
-    reach = np.zeros(len(skeleton))
-    for joint, offset in skeleton.ends:
-        reach[joint] = max(reach[joint], float(np.linalg.norm(offset)))
-    for joint in reversed(range(1, len(skeleton))):
-        above = skeleton.parents[joint]
-        reach[above] = max(reach[above], reach[joint] + float(np.linalg.norm(skeleton.offsets[joint])))
-    small = set(np.flatnonzero(reach <= LIMB_END * reach[0]).tolist())
-    heads = {joint for joint, name in enumerate(skeleton.names) if "head" in name.casefold()}
-    return (small | heads | set(skeleton.feet)) - {0}
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,14 @@ class Catalogue:
     acknowledgement: str = ""  # whom to thank, in every show made of them
     keep: dict[str, Spans] = field(default_factory=dict)
     mask: dict[str, Spans] = field(default_factory=dict)
+    metres_per_unit: dict[str, float] = field(default_factory=dict)
 
     def fps_of(self, name: str) -> float | None:
-        return next((fps for pattern, fps in self.true_fps.items() if fnmatch.fnmatch(name, pattern)), None)
+        return _first(self.true_fps, name)
+
+    def unit_of(self, name: str) -> float | None:
+        """What a recording's lengths are in, metres."""
+        return _first(self.metres_per_unit, name)
 
     def take_of(self, name: str) -> str:
         return self.take.get(name, name)
@@ -70,6 +75,7 @@ def read_catalogue(path: Path) -> Catalogue:
         file.acknowledgement.strip(),
         {pattern: tuple(spans) for pattern, spans in file.keep.items()},
         {pattern: tuple(spans) for pattern, spans in file.mask.items()},
+        file.metres_per_unit,
     )
 
 
@@ -83,6 +89,10 @@ def _joined(catalogues: Sequence[Catalogue]) -> Catalogue:
     held = tuple(pattern for one in catalogues for pattern in one.held_out)
     thanks = dict.fromkeys(one.acknowledgement for one in catalogues if one.acknowledgement)
     return Catalogue(rates, takes, held, " ".join(thanks))
+
+
+def _first(by_pattern: Mapping[str, float], name: str) -> float | None:
+    return next((value for pattern, value in by_pattern.items() if fnmatch.fnmatch(name, pattern)), None)
 
 
 def _spans(by_pattern: Mapping[str, Spans], name: str) -> Spans:

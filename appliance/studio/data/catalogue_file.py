@@ -13,6 +13,7 @@ from appliance.show.yaml_file import read_yaml
 
 ALWAYS = (0.0, 1e9)  # seconds
 Rate = Annotated[float, Field(ge=1, le=1000)]
+Unit = Annotated[float, Field(gt=0, le=10)]
 Second = Annotated[float, Field(ge=0)]
 Span = Annotated[tuple[Second, Second], Field(strict=False)]
 Name = Annotated[str, Field(min_length=1)]
@@ -35,6 +36,9 @@ class CatalogueFile(Section):
     mask: dict[str, list[Span]] = Field(
         default={},
         description="What is not to be learned from, by pattern: {anna_1: [[0, 3.2]]}, in seconds.",
+    )
+    metres_per_unit: dict[str, Unit] = Field(
+        default={}, description="What lengths are in, by pattern: {solo_*: 0.0254} for inches."
     )
     acknowledgement: str = Field(default="", description="Whom to thank in every show made of them.")
     bytes: dict[str, int] = Field(default={}, description="Sizes by which the studio knows recordings.")

@@ -10,7 +10,7 @@ import numpy as np
 
 from appliance.pose.filmstrip import Strip, draw_strips
 from appliance.studio.data.capture_errors import REASONS, CaptureError
-from appliance.studio.data.dataset import FPS, Take
+from appliance.studio.data.takes import FPS, Take
 
 COLUMNS, ROWS, ROWS_A_TAKE = 6, 6, 2
 BESIDE_S = 0.2  # the frame before and the one after
@@ -45,7 +45,8 @@ class MaskedStretch:
             words += f" ({worst.degrees:.0f} degrees)"
         others = sorted({error.joint for error in self.errors} - {worst.joint, ""})
         also = f"; also {', '.join(others)}" if others else ""
-        return f"{self.take.name}, {self.start_s:.2f} to {self.end_s:.2f} s: {words}{also}"
+        start_s, end_s = self.take.begins_s + self.start_s, self.take.begins_s + self.end_s
+        return f"{self.take.file}, {start_s:.2f} to {end_s:.2f} s: {words}{also}"
 
 
 def masked_stretches(takes: Sequence[Take]) -> list[MaskedStretch]:
@@ -89,5 +90,5 @@ def _strip(stretch: MaskedStretch) -> Strip:
         np.minimum(chosen, len(recording) - 1),
         stretch.sentence(),
         held=tuple(recording.skeleton.index(name) for name in sorted(names)),
-        stamps=tuple(f"{word}{at:.2f} s" for at, word in there),
+        stamps=tuple(f"{word}{stretch.take.begins_s + at:.2f} s" for at, word in there),
     )
