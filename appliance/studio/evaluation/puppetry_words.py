@@ -1,0 +1,91 @@
+"""The answer of a dancer in a table and in sentences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.table import Table
+
+ANSWERS, ANSWERS_A_LITTLE = 8.0, 4.0  # degrees
+LIVELY = (0.7, 1.3)  # energy
+COLUMNS = (
+    "held",
+    "K/J",
+    "answer",
+    "fit",
+    "own / foreign",
+    "plausibility",
+    "energy",
+    "roughness",
+    "off the hand",
+)
+NOT_JOINTS = ("free", "phrase", "reference")
+
+
+def table(found: dict[str, Any]) -> Table:
+    """A row for each joint and K/J, hands that turn, and the dance without a hand."""
+    made = Table(
+        title="Does the hand move the body? Degrees; plausibility, energy, roughness: the phrase is 1"
+    )
+    for heading in COLUMNS:
+        made.add_column(heading, justify="left" if heading == "held" else "right")
+    for joint in joints_of(found):
+        for key, row in iterations_of(found[joint]).items():
+            made.add_row(joint, key.replace("_", "/"), *_row(row))
+        made.add_row(joint, "turning", *_row(found[joint]["turning"]))
+    for coding, row in found["free"].items():
+        blank = {"answer": None, "fit": None, "fit_own": None, "fit_bare": None, "held": None}
+        made.add_row("nothing", f"{coding}/0", *_row({**blank, **row}))
+    return made
+
+
+def sentences(found: dict[str, Any]) -> list[str]:
+    """What the figures mean, a sentence a joint."""
+    return [_sentence(joint, *strongest(found[joint])) for joint in joints_of(found)]
+
+
+def joints_of(found: dict[str, Any]) -> list[str]:
+    """The joints that were held."""
+    return [name for name in found if name not in NOT_JOINTS]
+
+
+def iterations_of(figures: dict[str, Any]) -> dict[str, Any]:
+    """The rows of a joint by K_J."""
+    return {key: row for key, row in figures.items() if key.replace("_", "").isdigit()}
+
+
+def strongest(figures: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """The row at 10/9 or, where that was not asked for, at the most iterations; and which it is."""
+    rows = iterations_of(figures)
+    key = "10_9" if "10_9" in rows else max(rows, key=lambda key: [int(part) for part in key.split("_")])
+    return key.replace("_", "/"), rows[key]
+
+
+def _sentence(joint: str, iterations: str, row: dict[str, Any]) -> str:
+    answer, energy = row["answer"], row["energy"]
+    if answer >= ANSWERS:
+        meaning = "this dancer answers"
+    elif answer >= ANSWERS_A_LITTLE:
+        meaning = "this dancer answers a little"
+    else:
+        meaning = "this dancer hardly answers"
+    if energy < LIVELY[0]:
+        meaning += f", but comes nearly to rest (energy {energy:.2f})"
+    elif energy > LIVELY[1]:
+        meaning += f", but moves more than anybody did (energy {energy:.2f})"
+    return f"The others move {answer:.1f} degrees with a hand on {joint} at {iterations}: {meaning}."
+
+
+def _row(row: dict[str, Any]) -> list[str]:
+    baselines = " / ".join(_number(row[key], 1) for key in ("fit_own", "fit_bare"))
+    return [
+        _number(row["answer"], 1),
+        _number(row["fit"], 1),
+        "" if row["fit_own"] is None else baselines,
+        *(_number(row[key], 2) for key in ("plausibility", "energy", "roughness")),
+        _number(row["held"], 1),
+    ]
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
