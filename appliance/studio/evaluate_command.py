@@ -16,6 +16,7 @@ from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.evaluation import puppetry, puppetry_words
 from appliance.studio.evaluation.coders import Coder, open_coder
 from appliance.studio.evaluation.evaluation import Evaluation, evaluate, fitting_hop, load_takes
+from appliance.studio.evaluation.measurement import Iterations
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.pairs import apart_from, pair_up
 from appliance.studio.evaluation.usual_joints import usual_joints
@@ -67,7 +68,7 @@ def run(wish: Wish) -> None:
     _print_table(Console(), coder, found)
     if answer:
         Console().print(puppetry_words.table(answer))
-        for sentence in puppetry_words.sentences(answer):
+        for sentence in (*puppetry_words.sentences(answer), *puppetry_words.asides(answer)):
             Console().print(sentence, highlight=False)
 
 
@@ -78,7 +79,7 @@ def _answer(
     hands: Sequence[Take],
     folder: Path,
     joints: Sequence[str],
-    iterations: Sequence[puppetry.Iterations],
+    iterations: Sequence[Iterations],
 ) -> dict[str, Any]:
     """What the body does where a hand holds a joint, as JSON."""
     pairs = pair_up(takes, hands)
@@ -103,7 +104,7 @@ def _answer(
         )
 
 
-def _iterations(words: str) -> puppetry.Iterations:
+def _iterations(words: str) -> Iterations:
     coding, _, interaction = words.partition("/")
     if not (coding.isdigit() and interaction.isdigit() and int(coding) > 0):
         raise StudioError(f"'{words}' is no K/J: write for example 10/9, coding and interaction iterations.")

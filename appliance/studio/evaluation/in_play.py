@@ -77,6 +77,12 @@ class Rehearsal:
         )
         return danced, shown[WINDOW - 1 :]
 
+    def whole(self, danced: Poses) -> Array:
+        """(T, J, 4): a dance with the joints that the network does not move, as the phrase has them."""
+        poses = self.recording.poses[: len(danced)].copy()
+        poses[:, self.places] = danced
+        return poses
+
     def _danced(
         self,
         windows: Poses,

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset, Take
+from appliance.studio.evaluation.measurement import TICKS, Pair
 from appliance.studio.evaluation.pictures import longest_sound
-from appliance.studio.evaluation.puppetry import TICKS, Pair
 from appliance.studio.studio_error import StudioError
 
 LONGEST_S = (TICKS + WINDOW - 1) / FPS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from typing import Any
 
 from rich.table import Table
@@ -42,6 +43,35 @@ def table(found: dict[str, Any]) -> Table:
 def sentences(found: dict[str, Any]) -> list[str]:
     """What the figures mean, a sentence a joint."""
     return [_sentence(joint, *strongest(found[joint])) for joint in joints_of(found)]
+
+
+def asides(found: dict[str, Any]) -> list[str]:
+    """What else a body does: when it answers, whether it snaps, goes through itself, slides."""
+    joints, phrase = joints_of(found), found["phrase"]
+    onsets = [found[joint]["onset_ticks"] for joint in joints]
+    known = [ticks for ticks in onsets if ticks is not None]
+    step = max(found[joint]["turning"]["largest_step"] for joint in joints)
+    lines = []
+    if known:
+        lines.append(f"Half of the answer to a step of the hand is out after {max(known):g} ticks.")
+    lines.append(
+        f"While hands turn smoothly, a joint goes up to {step:.0f} degrees in one tick; in the recordings "
+        f"{found['reference']['largest_step']:.0f}."
+    )
+    deep, skate = (_mean_of(found, name) for name in ("arm_in_trunk", "foot_skate"))
+    if deep is not None and phrase["arm_in_trunk"] is not None:
+        lines.append(
+            f"An upper arm is deep in the trunk in {100 * deep:.0f} % of the ticks; "
+            f"in the phrase in {100 * phrase['arm_in_trunk']:.0f} %."
+        )
+    if skate is not None and phrase["foot_skate"] is not None:
+        lines.append(f"Feet slide at {skate:.2f} m/s; in the phrase at {phrase['foot_skate']:.2f}.")
+    return lines
+
+
+def _mean_of(found: dict[str, Any], name: str) -> float | None:
+    values = [strongest(found[joint])[1][name] for joint in joints_of(found)]
+    return None if None in values else statistics.fmean(values)
 
 
 def joints_of(found: dict[str, Any]) -> list[str]:
