@@ -16,7 +16,7 @@ from appliance.studio.evaluation.body_figures import BodyFigures
 from appliance.studio.evaluation.coders import Coder, Poses
 from appliance.studio.evaluation.in_play import FollowedOrientation, Rehearsal
 from appliance.studio.evaluation.nearest import Floats, Reference, without_heading
-from appliance.studio.evaluation.onset import onset_ticks
+from appliance.studio.evaluation.onset import StepAnswer, answer_to_steps
 
 TICKS = 1200
 STEP = 5  # ticks from one search for the nearest pose to the next: the means stay the same to 0.1 degrees
@@ -84,10 +84,10 @@ class Measurement:
         """The puppeteer that holds a joint as the other take did."""
         return FollowedOrientation(joint, self.pair.orientations(joint, self._is_root(joint)))
 
-    def onset(self, joint: str, iterations: Iterations) -> float | None:
-        """Ticks until half of the answer to a step of the hand is out."""
+    def steps(self, joint: str, iterations: Iterations) -> StepAnswer:
+        """The answer to steps of the hand from one of its orientations to another."""
         turns = self.pair.orientations(joint, self._is_root(joint))
-        return onset_ticks(self.rehearsal, joint, turns, iterations)
+        return answer_to_steps(self.rehearsal, joint, turns, iterations)
 
     def with_hand(self, joint: str, iterations: Iterations, hand: Puppeteer, ticks: int = TICKS) -> Figures:
         """The figures of the dance with a hand on a joint."""

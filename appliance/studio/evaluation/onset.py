@@ -1,6 +1,8 @@
-"""Onset: how long after a step of the hand half of the other joints' answer is out."""
+"""A step of the hand: how far the other joints go for it, and how long until half of that is out."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,17 +19,30 @@ AFTER = 24  # ticks: all windows that saw the old orientation have passed after 
 LEAST_DEGREES = 1.0  # others that move less between the two orientations do not answer: nothing to time
 
 
-def onset_ticks(rehearsal: Rehearsal, joint: str, turns: Array, iterations: tuple[int, int]) -> float | None:
-    """Median over several steps of the hand, from one of its orientations (N, 4) to another.
+@dataclass(frozen=True)
+class StepAnswer:
+    """To several steps of a hand by STEP_DEGREES. degrees: of the others, between the hand at the one and at
+    the other orientation (mean). onset_ticks: until half of that is out (median), 0 in the tick of the step,
+    None where nothing answers."""
+
+    degrees: float
+    onset_ticks: float | None
+
+
+def answer_to_steps(
+    rehearsal: Rehearsal, joint: str, turns: Array, iterations: tuple[int, int]
+) -> StepAnswer:
+    """Steps from one of the hand's orientations (N, 4) to another, spread over the phrase.
 
     The dance with the step is compared with those in which the hand stays at the one or at the other: half of
-    the answer is out when it is nearer to the other. 0: in the tick of the step. None: no answer.
+    the answer is out when it is nearer to the other.
     """
     room = len(rehearsal.windows) - AFTER
     begins = np.linspace(0, room - WINDOW, STEPS).astype(int) if room >= WINDOW else np.zeros(0, dtype=int)
-    found = [_onset(rehearsal, joint, *_two(turns, begin), int(begin), iterations) for begin in begins]
-    known = [ticks for ticks in found if ticks is not None]
-    return float(np.median(known)) if known else None
+    found = [_step(rehearsal, joint, *_two(turns, begin), int(begin), iterations) for begin in begins]
+    known = [ticks for _, ticks in found if ticks is not None]
+    degrees = float(np.mean([degrees for degrees, _ in found])) if found else 0.0
+    return StepAnswer(degrees, float(np.median(known)) if known else None)
 
 
 def _two(turns: Array, number: int) -> tuple[Array, Array]:
@@ -37,9 +52,10 @@ def _two(turns: Array, number: int) -> tuple[Array, Array]:
     return one, turns[int(np.abs(away - STEP_DEGREES).argmin())]
 
 
-def _onset(
+def _step(
     rehearsal: Rehearsal, joint: str, one: Array, other: Array, begin: int, iterations: tuple[int, int]
-) -> int | None:
+) -> tuple[float, int | None]:
+    """Degrees between the two orientations' dances, and ticks until half of them are out."""
     ticks = WINDOW + AFTER
     part = slice(begin, begin + ticks)
     others = [place for place, name in enumerate(rehearsal.coder.joints) if name != joint]
@@ -54,7 +70,8 @@ def _onset(
         )[:, others]
         for path in paths
     )
-    if degrees_apart(stays, goes)[-AFTER // 2 :].mean() < LEAST_DEGREES:
-        return None
+    degrees = float(degrees_apart(stays, goes)[-AFTER // 2 :].mean())
+    if degrees < LEAST_DEGREES:
+        return degrees, None
     gone, left = degrees_apart(steps, stays)[1:], degrees_apart(steps, goes)[1:]  # from the step's tick on
-    return int((gone >= left).argmax())
+    return degrees, int((gone >= left).argmax())

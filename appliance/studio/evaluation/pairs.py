@@ -12,7 +12,7 @@ from appliance.studio.evaluation.pictures import longest_sound
 from appliance.studio.studio_error import StudioError
 
 LONGEST_S = (TICKS + WINDOW - 1) / FPS
-SHORTEST_S = 4.0  # a shorter stretch says nothing: an answer is a mean over many poses
+SHORTEST_S = 3.0  # a shorter stretch says nothing: an answer is a mean over many poses
 
 
 def pair_up(phrases: Sequence[Take], hands: Sequence[Take]) -> list[Pair]:

@@ -14,8 +14,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
 from appliance.dancer.puppeteers import TurningAxis
 from appliance.studio.evaluation.coders import Coder
 from appliance.studio.evaluation.measurement import Iterations, Measurement, Pair
@@ -38,7 +36,7 @@ def measure(
     free: Sequence[int] = FREE,
     advance: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Keys JOINT.K_J.{answer,fit,...}, JOINT.onset_ticks, JOINT.turning.{...}, free.K.{...}, phrase.{...}.
+    """Keys JOINT.K_J, JOINT.turning, free.K, phrase with figures below them, JOINT.onset_ticks, .step_answer.
 
     Means over the pairs; turning hands on the first one only. advance(words) is called before each dance, as
     often as `dances` says.
@@ -55,9 +53,10 @@ def measure(
                 rows.append(asdict(one.with_hand(joint, (coding, interaction), one.hand(joint))))
             figures[f"{coding}_{interaction}"] = _means(rows)
         advance(f"steps of a hand on {joint}")
-        onsets = [one.onset(joint, in_play) for one in measurements]
-        known = [ticks for ticks in onsets if ticks is not None]
-        figures["onset_ticks"] = float(np.median(known)) if known else None
+        steps = [one.steps(joint, in_play) for one in measurements]
+        known = [step.onset_ticks for step in steps if step.onset_ticks is not None]
+        figures["onset_ticks"] = statistics.median(known) if known else None
+        figures["step_answer"] = round(statistics.fmean(step.degrees for step in steps), 3)
         rows = []
         for axis, seconds in TURNING:
             advance(f"a hand that turns {joint}")

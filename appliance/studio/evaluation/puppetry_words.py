@@ -41,7 +41,11 @@ def table(found: dict[str, Any]) -> Table:
 
 
 def sentences(found: dict[str, Any]) -> list[str]:
-    """What the figures mean, a sentence a joint."""
+    """What the figures mean, a sentence a joint.
+
+    Noise moves the others as well as an answer does, and a pose without life fits everything a little: so fit
+    and energy are asked as well.
+    """
     return [_sentence(joint, *strongest(found[joint])) for joint in joints_of(found)]
 
 
@@ -92,18 +96,30 @@ def strongest(figures: dict[str, Any]) -> tuple[str, dict[str, Any]]:
 
 
 def _sentence(joint: str, iterations: str, row: dict[str, Any]) -> str:
-    answer, energy = row["answer"], row["energy"]
-    if answer >= ANSWERS:
-        meaning = "this dancer answers"
-    elif answer >= ANSWERS_A_LITTLE:
-        meaning = "this dancer answers a little"
-    else:
-        meaning = "this dancer hardly answers"
-    if energy < LIVELY[0]:
-        meaning += f", but comes nearly to rest (energy {energy:.2f})"
-    elif energy > LIVELY[1]:
-        meaning += f", but moves more than anybody did (energy {energy:.2f})"
-    return f"The others move {answer:.1f} degrees with a hand on {joint} at {iterations}: {meaning}."
+    meaning = {2: "this dancer answers", 1: "this dancer answers a little", 0: "this dancer hardly answers"}
+    reservations = []
+    if row["answer"] >= ANSWERS_A_LITTLE:
+        if fits_worse(row):
+            reservations.append("not to anything that it did with that joint")
+        if row["energy"] < LIVELY[0]:
+            reservations.append(f"it comes nearly to rest (energy {row['energy']:.2f})")
+        if row["energy"] > LIVELY[1]:
+            reservations.append(f"it is restless (energy {row['energy']:.2f})")
+    but = f", but {' and '.join(reservations)}" if reservations else ""
+    return (
+        f"The others move {row['answer']:.1f} degrees with a hand on {joint} at {iterations}: "
+        f"{meaning[degree(row)]}{but}."
+    )
+
+
+def degree(row: dict[str, Any]) -> int:
+    """0, 1 or 2: it hardly answers, a little, or answers."""
+    return int(row["answer"] >= ANSWERS_A_LITTLE) + int(row["answer"] >= ANSWERS)
+
+
+def fits_worse(row: dict[str, Any]) -> bool:
+    """Whether the body is further from what the dancer did with that joint than the bare phrase is."""
+    return row["fit"] is not None and row["fit"] > row["fit_bare"]
 
 
 def _row(row: dict[str, Any]) -> list[str]:
