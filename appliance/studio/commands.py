@@ -122,6 +122,9 @@ def evaluate(
         list[str] | None,
         typer.Option(help="K/J, coding and interaction iterations; repeatable; left out: 1/1 to 30/29."),
     ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="PNG: the phrase, the arm pasted on, the dancer's answer.")
+    ] = None,
 ) -> None:
     """Measure how well a network knows a dance, and with --hands whether its body answers a held joint."""
     with clear_errors("evaluate"):
@@ -138,6 +141,7 @@ def evaluate(
                 reference=reference,
                 joints=tuple(joint or ()),
                 iterations=tuple(iterations or ()),
+                picture=picture,
             )
         )
 

@@ -14,9 +14,10 @@ from rich.table import Table
 
 from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.evaluation import puppetry, puppetry_words
+from appliance.studio.evaluation.answer_picture import draw_answer
 from appliance.studio.evaluation.coders import Coder, open_coder
 from appliance.studio.evaluation.evaluation import Evaluation, evaluate, fitting_hop, load_takes
-from appliance.studio.evaluation.measurement import Iterations
+from appliance.studio.evaluation.measurement import Iterations, Measurement
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.pairs import apart_from, pair_up
 from appliance.studio.evaluation.usual_joints import usual_joints
@@ -36,17 +37,13 @@ class Wish:
     reference: Path | None = None
     joints: Sequence[str] = ()
     iterations: Sequence[str] = ()
+    picture: Path | None = None
 
 
 def run(wish: Wish) -> None:
     """Measure and print. Figures go to standard output, everything else to standard error."""
     console = Console(stderr=True)
-    if bool(wish.hands) != (wish.reference is not None):
-        raise StudioError(
-            "--hands and --reference belong together: the answer to a hand is measured against what the "
-            "dancer did in the recordings that the network learned from. Give both, or neither."
-        )
-    iterations = [_iterations(words) for words in wish.iterations] or list(puppetry.ITERATIONS)
+    iterations = _checked(wish)
     coder = open_coder(wish.network)
     joints = _held_joints(coder, wish.joints) if wish.hands else []
     takes = load_takes(wish.recordings, coder, wish.true_fps, wish.all_frames)
@@ -59,7 +56,12 @@ def run(wish: Wish) -> None:
 
     answer = {}
     if wish.reference is not None:
-        answer = _answer(console, coder, takes, hands, wish.reference, joints, iterations)
+        measurements = _measurements(console, coder, takes, hands, wish.reference)
+        answer = _answer(console, measurements, joints, iterations)
+        if wish.picture is not None:
+            usual = puppetry.usual_iterations(iterations)
+            draw_answer(wish.picture, measurements[0], joints[0], usual)
+            console.print(f"{wish.picture} shows a hand on {joints[0]}.", highlight=False)
     found = evaluate(coder, takes, fitting_hop(coder, takes), progress)
     if wish.as_json:
         figures = {"network": coder.facts, **found.as_json()}
@@ -72,16 +74,24 @@ def run(wish: Wish) -> None:
             Console().print(sentence, highlight=False)
 
 
-def _answer(
-    console: Console,
-    coder: Coder,
-    takes: Sequence[Take],
-    hands: Sequence[Take],
-    folder: Path,
-    joints: Sequence[str],
-    iterations: Sequence[Iterations],
-) -> dict[str, Any]:
-    """What the body does where a hand holds a joint, as JSON."""
+def _checked(wish: Wish) -> list[Iterations]:
+    """The iterations asked for. Raises StudioError where options are missing or no numbers."""
+    if bool(wish.hands) != (wish.reference is not None):
+        raise StudioError(
+            "--hands and --reference belong together: the answer to a hand is measured against what the "
+            "dancer did in the recordings that the network learned from. Give both, or neither."
+        )
+    if not wish.hands and (wish.joints or wish.iterations or wish.picture):
+        raise StudioError(
+            "--joint, --iterations and --picture say how a hand is tried: give --hands as well."
+        )
+    return [_iterations(words) for words in wish.iterations] or list(puppetry.ITERATIONS)
+
+
+def _measurements(
+    console: Console, coder: Coder, takes: Sequence[Take], hands: Sequence[Take], folder: Path
+) -> list[Measurement]:
+    """Every phrase with a hand of another take, and the training takes as reference."""
     pairs = pair_up(takes, hands)
     known = apart_from(load_dataset(folder), (*takes, *hands))
     if not known:
@@ -92,12 +102,21 @@ def _answer(
     reference = reference_of(known, coder.joints)
     for pair in pairs:
         console.print(f"- {pair.phrase_name} with the hands of {pair.hand_name}.", highlight=False)
+    return [Measurement(coder, pair, reference) for pair in pairs]
+
+
+def _answer(
+    console: Console,
+    measurements: Sequence[Measurement],
+    joints: Sequence[str],
+    iterations: Sequence[Iterations],
+) -> dict[str, Any]:
+    """What the body does where a hand holds a joint, as JSON."""
+    count = puppetry.dances(len(measurements), len(joints), iterations)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("dancing", total=puppetry.dances(len(pairs), len(joints), iterations))
+        task = bar.add_task("dancing", total=count)
         return puppetry.measure(
-            coder,
-            pairs,
-            reference,
+            measurements,
             joints,
             iterations,
             advance=lambda words: bar.update(task, advance=1, description=words),

@@ -14,11 +14,13 @@ from typer.testing import Result
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
+from appliance.studio.evaluation import answer_picture
 from appliance.studio.export import gate
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import swaying
 
 Trained = tuple[Path, Result]
+HANDS = ["evaluate", "{show}", "{rec}/sway_0.bvh", "--reference", "{rec}", "--hands"]
 
 
 def said(result: Result) -> str:
@@ -98,6 +100,29 @@ def test_evaluate_for_people_is_a_table(trained: Trained, recordings: Path) -> N
     assert "sway_0: 4.0 s, 50 poses a second." in said(result)
 
 
+def test_evaluate_measures_the_answer_to_a_hand(
+    tiny_show: Path, recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(answer_picture, "COLUMNS", 2)
+    phrase, hand, picture = recordings / "sway_2.bvh", recordings / "sway_0.bvh", tmp_path / "answer.png"
+    asked = ["evaluate", tiny_show, phrase, "--hands", hand, "--reference", recordings]
+    asked += ["--joint", "lShldr", "--iterations", "2/1", "--iterations", "3/3"]
+    result = bunraku(*asked, "--json", "--picture", picture)
+    assert result.exit_code == 0, said(result)
+    figures = json.loads(result.stdout)
+    assert {"degrees", "centimetres", "latent"} <= set(figures)
+    answer = figures["puppetry"]
+    row = answer["lShldr"]["3_3"]
+    expected = {"answer", "fit", "fit_own", "fit_bare", "plausibility", "energy", "roughness", "held"}
+    assert expected | {"arm_in_trunk", "foot_skate"} <= set(row)
+    assert row["answer"] > 0 and row["held"] < 5.0
+    assert set(answer["free"]) == {"1", "10", "30", "100"}
+    assert answer["reference"]["poses"] == 200  # sway_1: the phrase's and the hand's takes are no reference
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    people = bunraku(*asked)  # as a table
+    assert "Does the hand move the body?" in people.stdout and "with a hand on lShldr at 3/3" in people.stdout
+
+
 def test_export_keeps_what_the_artist_wrote(trained: Trained, tmp_path: Path) -> None:
     out = tmp_path / "other"
     out.mkdir()
@@ -169,12 +194,19 @@ def test_a_stop_in_the_middle_says_how_to_go_on(tmp_path: Path, recordings: Path
         ),
         (["export", "{tmp}/checkpoint.pt", "--out", "{tmp}/show"], "does not exist"),
         (["evaluate", "{tmp}/show", "{rec}/sway_0.bvh"], "does not exist"),
+        (["evaluate", "{show}", "{rec}/sway_0.bvh", "--hands", "{rec}/sway_1.bvh"], "belong together"),
+        (["evaluate", "{show}", "{rec}/sway_0.bvh", "--reference", "{rec}"], "belong together"),
+        (["evaluate", "{show}", "{rec}/sway_0.bvh", "--joint", "head"], "give --hands as well"),
+        ([*HANDS, "{rec}/sway_0.bvh"], "of the same take"),
+        ([*HANDS, "{rec}/sway_1.bvh", "--joint", "tail"], "No hand can hold 'tail'"),
+        ([*HANDS, "{rec}/sway_1.bvh", "--iterations", "ten"], "is no K/J"),
     ],
 )
 def test_what_people_can_mend_is_one_message(
-    arguments: list[str], complaint: str, tmp_path: Path, recordings: Path
+    arguments: list[str], complaint: str, tmp_path: Path, recordings: Path, tiny_show: Path
 ) -> None:
-    result = bunraku(*(argument.format(tmp=tmp_path, rec=recordings) for argument in arguments))
+    folders = {"tmp": tmp_path, "rec": recordings, "show": tiny_show}
+    result = bunraku(*(argument.format(**folders) for argument in arguments))
     assert result.exit_code == 2
     assert complaint in said(result)
     assert "Traceback" not in result.output

@@ -48,7 +48,7 @@ def test_a_puppet_that_pastes_the_arm_on_does_not_answer(pair: Pair, poses: np.n
     assert found.fit == pytest.approx(found.fit_bare, abs=0.1)
     assert found.held < 3.0
     # Blending takes a little of the pace away, of the held joint as of the others.
-    assert 0.9 < found.energy <= 1.0 and found.roughness <= 1.0
+    assert 0.9 < found.energy < 1.01 and found.roughness < 1.01
 
 
 def test_a_puppet_that_does_what_the_dancer_did_fits(pair: Pair, poses: np.ndarray) -> None:
@@ -80,7 +80,7 @@ def test_figures_are_in_the_agreed_json(pair: Pair, poses: np.ndarray) -> None:
     told: list[str] = []
     joints, iterations = ["lShldr", "head"], [(2, 1), (10, 9)]
     found = puppetry.measure(
-        Pasting(), [pair], Reference(poses, 10.0), joints, iterations, (1, 10), told.append
+        [Measurement(Pasting(), pair, Reference(poses, 10.0))], joints, iterations, (1, 10), told.append
     )
     assert len(told) == puppetry.dances(1, 2, iterations, (1, 10))
     keys = {"answer", "fit", "fit_own", "fit_bare", "plausibility", "energy", "roughness", "held"}
@@ -183,8 +183,8 @@ def test_a_hand_of_the_same_take_is_refused_and_both_are_kept_out_of_the_referen
     [
         (NAMES, ["lShldr", "rShldr", "lForeArm", "head", "chest", "lThigh"]),
         (
-            tuple("Hips Spine Spine1 Head LeftShoulder LeftArm LeftForeArm RightArm LeftUpLeg".split()),
-            ["LeftArm", "RightArm", "LeftForeArm", "Head", "Spine1", "LeftUpLeg"],
+            ("Hips", "Spine", "Spine1", "Head", "LeftShoulder", "LeftArm", "RightArm", "LeftUpLeg"),
+            ["LeftArm", "RightArm", "Head", "Spine1", "LeftUpLeg"],
         ),
         (("mixamorig:Hips", "upper_arm.L", "mixamorig:Head"), ["upper_arm.L", "mixamorig:Head"]),
         (("bone1", "bone2"), []),

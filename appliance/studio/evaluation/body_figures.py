@@ -55,15 +55,20 @@ class BodyFigures:
         """Metres a second that the foot that carries slides in poses (T, J, 4) on the phrase's path."""
         if self._floor is None or len(poses) < 2:
             return float("nan")
-        grounding = Grounding(self._skeleton, self._floor)
-        path = self._recording.roots.astype(np.float32)
-        roots = np.empty((len(poses), 3), dtype=np.float32)
         lifts = self._floor.lifts[: len(poses)]
-        for tick, pose in enumerate(poses.astype(np.float32)):
-            grounding.stand(pose, path[tick], float(lifts[tick]))
-            roots[tick] = grounding.root
-        standing = measure_standing(self._skeleton, poses, roots, self._floor, lifts)
+        standing = measure_standing(self._skeleton, poses, self.grounded(poses), self._floor, lifts)
         return standing.slide_cm_s / 100
+
+    def grounded(self, poses: Array) -> Array:
+        """Roots (T, 3) in metres of poses (T, J, 4) on the phrase's path, set on the floor as in play."""
+        path = self._recording.roots[: len(poses)].astype(np.float32)
+        if self._floor is None:
+            return path
+        grounding, roots = Grounding(self._skeleton, self._floor), np.empty_like(path)
+        for tick, pose in enumerate(poses.astype(np.float32)):
+            grounding.stand(pose, path[tick], float(self._floor.lifts[tick]))
+            roots[tick] = grounding.root
+        return roots
 
     def _shoulder_distance(self) -> float:
         """Metres, in the rest pose."""

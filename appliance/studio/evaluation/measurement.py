@@ -93,10 +93,9 @@ class Measurement:
         """The figures of the dance with a hand on a joint."""
         shown, hand_turns = self.rehearsal.held(*iterations, hand, slice(0, ticks))
         danced = without_heading(shown)
-        free = without_heading(self.rehearsal.free(iterations[0]))[: len(danced)]
+        free = self.rehearsal.free(iterations[0])[: len(danced)]
         phrase, rows = self.phrase[: len(danced)], slice(0, len(danced), STEP)
-        held = self.joints.index(joint)
-        others = [place for place in range(len(self.joints)) if place != held]
+        held, others = self.joints.index(joint), self._others(joint)
         if self._is_root(joint):
             hand_turns = without_heading(hand_turns[:, None])[:, 0]
         far = self.reference.nearest(danced[rows])
@@ -104,7 +103,7 @@ class Measurement:
         fit = self.reference.nearest(danced[rows], others, held, hand_turns[rows])
         bare = self.reference.nearest(phrase[rows], others, held, hand_turns[rows])
         return Figures(
-            answer=float(motion.degrees_apart(danced[:, others], free[:, others]).mean()),
+            answer=self.answer(joint, shown, free),
             fit=_mean(fit),
             fit_own=_mean(self._fit_of_phrase(joint, others)[: len(far)]),
             fit_bare=_mean(bare),
@@ -116,6 +115,12 @@ class Measurement:
             found=float(np.isfinite(fit).mean()),
             **self._of_body(shown),
         )
+
+    def answer(self, joint: str, danced: Poses, free: Poses) -> float:
+        """Degrees that the others are moved by a hand: a dance (T, M, 4) with it against one without."""
+        others = self._others(joint)
+        apart = motion.degrees_apart(without_heading(danced)[:, others], without_heading(free)[:, others])
+        return float(apart.mean())
 
     def free(self, coding_iterations: int) -> dict[str, float]:
         """The figures of the dance without a hand."""
@@ -156,6 +161,10 @@ class Measurement:
             held, phrase = self.joints.index(joint), self.phrase[::STEP]
             self._own_fit[joint] = self.reference.nearest(phrase, others, held, phrase[:, held])
         return self._own_fit[joint]
+
+    def _others(self, joint: str) -> list[int]:
+        """Places of the joints that the hand does not hold."""
+        return [place for place, name in enumerate(self.joints) if name != joint]
 
     def _is_root(self, joint: str) -> bool:
         return self.joints.index(joint) == 0

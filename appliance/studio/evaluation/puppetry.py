@@ -15,9 +15,7 @@ from dataclasses import asdict
 from typing import Any
 
 from appliance.dancer.puppeteers import TurningAxis
-from appliance.studio.evaluation.coders import Coder
-from appliance.studio.evaluation.measurement import Iterations, Measurement, Pair
-from appliance.studio.evaluation.nearest import Reference
+from appliance.studio.evaluation.measurement import Iterations, Measurement
 
 ITERATIONS: tuple[Iterations, ...] = ((1, 1), (2, 1), (10, 9), (10, 10), (30, 29))
 IN_PLAY: Iterations = (10, 9)  # at which the onset and turning hands are measured
@@ -28,9 +26,7 @@ LARGEST = ("largest_step", "snap")  # of several dances the largest counts, not 
 
 
 def measure(
-    coder: Coder,
-    pairs: Sequence[Pair],
-    reference: Reference,
+    measurements: Sequence[Measurement],
     joints: Sequence[str],
     iterations: Sequence[Iterations] = ITERATIONS,
     free: Sequence[int] = FREE,
@@ -38,11 +34,10 @@ def measure(
 ) -> dict[str, Any]:
     """Keys JOINT.K_J, JOINT.turning, free.K, phrase with figures below them, JOINT.onset_ticks, .step_answer.
 
-    Means over the pairs; turning hands on the first one only. advance(words) is called before each dance, as
-    often as `dances` says.
+    Means over the pairs that are measured; turning hands on the first one only. advance(words) is called
+    before each dance, as often as `dances` says.
     """
-    measurements = [Measurement(coder, pair, reference) for pair in pairs]
-    in_play = IN_PLAY if IN_PLAY in iterations else max(iterations)
+    in_play = usual_iterations(iterations)
     found: dict[str, Any] = {}
     for joint in joints:
         figures: dict[str, Any] = {}
@@ -69,6 +64,7 @@ def measure(
         advance(f"without a hand, {coding}")
         found["free"][str(coding)] = _means([one.free(coding) for one in measurements])
     found["phrase"] = _means([one.of_phrase() for one in measurements])
+    reference = measurements[0].reference
     found["reference"] = {"poses": len(reference), "largest_step": round(reference.largest_step, 3)}
     return found
 
@@ -78,6 +74,11 @@ def dances(
 ) -> int:
     """How often measure advances."""
     return joints * (pairs * len(iterations) + 1 + len(TURNING)) + len(free)
+
+
+def usual_iterations(iterations: Sequence[Iterations]) -> Iterations:
+    """Those in play where they are among these, else the most."""
+    return IN_PLAY if IN_PLAY in iterations else max(iterations)
 
 
 def _means(rows: Sequence[dict[str, float]]) -> dict[str, float | None]:
