@@ -1,28 +1,47 @@
-"""Training data: recordings to windows of poses, split by take, glitches masked, mirrored."""
+"""Training data: recordings to windows of poses, split by take, capture errors masked, mirrored."""
 
 from __future__ import annotations
 
-import fnmatch
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.bvh import leading_tpose_frames, read_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
+from appliance.studio.data.capture_errors import CaptureError, find_capture_errors, sound_frames
+from appliance.studio.data.catalogue import CATALOGUES, Catalogue, find_catalogue, read_catalogue
+
+__all__ = [
+    "CATALOGUES",
+    "CaptureError",
+    "Catalogue",
+    "Dataset",
+    "DatasetError",
+    "Take",
+    "extremities",
+    "find_catalogue",
+    "load_dataset",
+    "load_take",
+    "mean_pose",
+    "mirror_pairs",
+    "mirrored",
+    "moving_joints",
+    "read_catalogue",
+    "window_starts",
+    "windows",
+]
 
 FPS = 50.0
 WINDOW = 8
-GLITCH_DEGREES = 25.0  # a larger step between two recorded frames is a capture error, not a dancer
-EXTREMITY_DEGREES = 110.0  # head, hands and feet further than this from the mean pose: swapped markers
 MOVING_DEGREES = 1.0  # joints that turn less than this in every recording are still
 TPOSE_FRAMES = 3
-CATALOGUES = Path(__file__).parent / "catalogues"
+Pose = NDArray[np.floating[Any]]
 
 
 class DatasetError(ValueError):
@@ -39,22 +58,7 @@ class Take:
     sound: NDArray[np.bool_]  # (N,) frames that are no glitch
     header_fps: float
     true_fps: float
-
-
-@dataclass(frozen=True)
-class Catalogue:
-    """What is known of recordings beyond their files: true frame rates, takes, what is held out."""
-
-    true_fps: dict[str, float] = field(default_factory=dict)
-    take: dict[str, str] = field(default_factory=dict)
-    held_out: tuple[str, ...] = ()
-    acknowledgement: str = ""  # whom to thank, in every show made of them
-
-    def fps_of(self, name: str) -> float | None:
-        return next((fps for pattern, fps in self.true_fps.items() if fnmatch.fnmatch(name, pattern)), None)
-
-    def take_of(self, name: str) -> str:
-        return self.take.get(name, name)
+    errors: tuple[CaptureError, ...] = ()  # why the others are
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,8 @@ def load_dataset(
     if not files:
         raise DatasetError(f"{folder} has no .bvh files. Give the folder that holds your recordings.")
     catalogue = catalogue or find_catalogue(folder, files)
-    takes = [load_take(file, catalogue) for file in progress(files)]
+    read = [_read(file, catalogue) for file in progress(files)]
+    takes = [take for take, _ in read]
     skeleton = takes[0].recording.skeleton
     for file, take in zip(files, takes, strict=True):
         if not take.recording.skeleton.same_joints(skeleton):
@@ -93,57 +98,43 @@ def load_dataset(
                 f"{file.name} has another skeleton than {files[0].name}. Train one dancer on one skeleton: "
                 "move the file to a folder of its own."
             )
-    held = {take.take for take in takes if any(fnmatch.fnmatch(take.name, p) for p in catalogue.held_out)}
+    held = {take.take for take in takes if catalogue.is_held_out(take.name)}
     if not held and len({take.take for take in takes}) > 1:
         held = {sorted({take.take for take in takes})[-1]}
-    moving = moving_joints(takes)
-    training = tuple(take for take in takes if take.take not in held)
-    if not training:
+    if all(take.take in held for take in takes):
         raise DatasetError("Every take is held out: nothing is left to train on.")
-    usual = mean_pose(training)
-    tips = extremities(skeleton, moving)
-    for take in takes:
-        take.sound[:] &= plausible(take.recording.poses[:, tips], usual[tips])
+    moving = moving_joints(takes)
+    errors = find_capture_errors([recorded for _, recorded in read], moving)
+    takes = [_masked(take, found) for take, found in zip(takes, errors, strict=True)]
+    training = tuple(take for take in takes if take.take not in held)
     return Dataset(skeleton, moving, training, tuple(take for take in takes if take.take in held))
 
 
-def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
-    """catalogue.yaml beside the recordings, else one of the studio's whose file names and sizes all match."""
-    own = folder / "catalogue.yaml"
-    if own.exists():
-        return read_catalogue(own)
-    sizes = {file.stem: file.stat().st_size for file in files}
-    for known in sorted(CATALOGUES.glob("*.yaml")):
-        text = yaml.safe_load(known.read_text(encoding="utf-8"))
-        if all(text["bytes"].get(name) == size for name, size in sizes.items()):
-            return read_catalogue(known)
-    return Catalogue()
+def load_take(file: Path, catalogue: Catalogue, usual: Mapping[str, Pose] | None = None) -> Take:
+    """One file at its true rate, T-pose dropped, capture errors marked, resampled to 50 Hz.
+
+    usual: by joint name the orientations (4,) in which the dancer usually is, where one file cannot tell.
+    """
+    take, recorded = _read(file, catalogue)
+    skeleton = recorded.skeleton
+    known = {skeleton.index(name): pose for name, pose in (usual or {}).items() if name in skeleton.names}
+    return _masked(take, find_capture_errors([recorded], moving_joints([take]), known)[0])
 
 
-def read_catalogue(path: Path) -> Catalogue:
-    """Read a catalogue: true_fps (pattern: rate), takes (take: [names]), held_out (patterns),
-    acknowledgement."""
-    text = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    takes = {name: take for take, names in (text.get("takes") or {}).items() for name in names}
-    rates = {str(pattern): float(fps) for pattern, fps in (text.get("true_fps") or {}).items()}
-    thanks = str(text.get("acknowledgement") or "").strip()
-    return Catalogue(rates, takes, tuple(text.get("held_out") or ()), thanks)
-
-
-def load_take(file: Path, catalogue: Catalogue) -> Take:
-    """One file at its true rate, T-pose dropped, glitches marked, resampled to 50 Hz."""
+def _read(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
+    """A take in which nothing is masked, and its recording at the rate at which it was captured."""
     header = read_bvh(file)
     fps = catalogue.fps_of(file.stem) or header.fps
-    recording = Recording(header.skeleton, header.poses, header.roots, fps, header.translations)
+    recording = replace(header, fps=fps)
     if leading_tpose_frames(recording):
         recording = recording.without_first(TPOSE_FRAMES)
-    steps = np.degrees(quaternion.angle_between(recording.poses[1:], recording.poses[:-1])).max(axis=-1)
     resampled = recording.resampled(FPS)
     sound = np.ones(len(resampled), dtype=bool)
-    for frame in np.flatnonzero(steps > GLITCH_DEGREES):
-        at = frame * FPS / fps
-        sound[max(int(np.floor(at)), 0) : int(np.ceil(at + FPS / fps)) + 1] = False
-    return Take(file.stem, catalogue.take_of(file.stem), resampled, sound, header.fps, fps)
+    return Take(file.stem, catalogue.take_of(file.stem), resampled, sound, header.fps, fps), recording
+
+
+def _masked(take: Take, errors: Sequence[CaptureError]) -> Take:
+    return replace(take, sound=sound_frames(len(take.recording), FPS, errors), errors=tuple(errors))
 
 
 def mean_pose(takes: Sequence[Take]) -> NDArray[np.float64]:
@@ -162,16 +153,6 @@ def extremities(skeleton: Skeleton, moving: Sequence[int]) -> list[int]:
         while (joint := skeleton.parents[joint]) >= 0:
             inner.add(joint)
     return [joint for joint in moving if joint not in inner]
-
-
-def plausible(tips: NDArray[np.floating], usual: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """(N,): no extremity (N, E, 4) is further from its usual orientation (E, 4) than a body allows.
-
-    No wrist, neck or ankle turns 110 degrees from its mean; where a recording says so, two markers were
-    taken for each other (in the CMU dance takes: a head upside down for a whole take, hands, feet).
-    """
-    away = np.degrees(quaternion.angle_between(tips, usual))
-    return np.asarray((away <= EXTREMITY_DEGREES).all(axis=-1))
 
 
 def moving_joints(takes: Sequence[Take]) -> tuple[int, ...]:

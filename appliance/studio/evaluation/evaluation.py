@@ -17,10 +17,8 @@ from appliance.studio.data.dataset import (
     WINDOW,
     Catalogue,
     Take,
-    extremities,
     find_catalogue,
     load_take,
-    plausible,
     window_starts,
 )
 from appliance.studio.evaluation.coders import Coder, Poses
@@ -85,14 +83,9 @@ def load_takes(
         if not file.is_file():
             raise StudioError(f"{file} does not exist. Give BVH files to evaluate on.")
         known = Catalogue({"*": true_fps}) if true_fps else find_catalogue(file.parent, [file])
-        take = load_take(file, known)
+        take = load_take(file, known, dict(zip(coder.joints, coder.rest, strict=True)))
         if all_frames:
             take.sound[:] = True
-        else:
-            places = _places(take, coder)
-            tips = [j for j in extremities(take.recording.skeleton, sorted(places)) if j in places]
-            usual = coder.rest[[places.index(j) for j in tips]]
-            take.sound[:] &= plausible(take.recording.poses[:, tips], usual)
         takes.append(take)
     return takes
 

@@ -1,0 +1,208 @@
+"""Capture errors: jumps, and stretches in which a joint stands where only swapped markers put it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+from appliance.studio.data.jumps import bend_limits, bends, jumps, runs
+
+SNAP = 0.5  # of a jump's limit: no error by itself, but a way in which a joint is put into a wrong place
+FAR_DEGREES = 110.0  # head, hand or foot from its usual orientation: more than a neck, wrist or ankle turns
+AWAY_DEGREES = 60.0  # any other joint that a jump brings there and a jump takes away
+GAP_DEGREES = 30.0  # to where the joint is at all other times: it never passes there
+PASSING_S = 0.5  # so long it may pass nearer: on the way there and back
+TOUCHING_S = 0.1  # between a stretch and the jump that put the joint there
+LIMB_END = 0.2  # of the skeleton's reach: what hangs below a head, hand or foot is no longer than this
+BLOCK = 256
+
+JUMP, APART, MARKED = "jump", "apart", "marked"
+REASONS = {
+    JUMP: "moves as no body does",
+    APART: "was put by a snap where it is at no other time",
+    MARKED: "masked by the catalogue",
+}
+
+
+@dataclass(frozen=True)
+class CaptureError:
+    """A stretch of a recording in seconds in which a joint is not what the dancer did. degrees: how far off.
+
+    joint is empty where the whole figure is meant.
+    """
+
+    joint: str
+    start_s: float
+    end_s: float
+    reason: str
+    degrees: float = 0.0
+
+
+def find_capture_errors(
+    recordings: Sequence[Recording], moving: Sequence[int], usual: Mapping[int, Array] | None = None
+) -> list[list[CaptureError]]:
+    """Errors of each take of one dancer, at its recorded rate; moving: the joints to look at.
+
+    usual: joints to orientations (4,) in which they usually are; for the others it is the mean of the takes.
+    """
+    if not recordings:
+        return []
+    bent = [bends(recording) for recording in recordings]
+    limits = bend_limits(bent)
+    given = list(zip(recordings, bent, limits, strict=True))
+    jumped = [_of(moving, jumps(one, bend, limit)) for one, bend, limit in given]
+    snapped = [_of(moving, jumps(one, bend, SNAP * limit)) for one, bend, limit in given]
+    errors = [
+        [_jump(recording, joint, *ends) for joint, found in one.items() for ends in found]
+        for recording, one in zip(recordings, jumped, strict=True)
+    ]
+    skeleton = recordings[0].skeleton
+    ends = limb_ends(skeleton)
+    for joint in moving:
+        if joint == 0:
+            continue
+        poses = [recording.poses[:, joint] for recording in recordings]
+        jumps_here = [one.get(joint, []) for one in jumped]
+        snaps_here = [one.get(joint, []) for one in snapped] if joint in ends else jumps_here
+        middle = usual[joint] if usual and joint in usual else _mean(poses, jumps_here)
+        stretches = [
+            _Stretch(number, first, end)
+            for number, cuts in enumerate(snaps_here)
+            for first, end in _between(cuts, len(poses[number]))
+        ]
+        looked_at = _Joint([one.fps for one in recordings], poses, jumps_here, middle, joint in ends)
+        for stretch in looked_at.apart(stretches):
+            fps, name = recordings[stretch.take].fps, skeleton.names[joint]
+            away = looked_at.away[stretch.take][stretch.first : stretch.end]
+            span = (stretch.first / fps, (stretch.end - 1) / fps)
+            errors[stretch.take].append(CaptureError(name, *span, APART, float(np.median(away))))
+    return [sorted(one, key=lambda error: error.start_s) for one in errors]
+
+
+def sound_frames(count: int, fps: float, errors: Sequence[CaptureError]) -> NDArray[np.bool_]:
+    """(count,) poses at a rate that no error touches."""
+    sound = np.ones(count, dtype=bool)
+    for error in errors:
+        sound[max(int(np.floor(error.start_s * fps)), 0) : int(np.ceil(error.end_s * fps)) + 1] = False
+    return sound
+
+
+def limb_ends(skeleton: Skeleton) -> set[int]:
+    """Joints below which little hangs: heads, hands, feet, and what is smaller."""
+    reach = np.zeros(len(skeleton))
+    for joint, offset in skeleton.ends:
+        reach[joint] = max(reach[joint], float(np.linalg.norm(offset)))
+    for joint in reversed(range(1, len(skeleton))):
+        above = skeleton.parents[joint]
+        reach[above] = max(reach[above], reach[joint] + float(np.linalg.norm(skeleton.offsets[joint])))
+    return set(np.flatnonzero(reach <= LIMB_END * reach[0]).tolist()) - {0}
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Frames first..end - 1 of a take between two cuts."""
+
+    take: int
+    first: int
+    end: int
+
+
+class _Joint:
+    """One joint in all takes: its orientations, jumps, and how far it is from where it usually is."""
+
+    def __init__(
+        self,
+        fps: Sequence[float],
+        poses: Sequence[Array],
+        jumped: Sequence[Sequence[tuple[int, int]]],
+        usual: Array,
+        limb_end: bool,
+    ) -> None:
+        self.fps, self.poses, self.jumped, self.usual, self.limb_end = fps, poses, jumped, usual, limb_end
+        self.away = [np.degrees(quaternion.angle_between(q, usual)) for q in poses]
+        self.far = FAR_DEGREES if limb_end else AWAY_DEGREES
+
+    def apart(self, stretches: Sequence[_Stretch]) -> list[_Stretch]:
+        """Those in which the joint is wrong for as long as they last, with the way there and back."""
+        suspects = [one for one in stretches if self._is_suspect(one)]
+        if not suspects:
+            return []
+        others = [one for one in stretches if one not in suspects]
+        rest = np.concatenate([self.usual[None], *map(self._few, others)])
+        return [
+            self._grown(one) for one in suspects if self._is_put(one) or self._gap(one, rest) > GAP_DEGREES
+        ]
+
+    def _is_suspect(self, one: _Stretch) -> bool:
+        return bool(np.median(self.away[one.take][one.first : one.end]) > self.far) and (
+            self.limb_end or len(self.jumped[one.take]) > 0
+        )
+
+    def _is_put(self, one: _Stretch) -> bool:
+        """Whether a jump put the end of a limb beyond what a body can."""
+        near = TOUCHING_S * self.fps[one.take]
+        return self.limb_end and any(
+            abs(last - one.first) <= near or abs(first - one.end) <= near
+            for first, last in self.jumped[one.take]
+        )
+
+    def _few(self, one: _Stretch) -> Array:
+        """Orientations ten times a second: what passes within PASSING_S counts little."""
+        return self.poses[one.take][one.first : one.end : max(1, round(self.fps[one.take] / 10))]
+
+    def _gap(self, one: _Stretch, rest: Array) -> float:
+        """How far from this stretch the joint stays at all other times but PASSING_S of them."""
+        near = np.zeros(len(rest))
+        few = self._few(one)
+        for at in range(0, len(few), BLOCK):
+            near = np.maximum(near, np.abs(few[at : at + BLOCK] @ rest.T).max(axis=0))
+        passing = min(round(10 * PASSING_S), len(rest) - 1)
+        return float(np.degrees(2 * np.arccos(min(np.sort(near)[-1 - passing], 1.0))))
+
+    def _grown(self, one: _Stretch) -> _Stretch:
+        """With the frames before and after it in which the end of a limb is still too far."""
+        far, first, end = self.away[one.take] > self.far, one.first, one.end
+        while self.limb_end and first > 0 and far[first - 1]:
+            first -= 1
+        while self.limb_end and end < len(far) and far[end]:
+            end += 1
+        return _Stretch(one.take, first, end)
+
+
+def _of(moving: Sequence[int], found: dict[int, list[tuple[int, int]]]) -> dict[int, list[tuple[int, int]]]:
+    return {joint: found[joint] for joint in moving if joint in found}
+
+
+def _jump(recording: Recording, joint: int, first: int, last: int) -> CaptureError:
+    q, fps = recording.poses[first : last + 1, joint], recording.fps
+    degrees = np.degrees(quaternion.angle_between(q, q[:1])).max()
+    return CaptureError(recording.skeleton.names[joint], first / fps, last / fps, JUMP, float(degrees))
+
+
+def _between(cuts: Sequence[tuple[int, int]], count: int) -> list[tuple[int, int]]:
+    """Frames (first, last + 1) of the stretches between cuts."""
+    return runs(_free(cuts, count))
+
+
+def _free(cuts: Sequence[tuple[int, int]], count: int) -> NDArray[np.bool_]:
+    free = np.ones(count, dtype=bool)
+    for first, last in cuts:
+        free[first : last + 1] = False
+    return free
+
+
+def _mean(poses: Sequence[Array], jumped: Sequence[Sequence[tuple[int, int]]]) -> Array:
+    """Where a joint usually is: the mean (Markley et al. 2007) of what is not far from the mean of all."""
+    q = np.concatenate([one[_free(cuts, len(one))] for one, cuts in zip(poses, jumped, strict=True)])
+    mean: Array = np.linalg.eigh(q.T @ q)[1][:, -1]
+    near = np.degrees(quaternion.angle_between(q, mean)) <= FAR_DEGREES
+    if near.any():
+        mean = np.linalg.eigh(q[near].T @ q[near])[1][:, -1]
+    return mean

@@ -1,0 +1,92 @@
+"""Jumps: where a joint moves as no body does, judged by speed and by how suddenly its motion changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+
+SPAN_S = 1 / 30  # motions are compared over this time at any rate: an error of one frame shows as clearly
+# Two motions that follow each other and differ by more than this are a jump: what the dancer's own sharpest
+# 1 % allows, between two bounds. Measured in degrees: clean salsa and Indian dance reach 44 (a hand), martial
+# arts 65 (a shin in a kick); swapped markers begin at 34 (a hip), 43 (a neck), 57 (a foot).
+LEAST_DEGREES, MOST_DEGREES, CALM_DEGREES, TIMES_SHARP = 30.0, 80.0, 20.0, 3.2
+FASTEST, FASTEST_S = 2400.0, 1 / 60  # degrees a second over this time: a fighter's wrist reaches 2000
+FAST = 0.3  # of a jump's fastest step: the steps beside it that belong to it
+
+
+def bends(recording: Recording) -> NDArray[np.float32]:
+    """(N, J): by how many degrees the motion in the SPAN_S after each frame differs from that before it."""
+    span, q = _frames(SPAN_S, recording.fps), recording.poses
+    bent = np.zeros(q.shape[:2], dtype=np.float32)
+    if len(q) > 2 * span:
+        axis, angle = quaternion.to_axis_angle(quaternion.multiply(q[span:], quaternion.inverse(q[:-span])))
+        way = np.degrees(axis * angle[..., None])
+        bent[span:-span] = np.linalg.norm(way[span:] - way[:-span], axis=-1)
+    return bent
+
+
+def bend_limits(bent: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float64]]:
+    """For each take (J,): from how many degrees on a bend is a jump, judged by what the dancer does.
+
+    That is the sharpest 1 % of all takes, and up to twice as much where one take is sharp for a twentieth of
+    its time: a fight among waltzes is no error.
+    """
+    sharp = np.percentile(np.concatenate(bent), 99, axis=0)
+    own = [np.clip(2 * np.percentile(take, 95, axis=0), sharp, 2 * sharp) for take in bent]
+    return [np.clip(CALM_DEGREES + TIMES_SHARP * one, LEAST_DEGREES, MOST_DEGREES) for one in own]
+
+
+def jumps(
+    recording: Recording, bent: NDArray[np.float32], limits: NDArray[np.float64]
+) -> dict[int, list[tuple[int, int]]]:
+    """By joint the first and last frame of each jump, both of them sound; recording at its recorded rate."""
+    span = _frames(SPAN_S, recording.fps)
+    too_fast, sharp = _too_fast(recording), bent > limits
+    found = {}
+    for joint in np.flatnonzero(sharp.any(axis=0) | too_fast.any(axis=0)):
+        q = recording.poses[:, joint]
+        steps = np.degrees(quaternion.angle_between(q[1:], q[:-1]))
+        moving = too_fast[:, joint]
+        for frame in np.flatnonzero(sharp[:, joint]):
+            _mark(moving, steps, max(int(frame) - span, 0), min(int(frame) + span, len(steps)))
+        found[int(joint)] = runs(moving)
+    return found
+
+
+def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last + 1 of each run of true ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _mark(moving: NDArray[np.bool_], steps: Array, first: int, last: int) -> None:
+    """Mark the fast ones of steps first..last - 1, and those beside them that are as fast."""
+    least = FAST * steps[first:last].max()
+    moving[first:last] |= steps[first:last] >= least
+    while first > 0 and moving[first] and steps[first - 1] >= least:
+        first -= 1
+        moving[first] = True
+    while last < len(steps) and moving[last - 1] and steps[last] >= least:
+        moving[last] = True
+        last += 1
+
+
+def _too_fast(recording: Recording) -> NDArray[np.bool_]:
+    """(N - 1, J): steps that are part of a turn faster than any body's."""
+    span, q = _frames(FASTEST_S, recording.fps), recording.poses
+    too_fast = np.zeros((max(len(q) - 1, 0), q.shape[1]), dtype=bool)
+    if len(q) > span:
+        turned = np.degrees(quaternion.angle_between(q[span:], q[:-span]))
+        for later in range(span):
+            too_fast[later : later + len(turned)] |= turned > FASTEST * span / recording.fps
+    return too_fast
+
+
+def _frames(seconds: float, fps: float) -> int:
+    return max(1, round(seconds * fps))

@@ -1,0 +1,132 @@
+"""What is masked is an error of the capture: jumps and swapped markers go, big gestures stay."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.pose import quaternion
+from appliance.pose.recording import Recording
+from appliance.studio.data.capture_errors import APART, JUMP, CaptureError, find_capture_errors, sound_frames
+from appliance.studio.data.dataset import load_dataset
+from tests.studio.tiny import moving, skeleton, swaying
+
+RATES = (30.0, 60.0, 120.0)
+FLIP = quaternion.from_axis_angle([1.0, 0.0, 0.2], np.radians(170.0))
+
+
+def turned(recording: Recording, joint: str, turns: np.ndarray, first: int = 0) -> Recording:
+    """The recording with a joint turned besides, by turns (K, 4) from a frame on."""
+    poses, place = recording.poses.copy(), recording.skeleton.index(joint)
+    span = slice(first, first + len(turns))
+    poses[span, place] = quaternion.multiply(turns, poses[span, place])
+    return replace(recording, poses=quaternion.continuous(poses))
+
+
+def flipped(recording: Recording, joint: str, start_s: float, end_s: float) -> Recording:
+    first, last = round(start_s * recording.fps), round(end_s * recording.fps)
+    return turned(recording, joint, np.tile(FLIP, (last - first, 1)), first)
+
+
+def errors_of(*recordings: Recording) -> list[list[CaptureError]]:
+    return find_capture_errors(recordings, moving())
+
+
+def sound(recording: Recording, errors: list[CaptureError]) -> np.ndarray:
+    return sound_frames(len(recording), recording.fps, errors)
+
+
+@pytest.mark.parametrize("fps", RATES)
+@pytest.mark.parametrize("joint", ["neck", "lForeArm", "rFoot"])
+def test_a_jump_of_one_frame_is_found_at_any_rate(fps: float, joint: str) -> None:
+    dance = swaying(8.0, fps=fps)
+    spike = quaternion.from_axis_angle([0.3, 1.0, 0.0], np.radians([70.0]))
+    at = round(3 * fps)
+    errors = errors_of(turned(dance, joint, spike, at))[0]
+    assert errors and {(error.joint, error.reason) for error in errors} == {(joint, JUMP)}
+    masked = np.flatnonzero(~sound(dance, errors))
+    assert at in masked and len(masked) <= 0.1 * fps + 3
+
+
+@pytest.mark.parametrize("fps", RATES)
+@pytest.mark.parametrize("joint", ["head", "lHand", "rFoot", "lThigh"])
+def test_a_joint_that_is_upside_down_for_two_seconds_is_masked_for_two_seconds(
+    fps: float, joint: str
+) -> None:
+    dance = swaying(20.0, fps=fps)
+    errors = errors_of(flipped(dance, joint, 8, 10), swaying(20.0, seed=0, fps=fps))
+    assert errors[1] == []
+    assert {error.joint for error in errors[0]} == {joint}
+    assert {error.reason for error in errors[0]} == {JUMP, APART}
+    good = sound(dance, errors[0])
+    assert not good[round(8 * fps) : round(10 * fps)].any()
+    assert good[: round(7.9 * fps)].all() and good[round(10.1 * fps) :].all()
+
+
+@pytest.mark.parametrize("joint", ["head", "rHand"])
+def test_a_whole_take_upside_down_is_masked_beside_sound_ones(joint: str) -> None:
+    dance = swaying(10.0)
+    errors = errors_of(dance, flipped(dance, joint, 0, 10), replace(dance))
+    assert errors[0] == errors[2] == []
+    assert not sound(dance, errors[1]).any()
+
+
+def gesture(fps: float, degrees: float, there_s: float, held_s: float) -> np.ndarray:
+    """A turn by so much and back, as smooth as muscles make it (least jerk)."""
+    share = np.linspace(0, 1, round(there_s * fps) + 1)
+    there = 10 * share**3 - 15 * share**4 + 6 * share**5
+    angles = np.radians(degrees) * np.concatenate([there, np.ones(round(held_s * fps)), there[::-1]])
+    return quaternion.from_axis_angle([0.1, 0.2, 1.0], angles)
+
+
+@pytest.mark.parametrize("fps", RATES)
+@pytest.mark.parametrize(
+    ("joint", "degrees", "there_s"),
+    [("lShldr", 150.0, 0.4), ("rThigh", 140.0, 0.25), ("rHand", 150.0, 0.4), ("head", 120.0, 0.4)],
+    ids=["arm overhead and behind", "high kick", "hand turned over", "head thrown back"],
+)
+def test_a_big_gesture_is_no_error(fps: float, joint: str, degrees: float, there_s: float) -> None:
+    dance = swaying(12.0, fps=fps)
+    big = turned(dance, joint, gesture(fps, degrees, there_s, 1.5), round(4 * fps))
+    assert errors_of(big, swaying(12.0, seed=3, fps=fps)) == [[], []]
+
+
+def test_a_fight_among_waltzes_is_no_error() -> None:
+    """Kicks of 1,900 degrees a second in one take of three."""
+    calm = swaying(20.0, fps=120.0)
+    fight = calm
+    for second in range(1, 19):
+        fight = turned(fight, "rShin", gesture(120.0, 110.0, 0.11, 0.0), second * 120)
+    assert errors_of(calm, fight, swaying(20.0, seed=1, fps=120.0)) == [[], [], []]
+
+
+def test_nothing_is_found_in_nothing() -> None:
+    assert find_capture_errors([], moving()) == []
+    still = Recording(skeleton(), np.tile(quaternion.IDENTITY, (3, 20, 1)), np.zeros((3, 3)), 50.0)
+    assert errors_of(still) == [[]]
+
+
+def test_the_cmu_dances_lose_their_errors_and_nothing_else(recordings_dir: Path) -> None:
+    found = load_dataset(recordings_dir / "train")
+    takes = {take.name: take for take in (*found.training, *found.held_out)}
+    share = {name: float(np.mean(~take.sound)) for name, take in takes.items()}
+    assert share["salsa_06"] == 1.0  # her head hangs upside down from the first frame to the last
+    head = [error for error in takes["salsa_07"].errors if error.joint == "head" and error.reason == APART]
+    assert head[0].start_s == pytest.approx(20.4, abs=0.6) and head[-1].end_s > 34.4
+    assert share["salsa_13"] > 0.13 and share["salsa_14"] > 0.09  # a hand turned by 180 degrees
+    assert share["salsa_24"] == pytest.approx(606 / 2144, abs=0.01)  # twelve seconds of it
+    assert share["salsa_01"] > 0.08 and share["salsa_02"] > 0.03  # feet that point backwards
+    clean = [f"salsa_{n}" for n in (16, 17, 18, 19, 21, 25, 28, 29, 30)] + [
+        "indian_06",
+        "indian_13",
+        "indian_14",
+    ]
+    assert [name for name in clean if share[name]] == []
+
+
+def test_a_fighter_s_kicks_are_no_errors(recordings_dir: Path) -> None:
+    found = load_dataset(recordings_dir / "martial")
+    assert [take.name for take in (*found.training, *found.held_out) if take.errors] == []
