@@ -69,9 +69,7 @@ def run(wish: Wish) -> None:
         return
     _print_table(Console(), coder, found)
     if answer:
-        Console().print(puppetry_words.table(answer))
-        for sentence in (*puppetry_words.sentences(answer), *puppetry_words.asides(answer)):
-            Console().print(sentence, highlight=False)
+        puppetry_words.print_answer(Console(), answer)
 
 
 def _checked(wish: Wish) -> list[Iterations]:

@@ -14,7 +14,6 @@ from typer.testing import Result
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
-from appliance.studio.evaluation import answer_picture
 from appliance.studio.export import gate
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import swaying
@@ -55,12 +54,23 @@ def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:
         assert expected in words, expected
 
 
+def test_training_ends_with_whether_the_dancer_answers(trained: Trained) -> None:
+    show, result = trained
+    answer = json.loads((show / "report.json").read_text())["puppetry"]
+    assert answer["lShldr"]["10_9"]["answer"] >= 0 and answer["free"]["30"]["plausibility"] > 0
+    assert "with hands of sway_0" in answer["measured_on"]
+    words = said(result)
+    assert "Does the hand move the body?" in words and "with a hand on lShldr at 10/9" in words
+    assert answer["verdict"] in words and words.index(answer["verdict"]) < words.index("is a show. Dance it")
+    assert "answer.png" in (show / "SHA256SUMS").read_text()
+
+
 def test_training_leaves_its_history_and_pictures(trained: Trained) -> None:
     show, _ = trained
     told = json.loads((show / "training.json").read_text())
     assert told["settings"]["width"] == 48 and told["history"][-1]["step"] == 150
     assert told["history"][-1]["held_out_degrees"] > 0
-    for picture in (show / "pictures" / "losses.png", show / "report.png"):
+    for picture in (show / "pictures" / "losses.png", show / "report.png", show / "answer.png"):
         assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 10_000
     listed = (show / "SHA256SUMS").read_text()
     assert "puppet.onnx" in listed and "checkpoint.pt" not in listed and "pictures" not in listed
@@ -100,10 +110,7 @@ def test_evaluate_for_people_is_a_table(trained: Trained, recordings: Path) -> N
     assert "sway_0: 4.0 s, 50 poses a second." in said(result)
 
 
-def test_evaluate_measures_the_answer_to_a_hand(
-    tiny_show: Path, recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(answer_picture, "COLUMNS", 2)
+def test_evaluate_measures_the_answer_to_a_hand(tiny_show: Path, recordings: Path, tmp_path: Path) -> None:
     phrase, hand, picture = recordings / "sway_2.bvh", recordings / "sway_0.bvh", tmp_path / "answer.png"
     asked = ["evaluate", tiny_show, phrase, "--hands", hand, "--reference", recordings]
     asked += ["--joint", "lShldr", "--iterations", "2/1", "--iterations", "3/3"]
@@ -119,8 +126,7 @@ def test_evaluate_measures_the_answer_to_a_hand(
     assert set(answer["free"]) == {"1", "10", "30", "100"}
     assert answer["reference"]["poses"] == 200  # sway_1: the phrase's and the hand's takes are no reference
     assert picture.read_bytes().startswith(b"\x89PNG")
-    people = bunraku(*asked)  # as a table
-    assert "Does the hand move the body?" in people.stdout and "with a hand on lShldr at 3/3" in people.stdout
+    assert "with the hands of sway_0" in said(result)
 
 
 def test_export_keeps_what_the_artist_wrote(trained: Trained, tmp_path: Path) -> None:

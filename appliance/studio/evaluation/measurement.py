@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -107,9 +108,9 @@ class Measurement:
             fit=_mean(fit),
             fit_own=_mean(self._fit_of_phrase(joint, others)[: len(far)]),
             fit_bare=_mean(bare),
-            plausibility=float(far.mean() / own_far.mean()),
-            energy=motion.energy(danced[:, others]) / motion.energy(phrase[:, others]),
-            roughness=motion.roughness(danced[:, others]) / motion.roughness(phrase[:, others]),
+            plausibility=_ratio(far.mean(), own_far.mean()),
+            energy=_ratio(motion.energy(danced[:, others]), motion.energy(phrase[:, others])),
+            roughness=_ratio(motion.roughness(danced[:, others]), motion.roughness(phrase[:, others])),
             held=float(np.degrees(quaternion.angle_between(danced[:, held], hand_turns)).mean()),
             plausibility_degrees=float(far.mean()),
             found=float(np.isfinite(fit).mean()),
@@ -128,9 +129,9 @@ class Measurement:
         danced = without_heading(shown)
         far = self.reference.nearest(danced[::STEP])
         return {
-            "plausibility": float(far.mean() / self.phrase_far.mean()),
-            "energy": motion.energy(danced) / motion.energy(self.phrase),
-            "roughness": motion.roughness(danced) / motion.roughness(self.phrase),
+            "plausibility": _ratio(far.mean(), self.phrase_far.mean()),
+            "energy": _ratio(motion.energy(danced), motion.energy(self.phrase)),
+            "roughness": _ratio(motion.roughness(danced), motion.roughness(self.phrase)),
             "deviation": float(motion.degrees_apart(danced, self.phrase).mean()),
             "plausibility_degrees": float(far.mean()),
             **self._of_body(shown),
@@ -150,7 +151,7 @@ class Measurement:
         step, whole = motion.largest_step(without_heading(danced)), self.rehearsal.whole(danced)
         return {
             "largest_step": step,
-            "snap": step / self.reference.largest_step,
+            "snap": _ratio(step, self.reference.largest_step),
             "arm_in_trunk": self.body.arm_in_trunk(whole),
             "foot_skate": self.body.foot_skate(whole),
         }
@@ -174,3 +175,8 @@ def _mean(values: Floats) -> float:
     """Of the ticks that have a value."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else float("nan")
+
+
+def _ratio(value: float | np.floating[Any], own: float | np.floating[Any]) -> float:
+    """Against the phrase's own; not a number where the phrase stands still."""
+    return float(value) / float(own) if own > 0 else float("nan")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.data.dataset import Take
+from appliance.studio.studio_error import StudioError
 
 HOLDS_DEGREES = 15.0  # a recorded joint so close to the hand's orientation is held as the hand holds it
 CANDIDATES = 128
@@ -81,10 +82,15 @@ class Reference:
 
 
 def reference_of(takes: Sequence[Take], joints: Sequence[str]) -> Reference:
-    """The sound poses of takes, joints by name."""
+    """The sound poses of takes, joints by name. Raises StudioError where there is none."""
     places = [takes[0].recording.skeleton.index(name) for name in joints]
     steps = [_largest_step(take, places) for take in takes]
     poses = np.concatenate([take.recording.poses[take.sound][:, places] for take in takes])
+    if not len(poses):
+        raise StudioError(
+            "No sound pose is left in the recordings that the dance is compared with. Give the folder of the "
+            "training takes."
+        )
     return Reference(poses, max(steps))
 
 

@@ -16,6 +16,7 @@ from appliance.studio.evaluation.nearest import without_heading
 STEPS = 8  # evenly over the phrase
 STEP_DEGREES = 60.0
 AFTER = 24  # ticks: all windows that saw the old orientation have passed after 15
+CODED_WINDOWS = STEPS * 3 * (WINDOW + AFTER)  # what it costs
 LEAST_DEGREES = 1.0  # others that move less between the two orientations do not answer: nothing to time
 
 

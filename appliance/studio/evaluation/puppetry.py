@@ -31,6 +31,7 @@ def measure(
     iterations: Sequence[Iterations] = ITERATIONS,
     free: Sequence[int] = FREE,
     advance: Callable[[str], None] = lambda _: None,
+    turning: bool = True,
 ) -> dict[str, Any]:
     """Keys JOINT.K_J, JOINT.turning, free.K, phrase with figures below them, JOINT.onset_ticks, .step_answer.
 
@@ -53,11 +54,12 @@ def measure(
         figures["onset_ticks"] = statistics.median(known) if known else None
         figures["step_answer"] = round(statistics.fmean(step.degrees for step in steps), 3)
         rows = []
-        for axis, seconds in TURNING:
+        for axis, seconds in TURNING if turning else ():
             advance(f"a hand that turns {joint}")
             hand = TurningAxis(joint, axis, seconds)
             rows.append(asdict(measurements[0].with_hand(joint, in_play, hand, TURNING_TICKS)))
-        figures["turning"] = _means(rows)
+        if rows:
+            figures["turning"] = _means(rows)
         found[joint] = figures
     found["free"] = {}
     for coding in free:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import statistics
 from typing import Any
 
+from rich.console import Console
 from rich.table import Table
+
+from appliance.studio.evaluation.usual_joints import UPPER_ARMS, usual_joints
 
 ANSWERS, ANSWERS_A_LITTLE = 8.0, 4.0  # degrees
 LIVELY = (0.7, 1.3)  # energy
@@ -20,7 +23,48 @@ COLUMNS = (
     "roughness",
     "off the hand",
 )
-NOT_JOINTS = ("free", "phrase", "reference")
+ENOUGH_MINUTES = 8.0  # the default show's dancer answers with what it learned in 11
+
+
+def verdict(found: dict[str, Any], minutes: float) -> str:
+    """Whether the dancer answers, by its upper arms where they were held, and what to do.
+
+    minutes: of dance that it learned from.
+    """
+    named = [name for part, name in usual_joints(joints_of(found)).items() if part in UPPER_ARMS]
+    rows = [strongest(found[joint])[1] for joint in named or joints_of(found)]
+    what = f"a hand moves its other joints by {statistics.fmean(row['answer'] for row in rows):.1f} degrees"
+    if None not in (energies := [row["energy"] for row in rows]):
+        what += f", at an energy of {statistics.fmean(energies):.2f}"
+    wrong = list(dict.fromkeys(words for row in rows for words in reservations(row)))
+    strength = min(degree(row) for row in rows)
+    if strength == 2 and not wrong:
+        return f"The dancer answers: {what}."
+    opening = f"The dancer {'answers a little' if strength else 'does not answer'}: {what}"
+    if strength and wrong:
+        opening += f", but {' and '.join(wrong)}"
+    if minutes < ENOUGH_MINUTES:
+        cure = (
+            f"More recordings help most: it learned from {minutes:.1f} minutes of dance, the default show's "
+            "dancer from 11."
+        )
+    else:
+        cure = "Train longer (--minutes), or with recordings in which the arms do more."
+    return f"{opening}. {cure}"
+
+
+def print_answer(console: Console, found: dict[str, Any]) -> None:
+    """Table and sentences; why there are none where nothing was measured."""
+    if "not_measured" in found:
+        words = f"Whether this dancer answers a hand could not be measured: {found['not_measured']}"
+        console.print(words, highlight=False)
+        return
+    console.print(table(found))
+    lines = [*sentences(found), *asides(found)]
+    if "verdict" in found:
+        lines += [f"Measured {found['measured_on']}.", found["verdict"]]
+    for line in lines:
+        console.print(line, highlight=False, soft_wrap=True)
 
 
 def table(found: dict[str, Any]) -> Table:
@@ -33,7 +77,8 @@ def table(found: dict[str, Any]) -> Table:
     for joint in joints_of(found):
         for key, row in iterations_of(found[joint]).items():
             made.add_row(joint, key.replace("_", "/"), *_row(row))
-        made.add_row(joint, "turning", *_row(found[joint]["turning"]))
+        if "turning" in found[joint]:
+            made.add_row(joint, "turning", *_row(found[joint]["turning"]))
     for coding, row in found["free"].items():
         blank = {"answer": None, "fit": None, "fit_own": None, "fit_bare": None, "held": None}
         made.add_row("nothing", f"{coding}/0", *_row({**blank, **row}))
@@ -54,14 +99,15 @@ def asides(found: dict[str, Any]) -> list[str]:
     joints, phrase = joints_of(found), found["phrase"]
     onsets = [found[joint]["onset_ticks"] for joint in joints]
     known = [ticks for ticks in onsets if ticks is not None]
-    step = max(found[joint]["turning"]["largest_step"] for joint in joints)
+    turned = [found[joint]["turning"]["largest_step"] for joint in joints if "turning" in found[joint]]
     lines = []
     if known:
         lines.append(f"Half of the answer to a step of the hand is out after {max(known):g} ticks.")
-    lines.append(
-        f"While hands turn smoothly, a joint goes up to {step:.0f} degrees in one tick; in the recordings "
-        f"{found['reference']['largest_step']:.0f}."
-    )
+    if turned:
+        lines.append(
+            f"While hands turn smoothly, a joint goes up to {max(turned):.0f} degrees in one tick; in the "
+            f"recordings {found['reference']['largest_step']:.0f}."
+        )
     deep, skate = (_mean_of(found, name) for name in ("arm_in_trunk", "foot_skate"))
     if deep is not None and phrase["arm_in_trunk"] is not None:
         lines.append(
@@ -80,7 +126,7 @@ def _mean_of(found: dict[str, Any], name: str) -> float | None:
 
 def joints_of(found: dict[str, Any]) -> list[str]:
     """The joints that were held."""
-    return [name for name in found if name not in NOT_JOINTS]
+    return [name for name, figures in found.items() if isinstance(figures, dict) and "onset_ticks" in figures]
 
 
 def iterations_of(figures: dict[str, Any]) -> dict[str, Any]:
@@ -97,15 +143,7 @@ def strongest(figures: dict[str, Any]) -> tuple[str, dict[str, Any]]:
 
 def _sentence(joint: str, iterations: str, row: dict[str, Any]) -> str:
     meaning = {2: "this dancer answers", 1: "this dancer answers a little", 0: "this dancer hardly answers"}
-    reservations = []
-    if row["answer"] >= ANSWERS_A_LITTLE:
-        if fits_worse(row):
-            reservations.append("not to anything that it did with that joint")
-        if row["energy"] < LIVELY[0]:
-            reservations.append(f"it comes nearly to rest (energy {row['energy']:.2f})")
-        if row["energy"] > LIVELY[1]:
-            reservations.append(f"it is restless (energy {row['energy']:.2f})")
-    but = f", but {' and '.join(reservations)}" if reservations else ""
+    but = f", but {' and '.join(reservations(row))}" if reservations(row) else ""
     return (
         f"The others move {row['answer']:.1f} degrees with a hand on {joint} at {iterations}: "
         f"{meaning[degree(row)]}{but}."
@@ -117,9 +155,18 @@ def degree(row: dict[str, Any]) -> int:
     return int(row["answer"] >= ANSWERS_A_LITTLE) + int(row["answer"] >= ANSWERS)
 
 
-def fits_worse(row: dict[str, Any]) -> bool:
-    """Whether the body is further from what the dancer did with that joint than the bare phrase is."""
-    return row["fit"] is not None and row["fit"] > row["fit_bare"]
+def reservations(row: dict[str, Any]) -> list[str]:
+    """What is wrong with an answer: the body is further from what the dancer did with that joint than the
+    bare phrase is, or it has another energy."""
+    found = []
+    if degree(row) and row["fit"] is not None and row["fit"] > row["fit_bare"]:
+        found.append("it does nothing that the dancer did with that joint")
+    energy = row["energy"]
+    if degree(row) and energy is not None and energy < LIVELY[0]:
+        found.append(f"it comes nearly to rest (energy {energy:.2f})")
+    if degree(row) and energy is not None and energy > LIVELY[1]:
+        found.append(f"it is restless (energy {energy:.2f})")
+    return found
 
 
 def _row(row: dict[str, Any]) -> list[str]:
