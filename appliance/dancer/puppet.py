@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from appliance.dancer.slerp import FloatArray
 from appliance.pose.skeleton import Skeleton, UnknownJointError
 
-_INPUTS = {"window", "mask", "targets", "weights", "coding_iterations", "interaction_iterations"}
+_INPUTS = {  # and how many dimensions each has
+    "window": 3,
+    "mask": 1,
+    "targets": 3,
+    "weights": 1,
+    "coding_iterations": 0,
+    "interaction_iterations": 0,
+}
 _OUTPUT = "poses"
 _CURE = "Export the show again, or copy the bundle again."
 # Sum of squares of a window of unit quaternions is their count. Rounding moves it by 1e-6 of that; a damaged
@@ -75,8 +82,9 @@ class Puppet:
     ) -> FloatArray:
         """Iterate a window (window, M, 4); returns unit quaternions (window, M, 4).
 
-        mask (M,), targets (M, 4), weights (M,): the held joints, as puppeteers.Hands gives them. The held
-        joints are overwritten in the first interaction_iterations of coding_iterations passes.
+        mask (M,), targets (window, M, 4), weights (M,): the held joints, with one orientation for each pose
+        of the window, as hands.Hands gives them. The held joints are overwritten in the first
+        interaction_iterations of coding_iterations passes.
         """
         self._iterations[0][...] = coding_iterations
         self._iterations[1][...] = interaction_iterations
@@ -111,13 +119,19 @@ def _session(path: Path) -> onnxruntime.InferenceSession:
         raise PuppetError(
             f"{path}: onnxruntime cannot read this network ({_short(error)}). {_CURE}"
         ) from None
-    inputs = {value.name for value in session.get_inputs()}
+    inputs = {value.name: value.shape for value in session.get_inputs()}
     outputs = {value.name for value in session.get_outputs()}
-    if inputs != _INPUTS or _OUTPUT not in outputs:
+    if inputs.keys() != _INPUTS.keys() or _OUTPUT not in outputs:
         raise PuppetError(
             f"{path}: this network takes {', '.join(sorted(inputs))} and gives {', '.join(sorted(outputs))}; "
             f"a puppet takes {', '.join(sorted(_INPUTS))} and gives {_OUTPUT}. Make one with bunraku export."
         )
+    for name, shape in inputs.items():
+        if len(shape) != _INPUTS[name]:
+            raise PuppetError(
+                f"{path}: the network's input '{name}' has the shape {shape}, as another release exported "
+                "it. Export the show again with this release."
+            )
     return session
 
 

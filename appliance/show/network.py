@@ -13,7 +13,7 @@ from appliance.show.config_error import did_you_mean
 
 WINDOW = 8
 UNIT_TOLERANCE = 1e-3
-_EXPORT_AGAIN = "Export the network again with bunraku export."
+_EXPORT_AGAIN = "Export the show again with this release."
 _COPY_AGAIN = "Copy the whole bundle again."
 
 Complaint = tuple[str, str]  # message, cure
@@ -50,7 +50,7 @@ def _inputs(joints: int) -> dict[str, tuple[str, list[int]]]:
     return {
         "window": ("tensor(float)", [WINDOW, joints, 4]),
         "mask": ("tensor(bool)", [joints]),
-        "targets": ("tensor(float)", [joints, 4]),
+        "targets": ("tensor(float)", [WINDOW, joints, 4]),
         "weights": ("tensor(float)", [joints]),
         "coding_iterations": ("tensor(int64)", []),
         "interaction_iterations": ("tensor(int64)", []),
@@ -123,7 +123,7 @@ def _run_complaints(session: Any, rest: list[list[float]]) -> Iterator[Complaint
     feed = {
         "window": np.tile(np.array(rest, np.float32), (WINDOW, 1, 1)),
         "mask": np.zeros(joints, bool),
-        "targets": np.array(rest, np.float32),
+        "targets": np.tile(np.array(rest, np.float32), (WINDOW, 1, 1)),
         "weights": np.zeros(joints, np.float32),
         "coding_iterations": np.array(1, np.int64),
         "interaction_iterations": np.array(0, np.int64),

@@ -18,7 +18,7 @@ from appliance.stage.journal.record import SECTIONS
 from appliance.stage.wearing import Wearing
 
 _STANDING = ("pose", "world", "positions", "root")  # arrays of a frame
-DRAIN, HANDS, MOTION, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
+DRAIN, MOTION, HANDS, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
 
 
 class Tick:
@@ -60,13 +60,13 @@ class Tick:
         for reading in self.readings:
             self.wearing.hear(reading)
             cast.hear(reading)
-        ends[DRAIN] = ends[HANDS] = ends[MOTION] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
+        ends[DRAIN] = ends[MOTION] = ends[HANDS] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
 
         if not frame.late:
-            cast.hands.pull(slot.started)
-            ends[HANDS] = now()
             window = cast.puppet.select(cast.motion.window())
             ends[MOTION] = now()
+            cast.hands.pull(slot.started, window)
+            ends[HANDS] = now()
             if cast.blending.is_due:
                 self._regenerate(window)
             ends[PUPPET] = now()

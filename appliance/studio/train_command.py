@@ -20,6 +20,7 @@ from appliance.studio.data.sources import Sources
 from appliance.studio.evaluation.coders import load_checkpoint
 from appliance.studio.evaluation.findings import MASKED_PICTURE, findings, require_windows
 from appliance.studio.evaluation.masked import draw_masked
+from appliance.studio.evaluation.puppetry_words import print_answer
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
 
@@ -79,7 +80,8 @@ def run(wish: Wish) -> bool:
         return False
     name = wish.name or wish.out.resolve().name
     request = Request(checkpoint, source.recordings, wish.out, name, wish.phrase)
-    release(request, dataset, source.catalogue, lambda words: console.print(words, highlight=False))
+    report = release(request, dataset, source.catalogue, lambda words: console.print(words, highlight=False))
+    print_answer(console, report["puppetry"])
     console.print(
         f"{wish.out} is a show. Dance it: bunraku play --show {shlex.quote(str(wish.out))} --emulate"
     )

@@ -60,7 +60,7 @@ def inputs(joints: int) -> tuple[Any, ...]:
     window = np.ascontiguousarray(swaying(1.0).poses[:8, moving()[:joints]], dtype=np.float32)
     mask = np.zeros(joints, dtype=bool)
     mask[8] = True
-    targets = np.tile(np.array([0.8, 0.6, 0.0, 0.0], dtype=np.float32), (joints, 1))
+    targets = np.tile(np.array([0.8, 0.6, 0.0, 0.0], dtype=np.float32), (8, joints, 1))
     return window, mask, targets, np.ones(joints, dtype=np.float32)
 
 

@@ -31,13 +31,14 @@ def puppet(tiny_show: Path, phrase: Recording) -> Puppet:
 def free(puppet: Puppet) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mask, targets and weights of no hand at all."""
     count = len(puppet.joints)
-    return np.zeros(count, bool), np.tile(quaternion.IDENTITY, (count, 1)), np.zeros(count, np.float32)
+    targets = np.tile(quaternion.IDENTITY, (puppet.window, count, 1))
+    return np.zeros(count, bool), targets, np.zeros(count, np.float32)
 
 
 def holding(puppet: Puppet, joint: str, target: np.ndarray, weight: float = 1.0) -> tuple[np.ndarray, ...]:
     mask, targets, weights = free(puppet)
     place = puppet.joints.index(joint)
-    mask[place], targets[place], weights[place] = True, target, weight
+    mask[place], targets[:, place], weights[place] = True, target, weight
     return mask, targets, weights
 
 
@@ -107,6 +108,15 @@ def test_the_held_orientation_shows_when_the_last_pass_is_held(
     free_last = puppet.dance(window, *hands, 3, 2)[:, place]
     assert quaternion.angle_between(free_last, target).min() > 0.05
     assert quaternion.angle_between(shown, target).max() < quaternion.angle_between(free_last, target).max()
+
+
+def test_each_pose_of_the_window_is_held_at_its_own_target(puppet: Puppet, phrase: Recording) -> None:
+    window = puppet.select(Playback(phrase).window())
+    mask, targets, weights = holding(puppet, "lShldr", quaternion.IDENTITY)
+    place = puppet.joints.index("lShldr")
+    targets[:, place] = random_quaternions(np.random.default_rng(5), 8)
+    shown = puppet.dance(window, mask, targets, weights, 3, 3)[:, place]
+    assert quaternion.angle_between(shown, targets[:, place]).max() < 0.01
 
 
 def test_the_mask_and_the_weight_both_release_a_joint(puppet: Puppet, phrase: Recording) -> None:
@@ -179,6 +189,28 @@ def test_a_network_with_other_inputs_is_refused(tiny_show: Path, tmp_path: Path,
 
     with pytest.raises(PuppetError, match=r"takes .*pose_window.*bunraku export"):
         Puppet(altered(tiny_show / "puppet.onnx", tmp_path, rename), phrase.skeleton)
+
+
+def test_a_network_of_an_older_release_is_refused_with_the_cure(
+    tiny_show: Path, tmp_path: Path, phrase: Recording
+) -> None:
+    """It took one orientation for each hand, not one for each pose of the window."""
+
+    def hold_still(model: onnx.ModelProto) -> None:
+        (targets,) = (port for port in model.graph.input if port.name == "targets")
+        del targets.type.tensor_type.shape.dim[0]
+        frozen = onnx.helper.make_node("Concat", ["one_pose"] * 8, ["one_target_a_pose"], axis=0)
+        axis = numpy_helper.from_array(np.array([0]), "first_axis")
+        model.graph.initializer.append(axis)
+        for node in model.graph.node:
+            node.input[:] = ["one_target_a_pose" if name == "targets" else name for name in node.input]
+        model.graph.node.insert(0, frozen)
+        model.graph.node.insert(
+            0, onnx.helper.make_node("Unsqueeze", ["targets", "first_axis"], ["one_pose"])
+        )
+
+    with pytest.raises(PuppetError, match=r"'targets' has the shape \[17, 4\].*again with this release"):
+        Puppet(altered(tiny_show / "puppet.onnx", tmp_path, hold_still), phrase.skeleton)
 
 
 @pytest.mark.parametrize("key", ["bunraku.joints", "bunraku.window", "bunraku.rest"])

@@ -48,13 +48,14 @@ def save_network(
     facts: dict[str, str] | None = None,
     node: str = "Identity",
     without: str = "",
+    targets: list[int] | None = None,
 ) -> None:
     """A network with a puppet's inputs and outputs; `node` makes the poses out of the window."""
     count = len(joints)
     inputs = {
         "window": (TensorProto.FLOAT, [8, count, 4]),
         "mask": (TensorProto.BOOL, [count]),
-        "targets": (TensorProto.FLOAT, [count, 4]),
+        "targets": (TensorProto.FLOAT, targets or [8, count, 4]),
         "weights": (TensorProto.FLOAT, [count]),
         "coding_iterations": (TensorProto.INT64, []),
         "interaction_iterations": (TensorProto.INT64, []),

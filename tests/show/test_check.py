@@ -97,6 +97,10 @@ def test_faults_of_show_yaml_keep_their_lines(bundle: Path) -> None:
         ({"joints": ("hip", "chest", "lShldr", "chest", "rShldr")}, ["names a joint twice"]),
         ({"facts": {"bunraku.joints": ",".join(NAMES)}}, ["has the shape [8, 5, 4], not [8, 6, 4]"]),
         ({"without": "weights"}, ["no input 'weights'"]),
+        (  # an older release exported it: one orientation a hand
+            {"targets": [5, 4]},
+            ["'targets' has the shape [5, 4], not [8, 5, 4]", "Export the show again with this release."],
+        ),
         ({"node": "Log"}, ["numbers that are no rotations"]),
         ({"node": "Exp"}, ["numbers that are no rotations"]),
     ],

@@ -64,7 +64,7 @@ def _network(kind: str) -> onnx.ModelProto:
     inputs = [
         helper.make_tensor_value_info("window", TensorProto.FLOAT, [WINDOW, moving, 4]),
         helper.make_tensor_value_info("mask", TensorProto.BOOL, [moving]),
-        helper.make_tensor_value_info("targets", TensorProto.FLOAT, [moving, 4]),
+        helper.make_tensor_value_info("targets", TensorProto.FLOAT, [WINDOW, moving, 4]),
         helper.make_tensor_value_info("weights", TensorProto.FLOAT, [moving]),
         helper.make_tensor_value_info("coding_iterations", TensorProto.INT64, []),
         helper.make_tensor_value_info("interaction_iterations", TensorProto.INT64, []),

@@ -62,13 +62,13 @@ def test_a_joint_is_held_and_released_by_osc(cast: Cast) -> None:
     iterations = Iterations(3, 2, 8)
     assert obey(Order("hold", (1.0, 0.0, 0.0, np.pi / 2), "lShldr"), cast, iterations, 1.0) == (True, "")
     for tick in range(100):
-        cast.hands.pull(10.0 + 0.02 * tick)
+        cast.hands.pull(10.0 + 0.02 * tick, cast.puppet.select(cast.motion.window()))
     place = cast.hand_places[0]
-    assert quaternion.angle_between(cast.hands.targets[place], np.array([0.5**0.5, 0.5**0.5, 0, 0])) < 1e-3
+    assert quaternion.angle_between(cast.hands.targets[0, place], np.array([0.5**0.5, 0.5**0.5, 0, 0])) < 1e-3
     assert cast.hands.weights[place] == 1.0
     assert obey(Order("release", (), 2), cast, iterations, 1.0) == (True, "")  # the same joint by its number
     for tick in range(100):
-        cast.hands.pull(12.0 + 0.02 * tick)
+        cast.hands.pull(12.0 + 0.02 * tick, cast.puppet.select(cast.motion.window()))
     assert cast.hands.weights[place] == 0.0
 
 

@@ -71,7 +71,7 @@ class Stage:
         )
         self.wearing.hear(reading)
         self.cast.hear(reading)
-        self.cast.hands.pull(self.now)
+        self.cast.hands.pull(self.now, self.cast.puppet.select(self.cast.motion.window()))
         self.wearing.look(self.now)
 
     def stand(self, seconds: float, orientation: Orientation, **reading: int | str) -> None:
@@ -86,11 +86,11 @@ class Stage:
     def silence(self, seconds: float) -> None:
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
-            self.cast.hands.pull(self.now)
+            self.cast.hands.pull(self.now, self.cast.puppet.select(self.cast.motion.window()))
             self.wearing.look(self.now)
 
     def target(self, joint: str = "lShldr") -> np.ndarray:
-        return self.cast.hands.targets[self.cast.puppet.joints.index(joint)].copy()
+        return self.cast.hands.targets[0, self.cast.puppet.joints.index(joint)].copy()
 
     @property
     def wants(self) -> bool:

@@ -77,10 +77,10 @@ class Evening:
                 self.wearing.hear(reading)
                 self.cast.hear(reading)
                 self.newest = reading
-            self.cast.hands.pull(self.show.now)
+            self.cast.hands.pull(self.show.now, self.cast.puppet.select(self.cast.motion.window()))
             self.wearing.look(self.show.now)
             if self.newest is not None:
-                self.errors.append(self._error(self.newest, self.cast.hands.targets[place]))
+                self.errors.append(self._error(self.newest, self.cast.hands.targets[0, place]))
             if self.lights[-1:] != [self.device.light]:
                 self.lights.append(self.device.light)
 

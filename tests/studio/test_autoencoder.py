@@ -30,7 +30,7 @@ def turned(windows: Tensor, degrees: float) -> Tensor:
 def held(autoencoder: Autoencoder) -> dict[str, Tensor]:
     mask = torch.zeros(autoencoder.shape.joints, dtype=torch.bool)
     mask[6] = True
-    targets = rotation.normalize(torch.randn(autoencoder.shape.joints, 4))
+    targets = rotation.normalize(torch.randn(8, autoencoder.shape.joints, 4))
     return {"mask": mask, "targets": targets, "weights": torch.ones(autoencoder.shape.joints)}
 
 
@@ -51,7 +51,7 @@ def test_a_free_last_pass_does_not_show_the_held_orientation() -> None:
     hand = held(autoencoder)
     shown, _ = autoencoder.iterate(some_windows(), 4, 4, **hand)
     free, _ = autoencoder.iterate(some_windows(), 4, 3, **hand)
-    goal = hand["targets"][6].expand(6, 8, 4)
+    goal = hand["targets"][:, 6].expand(6, 8, 4)
     assert torch.rad2deg(rotation.angle_between(shown[:, :, 6], goal)).max() < 0.1
     assert torch.rad2deg(rotation.angle_between(free[:, :, 6], goal)).min() > 5.0
 
@@ -68,6 +68,19 @@ def test_a_weight_of_a_half_goes_half_the_way() -> None:
     torch.testing.assert_close(
         rotation.angle_between(half[:, :, 6], firm[:, :, 6]), way / 2, atol=0.05, rtol=0
     )
+
+
+def test_each_window_of_a_batch_may_have_targets_and_weights_of_its_own() -> None:
+    autoencoder = untrained()
+    windows, hands = some_windows(3), [held(autoencoder) for _ in range(3)]
+    targets = torch.stack([hand["targets"] for hand in hands])
+    weights = torch.tensor([0.0, 0.4, 1.0])[:, None].expand(-1, autoencoder.shape.joints)
+    together, _ = autoencoder.iterate(windows, 3, 2, hands[0]["mask"], targets, weights)
+    for place, hand in enumerate(hands):
+        alone, _ = autoencoder.iterate(
+            windows[place][None], 3, 2, hand["mask"], hand["targets"], weights[place]
+        )
+        torch.testing.assert_close(together[place], alone[0], atol=1e-5, rtol=0)
 
 
 @pytest.mark.parametrize("network", sorted(NETWORKS))

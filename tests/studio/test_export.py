@@ -41,7 +41,7 @@ def test_onnx_is_pytorch(network: str, exported: dict[str, Path], coding: int, i
     chance = np.random.default_rng(coding + interaction)
     mask = np.zeros(len(NAMES), dtype=bool)
     mask[chance.choice(len(NAMES), 4, replace=False)] = True
-    targets = quaternion.normalize(chance.normal(size=(len(NAMES), 4)).astype(np.float32))
+    targets = quaternion.normalize(chance.normal(size=(8, len(NAMES), 4)).astype(np.float32))
     weights = chance.uniform(size=len(NAMES)).astype(np.float32)
     for window in some_windows(4):
         held = {"mask": mask, "targets": targets, "weights": weights}

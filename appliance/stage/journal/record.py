@@ -15,7 +15,7 @@ from appliance.show.show import Show
 from appliance.stage.clock import TICK_S
 
 LATE, NOT_FINITE, JUMPED, RESENT = 1, 2, 4, 8  # flags of a tick; RESENT: it sent the last pose once more
-SECTIONS = ("drain", "puppeteers", "motion", "puppet", "blend", "figure", "send")
+SECTIONS = ("drain", "motion", "puppeteers", "puppet", "blend", "figure", "send")
 TICK, EVENT = 1, 2  # kinds of entries
 ORDER = "order"  # kind of the event that show control asked for something, and what came of it
 _LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970: the year 5138

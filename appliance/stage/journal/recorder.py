@@ -72,7 +72,7 @@ class Recorder:
         field["interaction_iterations"][0] = tick.iterations.interaction
         field["sections_ms"][0] = tick.sections_ms
         for hand, place in enumerate(cast.hand_places):
-            field["targets"][0, hand] = cast.hands.targets[place]
+            field["targets"][0, hand] = cast.hands.targets[0, place]
             field["weights"][0, hand] = cast.hands.weights[place]
         field["root"][0] = frame.root
         field["pose"][0] = frame.pose

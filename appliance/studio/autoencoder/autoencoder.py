@@ -61,7 +61,8 @@ class Autoencoder(nn.Module):
         """Iterative autoencoding: (B, T, M, 4) -> the same, and the last latents (B, Z).
 
         In the first interaction_iterations passes the held joints (mask (M,)) are overwritten before coding:
-        SLERP towards targets (M, 4) by weights (M,). Where all passes are interactive, the result is
+        SLERP towards targets (T, M, 4), one orientation for each pose of the window, by weights (M,); or
+        (B, T, M, 4) and (B, M), others for each window. Where all passes are interactive, the result is
         overwritten too, so that the held orientation shows; otherwise the last pass is the dancer's own.
         """
         facing = self.facing(windows)
@@ -70,8 +71,8 @@ class Autoencoder(nn.Module):
         held = x.new_zeros(1, 1, self.shape.joints, 1)
         goal = NEAR * x
         if mask is not None and targets is not None and weights is not None:
-            held = (mask.float() * weights)[None, None, :, None]
-            goal = NEAR * self.without_heading(targets[None, None].expand(len(x), 1, -1, -1), facing)
+            held = (mask.float() * weights).expand(len(x), -1)[:, None, :, None]
+            goal = NEAR * self.without_heading(targets.expand_as(x), facing)
         for k in range(coding_iterations):
             if k < interaction_iterations:
                 x = slerp_towards(x, goal, held)

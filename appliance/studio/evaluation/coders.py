@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.show.network import WINDOW
 from appliance.show.show import load_show
 from appliance.studio.studio_error import StudioError
 
@@ -30,8 +31,19 @@ class Coder(Protocol):
     facts: dict[str, str]
     batch: int
 
-    def iterate(self, windows: Poses, coding_iterations: int) -> tuple[Poses, Poses]:
-        """Windows (B, 8, M, 4) -> windows after so many iterations, latents (B, Z) of the last one."""
+    def iterate(
+        self,
+        windows: Poses,
+        coding_iterations: int,
+        interaction_iterations: int = 0,
+        mask: NDArray[np.bool_] | None = None,
+        targets: Poses | None = None,
+        weights: NDArray[np.float32] | None = None,
+    ) -> tuple[Poses, Poses]:
+        """Windows (B, 8, M, 4) -> windows after so many iterations, latents (B, Z) of the last one.
+
+        mask (M,), targets (B, 8, M, 4), weights (M,): held joints, overwritten in so many iterations.
+        """
 
 
 class OnnxCoder:
@@ -65,18 +77,31 @@ class OnnxCoder:
         joints = len(self.joints)
         self._free: dict[str, Any] = {
             "mask": np.zeros(joints, dtype=bool),
-            "targets": self.rest,
+            "targets": np.tile(self.rest, (WINDOW, 1, 1)),
             "weights": np.zeros(joints, dtype=np.float32),
         }
 
-    def iterate(self, windows: Poses, coding_iterations: int) -> tuple[Poses, Poses]:
-        made = [self.run(window, coding_iterations) for window in windows]
+    def iterate(
+        self,
+        windows: Poses,
+        coding_iterations: int,
+        interaction_iterations: int = 0,
+        mask: NDArray[np.bool_] | None = None,
+        targets: Poses | None = None,
+        weights: NDArray[np.float32] | None = None,
+    ) -> tuple[Poses, Poses]:
+        made = []
+        for number, window in enumerate(windows):
+            held: dict[str, Any] = {}
+            if mask is not None and targets is not None and weights is not None:
+                held = {"mask": mask, "targets": targets[number], "weights": weights}
+            made.append(self.run(window, coding_iterations, interaction_iterations, **held))
         return np.stack([poses for poses, _ in made]), np.stack([latent for _, latent in made])
 
     def run(
         self, window: Poses, coding_iterations: int, interaction_iterations: int = 0, **held: Any
     ) -> tuple[Poses, Poses]:
-        """One window (8, M, 4) -> poses and latent; held: mask, targets, weights of held joints."""
+        """One window (8, M, 4) -> poses and latent; held: mask (M,), targets (8, M, 4), weights (M,)."""
         counts = {
             "coding_iterations": np.array(coding_iterations, dtype=np.int64),
             "interaction_iterations": np.array(interaction_iterations, dtype=np.int64),
@@ -95,12 +120,25 @@ class TorchCoder:
         self.autoencoder, self.joints, self.facts = autoencoder, tuple(joints), facts
         self.rest = autoencoder.rest.cpu().numpy()
 
-    def iterate(self, windows: Poses, coding_iterations: int) -> tuple[Poses, Poses]:
+    def iterate(
+        self,
+        windows: Poses,
+        coding_iterations: int,
+        interaction_iterations: int = 0,
+        mask: NDArray[np.bool_] | None = None,
+        targets: Poses | None = None,
+        weights: NDArray[np.float32] | None = None,
+    ) -> tuple[Poses, Poses]:
         import torch
 
+        device = self.autoencoder.rest.device
+        held = [
+            None if values is None else torch.from_numpy(values).to(device)
+            for values in (mask, targets, weights)
+        ]
         with torch.no_grad():
-            given = torch.from_numpy(windows).to(self.autoencoder.rest.device)
-            poses, latents = self.autoencoder.iterate(given, coding_iterations)
+            given = torch.from_numpy(windows).to(device)
+            poses, latents = self.autoencoder.iterate(given, coding_iterations, interaction_iterations, *held)
         return poses.cpu().numpy(), latents.cpu().numpy()
 
 

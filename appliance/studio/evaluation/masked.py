@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from appliance.pose.filmstrip import Strip, draw_strips
+from appliance.pose.filmstrip import draw_rows
+from appliance.pose.filmstrip_stage import Row
 from appliance.studio.data.capture_errors import REASONS, CaptureError
 from appliance.studio.data.takes import FPS, Take
 
@@ -71,11 +72,11 @@ def draw_masked(path: Path, takes: Sequence[Take]) -> Path:
         if sum(one.take is stretch.take for one in shown) < ROWS_A_TAKE and len(shown) < ROWS:
             shown.append(stretch)
     title = "Masked as capture errors: the worst"
-    skeleton, strips = takes[0].recording.skeleton, [_strip(stretch) for stretch in shown]
-    return draw_strips(path, skeleton, strips, FPS, title, "masked between 'before' and 'after'")
+    skeleton, rows = takes[0].recording.skeleton, [_row(stretch) for stretch in shown]
+    return draw_rows(path, skeleton, rows, FPS, title, "masked between 'before' and 'after'")
 
 
-def _strip(stretch: MaskedStretch) -> Strip:
+def _row(stretch: MaskedStretch) -> Row:
     recording = stretch.take.recording
     start, end, last = stretch.start_s, stretch.end_s, (len(recording) - 1) / FPS
     inside = np.linspace(start, min(end, last), COLUMNS - 2)
@@ -84,7 +85,7 @@ def _strip(stretch: MaskedStretch) -> Strip:
     there = [(at, word) for at, word in zip(seconds, words, strict=True) if 0 <= at <= last]
     chosen = np.round(np.array([at for at, _ in there]) * FPS).astype(np.int64)
     names = {error.joint for error in stretch.errors if error.joint}
-    return Strip(
+    return Row(
         recording.poses,
         recording.roots,
         np.minimum(chosen, len(recording) - 1),

@@ -19,7 +19,7 @@ def export(
 ) -> onnx.ModelProto:
     """Write the puppet's network file.
 
-    Inputs: window (T, M, 4), mask (M) bool, targets (M, 4), weights (M), coding_iterations and
+    Inputs: window (T, M, 4), mask (M) bool, targets (T, M, 4), weights (M), coding_iterations and
     interaction_iterations (int64 scalars). Outputs: poses (T, M, 4) unit quaternions, latent (Z) of the last
     pass. What it computes is Autoencoder.iterate, node for node. Precision: float32, or dynamic int8 with u8
     weights per channel. Joint names and sizes travel in the file's metadata.
@@ -27,7 +27,7 @@ def export(
     shape = autoencoder.shape
     main = Graph()
     facing = _heading(main, shape.window)
-    poses = main.op("Concat", "window", _as_pose(main), axis=0)
+    poses = main.op("Concat", "window", "targets", axis=0)  # turned and aligned together
     level = _turned_root(main, poses, facing, inverse=True)
     x, goal = _split_goal(main, _aligned(main, level, autoencoder.rest.cpu().numpy()), shape.window)
     goal = main.op("Mul", goal, main.constant("near", NEAR))
@@ -93,7 +93,7 @@ def _model(main: Graph, autoencoder: Autoencoder) -> onnx.ModelProto:
     inputs = [
         info("window", [shape.window, m, 4]),
         info("mask", [m], TensorProto.BOOL),
-        info("targets", [m, 4]),
+        info("targets", [shape.window, m, 4]),
         info("weights", [m]),
         info("coding_iterations", [], TensorProto.INT64),
         info("interaction_iterations", [], TensorProto.INT64),
@@ -102,11 +102,6 @@ def _model(main: Graph, autoencoder: Autoencoder) -> onnx.ModelProto:
     graph = helper.make_graph(main.nodes, "bunraku_puppet", inputs, outputs, main.initializers())
     opsets = [helper.make_opsetid("", OPSET), helper.make_opsetid(MICROSOFT, 1)]
     return helper.make_model(graph, opset_imports=opsets, ir_version=8, producer_name="bunraku")
-
-
-def _as_pose(graph: Graph) -> str:
-    """Targets (M, 4) as one more pose (1, M, 4): they are turned and aligned together with the window."""
-    return graph.op("Unsqueeze", "targets", graph.constant("axis0", [0], np.int64))
 
 
 def _heading(graph: Graph, window: int) -> str:
@@ -144,7 +139,7 @@ def _aligned(graph: Graph, poses: str, rest: np.ndarray) -> str:
 
 def _split_goal(graph: Graph, poses: str, window: int) -> tuple[str, str]:
     x, goal = graph.name("x"), graph.name("goal")
-    sizes = graph.constant("window_and_goal", [window, 1], np.int64)
+    sizes = graph.constant("window_and_goal", [window, window], np.int64)
     graph.ops("Split", [poses, sizes], [x, goal], axis=0)
     return x, goal
 
@@ -170,7 +165,7 @@ def _gated(graph: Graph, held: str, gate: str) -> str:
 
 
 def _slerp(graph: Graph, x: str, goal: str, shares: str) -> str:
-    """autoencoder.slerp_towards as nodes: x (T, M, 4) towards goal (1, M, 4) by shares (1, M, 2)."""
+    """autoencoder.slerp_towards as nodes: x (T, M, 4) towards goal (T, M, 4) by shares (1, M, 2)."""
     dot = graph.op(
         "ReduceSum", graph.op("Mul", x, goal), graph.constant("axis_last", [-1], np.int64), keepdims=1
     )

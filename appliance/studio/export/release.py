@@ -18,6 +18,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import Catalogue, Dataset, Take, find_catalogue, load_take
 from appliance.studio.evaluation.coders import OnnxCoder, Poses, TorchCoder, load_checkpoint
 from appliance.studio.evaluation.evaluation import evaluate, fitting_hop
+from appliance.studio.evaluation.own_answer import own_answer
 from appliance.studio.evaluation.pictures import longest_sound
 from appliance.studio.evaluation.report import write_up
 from appliance.studio.evaluation.report_picture import draw_report
@@ -80,6 +81,8 @@ def release(
     evaluation = evaluate(coder, judged_on, fitting_hop(coder, judged_on))
     names = sorted(take.name for take in judged_on)
     report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
+    say("Measuring whether the body answers a hand.")
+    report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png")
     _write_texts(request, coder, dataset, catalogue, report, say)
     shown = max(judged_on, key=lambda take: len(longest_sound(take, PHRASE_S)))
     draw_report(request.out / "report.png", request.name, report, evaluation, coder, shown)
