@@ -80,6 +80,7 @@ class Measurement:
         self.phrase = without_heading(self.rehearsal.phrase)
         self.phrase_far = reference.nearest(self.phrase[::STEP])
         self._own_fit: dict[str, Floats] = {}
+        self._bare_fit: dict[tuple[str, bytes], float] = {}
 
     def hand(self, joint: str) -> Puppeteer:
         """The puppeteer that holds a joint as the other take did."""
@@ -102,12 +103,11 @@ class Measurement:
         far = self.reference.nearest(danced[rows])
         own_far = self.phrase_far[: len(far)]
         fit = self.reference.nearest(danced[rows], others, held, hand_turns[rows])
-        bare = self.reference.nearest(phrase[rows], others, held, hand_turns[rows])
         return Figures(
             answer=self.answer(joint, shown, free),
             fit=_mean(fit),
             fit_own=_mean(self._fit_of_phrase(joint, others)[: len(far)]),
-            fit_bare=_mean(bare),
+            fit_bare=self._fit_of_pasted(joint, others, hand_turns[rows]),
             plausibility=_ratio(far.mean(), own_far.mean()),
             energy=_ratio(motion.energy(danced[:, others]), motion.energy(phrase[:, others])),
             roughness=_ratio(motion.roughness(danced[:, others]), motion.roughness(phrase[:, others])),
@@ -162,6 +162,14 @@ class Measurement:
             held, phrase = self.joints.index(joint), self.phrase[::STEP]
             self._own_fit[joint] = self.reference.nearest(phrase, others, held, phrase[:, held])
         return self._own_fit[joint]
+
+    def _fit_of_pasted(self, joint: str, others: list[int], hand_turns: Floats) -> float:
+        """The phrase's others against what the dancer did with that joint as the hand has it."""
+        key = joint, hand_turns.tobytes()  # the same hand comes at several iterations
+        if key not in self._bare_fit:
+            held, phrase = self.joints.index(joint), self.phrase[::STEP][: len(hand_turns)]
+            self._bare_fit[key] = _mean(self.reference.nearest(phrase, others, held, hand_turns))
+        return self._bare_fit[key]
 
     def _others(self, joint: str) -> list[int]:
         """Places of the joints that the hand does not hold."""
