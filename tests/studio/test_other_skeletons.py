@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +10,9 @@ import numpy as np
 import pytest
 
 from appliance.pose import quaternion
-from appliance.pose.bvh import write_bvh
+from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.recording import Recording
+from appliance.show.check import verify_bundle
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.catalogue import Catalogue
 from appliance.studio.data.dataset import Dataset, DatasetError, load_dataset
@@ -153,6 +155,20 @@ def test_of_one_take_alone_the_end_is_kept_apart(tmp_path: Path) -> None:
     assert "1 recording of 1 take," in told(found)
     assert "the end of the only take: take_0 from 17.0 s on" in told(found)
     assert not load_dataset(write(tmp_path / "short", moved(body(), 8.0))).held_out
+    (longer,) = load_dataset(write(tmp_path / "longer", moved(body(), 40.0))).held_out
+    assert longer.begins_s == 34.0
+
+
+def test_one_short_take_of_many_joints_trains_to_a_show_that_is_measured(tmp_path: Path) -> None:
+    folder, out = write(tmp_path / "dancer", z_up(moved(body(fingers=5), 12.0))), tmp_path / "show"
+    options = ["--steps", 2, "--width", 32, "--latent", 8, "--threads", 1, "--device", "cpu"]
+    result = bunraku("train", "--recordings", folder, "--out", out, *options)
+    assert result.exit_code == 0, said(result)
+    assert verify_bundle(out) == []
+    report = json.loads((out / "report.json").read_text())
+    assert report["evaluated_on"] == ["take_0 from 9.0 s on"]
+    assert "not_measured" not in report["puppetry"]
+    assert read_bvh(out / "phrase.bvh").seconds == pytest.approx(8.0, abs=0.1)
 
 
 def test_errors_of_a_part_are_at_their_place_in_it(tmp_path: Path) -> None:

@@ -43,7 +43,8 @@ __all__ = [
 ]
 
 WINDOW = 8
-END_SHARE, END_GAP_S, END_LEAST_S = 0.15, 1.0, 10.0  # of a take alone: how much of it is held out
+# Of a take alone: how much of its end is held out, how far from the rest, and of how long a one.
+END_SHARE, END_LEAST_S, END_GAP_S, ALONE_LEAST_S = 0.15, 3.0, 1.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -130,8 +131,8 @@ def _kept_apart(takes: Sequence[Take], catalogue: Catalogue) -> tuple[tuple[Take
 def _ends_kept_apart(takes: Sequence[Take]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
     """Of one take, which may be two dancers at once, the same last part of each; nothing of a short one."""
     count = min(len(take.recording) for take in takes)
-    end = round((1 - END_SHARE) * count)
-    if count < END_LEAST_S * FPS:
+    end = count - round(max(END_SHARE * count, END_LEAST_S * FPS))
+    if count < ALONE_LEAST_S * FPS:
         return tuple(takes), ()
     training = tuple(take.part(0, end - round(END_GAP_S * FPS)) for take in takes)
     return training, tuple(take.part(end, len(take.recording)) for take in takes)

@@ -70,7 +70,7 @@ def _few_data(dataset: Dataset) -> list[str]:
         return []
     return [
         f"{seconds:.0f} s are little to learn from: expect a dancer that knows these few moves, and that "
-        "answers a hand far from all of them with the nearest one. The show that comes along learned from 12 "
+        "answers a hand far from all of them with the nearest one. The show that comes along learned from 11 "
         "minutes."
     ]
 
