@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.dancer.puppeteers import Puppeteer
+from appliance.dancer.extrapolation import Extrapolation
+from appliance.dancer.puppeteers import Kept, Puppeteer
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
 from appliance.pose.skeleton import UnknownJointError
@@ -21,7 +22,8 @@ class HandError(ValueError):
 class Hands:
     """Who holds which of the M moving joints: mask (M,), targets (T, M, 4) and weights (M,).
 
-    targets: one orientation for each pose of the window, the present one first.
+    targets: one orientation for each pose of the window, the present one first. The motion of a hand is
+    carried on over the window; a joint that is kept has the orientations of the phrase's own window.
     """
 
     def __init__(self, puppeteers: Sequence[Puppeteer], joints: Sequence[str], window: int = 8) -> None:
@@ -36,24 +38,41 @@ class Hands:
         self.mask: NDArray[np.bool_] = np.zeros(len(joints), dtype=np.bool_)
         self.targets = np.tile(quaternion.IDENTITY, (window, len(joints), 1))
         self.weights = np.zeros(len(joints), dtype=np.float32)
-        self._present = self.targets[0].copy()
+
+        count = len(self.puppeteers)
+        self._present = np.tile(quaternion.IDENTITY, (count, 1))
         self._before = self._present.copy()
-        self._signs = np.empty((len(joints), 1), dtype=np.float32)
+        self._signs = np.empty((count, 1), dtype=np.float32)
+        self._is_new = np.empty((count, 1), dtype=np.bool_)
+        self._extrapolation = Extrapolation(count, window)
+        self._ahead = np.empty((window, count, 4), dtype=np.float32)
 
     def pull(self, now: float, window: FloatArray) -> None:
-        """Write all targets of this moment; their signs do not jump from one tick to the next.
+        """Write all targets of this moment; call it once a tick.
 
-        window (T, M, 4): the phrase's own poses of the moving joints.
+        window (T, M, 4): the phrase's own poses of the moving joints, without sign jumps. The signs of the
+        targets jump neither from tick to tick nor from pose to pose. What moved a joint while nothing held it
+        is not carried on.
         """
+        if not self.puppeteers:
+            return
         np.copyto(self._before, self._present)
-        for place, puppeteer in zip(self._places, self.puppeteers, strict=True):
+        for hand, (place, puppeteer) in enumerate(zip(self._places, self.puppeteers, strict=True)):
+            self._is_new[hand] = not puppeteer.is_holding
+            if isinstance(puppeteer, Kept):
+                puppeteer.see(window[0, place])
             target = puppeteer.pull(now)
-            self._present[place] = target.orientation
+            self._present[hand] = target.orientation
             self.weights[place] = target.weight
-        np.einsum("mk,mk->m", self._present, self._before, out=self._signs[:, 0])
+        np.einsum("hk,hk->h", self._present, self._before, out=self._signs[:, 0])
         np.copysign(1.0, self._signs, out=self._signs)
         np.multiply(self._present, self._signs, out=self._present)
-        np.copyto(self.targets, self._present)
+        self._extrapolation(self._present, self._is_new, out=self._ahead)
+        for hand, (place, puppeteer) in enumerate(zip(self._places, self.puppeteers, strict=True)):
+            if isinstance(puppeteer, Kept):
+                np.multiply(window[:, place], self._signs[hand], out=self.targets[:, place])
+            else:
+                self.targets[:, place] = self._ahead[:, hand]
         np.greater(self.weights, 0.0, out=self.mask)
 
     def state(self) -> dict[str, Any]:
@@ -61,16 +80,19 @@ class Hands:
         return {
             "puppeteers": [puppeteer.state() for puppeteer in self.puppeteers],
             "mask": self.mask.copy(),
-            "targets": self.targets.copy(),
+            "present": self._present.copy(),
+            "targets": self.targets[:, self._places].copy(),
             "weights": self.weights.copy(),
+            "extrapolation": self._extrapolation.state(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the hands of the same show did that gave this state."""
         for puppeteer, kept in zip(self.puppeteers, state["puppeteers"], strict=True):
             puppeteer.restore(kept)
-        self.mask[:], self.targets[:], self.weights[:] = state["mask"], state["targets"], state["weights"]
-        np.copyto(self._present, self.targets[0])
+        self.mask[:], self._present[:], self.weights[:] = state["mask"], state["present"], state["weights"]
+        self.targets[:, self._places] = state["targets"]
+        self._extrapolation.restore(state["extrapolation"])
 
 
 def _place(joint: str, joints: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""Puppeteers: whatever holds a joint (worn sensor, turning axis, fixed orientation, OSC)."""
+"""Puppeteers: whatever holds a joint (worn sensor, turning axis, fixed orientation, the phrase, OSC)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.dancer.slerp import FloatArray, Slerp
+from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
 
 HOLD_S = 0.1  # a sensor may be silent for so long before its joint is given back
@@ -96,7 +96,8 @@ class Puppeteer(ABC):
 
 class WornSensor(Puppeteer):
     """A sensor that a dancer wears. Silent for 100 ms: its joint is given back over 1 s, taken again over
-    0.5 s, and the target is led to the new readings over as long as the silence lasted (0.5 s at most).
+    0.5 s, and the target is led to the new readings over as long as the silence lasted (0.5 s at most): what
+    lies between them when it ends is taken out evenly, while the readings move on.
 
     joint_from_reading: the matrix (4, 4) that makes a reading (w, x, y, z; sensor axes) the joint's local
     orientation; where it keeps the length, so does the target. None: readings are such orientations already.
@@ -111,22 +112,27 @@ class WornSensor(Puppeteer):
         )
         self._reading, self._local = quaternion.IDENTITY.copy(), quaternion.IDENTITY.copy()
         self._heard_at: float | None = None
-        self._leading_s = 0.0
-        self._slerp = Slerp(1)
+        self._leading_s = self._led_s = 0.0  # what is left of the leading, and how long it takes in all
+        self._apart = (
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )  # half the angle from reading to target, and its axis
 
     def wear(self, joint_from_reading: NDArray[np.float32]) -> None:
         """Take another matrix, for a new neutral pose; the joint is led over, as after a silence."""
         self._joint_from_reading = joint_from_reading
         if self._heard_at is not None:
             np.matmul(joint_from_reading, self._reading, out=self._local)
-            self._leading_s = TAKE_S
+            self._lead(TAKE_S)
 
     def hear(self, orientation: Sequence[float] | FloatArray, arrival: float) -> None:
         """Take a reading (unit quaternion w, x, y, z) that arrived at this time."""
         self._reading[:] = orientation
         np.matmul(self._joint_from_reading, self._reading, out=self._local)
         if self._heard_at is not None and arrival - self._heard_at > HOLD_S:
-            self._leading_s = max(self._leading_s, min(arrival - self._heard_at, TAKE_S))
+            self._lead(max(self._leading_s, min(arrival - self._heard_at, TAKE_S)))
         self._heard_at = arrival
 
     def state(self) -> dict[str, Any]:
@@ -135,14 +141,16 @@ class WornSensor(Puppeteer):
             "reading": self._reading.copy(),
             "local": self._local.copy(),
             "heard_at": self._heard_at,
-            "leading_s": self._leading_s,
+            "leading": [self._leading_s, self._led_s, *self._apart],
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         super().restore(state)
         self._joint_from_reading = np.array(state["joint_from_reading"], dtype=np.float32)
         self._reading[:], self._local[:] = state["reading"], state["local"]
-        self._heard_at, self._leading_s = state["heard_at"], state["leading_s"]
+        self._heard_at = state["heard_at"]
+        self._leading_s, self._led_s, *apart = state["leading"]
+        self._apart = _four(apart)
 
     def silent_s(self, now: float) -> float:
         """Seconds since the last reading; infinite before the first one."""
@@ -155,11 +163,27 @@ class WornSensor(Puppeteer):
         if self._leading_s <= elapsed:
             self._leading_s = 0.0
             orientation[:] = self._local
-            return
-        share = elapsed / self._leading_s
-        self._leading_s -= elapsed
-        row = orientation[None]
-        self._slerp(row, self._local[None], share, row)
+        elif elapsed:
+            self._leading_s -= elapsed
+            half_angle, x, y, z = self._apart
+            half_angle *= self._leading_s / self._led_s
+            sine = math.sin(half_angle)
+            left = np.array((math.cos(half_angle), sine * x, sine * y, sine * z), np.float32)
+            orientation[:] = quaternion.multiply(left, self._local)
+
+    def _lead(self, seconds: float) -> None:
+        """Lead the target from where it is to the readings, by half a turn in TAKE_S at most.
+
+        The way between them is fixed here and taken out evenly. Led by a share of what lies between them at
+        each tick, the target of a hand that went on by 7 degrees a tick made steps of 25, and it turned round
+        where the hand passed the orientation opposite to it.
+        """
+        axis, angle = quaternion.to_axis_angle(
+            quaternion.multiply(self._target.orientation, quaternion.inverse(self._local))
+        )
+        x, y, z = axis.tolist()
+        self._apart = float(angle) / 2, x, y, z
+        self._leading_s = self._led_s = max(seconds, TAKE_S * float(angle) / math.pi)
 
 
 class TurningAxis(Puppeteer):
@@ -201,6 +225,23 @@ class FixedOrientation(Puppeteer):
     def __init__(self, joint: str, orientation: Sequence[float], weight: float = 1.0) -> None:
         super().__init__(joint, weight)
         self._target.orientation[:] = _unit(orientation)
+
+    def _holds(self, now: float) -> bool:
+        return True
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        return
+
+
+class Kept(Puppeteer):
+    """Keeps its joint at the phrase's own orientation, pose by pose (the paper's Figure 4).
+
+    Its target is that of the window's first pose; Hands gives the other poses theirs.
+    """
+
+    def see(self, orientation: FloatArray) -> None:
+        """Take the phrase's orientation (4,) of this tick."""
+        self._target.orientation[:] = orientation
 
     def _holds(self, now: float) -> bool:
         return True

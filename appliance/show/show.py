@@ -21,7 +21,7 @@ from appliance.show.validation import validated
 from appliance.show.yaml_file import YamlFile, read_yaml
 
 MAX_HANDS = 8
-KINDS = ("sensor", "turning", "fixed", "osc")
+KINDS = ("sensor", "turning", "fixed", "kept", "osc")
 SENSOR_KEYS = ("facing", "at_neutral", "neutral", "primary")  # of a hand, for a worn sensor alone
 
 
@@ -43,13 +43,18 @@ class FixedConfig(Section):
 
 
 class HandConfig(Section):
-    """A puppeteer's hold on one joint. Exactly one of sensor, turning, fixed and osc says who holds it."""
+    """A puppeteer's hold on one joint. Exactly one of sensor, turning, fixed, kept, osc says who holds it."""
 
     sensor: str | None = Field(
         default=None, min_length=1, max_length=32, description="Name of the worn sensor that holds it."
     )
     turning: TurningConfig | None = Field(default=None, description="The joint turns at a constant rate.")
     fixed: FixedConfig | None = Field(default=None, description="The joint is held still.")
+    kept: Literal[True] | None = Field(
+        default=None,
+        description="The joint is kept where the phrase has it, pose by pose; with as many interaction as "
+        "coding iterations it stays there exactly.",
+    )
     osc: Literal[True] | None = Field(
         default=None, description="Messages to the control port hold the joint."
     )
@@ -110,7 +115,7 @@ class HandConfig(Section):
 
     @property
     def kind(self) -> str:
-        """sensor, turning, fixed or osc."""
+        """sensor, turning, fixed, kept or osc."""
         return next(kind for kind in KINDS if getattr(self, kind) is not None)
 
 

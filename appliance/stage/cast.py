@@ -14,7 +14,7 @@ from appliance.dancer.hands import Hands
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
 from appliance.dancer.puppet import Puppet, PuppetError
-from appliance.dancer.puppeteers import FixedOrientation, Puppeteer, Remote, TurningAxis, WornSensor
+from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Remote, TurningAxis, WornSensor
 from appliance.outputs.outputs import Outputs
 from appliance.pose.bvh import BvhError
 from appliance.pose.recording import Recording
@@ -173,6 +173,8 @@ def _puppeteer(hand: HandConfig) -> Puppeteer:
         return TurningAxis(hand.joint, hand.turning.axis, hand.turning.seconds_per_turn, hand.weight)
     if hand.fixed is not None:
         return FixedOrientation(hand.joint, hand.fixed.orientation, hand.weight)
+    if hand.kept:
+        return Kept(hand.joint, hand.weight)
     return Remote(hand.joint, hand.weight)
 
 

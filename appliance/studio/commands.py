@@ -65,6 +65,10 @@ def train(
     true_fps: Annotated[
         list[str] | None, typer.Option(help="PATTERN=FPS where a header is wrong ('salsa_*=60'); repeatable.")
     ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(help="Files in which nothing is a capture error ('solo_*'); repeatable."),
+    ] = None,
     phrase: Phrase = None,
     name: Annotated[
         str | None, typer.Option(help="What the show is called; left out: as its folder.")
@@ -91,6 +95,7 @@ def train(
                 catalogue=catalogue,
                 held_out=tuple(held_out or ()),
                 true_fps=tuple(true_fps or ()),
+                keep=tuple(keep or ()),
                 phrase=phrase,
                 name=name,
             )
@@ -108,12 +113,43 @@ def evaluate(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Figures as JSON on standard output.")] = False,
     all_frames: Annotated[bool, typer.Option("--all-frames", help="Measure on glitches too.")] = False,
+    hands: Annotated[
+        list[Path] | None,
+        typer.Option(help="BVH of another take: its joints hold the puppet's, one by one; repeatable."),
+    ] = None,
+    reference: Annotated[
+        Path | None, typer.Option(help="Folder of the training takes: what the dancer ever did.")
+    ] = None,
+    joint: Annotated[
+        list[str] | None,
+        typer.Option(help="Joint to hold; repeatable; left out: arms, head, chest and a thigh."),
+    ] = None,
+    iterations: Annotated[
+        list[str] | None,
+        typer.Option(help="K/J, coding and interaction iterations; repeatable; left out: 1/1 to 30/29."),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="PNG: the phrase, the arm pasted on, the dancer's answer.")
+    ] = None,
 ) -> None:
-    """Measure how well a network knows a dance: degrees, centimetres, latents."""
+    """Measure how well a network knows a dance, and with --hands whether its body answers a held joint."""
     with clear_errors("evaluate"):
         from appliance.studio import evaluate_command
 
-        evaluate_command.run(network, recordings, true_fps, json, all_frames)
+        evaluate_command.run(
+            evaluate_command.Wish(
+                network=network,
+                recordings=recordings,
+                true_fps=true_fps,
+                as_json=json,
+                all_frames=all_frames,
+                hands=tuple(hands or ()),
+                reference=reference,
+                joints=tuple(joint or ()),
+                iterations=tuple(iterations or ()),
+                picture=picture,
+            )
+        )
 
 
 @app.command()

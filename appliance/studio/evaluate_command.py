@@ -4,36 +4,139 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import track
+from rich.progress import Progress, track
 from rich.table import Table
 
-from appliance.studio.data.dataset import Take
+from appliance.studio.data.dataset import Take, load_dataset
+from appliance.studio.evaluation import puppetry, puppetry_words
+from appliance.studio.evaluation.answer_picture import draw_answer
 from appliance.studio.evaluation.coders import Coder, open_coder
 from appliance.studio.evaluation.evaluation import Evaluation, evaluate, fitting_hop, load_takes
+from appliance.studio.evaluation.measurement import Iterations, Measurement
+from appliance.studio.evaluation.nearest import reference_of
+from appliance.studio.evaluation.pairs import apart_from, pair_up
+from appliance.studio.evaluation.usual_joints import usual_joints
+from appliance.studio.studio_error import StudioError
 
 
-def run(
-    network: Path, files: Sequence[Path], true_fps: float | None, as_json: bool, all_frames: bool
-) -> None:
+@dataclass(frozen=True)
+class Wish:
+    """The command line of bunraku evaluate."""
+
+    network: Path
+    recordings: Sequence[Path]
+    true_fps: float | None = None
+    as_json: bool = False
+    all_frames: bool = False
+    hands: Sequence[Path] = ()
+    reference: Path | None = None
+    joints: Sequence[str] = ()
+    iterations: Sequence[str] = ()
+    picture: Path | None = None
+
+
+def run(wish: Wish) -> None:
     """Measure and print. Figures go to standard output, everything else to standard error."""
     console = Console(stderr=True)
-    coder = open_coder(network)
-    takes = load_takes(files, coder, true_fps, all_frames)
-    for take in takes:
+    iterations = _checked(wish)
+    coder = open_coder(wish.network)
+    joints = _held_joints(coder, wish.joints) if wish.hands else []
+    takes = load_takes(wish.recordings, coder, wish.true_fps, wish.all_frames)
+    hands = load_takes(wish.hands, coder, wish.true_fps, wish.all_frames)
+    for take in (*takes, *hands):
         console.print(_about(take), highlight=False)
 
     def progress(parts: Iterable[Any], count: int) -> Iterable[Any]:
         return track(parts, "coding", count, console=console, transient=True, disable=not console.is_terminal)
 
+    answer = {}
+    if wish.reference is not None:
+        measurements = _measurements(console, coder, takes, hands, wish.reference)
+        answer = _answer(console, measurements, joints, iterations)
+        if wish.picture is not None:
+            usual = puppetry.usual_iterations(iterations)
+            draw_answer(wish.picture, measurements[0], joints[0], usual)
+            console.print(f"{wish.picture} shows a hand on {joints[0]}.", highlight=False)
     found = evaluate(coder, takes, fitting_hop(coder, takes), progress)
-    if as_json:
-        print(json.dumps({"network": coder.facts, **found.as_json()}, indent=1))
-    else:
-        _print_table(Console(), coder, found)
+    if wish.as_json:
+        figures = {"network": coder.facts, **found.as_json()}
+        print(json.dumps({**figures, "puppetry": answer} if answer else figures, indent=1))
+        return
+    _print_table(Console(), coder, found)
+    if answer:
+        puppetry_words.print_answer(Console(), answer)
+
+
+def _checked(wish: Wish) -> list[Iterations]:
+    """The iterations asked for. Raises StudioError where options are missing or no numbers."""
+    if bool(wish.hands) != (wish.reference is not None):
+        raise StudioError(
+            "--hands and --reference belong together: the answer to a hand is measured against what the "
+            "dancer did in the recordings that the network learned from. Give both, or neither."
+        )
+    if not wish.hands and (wish.joints or wish.iterations or wish.picture):
+        raise StudioError(
+            "--joint, --iterations and --picture say how a hand is tried: give --hands as well."
+        )
+    return [_iterations(words) for words in wish.iterations] or list(puppetry.ITERATIONS)
+
+
+def _measurements(
+    console: Console, coder: Coder, takes: Sequence[Take], hands: Sequence[Take], folder: Path
+) -> list[Measurement]:
+    """Every phrase with a hand of another take, and the training takes as reference."""
+    pairs = pair_up(takes, hands)
+    known = apart_from(load_dataset(folder), (*takes, *hands))
+    if not known:
+        raise StudioError(
+            f"{folder} has no recording beside the phrases and the hands. "
+            "Give the folder of the training takes."
+        )
+    reference = reference_of(known, coder.joints)
+    for pair in pairs:
+        console.print(f"- {pair.phrase_name} with the hands of {pair.hand_name}.", highlight=False)
+    return [Measurement(coder, pair, reference) for pair in pairs]
+
+
+def _answer(
+    console: Console,
+    measurements: Sequence[Measurement],
+    joints: Sequence[str],
+    iterations: Sequence[Iterations],
+) -> dict[str, Any]:
+    """What the body does where a hand holds a joint, as JSON."""
+    count = puppetry.dances(len(measurements), len(joints), iterations)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("dancing", total=count)
+        return puppetry.measure(
+            measurements,
+            joints,
+            iterations,
+            advance=lambda words: bar.update(task, advance=1, description=words),
+        )
+
+
+def _iterations(words: str) -> Iterations:
+    coding, _, interaction = words.partition("/")
+    if not (coding.isdigit() and interaction.isdigit() and int(coding) > 0):
+        raise StudioError(f"'{words}' is no K/J: write for example 10/9, coding and interaction iterations.")
+    return int(coding), int(interaction)
+
+
+def _held_joints(coder: Coder, names: Sequence[str]) -> list[str]:
+    """Those asked for, else the usual ones. Raises StudioError for what the network does not move."""
+    for name in names:
+        if name not in coder.joints:
+            raise StudioError(f"No hand can hold '{name}': the network moves {', '.join(coder.joints)}.")
+    found = list(names) or list(usual_joints(coder.joints).values())
+    if not found:
+        raise StudioError(f"Say what to hold with --joint: the network moves {', '.join(coder.joints)}.")
+    return found
 
 
 def _about(take: Take) -> str:

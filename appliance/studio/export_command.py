@@ -9,6 +9,7 @@ from rich.console import Console
 
 from appliance.studio.data import sources
 from appliance.studio.evaluation.coders import load_checkpoint
+from appliance.studio.evaluation.puppetry_words import print_answer
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
 from appliance.studio.train_command import reading
@@ -25,6 +26,7 @@ def run(checkpoint: Path, out: Path, recordings: Path | None, phrase: Path | Non
     dataset = source.load(reading(console))
     request = Request(checkpoint, source.recordings, out, name or out.resolve().name, phrase)
     report = release(request, dataset, source.catalogue, lambda words: console.print(words, highlight=False))
+    print_answer(console, report["puppetry"])
     once = report["degrees"]["1"]["mean"]
     console.print(
         f"{out}: {once:.2f} degrees a joint after one iteration. Look at {out / 'report.png'}; "

@@ -18,7 +18,9 @@ from appliance.studio.autoencoder.training_run import TrainingRun, parameters
 from appliance.studio.data import sources
 from appliance.studio.data.sources import Sources
 from appliance.studio.evaluation.coders import load_checkpoint
-from appliance.studio.evaluation.findings import findings
+from appliance.studio.evaluation.findings import MASKED_PICTURE, findings, require_windows
+from appliance.studio.evaluation.masked import draw_masked
+from appliance.studio.evaluation.puppetry_words import print_answer
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
 
@@ -42,6 +44,7 @@ class Wish:
     catalogue: Path | None = None
     held_out: tuple[str, ...] = ()
     true_fps: tuple[str, ...] = ()
+    keep: tuple[str, ...] = ()
     phrase: Path | None = None
     name: str | None = None
 
@@ -57,6 +60,9 @@ def run(wish: Wish) -> bool:
     dataset = source.load(reading(console))
     for line in findings(dataset):
         console.print(f"- {line}", highlight=False)
+    if any(take.errors for take in dataset.takes):
+        draw_masked(wish.out / MASKED_PICTURE, dataset.takes)
+    require_windows(dataset, settings.batch)
     training = Training(dataset, settings, device)
     training.origin = source.as_state()
     if state is not None:
@@ -74,7 +80,8 @@ def run(wish: Wish) -> bool:
         return False
     name = wish.name or wish.out.resolve().name
     request = Request(checkpoint, source.recordings, wish.out, name, wish.phrase)
-    release(request, dataset, source.catalogue, lambda words: console.print(words, highlight=False))
+    report = release(request, dataset, source.catalogue, lambda words: console.print(words, highlight=False))
+    print_answer(console, report["puppetry"])
     console.print(
         f"{wish.out} is a show. Dance it: bunraku play --show {shlex.quote(str(wish.out))} --emulate"
     )
@@ -117,7 +124,7 @@ def _beginning(wish: Wish, checkpoint: Path) -> tuple[Settings, Sources, dict[st
     settings = Settings(
         network=wish.network, latent=wish.latent, width=wish.width, depth=wish.depth, seed=wish.seed
     )
-    source = sources.given(wish.recordings, wish.catalogue, wish.held_out, wish.true_fps)
+    source = sources.given(wish.recordings, wish.catalogue, wish.held_out, wish.true_fps, wish.keep)
     return _paced(settings, wish), source, None
 
 

@@ -17,7 +17,7 @@ from appliance.dancer.grounding import Grounding, measure_standing, survey
 from appliance.dancer.hands import Hands
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.puppet import Puppet
-from appliance.dancer.puppeteers import FixedOrientation, Puppeteer, TurningAxis
+from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, TurningAxis
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
@@ -160,6 +160,24 @@ def test_the_held_orientation_shows_when_every_pass_is_interactive_and_not_other
         off_free.append(degrees(let_go, target).mean())
     assert min(off_free) > 1.0
     assert np.mean(off_free) > 8.0
+
+
+@pytest.mark.parametrize("joint", ["lShldr", "rForeArm", "head"])
+@pytest.mark.parametrize("times", [1, 10])
+def test_a_kept_joint_stays_where_the_phrase_has_it(dancer: Dancer, joint: str, times: int) -> None:
+    """The paper's Figure 4: in every single window, and in the blended motion."""
+    dance = dancer.dance(times, times, Kept(joint))
+    place = dancer.place(joint)
+    assert degrees(dance.danced[:, place], dance.phrase[:, place]).max() < 0.1
+    puppet, motion = dancer.puppet, Playback(dancer.recording, floor=dancer.floor)
+    hands = Hands([Kept(joint)], puppet.joints)
+    for tick in range(SETTLING + 10):
+        window = puppet.select(motion.window())
+        hands.pull(tick * 0.02, window)
+        motion.advance()
+        if tick >= SETTLING:
+            poses = puppet.dance(window, hands.mask, hands.targets, hands.weights, times, times)
+            assert degrees(poses[:, place], window[:, place]).max() < 0.1
 
 
 def test_the_deviation_from_the_phrase_grows_with_the_coding_iterations(dancer: Dancer) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.image
@@ -13,7 +14,7 @@ import pytest
 from appliance.pose import quaternion
 from appliance.pose.body import Body, Cones
 from appliance.pose.figure import Frame, floor_shadow, render
-from appliance.pose.filmstrip import VERMILION, draw_filmstrip
+from appliance.pose.filmstrip import VERMILION, Strip, draw_filmstrip, draw_strips
 from appliance.pose.skeleton import Skeleton
 
 FRAME = Frame(100, 80, 50.0, 40.0, 100.0)
@@ -145,6 +146,21 @@ def test_original_and_reconstruction_stand_one_above_the_other(tmp_path: Path) -
     poses, roots = dance(FIGURE)
     picture = draw_filmstrip(tmp_path / "two.png", FIGURE, poses, roots, 50, columns=3, against=poses)
     assert size(picture)[0] > 700
+
+
+def test_strips_stand_under_each_other_with_ghosts_behind_them(tmp_path: Path) -> None:
+    poses, roots = dance(FIGURE)
+    still = np.tile(quaternion.IDENTITY, (len(poses), len(FIGURE), 1))
+    dancing = Strip(poses, roots, "dancing")
+    alone = [dancing, dancing, dancing]
+    pictures = [
+        matplotlib.image.imread(draw_strips(tmp_path / f"{number}.png", FIGURE, strips, 50, columns=3))
+        for number, strips in enumerate((alone, [*alone[:2], replace(dancing, behind=Strip(still, roots))]))
+    ]
+    changed = np.abs(pictures[0] - pictures[1]).max(axis=(1, 2)) > 0.05
+    assert changed[-len(changed) // 3 :].any() and not changed[: len(changed) // 2].any()
+    with pytest.raises(ValueError, match="at least one pose"):
+        draw_strips(tmp_path / "none.png", FIGURE, [], 50)
 
 
 @pytest.mark.parametrize("frames", [1, 2, 7])

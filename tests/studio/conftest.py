@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,12 +10,22 @@ import torch
 from typer.testing import CliRunner, Result
 
 from appliance.studio.commands import app
+from appliance.studio.evaluation import answer_picture, own_answer
 from tests.studio.tiny import write_recordings
 
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_thread() -> None:
     torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _small_answers() -> Iterator[None]:
+    """The answer of a trained dancer is measured on 3 s, and drawn with two figures a strip."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(answer_picture, "COLUMNS", 2)
+        patch.setattr(own_answer, "MOST_TICKS", 150)
+        yield
 
 
 def bunraku(*arguments: object) -> Result:

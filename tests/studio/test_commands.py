@@ -19,6 +19,7 @@ from tests.studio.conftest import bunraku
 from tests.studio.tiny import swaying
 
 Trained = tuple[Path, Result]
+HANDS = ["evaluate", "{show}", "{rec}/sway_0.bvh", "--reference", "{rec}", "--hands"]
 
 
 def said(result: Result) -> str:
@@ -53,12 +54,23 @@ def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:
         assert expected in words, expected
 
 
+def test_training_ends_with_whether_the_dancer_answers(trained: Trained) -> None:
+    show, result = trained
+    answer = json.loads((show / "report.json").read_text())["puppetry"]
+    assert answer["lShldr"]["10_9"]["answer"] >= 0 and answer["free"]["30"]["plausibility"] > 0
+    assert "with hands of sway_0" in answer["measured_on"]
+    words = said(result)
+    assert "Does the hand move the body?" in words and "with a hand on lShldr at 10/9" in words
+    assert answer["verdict"] in words and words.index(answer["verdict"]) < words.index("is a show. Dance it")
+    assert "answer.png" in (show / "SHA256SUMS").read_text()
+
+
 def test_training_leaves_its_history_and_pictures(trained: Trained) -> None:
     show, _ = trained
     told = json.loads((show / "training.json").read_text())
     assert told["settings"]["width"] == 48 and told["history"][-1]["step"] == 150
     assert told["history"][-1]["held_out_degrees"] > 0
-    for picture in (show / "pictures" / "losses.png", show / "report.png"):
+    for picture in (show / "pictures" / "losses.png", show / "report.png", show / "answer.png"):
         assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 10_000
     listed = (show / "SHA256SUMS").read_text()
     assert "puppet.onnx" in listed and "checkpoint.pt" not in listed and "pictures" not in listed
@@ -96,6 +108,25 @@ def test_evaluate_for_people_is_a_table(trained: Trained, recordings: Path) -> N
     assert result.exit_code == 0
     assert "iterations" in result.stdout and "Latents: mean" in result.stdout
     assert "sway_0: 4.0 s, 50 poses a second." in said(result)
+
+
+def test_evaluate_measures_the_answer_to_a_hand(tiny_show: Path, recordings: Path, tmp_path: Path) -> None:
+    phrase, hand, picture = recordings / "sway_2.bvh", recordings / "sway_0.bvh", tmp_path / "answer.png"
+    asked = ["evaluate", tiny_show, phrase, "--hands", hand, "--reference", recordings]
+    asked += ["--joint", "lShldr", "--iterations", "2/1", "--iterations", "3/3"]
+    result = bunraku(*asked, "--json", "--picture", picture)
+    assert result.exit_code == 0, said(result)
+    figures = json.loads(result.stdout)
+    assert {"degrees", "centimetres", "latent"} <= set(figures)
+    answer = figures["puppetry"]
+    row = answer["lShldr"]["3_3"]
+    expected = {"answer", "fit", "fit_own", "fit_bare", "plausibility", "energy", "roughness", "held"}
+    assert expected | {"arm_in_trunk", "foot_skate"} <= set(row)
+    assert row["answer"] > 0 and row["held"] < 5.0
+    assert set(answer["free"]) == {"1", "10", "30", "100"}
+    assert answer["reference"]["poses"] == 200  # sway_1: the phrase's and the hand's takes are no reference
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert "with the hands of sway_0" in said(result)
 
 
 def test_export_keeps_what_the_artist_wrote(trained: Trained, tmp_path: Path) -> None:
@@ -169,12 +200,19 @@ def test_a_stop_in_the_middle_says_how_to_go_on(tmp_path: Path, recordings: Path
         ),
         (["export", "{tmp}/checkpoint.pt", "--out", "{tmp}/show"], "does not exist"),
         (["evaluate", "{tmp}/show", "{rec}/sway_0.bvh"], "does not exist"),
+        (["evaluate", "{show}", "{rec}/sway_0.bvh", "--hands", "{rec}/sway_1.bvh"], "belong together"),
+        (["evaluate", "{show}", "{rec}/sway_0.bvh", "--reference", "{rec}"], "belong together"),
+        (["evaluate", "{show}", "{rec}/sway_0.bvh", "--joint", "head"], "give --hands as well"),
+        ([*HANDS, "{rec}/sway_0.bvh"], "of the same take"),
+        ([*HANDS, "{rec}/sway_1.bvh", "--joint", "tail"], "No hand can hold 'tail'"),
+        ([*HANDS, "{rec}/sway_1.bvh", "--iterations", "ten"], "is no K/J"),
     ],
 )
 def test_what_people_can_mend_is_one_message(
-    arguments: list[str], complaint: str, tmp_path: Path, recordings: Path
+    arguments: list[str], complaint: str, tmp_path: Path, recordings: Path, tiny_show: Path
 ) -> None:
-    result = bunraku(*(argument.format(tmp=tmp_path, rec=recordings) for argument in arguments))
+    folders = {"tmp": tmp_path, "rec": recordings, "show": tiny_show}
+    result = bunraku(*(argument.format(**folders) for argument in arguments))
     assert result.exit_code == 2
     assert complaint in said(result)
     assert "Traceback" not in result.output

@@ -21,7 +21,8 @@ from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.lessons import Copies, Lesson, Lessons
 from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.course import Course
-from appliance.studio.data.dataset import WINDOW, Dataset, limb_lengths, windows
+from appliance.studio.data.bones import reaches
+from appliance.studio.data.dataset import WINDOW, Dataset, windows
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,8 @@ class Training(Course[Report]):
         self.body = rotation.MovingSkeleton(dataset.skeleton, dataset.moving, torch.tensor(still)).to(
             self.device
         )
-        self.train_windows = self._heading_free(windows(dataset.training, dataset.moving, settings.mirror))
+        mirror = settings.mirror and dataset.mirrors
+        self.train_windows = self._heading_free(windows(dataset.training, dataset.moving, mirror))
         self.held_windows = torch.tensor(windows(dataset.held_out, dataset.moving)).to(self.device)
         self.optimizer = torch.optim.Adam(
             self.autoencoder.parameters(), lr=settings.learning_rate, fused=True
@@ -151,7 +153,7 @@ class Training(Course[Report]):
 
     def _chances(self) -> Tensor:
         """(M,): how often a joint is held while learning: more, the more of the body hangs on it."""
-        reach = limb_lengths(self.dataset.skeleton)[list(self.dataset.moving)]
+        reach = reaches(self.dataset.skeleton)[list(self.dataset.moving)]
         return torch.tensor(np.sqrt(reach / reach.max()), dtype=torch.float32, device=self.device)
 
     @torch.no_grad()

@@ -31,8 +31,19 @@ class Coder(Protocol):
     facts: dict[str, str]
     batch: int
 
-    def iterate(self, windows: Poses, coding_iterations: int) -> tuple[Poses, Poses]:
-        """Windows (B, 8, M, 4) -> windows after so many iterations, latents (B, Z) of the last one."""
+    def iterate(
+        self,
+        windows: Poses,
+        coding_iterations: int,
+        interaction_iterations: int = 0,
+        mask: NDArray[np.bool_] | None = None,
+        targets: Poses | None = None,
+        weights: NDArray[np.float32] | None = None,
+    ) -> tuple[Poses, Poses]:
+        """Windows (B, 8, M, 4) -> windows after so many iterations, latents (B, Z) of the last one.
+
+        mask (M,), targets (B, 8, M, 4), weights (M,): held joints, overwritten in so many iterations.
+        """
 
 
 class OnnxCoder:
@@ -70,8 +81,21 @@ class OnnxCoder:
             "weights": np.zeros(joints, dtype=np.float32),
         }
 
-    def iterate(self, windows: Poses, coding_iterations: int) -> tuple[Poses, Poses]:
-        made = [self.run(window, coding_iterations) for window in windows]
+    def iterate(
+        self,
+        windows: Poses,
+        coding_iterations: int,
+        interaction_iterations: int = 0,
+        mask: NDArray[np.bool_] | None = None,
+        targets: Poses | None = None,
+        weights: NDArray[np.float32] | None = None,
+    ) -> tuple[Poses, Poses]:
+        made = []
+        for number, window in enumerate(windows):
+            held: dict[str, Any] = {}
+            if mask is not None and targets is not None and weights is not None:
+                held = {"mask": mask, "targets": targets[number], "weights": weights}
+            made.append(self.run(window, coding_iterations, interaction_iterations, **held))
         return np.stack([poses for poses, _ in made]), np.stack([latent for _, latent in made])
 
     def run(
@@ -96,12 +120,25 @@ class TorchCoder:
         self.autoencoder, self.joints, self.facts = autoencoder, tuple(joints), facts
         self.rest = autoencoder.rest.cpu().numpy()
 
-    def iterate(self, windows: Poses, coding_iterations: int) -> tuple[Poses, Poses]:
+    def iterate(
+        self,
+        windows: Poses,
+        coding_iterations: int,
+        interaction_iterations: int = 0,
+        mask: NDArray[np.bool_] | None = None,
+        targets: Poses | None = None,
+        weights: NDArray[np.float32] | None = None,
+    ) -> tuple[Poses, Poses]:
         import torch
 
+        device = self.autoencoder.rest.device
+        held = [
+            None if values is None else torch.from_numpy(values).to(device)
+            for values in (mask, targets, weights)
+        ]
         with torch.no_grad():
-            given = torch.from_numpy(windows).to(self.autoencoder.rest.device)
-            poses, latents = self.autoencoder.iterate(given, coding_iterations)
+            given = torch.from_numpy(windows).to(device)
+            poses, latents = self.autoencoder.iterate(given, coding_iterations, interaction_iterations, *held)
         return poses.cpu().numpy(), latents.cpu().numpy()
 
 

@@ -92,7 +92,7 @@ def longest_sound(take: Take, most_s: float) -> Recording:
     starts, ends = edges[::2], edges[1::2]
     longest = int(np.argmax(ends - starts)) if len(starts) else 0
     first, last = (int(starts[longest]), int(ends[longest])) if len(starts) else (0, len(take.sound))
-    spare = max(0, last - first - round(most_s * FPS)) // 2
+    spare = max(0, last - first - round(min(most_s * FPS, len(take.sound)))) // 2
     return take.recording.excerpt((first + spare) / FPS, (last - spare) / FPS)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import Catalogue, Dataset, Take, find_catalogue, load_take
 from appliance.studio.evaluation.coders import OnnxCoder, Poses, TorchCoder, load_checkpoint
 from appliance.studio.evaluation.evaluation import evaluate, fitting_hop
+from appliance.studio.evaluation.own_answer import own_answer
 from appliance.studio.evaluation.pictures import longest_sound
 from appliance.studio.evaluation.report import write_up
 from appliance.studio.evaluation.report_picture import draw_report
@@ -29,6 +30,7 @@ from appliance.studio.studio_error import StudioError
 EQUALITY = 1e-4  # in any component of any quaternion after 10 iterations
 EQUALITY_WINDOWS = 16
 PHRASE_S = 60.0
+SHORT_PHRASE_S = 20.0  # rather something longer that was learned
 HANGING_DEGREES = 80.0  # below the level: a hanging arm does not touch the hip
 FIRST_HANDS = (
     "lshldr",
@@ -80,6 +82,8 @@ def release(
     evaluation = evaluate(coder, judged_on, fitting_hop(coder, judged_on))
     names = sorted(take.name for take in judged_on)
     report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
+    say("Measuring whether the body answers a hand.")
+    report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png")
     _write_texts(request, coder, dataset, catalogue, report, say)
     shown = max(judged_on, key=lambda take: len(longest_sound(take, PHRASE_S)))
     draw_report(request.out / "report.png", request.name, report, evaluation, coder, shown)
@@ -174,11 +178,18 @@ def _phrase(
         return found
     if (request.out / "phrase.bvh").exists():
         return None
-    takes: tuple[Take, ...] = dataset.held_out or dataset.training
-    longest = max(takes, key=lambda take: len(longest_sound(take, PHRASE_S)))
+    longest = _longest(dataset.held_out or dataset.training)
     phrase = longest_sound(longest, PHRASE_S)
+    if phrase.seconds < SHORT_PHRASE_S:
+        longest = _longest(dataset.takes)
+        phrase = longest_sound(longest, PHRASE_S)
     say(
         f"phrase.bvh is {phrase.seconds:.0f} s of the recording {longest.name}: the bundle contains a "
         "recording. Give your own with --phrase, or replace the file and run bunraku export again."
     )
     return phrase
+
+
+def _longest(takes: Sequence[Take]) -> Take:
+    """The take with the longest stretch without a capture error."""
+    return max(takes, key=lambda take: len(longest_sound(take, PHRASE_S)))

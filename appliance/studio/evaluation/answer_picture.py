@@ -1,0 +1,42 @@
+"""answer.png: the phrase, the phrase with the hand's arm pasted on, and what the body makes of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from appliance.pose.filmstrip import Strip, draw_strips
+from appliance.studio.data.dataset import FPS
+from appliance.studio.evaluation.coders import Poses
+from appliance.studio.evaluation.measurement import Iterations, Measurement
+
+COLUMNS = 7
+
+
+def draw_answer(path: Path, measurement: Measurement, joint: str, iterations: Iterations) -> Path:
+    """Three strips under each other: one sees whether more than the held joint leaves the ghost behind it.
+
+    The ghost is what would be there without the hand: the phrase behind the pasted arm, and behind the
+    answer the same dance without a hand, since many iterations change a phrase without any hand. The instants
+    are spread evenly over the whole dance, not chosen.
+    """
+    rehearsal, body = measurement.rehearsal, measurement.body
+    danced, turns = rehearsal.held(*iterations, measurement.hand(joint))
+    pasted = rehearsal.phrase.copy()
+    pasted[:, rehearsal.coder.joints.index(joint)] = turns
+    free, pair = rehearsal.free(iterations[0]), measurement.pair
+
+    def strip(poses: Poses, label: str, behind: Poses | None = None) -> Strip:
+        whole = rehearsal.whole(poses)
+        return Strip(whole, body.grounded(whole), label, None if behind is None else strip(behind, ""))
+
+    strips = (
+        strip(rehearsal.phrase, f"The phrase: {pair.phrase_name}"),
+        strip(pasted, f"Pasted on: {joint} as in {pair.hand_name}; all else is the phrase", rehearsal.phrase),
+        strip(danced, "The dancer's answer; behind it, in grey, the same dance without a hand", free),
+    )
+    skeleton = rehearsal.recording.skeleton
+    answer = measurement.answer(joint, danced, free)
+    title = (
+        f"A hand on {joint} at {iterations[0]}/{iterations[1]} moves the other joints by {answer:.1f} degrees"
+    )
+    return draw_strips(path, skeleton, strips, FPS, [skeleton.index(joint)], title, COLUMNS)

@@ -1,0 +1,190 @@
+"""The figures of dances on one phrase with one other take's hands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from appliance.dancer.puppeteers import Puppeteer
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.studio.data.dataset import WINDOW
+from appliance.studio.evaluation import motion_figures as motion
+from appliance.studio.evaluation.body_figures import BodyFigures
+from appliance.studio.evaluation.coders import Coder, Poses
+from appliance.studio.evaluation.in_play import FollowedOrientation, Rehearsal
+from appliance.studio.evaluation.nearest import Floats, Reference, without_heading
+from appliance.studio.evaluation.onset import StepAnswer, answer_to_steps
+
+TICKS = 1200
+STEP = 5  # ticks from one search for the nearest pose to the next: the means stay the same to 0.1 degrees
+Iterations = tuple[int, int]  # coding, interaction
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A phrase and the recording of another take whose joints are its hands; names for people."""
+
+    phrase: Recording
+    hand: Recording
+    phrase_name: str
+    hand_name: str
+
+    def orientations(self, joint: str, is_root: bool) -> Array:
+        """(N, 4): the hand's orientations; a root's heading is the phrase's."""
+        turns = self.hand.poses[:, self.hand.skeleton.index(joint)]
+        if not is_root:
+            return turns
+        own = self.phrase.poses[: len(turns), self.phrase.skeleton.index(joint)]
+        facing, away = quaternion.heading(own), quaternion.inverse(quaternion.heading(turns))
+        return quaternion.multiply(facing, quaternion.multiply(away[: len(own)], turns[: len(own)]))
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Of one joint at one K/J.
+
+    answer, fit, fit_own, fit_bare, held, plausibility_degrees, largest_step: degrees. plausibility, energy,
+    roughness: ratios to the phrase's own. snap: the largest step against the largest one of the recordings.
+    found: share of ticks at which the dancer ever held the joint so; fit is of those. arm_in_trunk: share of
+    ticks. foot_skate: metres a second.
+    """
+
+    answer: float
+    fit: float
+    fit_own: float
+    fit_bare: float
+    plausibility: float
+    energy: float
+    roughness: float
+    held: float
+    plausibility_degrees: float
+    largest_step: float
+    snap: float
+    found: float
+    arm_in_trunk: float
+    foot_skate: float
+
+
+class Measurement:
+    """One pair: the phrase's own figures, reckoned once, and those of every dance on it."""
+
+    def __init__(self, coder: Coder, pair: Pair, reference: Reference) -> None:
+        ticks = min(len(pair.phrase), len(pair.hand), TICKS + WINDOW - 1)
+        self.pair, self.reference, self.joints = pair, reference, coder.joints
+        self.rehearsal = Rehearsal(coder, pair.phrase.excerpt(0, ticks / pair.phrase.fps))
+        self.body = BodyFigures(self.rehearsal.recording)
+        self.phrase = without_heading(self.rehearsal.phrase)
+        self.phrase_far = reference.nearest(self.phrase[::STEP])
+        self._own_fit: dict[str, Floats] = {}
+        self._bare_fit: dict[tuple[str, bytes], float] = {}
+
+    def hand(self, joint: str) -> Puppeteer:
+        """The puppeteer that holds a joint as the other take did."""
+        return FollowedOrientation(joint, self.pair.orientations(joint, self._is_root(joint)))
+
+    def steps(self, joint: str, iterations: Iterations) -> StepAnswer:
+        """The answer to steps of the hand from one of its orientations to another."""
+        turns = self.pair.orientations(joint, self._is_root(joint))
+        return answer_to_steps(self.rehearsal, joint, turns, iterations)
+
+    def with_hand(self, joint: str, iterations: Iterations, hand: Puppeteer, ticks: int = TICKS) -> Figures:
+        """The figures of the dance with a hand on a joint."""
+        shown, hand_turns = self.rehearsal.held(*iterations, hand, slice(0, ticks))
+        danced = without_heading(shown)
+        free = self.rehearsal.free(iterations[0])[: len(danced)]
+        phrase, rows = self.phrase[: len(danced)], slice(0, len(danced), STEP)
+        held, others = self.joints.index(joint), self._others(joint)
+        if self._is_root(joint):
+            hand_turns = without_heading(hand_turns[:, None])[:, 0]
+        far = self.reference.nearest(danced[rows])
+        own_far = self.phrase_far[: len(far)]
+        fit = self.reference.nearest(danced[rows], others, held, hand_turns[rows])
+        return Figures(
+            answer=self.answer(joint, shown, free),
+            fit=_mean(fit),
+            fit_own=_mean(self._fit_of_phrase(joint, others)[: len(far)]),
+            fit_bare=self._fit_of_pasted(joint, others, hand_turns[rows]),
+            plausibility=_ratio(far.mean(), own_far.mean()),
+            energy=_ratio(motion.energy(danced[:, others]), motion.energy(phrase[:, others])),
+            roughness=_ratio(motion.roughness(danced[:, others]), motion.roughness(phrase[:, others])),
+            held=float(np.degrees(quaternion.angle_between(danced[:, held], hand_turns)).mean()),
+            plausibility_degrees=float(far.mean()),
+            found=float(np.isfinite(fit).mean()),
+            **self._of_body(shown),
+        )
+
+    def answer(self, joint: str, danced: Poses, free: Poses) -> float:
+        """Degrees that the others are moved by a hand: a dance (T, M, 4) with it against one without."""
+        others = self._others(joint)
+        apart = motion.degrees_apart(without_heading(danced)[:, others], without_heading(free)[:, others])
+        return float(apart.mean())
+
+    def free(self, coding_iterations: int) -> dict[str, float]:
+        """The figures of the dance without a hand."""
+        shown = self.rehearsal.free(coding_iterations)
+        danced = without_heading(shown)
+        far = self.reference.nearest(danced[::STEP])
+        return {
+            "plausibility": _ratio(far.mean(), self.phrase_far.mean()),
+            "energy": _ratio(motion.energy(danced), motion.energy(self.phrase)),
+            "roughness": _ratio(motion.roughness(danced), motion.roughness(self.phrase)),
+            "deviation": float(motion.degrees_apart(danced, self.phrase).mean()),
+            "plausibility_degrees": float(far.mean()),
+            **self._of_body(shown),
+        }
+
+    def of_phrase(self) -> dict[str, float]:
+        """The phrase's own figures, what the others are compared with."""
+        return {
+            "plausibility_degrees": float(self.phrase_far.mean()),
+            "energy_degrees_a_tick": motion.energy(self.phrase),
+            "roughness_degrees_a_tick2": motion.roughness(self.phrase),
+            **self._of_body(self.rehearsal.phrase),
+        }
+
+    def _of_body(self, danced: Poses) -> dict[str, float]:
+        """The largest step, arms in the trunk, feet that slide."""
+        step, whole = motion.largest_step(without_heading(danced)), self.rehearsal.whole(danced)
+        return {
+            "largest_step": step,
+            "snap": _ratio(step, self.reference.largest_step),
+            "arm_in_trunk": self.body.arm_in_trunk(whole),
+            "foot_skate": self.body.foot_skate(whole),
+        }
+
+    def _fit_of_phrase(self, joint: str, others: list[int]) -> Floats:
+        """The phrase's others against what the dancer did with that joint as the phrase has it."""
+        if joint not in self._own_fit:
+            held, phrase = self.joints.index(joint), self.phrase[::STEP]
+            self._own_fit[joint] = self.reference.nearest(phrase, others, held, phrase[:, held])
+        return self._own_fit[joint]
+
+    def _fit_of_pasted(self, joint: str, others: list[int], hand_turns: Floats) -> float:
+        """The phrase's others against what the dancer did with that joint as the hand has it."""
+        key = joint, hand_turns.tobytes()  # the same hand comes at several iterations
+        if key not in self._bare_fit:
+            held, phrase = self.joints.index(joint), self.phrase[::STEP][: len(hand_turns)]
+            self._bare_fit[key] = _mean(self.reference.nearest(phrase, others, held, hand_turns))
+        return self._bare_fit[key]
+
+    def _others(self, joint: str) -> list[int]:
+        """Places of the joints that the hand does not hold."""
+        return [place for place, name in enumerate(self.joints) if name != joint]
+
+    def _is_root(self, joint: str) -> bool:
+        return self.joints.index(joint) == 0
+
+
+def _mean(values: Floats) -> float:
+    """Of the ticks that have a value."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def _ratio(value: float | np.floating[Any], own: float | np.floating[Any]) -> float:
+    """Against the phrase's own; not a number where the phrase stands still."""
+    return float(value) / float(own) if own > 0 else float("nan")

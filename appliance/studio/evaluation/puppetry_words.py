@@ -1,0 +1,184 @@
+"""The answer of a dancer in a table and in sentences."""
+
+from __future__ import annotations
+
+import statistics
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from appliance.studio.evaluation.usual_joints import UPPER_ARMS, usual_joints
+
+ANSWERS, ANSWERS_A_LITTLE = 8.0, 4.0  # degrees
+LIVELY = (0.7, 1.3)  # energy
+COLUMNS = (
+    "held",
+    "K/J",
+    "answer",
+    "fit",
+    "own / foreign",
+    "plausibility",
+    "energy",
+    "roughness",
+    "off the hand",
+)
+ENOUGH_MINUTES = 8.0  # the default show's dancer answers with what it learned in 11
+
+
+def verdict(found: dict[str, Any], minutes: float) -> str:
+    """Whether the dancer answers, by its upper arms where they were held, and what to do.
+
+    minutes: of dance that it learned from.
+    """
+    named = [name for part, name in usual_joints(joints_of(found)).items() if part in UPPER_ARMS]
+    rows = [strongest(found[joint])[1] for joint in named or joints_of(found)]
+    what = f"a hand moves its other joints by {statistics.fmean(row['answer'] for row in rows):.1f} degrees"
+    if None not in (energies := [row["energy"] for row in rows]):
+        what += f", at an energy of {statistics.fmean(energies):.2f}"
+    wrong = list(dict.fromkeys(words for row in rows for words in reservations(row)))
+    strength = min(degree(row) for row in rows)
+    if strength == 2 and not wrong:
+        return f"The dancer answers: {what}."
+    opening = f"The dancer {'answers a little' if strength else 'does not answer'}: {what}"
+    if strength and wrong:
+        opening += f", but {' and '.join(wrong)}"
+    if minutes < ENOUGH_MINUTES:
+        cure = (
+            f"More recordings help most: it learned from {minutes:.1f} minutes of dance, the default show's "
+            "dancer from 11."
+        )
+    else:
+        cure = "Train longer (--minutes), or with recordings in which the arms do more."
+    return f"{opening}. {cure}"
+
+
+def print_answer(console: Console, found: dict[str, Any]) -> None:
+    """Table and sentences; why there are none where nothing was measured."""
+    if "not_measured" in found:
+        words = f"Whether this dancer answers a hand could not be measured: {found['not_measured']}"
+        console.print(words, highlight=False)
+        return
+    console.print(table(found))
+    lines = [*sentences(found), *asides(found)]
+    if "verdict" in found:
+        lines += [f"Measured {found['measured_on']}.", found["verdict"]]
+    for line in lines:
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def table(found: dict[str, Any]) -> Table:
+    """A row for each joint and K/J, hands that turn, and the dance without a hand."""
+    made = Table(
+        title="Does the hand move the body? Degrees; plausibility, energy, roughness: the phrase is 1"
+    )
+    for heading in COLUMNS:
+        made.add_column(heading, justify="left" if heading == "held" else "right")
+    for joint in joints_of(found):
+        for key, row in iterations_of(found[joint]).items():
+            made.add_row(joint, key.replace("_", "/"), *_row(row))
+        if "turning" in found[joint]:
+            made.add_row(joint, "turning", *_row(found[joint]["turning"]))
+    for coding, row in found["free"].items():
+        blank = {"answer": None, "fit": None, "fit_own": None, "fit_bare": None, "held": None}
+        made.add_row("nothing", f"{coding}/0", *_row({**blank, **row}))
+    return made
+
+
+def sentences(found: dict[str, Any]) -> list[str]:
+    """What the figures mean, a sentence a joint.
+
+    Noise moves the others as well as an answer does, and a pose without life fits everything a little: so fit
+    and energy are asked as well.
+    """
+    return [_sentence(joint, *strongest(found[joint])) for joint in joints_of(found)]
+
+
+def asides(found: dict[str, Any]) -> list[str]:
+    """What else a body does: when it answers, whether it snaps, goes through itself, slides."""
+    joints, phrase = joints_of(found), found["phrase"]
+    onsets = [found[joint]["onset_ticks"] for joint in joints]
+    known = [ticks for ticks in onsets if ticks is not None]
+    turned = [found[joint]["turning"]["largest_step"] for joint in joints if "turning" in found[joint]]
+    lines = []
+    if known:
+        lines.append(f"Half of the answer to a step of the hand is out after {max(known):g} ticks.")
+    if turned:
+        lines.append(
+            f"While hands turn smoothly, a joint goes up to {max(turned):.0f} degrees in one tick; in the "
+            f"recordings {found['reference']['largest_step']:.0f}."
+        )
+    deep, skate = (_mean_of(found, name) for name in ("arm_in_trunk", "foot_skate"))
+    if deep is not None and phrase["arm_in_trunk"] is not None:
+        lines.append(
+            f"An upper arm is deep in the trunk in {100 * deep:.0f} % of the ticks; "
+            f"in the phrase in {100 * phrase['arm_in_trunk']:.0f} %."
+        )
+    if skate is not None and phrase["foot_skate"] is not None:
+        lines.append(f"Feet slide at {skate:.2f} m/s; in the phrase at {phrase['foot_skate']:.2f}.")
+    return lines
+
+
+def _mean_of(found: dict[str, Any], name: str) -> float | None:
+    values = [strongest(found[joint])[1][name] for joint in joints_of(found)]
+    return None if None in values else statistics.fmean(values)
+
+
+def joints_of(found: dict[str, Any]) -> list[str]:
+    """The joints that were held."""
+    return [name for name, figures in found.items() if isinstance(figures, dict) and "onset_ticks" in figures]
+
+
+def iterations_of(figures: dict[str, Any]) -> dict[str, Any]:
+    """The rows of a joint by K_J."""
+    return {key: row for key, row in figures.items() if key.replace("_", "").isdigit()}
+
+
+def strongest(figures: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """The row at 10/9 or, where that was not asked for, at the most iterations; and which it is."""
+    rows = iterations_of(figures)
+    key = "10_9" if "10_9" in rows else max(rows, key=lambda key: [int(part) for part in key.split("_")])
+    return key.replace("_", "/"), rows[key]
+
+
+def _sentence(joint: str, iterations: str, row: dict[str, Any]) -> str:
+    meaning = {2: "this dancer answers", 1: "this dancer answers a little", 0: "this dancer hardly answers"}
+    but = f", but {' and '.join(reservations(row))}" if reservations(row) else ""
+    return (
+        f"The others move {row['answer']:.1f} degrees with a hand on {joint} at {iterations}: "
+        f"{meaning[degree(row)]}{but}."
+    )
+
+
+def degree(row: dict[str, Any]) -> int:
+    """0, 1 or 2: it hardly answers, a little, or answers."""
+    return int(row["answer"] >= ANSWERS_A_LITTLE) + int(row["answer"] >= ANSWERS)
+
+
+def reservations(row: dict[str, Any]) -> list[str]:
+    """What is wrong with an answer: the body is further from what the dancer did with that joint than the
+    bare phrase is, or it has another energy."""
+    found = []
+    if degree(row) and row["fit"] is not None and row["fit"] > row["fit_bare"]:
+        found.append("it does nothing that the dancer did with that joint")
+    energy = row["energy"]
+    if degree(row) and energy is not None and energy < LIVELY[0]:
+        found.append(f"it comes nearly to rest (energy {energy:.2f})")
+    if degree(row) and energy is not None and energy > LIVELY[1]:
+        found.append(f"it is restless (energy {energy:.2f})")
+    return found
+
+
+def _row(row: dict[str, Any]) -> list[str]:
+    baselines = " / ".join(_number(row[key], 1) for key in ("fit_own", "fit_bare"))
+    return [
+        _number(row["answer"], 1),
+        _number(row["fit"], 1),
+        "" if row["fit_own"] is None else baselines,
+        *(_number(row[key], 2) for key in ("plausibility", "energy", "roughness")),
+        _number(row["held"], 1),
+    ]
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
