@@ -47,7 +47,7 @@ class AnswerSettings:
 
 
 class Answers:
-    """A pool of P dances: first and present window, answer, hands (P, T, M, 4), weights (P, M), age, length."""
+    """P dances: first and present window, answer, hands (P, T, M, 4), weights (P, M), age and length."""
 
     def __init__(self, windows: Tensor, chances: Tensor, settings: AnswerSettings) -> None:
         """windows (N, T, M, 4), heading-free; chances (M,): how often each joint is held."""

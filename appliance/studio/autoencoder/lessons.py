@@ -16,7 +16,7 @@ from appliance.studio.autoencoder import rotation
 class Lesson:
     """A batch of B heading-free windows (B, T, M, 4) and the windows that should come out of one pass.
 
-    start (B, T, M, 4): the windows that the iteration began with; goal (B, T, M, 4): orientations of the joints
+    start (B, T, M, 4): the windows that the iteration began with; goal (B, T, M, 4): orientations of joints
     that are held by `held` (B, M); None for lessons without hands. rows: where they stand in their pool.
     """
 
