@@ -89,8 +89,8 @@ def table(found: dict[str, Any]) -> Table:
 def sentences(found: dict[str, Any]) -> list[str]:
     """What the figures mean, a sentence a joint.
 
-    Noise moves the others as well as an answer does, and a pose without life fits everything a little: so fit,
-    plausibility and energy are asked as well.
+    Noise moves the others as well as an answer does, and a pose without life fits everything a little: so
+    fit, plausibility and energy are asked as well.
     """
     return [_sentence(joint, *strongest(found[joint])) for joint in joints_of(found)]
 
