@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -92,10 +92,22 @@ def draw_filmstrip(
 def _draw(
     path: Path | str, skeleton: Skeleton, rows: Sequence[Row], fps: float, held: Sequence[int], title: str
 ) -> Path:
+    names = ", ".join(skeleton.names[joint] for joint in held)
+    rows = [replace(row, held=tuple(held)) for row in rows]
+    return draw_rows(path, skeleton, rows, fps, title, f"held: {names}" if names else "")
+
+
+def draw_rows(
+    path: Path | str, skeleton: Skeleton, rows: Sequence[Row], fps: float, title: str, coloured: str
+) -> Path:
+    """Draw rows under each other, each with instants, coloured joints and words of its own, into a PNG.
+
+    fps: poses a second; coloured: what the coloured joints are. Raises as draw_strips does.
+    """
     matplotlib_figure, canvas = _matplotlib()
     if not rows or not len(rows[0].chosen):
         raise ValueError("a filmstrip needs at least one pose")
-    stage = Stage(skeleton, rows, frozenset(held), fps)
+    stage = Stage(skeleton, rows, fps)
     height, width = stage.floor.shape[:2]
     figure = matplotlib_figure(figsize=(width / 100, height / 100), dpi=100)
     axes = figure.add_axes((0, 0, 1, 1))
@@ -104,7 +116,7 @@ def _draw(
     axes.imshow(np.clip(stage.floor, 0, 1), **place, zorder=0)
     _draw_trails(axes, stage.trails)
     axes.imshow(np.clip(straight(stage.figures), 0, 1), **place, zorder=2)
-    _write(axes, stage, title, ", ".join(skeleton.names[joint] for joint in held))
+    _write(axes, stage, title, coloured)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     canvas(figure).print_png(path)
@@ -146,14 +158,14 @@ def _draw_trails(axes: Any, trails: list[Array]) -> None:
         )
 
 
-def _write(axes: Any, stage: Stage, title: str, held: str) -> None:
+def _write(axes: Any, stage: Stage, title: str, coloured: str) -> None:
     """Title, legend, labels of the rows and time stamps."""
     axes.set_xlim(0, stage.floor.shape[1])
     axes.set_ylim(stage.floor.shape[0], 0)
     axes.text(MARGIN_PX, 42, title or "Filmstrip", color=INK, fontsize=19, va="center")
-    if held:
+    if coloured:
         axes.plot([MARGIN_PX + 6], [78], "o", color=VERMILION, markersize=8, zorder=3)
-        axes.text(MARGIN_PX + 22, 78, f"held: {held}", color=FAINT, fontsize=11, va="center")
+        axes.text(MARGIN_PX + 22, 78, coloured, color=FAINT, fontsize=11, va="center")
     for x, y, text in stage.times:
         axes.text(x, y, text, color=FAINT, fontsize=9.5, ha="center", va="center")
     for y, text in stage.labels:

@@ -29,7 +29,8 @@ GHOST = 0.55  # how dense the figure is that stands behind another one
 class Row:
     """Poses drawn beside each other: local rotations (N, J, 4), roots (N, 3) metres, a label, a colour.
 
-    chosen: which of the N; behind: a row whose figures stand behind these as ghosts.
+    chosen: which of the N; behind: a row whose figures stand behind these as ghosts; held: joints in colour;
+    stamps: words below the figures, left out: their seconds.
     """
 
     poses: Array
@@ -38,13 +39,15 @@ class Row:
     label: str = ""
     colour: Array = field(default_factory=lambda: IVORY)
     behind: Row | None = None
+    held: tuple[int, ...] = ()
+    stamps: tuple[str, ...] | None = None
 
 
 class Stage:
     """The picture in layers: the floor with its shadows, the trails, the figures; and where words belong."""
 
-    def __init__(self, skeleton: Skeleton, rows: Sequence[Row], held: frozenset[int], fps: float) -> None:
-        self.skeleton, self.held, self.fps = skeleton, held, fps
+    def __init__(self, skeleton: Skeleton, rows: Sequence[Row], fps: float) -> None:
+        self.skeleton, self.fps = skeleton, fps
         self.body = Body(skeleton)
         self.scale = HEIGHT_PX / self.body.height
         self.times: list[tuple[float, float, str]] = []
@@ -81,7 +84,8 @@ class Stage:
             centre = MARGIN_PX + (column + 0.5) * COLUMN_PX
             self._figure(row, int(index), centre, floor, rows)
             self._trail(row, int(index), centre, floor, top)
-            self.times.append((centre, top + self.floor_px + FOOTER_PX, f"{index / self.fps:.1f} s"))
+            stamp = row.stamps[column] if row.stamps else f"{index / self.fps:.1f} s"
+            self.times.append((centre, top + self.floor_px + FOOTER_PX, stamp))
         if row.label:
             self.labels.append((top + 12, row.label))
 
@@ -97,7 +101,7 @@ class Stage:
         on_stage = replace(cones, start=cones.start @ _turn().T, end=cones.end @ _turn().T)
         _over(self.floor[rows], left, self._shadow(on_stage, frame))
         colours = np.tile(row.colour, (len(cones.joint), 1))
-        colours[np.isin(cones.joint, list(self.held))] = VERMILION
+        colours[np.isin(cones.joint, row.held)] = VERMILION
         _over(self.figures[rows], left, render(_seen(cones), colours, frame))
 
     def _cones(self, row: Row, index: int, floor: float) -> Cones:
@@ -122,7 +126,7 @@ class Stage:
         here = row.roots[index] * [1, 0, 1] + [0, floor, 0]
         span = slice(first, index + 1)
         positions, _ = self.skeleton.forward_kinematics(row.poses[span], row.roots[span])
-        for joint in self.held:
+        for joint in row.held:
             child = next((c for c, p in enumerate(self.skeleton.parents) if p == joint), joint)
             seen = (positions[:, child] - here) @ _view().T * self.scale
             pixels = np.stack([centre + seen[:, 0], top + self.floor_px - seen[:, 1]], axis=-1)

@@ -17,6 +17,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 class NetworkName(StrEnum):
     """Architectures, as networks.NETWORKS has them."""
 
+    conditional = "conditional"
     mlp = "mlp"
     conv = "conv"
     lstm = "lstm"
@@ -43,7 +44,7 @@ Phrase = Annotated[
 def train(
     out: Annotated[Path, typer.Option(help="Folder of the show that comes out of it.")],
     recordings: Recordings = None,
-    network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.mlp,
+    network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.conditional,
     minutes: Annotated[
         float | None, typer.Option(min=0.01, help="How long to train.", show_default="45")
     ] = None,
@@ -63,6 +64,10 @@ def train(
     ] = None,
     true_fps: Annotated[
         list[str] | None, typer.Option(help="PATTERN=FPS where a header is wrong ('salsa_*=60'); repeatable.")
+    ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(help="Files in which nothing is a capture error ('solo_*'); repeatable."),
     ] = None,
     phrase: Phrase = None,
     name: Annotated[
@@ -90,6 +95,7 @@ def train(
                 catalogue=catalogue,
                 held_out=tuple(held_out or ()),
                 true_fps=tuple(true_fps or ()),
+                keep=tuple(keep or ()),
                 phrase=phrase,
                 name=name,
             )

@@ -12,13 +12,14 @@ import torch
 from rich.console import Console
 from rich.progress import track
 
-from appliance.studio.autoencoder.losses import LossWeights
+from appliance.studio.autoencoder.architectures import DEFAULT
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.autoencoder.training_run import TrainingRun, parameters
 from appliance.studio.data import sources
 from appliance.studio.data.sources import Sources
 from appliance.studio.evaluation.coders import load_checkpoint
-from appliance.studio.evaluation.findings import findings
+from appliance.studio.evaluation.findings import MASKED_PICTURE, findings, require_windows
+from appliance.studio.evaluation.masked import draw_masked
 from appliance.studio.evaluation.puppetry_words import print_answer
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
@@ -30,7 +31,7 @@ class Wish:
 
     out: Path
     recordings: Path | None = None
-    network: str = "mlp"
+    network: str = DEFAULT
     minutes: float | None = None
     steps: int | None = None
     seed: int = 1
@@ -43,6 +44,7 @@ class Wish:
     catalogue: Path | None = None
     held_out: tuple[str, ...] = ()
     true_fps: tuple[str, ...] = ()
+    keep: tuple[str, ...] = ()
     phrase: Path | None = None
     name: str | None = None
 
@@ -58,6 +60,9 @@ def run(wish: Wish) -> bool:
     dataset = source.load(reading(console))
     for line in findings(dataset):
         console.print(f"- {line}", highlight=False)
+    if any(take.errors for take in dataset.takes):
+        draw_masked(wish.out / MASKED_PICTURE, dataset.takes)
+    require_windows(dataset, settings.batch)
     training = Training(dataset, settings, device)
     training.origin = source.as_state()
     if state is not None:
@@ -108,8 +113,7 @@ def _beginning(wish: Wish, checkpoint: Path) -> tuple[Settings, Sources, dict[st
         if not checkpoint.exists():
             raise StudioError(f"{wish.out} has no checkpoint.pt to go on from. Leave --resume out to begin.")
         state = load_checkpoint(checkpoint)[1]
-        saved = state["settings"]
-        settings = Settings(**{**saved, "weights": LossWeights(**saved["weights"])})
+        settings = Settings.from_state(state["settings"])
         return _paced(settings, wish), sources.remembered(state, wish.recordings, checkpoint), state
     if checkpoint.exists():
         raise StudioError(
@@ -120,7 +124,7 @@ def _beginning(wish: Wish, checkpoint: Path) -> tuple[Settings, Sources, dict[st
     settings = Settings(
         network=wish.network, latent=wish.latent, width=wish.width, depth=wish.depth, seed=wish.seed
     )
-    source = sources.given(wish.recordings, wish.catalogue, wish.held_out, wish.true_fps)
+    source = sources.given(wish.recordings, wish.catalogue, wish.held_out, wish.true_fps, wish.keep)
     return _paced(settings, wish), source, None
 
 

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from appliance.studio.autoencoder import losses, rotation
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
-from appliance.studio.autoencoder.networks import NETWORKS
+from appliance.studio.autoencoder.architectures import NETWORKS
 from tests.studio.tiny import moving, swaying, untrained
 
 

@@ -7,26 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.data import dataset
-from appliance.studio.data.dataset import Catalogue, DatasetError, load_dataset, load_take
-from tests.studio.tiny import STILL, moving, skeleton, swaying, write_recordings
-
-
-def write_known(folder: Path, *names: str) -> list[Path]:
-    """Empty files with the names and sizes that the studio's catalogues know."""
-    files = []
-    for name in names:
-        text = yaml.safe_load((dataset.CATALOGUES / f"{name}.yaml").read_text())
-        for recording, size in text["bytes"].items():
-            files.append(folder / f"{recording}.bvh")
-            with files[-1].open("wb") as stream:
-                stream.truncate(size)
-    return files
+from appliance.studio.data.catalogue import Catalogue, find_catalogue
+from appliance.studio.data.dataset import DatasetError, load_dataset, load_take
+from appliance.studio.data.mirror import mirror_pairs
+from tests.studio.tiny import STILL, moving, swaying, write_recordings
 
 
 def test_both_partners_of_a_take_are_held_out_together(tmp_path: Path) -> None:
@@ -47,41 +36,6 @@ def test_only_joints_that_turn_somewhere_are_learned(tmp_path: Path) -> None:
     assert set(found.skeleton.names) - set(found.moving_names) == set(STILL)
 
 
-def test_the_cmu_dances_are_known_by_names_and_sizes(tmp_path: Path) -> None:
-    files = write_known(tmp_path, "cmu_dance")
-    found = dataset.find_catalogue(tmp_path, files)
-    assert found.fps_of("salsa_09") == 60 and found.fps_of("indian_04") == 120
-    assert found.take_of("salsa_09") == found.take_of("salsa_24")
-    assert "mocap.cs.cmu.edu" in found.acknowledgement
-    with files[0].open("ab") as stream:
-        stream.write(b"\n")
-    assert dataset.find_catalogue(tmp_path, files) == Catalogue()
-
-
-def test_fighters_and_dancers_are_known_alone_and_together(tmp_path: Path) -> None:
-    dancers = write_known(tmp_path, "cmu_dance")
-    alone = dataset.find_catalogue(tmp_path, dancers)
-    assert set(alone.held_out) == {"salsa_09", "salsa_24", "salsa_14", "salsa_29", "indian_13"}
-    fighters = write_known(tmp_path, "cmu_martial")
-    assert dataset.find_catalogue(tmp_path, fighters).held_out == ("martial_04",)
-    both = dataset.find_catalogue(tmp_path, [*fighters, *dancers])
-    assert set(both.held_out) == {*alone.held_out, "martial_04"}
-    assert both.fps_of("salsa_01") == 60 and both.fps_of("martial_03") == 120
-    assert both.acknowledgement == alone.acknowledgement
-    own = tmp_path / "martial_99.bvh"
-    own.touch()
-    assert dataset.find_catalogue(tmp_path, [*fighters, own]) == Catalogue()
-
-
-def test_a_catalogue_beside_the_recordings_goes_before_all(tmp_path: Path) -> None:
-    folder = write_recordings(tmp_path / "dancer", count=2)
-    (folder / "catalogue.yaml").write_text("true_fps: {sway_*: 25}\nheld_out: [sway_0]\n")
-    found = load_dataset(folder)
-    assert [take.name for take in found.held_out] == ["sway_0"]
-    assert found.training[0].true_fps == 25
-    assert found.training[0].recording.seconds == pytest.approx(8.0, abs=0.1)
-
-
 def test_a_glitch_is_masked_at_its_place_in_true_time(tmp_path: Path) -> None:
     smooth = swaying(4.0, fps=100.0)
     poses = smooth.poses.copy()
@@ -97,17 +51,12 @@ def test_a_glitch_is_masked_at_its_place_in_true_time(tmp_path: Path) -> None:
     assert len(dataset.windows([take], moving())) == len(starts)
 
 
-def test_extremities_are_the_moving_joints_at_the_ends() -> None:
-    names = {skeleton().names[j] for j in dataset.extremities(skeleton(), moving())}
-    assert names == {"head", "rHand", "lHand", "rFoot", "lFoot"}
-
-
 def assert_mirrored(recording: Recording, but: set[str], asymmetry_m: float = 1e-5) -> None:
     """Forward kinematics of the mirrored dance = the mirrored places of the other side's joints."""
     seen, _ = recording.skeleton.forward_kinematics(recording.poses, recording.roots)
     image = dataset.mirrored(recording)
     places, _ = image.skeleton.forward_kinematics(image.poses, image.roots)
-    pairs = dataset.mirror_pairs(recording.skeleton)
+    pairs = mirror_pairs(recording.skeleton)
     kept = [j for j, name in enumerate(recording.skeleton.names) if name not in but]
     assert {int(pairs[j]) for j in kept} == set(kept)
     assert any(pairs[j] != j for j in kept)
@@ -120,7 +69,7 @@ def test_the_mirror_image_is_a_mirror_image() -> None:
 
 def test_the_mirror_image_of_a_recorded_dancer_is_one(recordings_dir: Path) -> None:
     file = recordings_dir / "train" / "salsa_25.bvh"
-    take = load_take(file, dataset.find_catalogue(file.parent, [file]))
+    take = load_take(file, find_catalogue(file.parent, [file]))
     assert take.true_fps == 60 and take.header_fps == pytest.approx(120, abs=0.01)
     assert_mirrored(take.recording, but=set(), asymmetry_m=0.006)  # her head sits 5 mm off the middle
 

@@ -12,7 +12,7 @@ import torch
 from onnx import numpy_helper
 
 from appliance.pose import quaternion
-from appliance.studio.autoencoder.networks import NETWORKS
+from appliance.studio.autoencoder.architectures import NETWORKS
 from appliance.studio.evaluation.coders import OnnxCoder
 from appliance.studio.export.export import export
 from tests.studio.test_autoencoder import some_windows

@@ -36,6 +36,7 @@ def dataset(training: list[Take], held_out: list[Take]) -> Dataset:
         ((9.0, 9.0), (9.0, 9.0), "apart_0", "apart_1", ["take_0", "take_1"], "never saw"),
         ((9.0, 9.0), (20.0,), "apart_0, part 1 of 2", "apart_0, part 2 of 2", ["take_0", "take_1"], "halves"),
         ((9.0, 9.0), (5.0,), "apart_0", "take_0", ["take_1"], "with hands of take_0"),
+        ((9.0,), (5.0,), "apart_0", "take_0, part 1 of 2", ["take_0, part 2 of 2"], "which it learned"),
         ((30.0,), (), "take_0, part 1 of 3", "take_0, part 3 of 3", ["take_0, part 2 of 3"], "flatter"),
     ],
 )

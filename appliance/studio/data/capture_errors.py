@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.pose.skeleton import Skeleton
-from appliance.studio.data.jumps import bend_limits, bends, jumps, runs
+from appliance.studio.data.bones import limb_ends
+from appliance.studio.data.jumps import Runs, bend_limits, bends, jumps, runs, visible
 
 SNAP = 0.5  # of a jump's limit: no error by itself, but a way in which a joint is put into a wrong place
 FAR_DEGREES = 110.0  # head, hand or foot from its usual orientation: more than a neck, wrist or ankle turns
@@ -20,13 +20,13 @@ AWAY_DEGREES = 60.0  # any other joint that a jump brings there and a jump takes
 GAP_DEGREES = 30.0  # to where the joint is at all other times: it never passes there
 PASSING_S = 0.5  # so long it may pass nearer: on the way there and back
 TOUCHING_S = 0.1  # between a stretch and the jump that put the joint there
-LIMB_END = 0.2  # of the skeleton's reach: what hangs below a head, hand or foot is no longer than this
 BLOCK = 256
+SLACK_S = 0.02  # people copy seconds from a picture
 
 JUMP, APART, MARKED = "jump", "apart", "marked"
 REASONS = {
     JUMP: "moves as no body does",
-    APART: "was put by a snap where it is at no other time",
+    APART: "stands as it does at no other time",
     MARKED: "masked by the catalogue",
 }
 
@@ -54,11 +54,11 @@ def find_capture_errors(
     """
     if not recordings:
         return []
-    bent = [bends(recording) for recording in recordings]
+    bent = [bends(recording.poses, recording.fps) for recording in recordings]
     limits = bend_limits(bent)
     given = list(zip(recordings, bent, limits, strict=True))
-    jumped = [_of(moving, jumps(one, bend, limit)) for one, bend, limit in given]
-    snapped = [_of(moving, jumps(one, bend, SNAP * limit)) for one, bend, limit in given]
+    jumped = [visible(one, _of(moving, jumps(one, bend, limit))) for one, bend, limit in given]
+    snapped = [visible(one, _of(moving, jumps(one, bend, SNAP * limit))) for one, bend, limit in given]
     errors = [
         [_jump(recording, joint, *ends) for joint, found in one.items() for ends in found]
         for recording, one in zip(recordings, jumped, strict=True)
@@ -86,23 +86,30 @@ def find_capture_errors(
     return [sorted(one, key=lambda error: error.start_s) for one in errors]
 
 
+def without(errors: Sequence[CaptureError], kept: Sequence[tuple[float, float]]) -> list[CaptureError]:
+    """What is left of errors where spans of seconds are known to be sound."""
+    left = list(errors)
+    for start, end in kept:
+        left = [
+            replace(one, start_s=first, end_s=last)
+            for one in left
+            for first, last in _outside((one.start_s, one.end_s), start - SLACK_S, end + SLACK_S)
+        ]
+    return left
+
+
+def _outside(span: tuple[float, float], start: float, end: float) -> list[tuple[float, float]]:
+    if end < span[0] or span[1] < start:
+        return [span]
+    return [(first, last) for first, last in ((span[0], start), (end, span[1])) if first < last]
+
+
 def sound_frames(count: int, fps: float, errors: Sequence[CaptureError]) -> NDArray[np.bool_]:
     """(count,) poses at a rate that no error touches."""
     sound = np.ones(count, dtype=bool)
     for error in errors:
         sound[max(int(np.floor(error.start_s * fps)), 0) : int(np.ceil(error.end_s * fps)) + 1] = False
     return sound
-
-
-def limb_ends(skeleton: Skeleton) -> set[int]:
-    """Joints below which little hangs: heads, hands, feet, and what is smaller."""
-    reach = np.zeros(len(skeleton))
-    for joint, offset in skeleton.ends:
-        reach[joint] = max(reach[joint], float(np.linalg.norm(offset)))
-    for joint in reversed(range(1, len(skeleton))):
-        above = skeleton.parents[joint]
-        reach[above] = max(reach[above], reach[joint] + float(np.linalg.norm(skeleton.offsets[joint])))
-    return set(np.flatnonzero(reach <= LIMB_END * reach[0]).tolist()) - {0}
 
 
 @dataclass(frozen=True)
@@ -137,7 +144,7 @@ class _Joint:
         others = [one for one in stretches if one not in suspects]
         rest = np.concatenate([self.usual[None], *map(self._few, others)])
         return [
-            self._grown(one) for one in suspects if self._is_put(one) or self._gap(one, rest) > GAP_DEGREES
+            self._fitted(one) for one in suspects if self._is_put(one) or self._gap(one, rest) > GAP_DEGREES
         ]
 
     def _is_suspect(self, one: _Stretch) -> bool:
@@ -166,17 +173,22 @@ class _Joint:
         passing = min(round(10 * PASSING_S), len(rest) - 1)
         return float(np.degrees(2 * np.arccos(min(np.sort(near)[-1 - passing], 1.0))))
 
-    def _grown(self, one: _Stretch) -> _Stretch:
-        """With the frames before and after it in which the end of a limb is still too far."""
-        far, first, end = self.away[one.take] > self.far, one.first, one.end
-        while self.limb_end and first > 0 and far[first - 1]:
+    def _fitted(self, one: _Stretch) -> _Stretch:
+        """Of the end of a limb all frames in which it is too far, and none before and after them."""
+        if not self.limb_end:
+            return one
+        far = self.away[one.take] > self.far
+        first, end = one.first + int(np.argmax(far[one.first :])), one.end
+        while not far[end - 1]:
+            end -= 1
+        while first > 0 and far[first - 1]:
             first -= 1
-        while self.limb_end and end < len(far) and far[end]:
+        while end < len(far) and far[end]:
             end += 1
         return _Stretch(one.take, first, end)
 
 
-def _of(moving: Sequence[int], found: dict[int, list[tuple[int, int]]]) -> dict[int, list[tuple[int, int]]]:
+def _of(moving: Sequence[int], found: Mapping[int, Runs]) -> dict[int, Runs]:
     return {joint: found[joint] for joint in moving if joint in found}
 
 

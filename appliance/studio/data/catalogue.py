@@ -3,32 +3,50 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import yaml
+from appliance.studio.data.catalogue_file import read_catalogue_file
 
 CATALOGUES = Path(__file__).parent / "catalogues"
+Spans = tuple[tuple[float, float], ...]  # seconds from and to
 
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What is known of recordings beyond their files: true frame rates, takes, what is held out."""
+    """What is known of recordings beyond their files: true frame rates, takes, what is held out, and where
+    people know better than we what is a capture error.
+    """
 
     true_fps: dict[str, float] = field(default_factory=dict)
     take: dict[str, str] = field(default_factory=dict)
     held_out: tuple[str, ...] = ()
     acknowledgement: str = ""  # whom to thank, in every show made of them
+    keep: dict[str, Spans] = field(default_factory=dict)
+    mask: dict[str, Spans] = field(default_factory=dict)
+    metres_per_unit: dict[str, float] = field(default_factory=dict)
 
     def fps_of(self, name: str) -> float | None:
-        return next((fps for pattern, fps in self.true_fps.items() if fnmatch.fnmatch(name, pattern)), None)
+        return _first(self.true_fps, name)
+
+    def unit_of(self, name: str) -> float | None:
+        """What a recording's lengths are in, metres."""
+        return _first(self.metres_per_unit, name)
 
     def take_of(self, name: str) -> str:
         return self.take.get(name, name)
 
     def is_held_out(self, name: str) -> bool:
         return any(fnmatch.fnmatch(name, pattern) for pattern in self.held_out)
+
+    def kept(self, name: str) -> Spans:
+        """When a recording is sound whatever it looks like."""
+        return _spans(self.keep, name)
+
+    def masked(self, name: str) -> Spans:
+        """When a recording is not to be learned from."""
+        return _spans(self.mask, name)
 
 
 def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
@@ -39,7 +57,7 @@ def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
     sizes = {file.stem: file.stat().st_size for file in files}
     found = []
     for path in sorted(CATALOGUES.glob("*.yaml")):
-        known = yaml.safe_load(path.read_text(encoding="utf-8"))["bytes"]
+        known = read_catalogue_file(path).bytes
         here = {name for name, size in sizes.items() if known.get(name) == size}
         if here:
             found.append(read_catalogue(path))
@@ -48,13 +66,17 @@ def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
 
 
 def read_catalogue(path: Path) -> Catalogue:
-    """Read a catalogue: true_fps (pattern: rate), takes (take: [names]), held_out (patterns),
-    acknowledgement."""
-    text = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    takes = {name: take for take, names in (text.get("takes") or {}).items() for name in names}
-    rates = {str(pattern): float(fps) for pattern, fps in (text.get("true_fps") or {}).items()}
-    thanks = str(text.get("acknowledgement") or "").strip()
-    return Catalogue(rates, takes, tuple(text.get("held_out") or ()), thanks)
+    """Read a catalogue file. Raises ConfigError with the line of everything that is wrong in it."""
+    file = read_catalogue_file(path)
+    return Catalogue(
+        file.true_fps,
+        {name: take for take, names in file.takes.items() for name in names},
+        tuple(file.held_out),
+        file.acknowledgement.strip(),
+        {pattern: tuple(spans) for pattern, spans in file.keep.items()},
+        {pattern: tuple(spans) for pattern, spans in file.mask.items()},
+        file.metres_per_unit,
+    )
 
 
 def _joined(catalogues: Sequence[Catalogue]) -> Catalogue:
@@ -67,3 +89,13 @@ def _joined(catalogues: Sequence[Catalogue]) -> Catalogue:
     held = tuple(pattern for one in catalogues for pattern in one.held_out)
     thanks = dict.fromkeys(one.acknowledgement for one in catalogues if one.acknowledgement)
     return Catalogue(rates, takes, held, " ".join(thanks))
+
+
+def _first(by_pattern: Mapping[str, float], name: str) -> float | None:
+    return next((value for pattern, value in by_pattern.items() if fnmatch.fnmatch(name, pattern)), None)
+
+
+def _spans(by_pattern: Mapping[str, Spans], name: str) -> Spans:
+    return tuple(
+        span for pattern, spans in by_pattern.items() if fnmatch.fnmatch(name, pattern) for span in spans
+    )

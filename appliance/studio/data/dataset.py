@@ -2,34 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
-from appliance.pose.bvh import leading_tpose_frames, read_bvh
-from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.studio.data.capture_errors import CaptureError, find_capture_errors, sound_frames
-from appliance.studio.data.catalogue import CATALOGUES, Catalogue, find_catalogue, read_catalogue
+from appliance.studio.data.capture_errors import find_capture_errors
+from appliance.studio.data.catalogue import Catalogue, find_catalogue, read_catalogue
+from appliance.studio.data.mirror import asymmetry, mirrored
+from appliance.studio.data.takes import (
+    FPS,
+    MOVING_DEGREES,
+    DatasetError,
+    Take,
+    load_take,
+    masked_take,
+    moving_joints,
+    read_take,
+)
 
 __all__ = [
-    "CATALOGUES",
-    "CaptureError",
+    "FPS",
     "Catalogue",
     "Dataset",
     "DatasetError",
     "Take",
-    "extremities",
     "find_catalogue",
     "load_dataset",
     "load_take",
     "mean_pose",
-    "mirror_pairs",
     "mirrored",
     "moving_joints",
     "read_catalogue",
@@ -37,28 +42,9 @@ __all__ = [
     "windows",
 ]
 
-FPS = 50.0
 WINDOW = 8
-MOVING_DEGREES = 1.0  # joints that turn less than this in every recording are still
-TPOSE_FRAMES = 3
-Pose = NDArray[np.floating[Any]]
-
-
-class DatasetError(ValueError):
-    """Recordings that cannot be trained on; says which and why."""
-
-
-@dataclass(frozen=True)
-class Take:
-    """One recording at 50 Hz with what is known of it."""
-
-    name: str
-    take: str
-    recording: Recording
-    sound: NDArray[np.bool_]  # (N,) frames that are no glitch
-    header_fps: float
-    true_fps: float
-    errors: tuple[CaptureError, ...] = ()  # why the others are
+# Of a take alone: how much of its end is held out, how far from the rest, and of how long a one.
+END_SHARE, END_LEAST_S, END_GAP_S, ALONE_LEAST_S = 0.15, 3.0, 1.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -71,8 +57,22 @@ class Dataset:
     held_out: tuple[Take, ...]
 
     @property
+    def takes(self) -> list[Take]:
+        return [*self.training, *self.held_out]
+
+    @property
     def moving_names(self) -> tuple[str, ...]:
         return tuple(self.skeleton.names[j] for j in self.moving)
+
+    @property
+    def asymmetry(self) -> str:
+        """Why a mirror would show another body than this dancer's; '' where it shows this one."""
+        return asymmetry(self.skeleton, self.moving, self.still_pose())
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether the mirror images of the dances can be learned from too."""
+        return not self.asymmetry
 
     def still_pose(self) -> NDArray[np.float64]:
         """(J, 4): the mean pose of the training takes, in which the still joints stand for good."""
@@ -89,7 +89,7 @@ def load_dataset(
     if not files:
         raise DatasetError(f"{folder} has no .bvh files. Give the folder that holds your recordings.")
     catalogue = catalogue or find_catalogue(folder, files)
-    read = [_read(file, catalogue) for file in progress(files)]
+    read = [read_take(file, catalogue) for file in progress(files)]
     takes = [take for take, _ in read]
     skeleton = takes[0].recording.skeleton
     for file, take in zip(files, takes, strict=True):
@@ -98,43 +98,44 @@ def load_dataset(
                 f"{file.name} has another skeleton than {files[0].name}. Train one dancer on one skeleton: "
                 "move the file to a folder of its own."
             )
-    held = {take.take for take in takes if catalogue.is_held_out(take.name)}
-    if not held and len({take.take for take in takes}) > 1:
-        held = {sorted({take.take for take in takes})[-1]}
-    if all(take.take in held for take in takes):
-        raise DatasetError("Every take is held out: nothing is left to train on.")
     moving = moving_joints(takes)
+    if len(moving) < 2:
+        raise DatasetError(
+            f"Nothing moves in the recordings of {folder}: no joint turns by more than {MOVING_DEGREES:g} "
+            "degree. Export them again with their rotations."
+        )
     errors = find_capture_errors([recorded for _, recorded in read], moving)
-    takes = [_masked(take, found) for take, found in zip(takes, errors, strict=True)]
+    takes = [masked_take(take, found, catalogue) for take, found in zip(takes, errors, strict=True)]
+    training, held_out = _kept_apart(takes, catalogue)
+    if not any(take.sound.any() for take in training):
+        raise DatasetError(
+            "Every frame is masked as a capture error: nothing is left to train on. "
+            "Say what is none with --keep."
+        )
+    return Dataset(skeleton, moving, training, held_out)
+
+
+def _kept_apart(takes: Sequence[Take], catalogue: Catalogue) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
+    """What to learn from and what to measure on: whole takes, of one alone its end."""
+    held = {take.take for take in takes if catalogue.is_held_out(take.name)}
+    names = sorted({take.take for take in takes})
+    if not held and len(names) == 1:
+        return _ends_kept_apart(takes)
+    held = held or {names[-1]}
+    if held.issuperset(names):
+        raise DatasetError("Every take is held out: nothing is left to train on.")
     training = tuple(take for take in takes if take.take not in held)
-    return Dataset(skeleton, moving, training, tuple(take for take in takes if take.take in held))
+    return training, tuple(take for take in takes if take.take in held)
 
 
-def load_take(file: Path, catalogue: Catalogue, usual: Mapping[str, Pose] | None = None) -> Take:
-    """One file at its true rate, T-pose dropped, capture errors marked, resampled to 50 Hz.
-
-    usual: by joint name the orientations (4,) in which the dancer usually is, where one file cannot tell.
-    """
-    take, recorded = _read(file, catalogue)
-    skeleton = recorded.skeleton
-    known = {skeleton.index(name): pose for name, pose in (usual or {}).items() if name in skeleton.names}
-    return _masked(take, find_capture_errors([recorded], moving_joints([take]), known)[0])
-
-
-def _read(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
-    """A take in which nothing is masked, and its recording at the rate at which it was captured."""
-    header = read_bvh(file)
-    fps = catalogue.fps_of(file.stem) or header.fps
-    recording = replace(header, fps=fps)
-    if leading_tpose_frames(recording):
-        recording = recording.without_first(TPOSE_FRAMES)
-    resampled = recording.resampled(FPS)
-    sound = np.ones(len(resampled), dtype=bool)
-    return Take(file.stem, catalogue.take_of(file.stem), resampled, sound, header.fps, fps), recording
-
-
-def _masked(take: Take, errors: Sequence[CaptureError]) -> Take:
-    return replace(take, sound=sound_frames(len(take.recording), FPS, errors), errors=tuple(errors))
+def _ends_kept_apart(takes: Sequence[Take]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
+    """Of one take, which may be two dancers at once, the same last part of each; nothing of a short one."""
+    count = min(len(take.recording) for take in takes)
+    end = count - round(max(END_SHARE * count, END_LEAST_S * FPS))
+    if count < ALONE_LEAST_S * FPS:
+        return tuple(takes), ()
+    training = tuple(take.part(0, end - round(END_GAP_S * FPS)) for take in takes)
+    return training, tuple(take.part(end, len(take.recording)) for take in takes)
 
 
 def mean_pose(takes: Sequence[Take]) -> NDArray[np.float64]:
@@ -144,45 +145,6 @@ def mean_pose(takes: Sequence[Take]) -> NDArray[np.float64]:
     poses = np.concatenate([quaternion.multiply(quaternion.inverse(facing), poses[:, :1]), poses[:, 1:]], 1)
     mean = quaternion.aligned(poses, poses[len(poses) // 2]).mean(axis=0)
     return quaternion.normalize(mean).astype(np.float64)
-
-
-def extremities(skeleton: Skeleton, moving: Sequence[int]) -> list[int]:
-    """Moving joints with no moving joint below them: head, hands, feet."""
-    inner: set[int] = set()
-    for joint in moving:
-        while (joint := skeleton.parents[joint]) >= 0:
-            inner.add(joint)
-    return [joint for joint in moving if joint not in inner]
-
-
-def moving_joints(takes: Sequence[Take]) -> tuple[int, ...]:
-    """Joints that turn more than a degree in any recording."""
-    count = len(takes[0].recording.skeleton)
-    widest = np.zeros(count)
-    for take in takes:
-        poses = take.recording.poses
-        widest = np.maximum(widest, np.degrees(quaternion.angle_between(poses, poses[:1])).max(axis=0))
-    return tuple(int(j) for j in np.flatnonzero(widest > MOVING_DEGREES))
-
-
-def mirror_pairs(skeleton: Skeleton) -> NDArray[np.intp]:
-    """(J,): for each joint its counterpart on the other side (itself for the spine)."""
-    others = []
-    for name in skeleton.names:
-        swaps = [("Left", "Right"), ("Right", "Left"), ("left", "right"), ("right", "left")]
-        swaps += [("l", "r"), ("r", "l"), ("L_", "R_"), ("R_", "L_")]
-        names = [to + name[len(frm) :] for frm, to in swaps if name.startswith(frm)]
-        names += [name[: -len(frm)] + to for frm, to in [("_l", "_r"), ("_r", "_l")] if name.endswith(frm)]
-        found = [other for other in names if other in skeleton.names]
-        others.append(skeleton.index(found[0]) if found else skeleton.index(name))
-    return np.array(others)
-
-
-def mirrored(recording: Recording) -> Recording:
-    """The dance as a mirror shows it: left and right joints swapped, reflected through the x = 0 plane."""
-    pairs = mirror_pairs(recording.skeleton)
-    poses = recording.poses[:, pairs] * np.array([1.0, 1.0, -1.0, -1.0])
-    return Recording(recording.skeleton, poses, recording.roots * np.array([-1.0, 1.0, 1.0]), recording.fps)
 
 
 def window_starts(take: Take, hop: int = 1) -> NDArray[np.intp]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,25 +10,30 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
 
 SPAN_S = 1 / 30  # motions are compared over this time at any rate: an error of one frame shows as clearly
 # Two motions that follow each other and differ by more than this are a jump: what the dancer's own sharpest
 # 1 % allows, between two bounds. Measured in degrees: clean salsa and Indian dance reach 44 (a hand), martial
 # arts 65 (a shin in a kick); swapped markers begin at 34 (a hip), 43 (a neck), 57 (a foot).
 LEAST_DEGREES, MOST_DEGREES, CALM_DEGREES, TIMES_SHARP = 30.0, 80.0, 20.0, 3.2
-FASTEST, FASTEST_S = 2400.0, 1 / 60  # degrees a second over this time: a fighter's wrist reaches 2000
+FASTEST, FASTEST_S = 2200.0, 1 / 60  # degrees a second over this time: a fighter's wrist reaches 2020
+SEEN_DEGREES, SEEN_OF_HEIGHT = 12.0, 0.05  # bends; a twist that the arm hands to the wrist shows 8 and 0.04
 FAST = 0.3  # of a jump's fastest step: the steps beside it that belong to it
 
 
-def bends(recording: Recording) -> NDArray[np.float32]:
-    """(N, J): by how many degrees the motion in the SPAN_S after each frame differs from that before it."""
-    span, q = _frames(SPAN_S, recording.fps), recording.poses
-    bent = np.zeros(q.shape[:2], dtype=np.float32)
-    if len(q) > 2 * span:
-        axis, angle = quaternion.to_axis_angle(quaternion.multiply(q[span:], quaternion.inverse(q[:-span])))
-        way = np.degrees(axis * angle[..., None])
-        bent[span:-span] = np.linalg.norm(way[span:] - way[:-span], axis=-1)
-    return bent
+Runs = list[tuple[int, int]]
+
+
+def bends(poses: Array, fps: float) -> NDArray[np.float32]:
+    """(N, J) of orientations (N, J, 4): by how many degrees the motion in the SPAN_S after each frame differs
+    from that before it."""
+    span = _frames(SPAN_S, fps)
+    if len(poses) <= span:
+        return np.zeros(poses.shape[:2], dtype=np.float32)
+    turns = quaternion.multiply(poses[span:], quaternion.inverse(poses[:-span]))
+    axis, angle = quaternion.to_axis_angle(turns)
+    return _bent(np.degrees(axis * angle[..., None]), len(poses), span)
 
 
 def bend_limits(bent: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float64]]:
@@ -42,10 +47,8 @@ def bend_limits(bent: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float64]
     return [np.clip(CALM_DEGREES + TIMES_SHARP * one, LEAST_DEGREES, MOST_DEGREES) for one in own]
 
 
-def jumps(
-    recording: Recording, bent: NDArray[np.float32], limits: NDArray[np.float64]
-) -> dict[int, list[tuple[int, int]]]:
-    """By joint the first and last frame of each jump, both of them sound; recording at its recorded rate."""
+def jumps(recording: Recording, bent: NDArray[np.float32], limits: NDArray[np.float64]) -> dict[int, Runs]:
+    """By joint the first and last frame of each jump; recording at its recorded rate."""
     span = _frames(SPAN_S, recording.fps)
     too_fast, sharp = _too_fast(recording), bent > limits
     found = {}
@@ -53,16 +56,58 @@ def jumps(
         q = recording.poses[:, joint]
         steps = np.degrees(quaternion.angle_between(q[1:], q[:-1]))
         moving = too_fast[:, joint]
+        for first, end in runs(moving):
+            _mark(moving, steps, first, end)
         for frame in np.flatnonzero(sharp[:, joint]):
             _mark(moving, steps, max(int(frame) - span, 0), min(int(frame) + span, len(steps)))
         found[int(joint)] = runs(moving)
     return found
 
 
-def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def visible(recording: Recording, found: Mapping[int, Runs]) -> dict[int, Runs]:
+    """Jumps that the figure shows. A twist that one joint takes over from the next (solvers share it anew
+    between an arm and its hand) moves nothing: it is a matter of reckoning, not of capture.
+    """
+    if not found:
+        return {}
+    skeleton, fps, span = recording.skeleton, recording.fps, _frames(SPAN_S, recording.fps)
+    poses = np.array(recording.poses)
+    poses[:, 0] = quaternion.IDENTITY
+    places, world = skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
+    turning = bends(world, fps)
+    least_m = SEEN_OF_HEIGHT * float(np.ptp(places[0], axis=0).max())
+    shown: dict[int, Runs] = {}
+    for joint, jumped in found.items():
+        below = _below(skeleton, joint)
+        ends = [one for one in below if one not in skeleton.parents]
+        reach = places[:, below] - places[:, [joint]]
+        moved = _bent(reach[span:] - reach[:-span], len(reach), span).max(axis=1) > least_m
+        seen = moved | (turning[:, ends].max(axis=1) > SEEN_DEGREES) | (joint == 0)
+        shown[joint] = [run for run in jumped if seen[max(run[0] - span, 0) : run[1] + span + 1].any()]
+    return {joint: left for joint, left in shown.items() if left}
+
+
+def runs(flags: NDArray[np.bool_]) -> Runs:
     """First and last + 1 of each run of true ones."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _bent(ways: Array, count: int, span: int) -> NDArray[np.float32]:
+    """(count, ...): how much the way (count - span, ..., 3) from each frame on differs from the way to it."""
+    bent = np.zeros((count, *ways.shape[1:-1]), dtype=np.float32)
+    if len(ways) > span:
+        bent[span:-span] = np.linalg.norm(ways[span:] - ways[:-span], axis=-1)
+    return bent
+
+
+def _below(skeleton: Skeleton, joint: int) -> list[int]:
+    """A joint and all that hangs from it."""
+    below = [joint]
+    for other, parent in enumerate(skeleton.parents):
+        if parent in below:
+            below.append(other)
+    return below
 
 
 def _mark(moving: NDArray[np.bool_], steps: Array, first: int, last: int) -> None:

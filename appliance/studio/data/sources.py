@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import fnmatch
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from appliance.studio.data.dataset import Catalogue, Dataset, find_catalogue, load_dataset, read_catalogue
+from appliance.studio.data.catalogue import Catalogue, find_catalogue, read_catalogue
+from appliance.studio.data.catalogue_file import ALWAYS
+from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.studio_error import StudioError
 
 
@@ -28,7 +31,11 @@ class Sources:
 
 
 def given(
-    recordings: Path, catalogue: Path | None, held_out: Sequence[str], true_fps: Sequence[str]
+    recordings: Path,
+    catalogue: Path | None = None,
+    held_out: Sequence[str] = (),
+    true_fps: Sequence[str] = (),
+    keep: Sequence[str] = (),
 ) -> Sources:
     """Sources from options; what is said by hand goes before what a catalogue knows."""
     files = sorted(recordings.glob("*.bvh"))
@@ -36,7 +43,14 @@ def given(
         raise StudioError(f"{recordings} has no .bvh files. Give the folder that holds your recordings.")
     known = read_catalogue(catalogue) if catalogue else find_catalogue(recordings, files)
     rates = dict(_rate(words) for words in true_fps)
-    known = replace(known, true_fps={**rates, **known.true_fps})
+    kept = {**known.keep, **dict.fromkeys(keep, (ALWAYS,))}
+    known = replace(known, true_fps={**rates, **known.true_fps}, keep=kept)
+    for pattern in (*known.keep, *known.mask):
+        if not any(fnmatch.fnmatch(file.stem, pattern) for file in files):
+            raise StudioError(
+                f"'{pattern}' is to be kept or masked, but no recording in {recordings} is called so. "
+                "Give the name of a file without .bvh, or a pattern such as 'solo_*'."
+            )
     return Sources(recordings, replace(known, held_out=tuple(held_out)) if held_out else known)
 
 
@@ -49,7 +63,7 @@ def remembered(state: dict[str, Any], recordings: Path | None, checkpoint: Path)
     if not folder.is_dir():
         raise StudioError(f"The recordings are no longer in {folder}: say where with --recordings.")
     if "catalogue" not in origin:
-        return given(folder, None, [], [])
+        return given(folder)
     known = origin["catalogue"]
     return Sources(folder, Catalogue(**{**known, "held_out": tuple(known["held_out"])}))
 

@@ -6,33 +6,82 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from appliance.studio.data.dataset import FPS, Dataset, Take, window_starts
+from appliance.studio.data.dataset import FPS, Dataset, DatasetError, Take, window_starts
+
+MASKED_PICTURE = "pictures/masked.png"
+FEW_S = 120.0  # of sound dance to learn from
 
 
 def findings(dataset: Dataset) -> list[str]:
-    """Files, rates, what is held out, what is masked, which joints stand still."""
-    takes = [*dataset.training, *dataset.held_out]
+    """Files, rates, what is held out, what is masked, which joints stand still, whether it is much."""
+    takes = dataset.takes
     names, moving = dataset.skeleton.names, dataset.moving_names
     still = [name for name in names if name not in moving]
-    training = sum(len(window_starts(take)) for take in dataset.training)
+    files, performances = len({take.file for take in takes}), len({take.take for take in takes})
+    why_not = dataset.asymmetry
+    images = " (their mirror images besides)" if not why_not else ""
     apart = sum(len(window_starts(take)) for take in dataset.held_out)
-    lines = [
-        f"{_count(len(takes), 'recording')} of {len({take.take for take in takes})} takes, "
+    return [
+        f"{_count(files, 'recording')} of {_count(performances, 'take')}, "
         f"{_minutes(takes):.1f} minutes, resampled to {FPS:g} poses a second.",
         f"{len(moving)} of {len(names)} joints move: {', '.join(moving)}."
         + (f" Still everywhere, kept as they stand: {', '.join(still)}." if still else ""),
         *_rates(takes),
-        _masked(takes),
+        *_notes(takes),
+        *_masked(takes),
+        _kept_apart(dataset),
+        f"{learned_windows(dataset):,} windows of 8 poses to learn from{images}, {apart:,} kept apart.",
+        *([f"Not learned from the mirror's side too: {why_not}."] if why_not else []),
+        *_few_data(dataset),
     ]
-    if dataset.held_out:
-        held = ", ".join(sorted(take.name for take in dataset.held_out))
-        lines.append(f"Kept apart to measure on, by take: {held} ({_minutes(dataset.held_out):.1f} minutes).")
-    else:
-        lines.append("Nothing is kept apart: one take alone is here, so what is learned cannot be measured.")
-    lines.append(
-        f"{training:,} windows of 8 poses to learn from (their mirror images besides), {apart:,} kept apart."
+
+
+def learned_windows(dataset: Dataset) -> int:
+    """How many sound windows there are to learn from, mirror images not counted."""
+    return sum(len(window_starts(take)) for take in dataset.training)
+
+
+def require_windows(dataset: Dataset, least: int) -> None:
+    """Raises DatasetError where fewer windows are left to learn from than one step of training looks at."""
+    found = learned_windows(dataset)
+    if found >= least:
+        return
+    masked = sum(int(np.count_nonzero(~take.sound)) for take in dataset.training) / FPS
+    why = f" {masked:.1f} s are masked as capture errors ({MASKED_PICTURE})." if masked else ""
+    raise DatasetError(
+        f"Only {_count(found, 'window')} of 8 sound poses (about {found / FPS:.1f} s) to learn from: too few "
+        f"to learn anything. At least {least} are needed (about {least / FPS:.0f} s in a row), some minutes "
+        f"are better.{why} Bring more or longer recordings."
     )
-    return lines
+
+
+def _kept_apart(dataset: Dataset) -> str:
+    if not dataset.held_out:
+        return "Nothing is kept apart: one short take alone is here, so what is learned cannot be measured."
+    held = ", ".join(sorted(take.name for take in dataset.held_out))
+    alone = {take.take for take in dataset.training} & {take.take for take in dataset.held_out}
+    how = "the end of the only take" if alone else "by take"
+    return f"Kept apart to measure on, {how}: {held} ({_minutes(dataset.held_out):.1f} minutes)."
+
+
+def _few_data(dataset: Dataset) -> list[str]:
+    seconds = sum(int(np.count_nonzero(take.sound)) for take in dataset.training) / FPS
+    if seconds >= FEW_S:
+        return []
+    return [
+        f"{seconds:.0f} s are little to learn from: expect a dancer that knows these few moves, and that "
+        "answers a hand far from all of them with the nearest one. The show that comes along learned from 11 "
+        "minutes."
+    ]
+
+
+def _notes(takes: Sequence[Take]) -> list[str]:
+    """What had to be done to files, and to how many."""
+    files: dict[str, list[str]] = {}
+    for take in takes:
+        for note in take.notes:
+            files.setdefault(note, []).append(take.file)
+    return [f"{_few(sorted(set(names)))}: {note}." for note, names in files.items()]
 
 
 def _rates(takes: Sequence[Take]) -> list[str]:
@@ -48,16 +97,29 @@ def _rates(takes: Sequence[Take]) -> list[str]:
     ]
 
 
-def _masked(takes: Sequence[Take]) -> str:
+def _masked(takes: Sequence[Take]) -> list[str]:
+    """How much, where and at which joints; how people see it and say that it is none."""
     counts = {take.name: int(np.count_nonzero(~take.sound)) for take in takes}
     total, frames = sum(counts.values()), sum(len(take.sound) for take in takes)
     if not total:
-        return "No frame had to be masked."
-    most = sorted((name for name in counts if counts[name]), key=lambda name: -counts[name])
-    named = _few([f"{name} ({counts[name]})" for name in most])
-    return (
-        f"Masked as capture errors: {total:,} of {frames:,} frames ({100 * total / frames:.1f} %): {named}."
-    )
+        return ["No frame had to be masked."]
+    worst = sorted((take for take in takes if counts[take.name]), key=lambda take: -counts[take.name])
+    named = _few([f"{take.name} ({counts[take.name]:,}: {_joints(take)})" for take in worst])
+    return [
+        f"Masked as capture errors: {total:,} of {frames:,} frames ({100 * total / frames:.1f} %) in "
+        f"{_count(len(worst), 'recording')}: {named}.",
+        f"{MASKED_PICTURE} shows the worst. What is no error: --keep '{worst[0].file}', or keep: with its "
+        "seconds in catalogue.yaml.",
+    ]
+
+
+def _joints(take: Take) -> str:
+    """The joints at fault, those first that are so for longest."""
+    seconds: dict[str, float] = {}
+    for error in take.errors:
+        name = error.joint or "by the catalogue"
+        seconds[name] = seconds.get(name, 0.0) + error.end_s - error.start_s
+    return _few(sorted(seconds, key=lambda name: -seconds[name]), 2)
 
 
 def _few(names: Sequence[str], most: int = 4) -> str:

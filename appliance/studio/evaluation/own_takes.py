@@ -29,11 +29,15 @@ def own_takes(dataset: Dataset) -> OwnTakes:
         return OwnTakes(pair_up(apart, apart), training, "on takes that it never saw")
     if apart:
         longest = max(apart, key=lambda take: len(take.recording))
-        if longest.recording.seconds >= HALVES_S or len({take.take for take in training}) == 1:
+        if longest.recording.seconds >= HALVES_S:
             phrase, hand = _part(longest, 0, 2), _part(longest, 1, 2)
             return OwnTakes(
                 pair_up([phrase], [hand]), training, f"on two halves of {longest.name}, never seen"
             )
+        if len({take.take for take in training}) == 1:
+            hand, rest = (_part(training[0], number, 2) for number in range(2))
+            words = f"on {longest.name}, never seen, with the hand of {hand.name}, which it learned"
+            return OwnTakes(pair_up([longest], [hand]), [rest], words)
         return OwnTakes(
             pair_up([longest], training[:1]),
             apart_from(dataset, training[:1]),

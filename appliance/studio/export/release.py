@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from appliance.studio.studio_error import StudioError
 EQUALITY = 1e-4  # in any component of any quaternion after 10 iterations
 EQUALITY_WINDOWS = 16
 PHRASE_S = 60.0
+SHORT_PHRASE_S = 20.0  # rather something longer that was learned
 HANGING_DEGREES = 80.0  # below the level: a hanging arm does not touch the hip
 FIRST_HANDS = (
     "lshldr",
@@ -177,11 +178,18 @@ def _phrase(
         return found
     if (request.out / "phrase.bvh").exists():
         return None
-    takes: tuple[Take, ...] = dataset.held_out or dataset.training
-    longest = max(takes, key=lambda take: len(longest_sound(take, PHRASE_S)))
+    longest = _longest(dataset.held_out or dataset.training)
     phrase = longest_sound(longest, PHRASE_S)
+    if phrase.seconds < SHORT_PHRASE_S:
+        longest = _longest(dataset.takes)
+        phrase = longest_sound(longest, PHRASE_S)
     say(
         f"phrase.bvh is {phrase.seconds:.0f} s of the recording {longest.name}: the bundle contains a "
         "recording. Give your own with --phrase, or replace the file and run bunraku export again."
     )
     return phrase
+
+
+def _longest(takes: Sequence[Take]) -> Take:
+    """The take with the longest stretch without a capture error."""
+    return max(takes, key=lambda take: len(longest_sound(take, PHRASE_S)))

@@ -15,7 +15,8 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.data.dataset import FPS, WINDOW, Take, mirrored
+from appliance.studio.data.dataset import FPS, WINDOW, Take
+from appliance.studio.data.mirror import asymmetry, mirrored
 
 HOP = 4  # frames from one step to the next: 12.5 steps a second, half a window, so that two windows overlap
 MIDDLE = WINDOW // 2  # the frame of a window whose heading and place count as the window's own
@@ -52,14 +53,16 @@ def steps_of_takes(
     autoencoder: Autoencoder, takes: Sequence[Take], moving: Sequence[int], shortest: int
 ) -> list[Steps]:
     """Every sound stretch of the takes and its mirror image, at each of the 4 frames that it can begin with.
+    A body that is not its own mirror image is not mirrored.
 
     shortest: stretches of fewer steps are left out.
     """
     found = []
+    two_sided = bool(takes) and not asymmetry(takes[0].recording.skeleton, moving)
     for take in takes:
         for start, end in _stretches(take.sound):
             excerpt = take.recording.excerpt(start / FPS, end / FPS)
-            for recording in (excerpt, mirrored(excerpt)):
+            for recording in (excerpt, mirrored(excerpt)) if two_sided else (excerpt,):
                 for first in range(HOP):
                     steps = steps_of(autoencoder, recording.without_first(first), moving)
                     if len(steps) >= shortest:
