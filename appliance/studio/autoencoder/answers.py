@@ -6,7 +6,8 @@ pass shows the network what it made of the dance so far and asks for a step towa
 repertoire. So the network learns on its own windows, the ones that it meets when it iterates, and learns
 iterative autoencoding with a purpose: from the phrase to the nearest thing that this dancer does with that
 arm, further with each pass. A dance without hands should stay as it is; some are disturbed, and the
-network should lead them back.
+network should lead them back. Dances come in pairs, one a few poses after the other, so that the network learns
+how an answer changes from tick to tick.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from appliance.studio.autoencoder.repertoire import Nearness, Repertoire
 _REFILL_PASSES = 16  # dances that have ended begin anew together: the search is a matrix product
 _REFILL_ROWS = 512
 _HANDS = (0.7, 0.2, 0.1)  # shares of dances with one, two, three hands
+_LATER_POSES = 8  # at most, of the second dance of a pair
 _DISTURBED_JOINTS = 0.15
 _WILD_SPEED = 0.06  # half angles (radians) a pose of hands that no dancer had: up to half a turn a second
 
@@ -64,16 +66,17 @@ class Answers:
         self._drawn = 0
 
     def draw(self, batch: int) -> Lesson:
-        """A random part of the pool, one pass further."""
+        """A random part of the pool, one pass further: first halves of pairs, then their second halves."""
         if self._drawn % _REFILL_PASSES == 0:
             for rows in torch.split((self._age >= self._passes).nonzero()[:, 0], _REFILL_ROWS):
                 self._begin(rows)
         self._drawn += 1
         settings = self._settings
-        rows = torch.randperm(len(self._age), device=self._age.device)[:batch]
+        first = 2 * torch.randperm(len(self._age) // 2, device=self._age.device)[: batch // 2]
+        rows = torch.cat([first, first + 1])
         windows, answer = self._windows[rows], self._answer[rows]
         is_held = (self._held[rows] > 0).any(dim=1)
-        holds = torch.rand(len(rows), device=rows.device) >= settings.let_go
+        holds = (torch.rand(len(first), device=rows.device) >= settings.let_go).repeat(2)
         held = self._held[rows] * holds[:, None]
         step = torch.where(holds, settings.step, settings.let_go_step)
         step = torch.where(is_held, step, torch.ones_like(step))[:, None, None, None]
@@ -96,37 +99,43 @@ class Answers:
             getattr(self, f"_{name}").copy_(state[name])
 
     def _begin(self, rows: Tensor) -> None:
-        """New dances in the rows (R,) of the pool."""
-        settings, count, device = self._settings, len(rows), rows.device
-        windows = self._recorded[torch.randint(len(self._recorded), (count,), device=device)]
+        """New dances in the rows (R,) of the pool, pair by pair."""
+        settings, pairs, device = self._settings, len(rows) // 2, rows.device
+        later = torch.randint(1, _LATER_POSES + 1, (pairs,), device=device)
+        windows = self._moments(pairs, later)
         self._start[rows] = self._windows[rows] = self._answer[rows] = windows
         self._held[rows], self._age[rows] = 0.0, 0.0
         # Most dances are as long as those on stage; a few long ones show the network where it drifts.
-        longest = torch.where(torch.rand(count, device=device) < 0.2, 4.0, 1.2) * settings.passes
-        self._passes[rows] = 1 + longest * torch.rand(count, device=device)
-        free = torch.rand(count, device=device) < settings.free
-        disturbed = free & (torch.rand(count, device=device) < settings.disturbed)
+        longest = torch.where(torch.rand(pairs, device=device) < 0.2, 4.0, 1.2) * settings.passes
+        self._passes[rows] = _twice(1 + longest * torch.rand(pairs, device=device))
+        free = torch.rand(pairs, device=device) < settings.free
+        disturbed = _twice(free & (torch.rand(pairs, device=device) < settings.disturbed))
         self._windows[rows[disturbed]] = self._disturbed(windows[disturbed])
-        with_hands = rows[~free]
-        if len(with_hands):
-            self._take_hands(with_hands, windows[~free])
+        if not free.all():
+            self._take_hands(rows[~_twice(free)], windows[~_twice(free)], later[~free])
+
+    def _moments(self, pairs: int, later: Tensor) -> Tensor:
+        """(2 * pairs, T, M, 4): recorded windows, each followed by the one that is `later` (pairs,) poses on."""
+        first = torch.randint(len(self._recorded), (pairs,), device=later.device)
+        second = (first + later).clamp(max=len(self._recorded) - 1)
+        return self._recorded[torch.stack([first, second], dim=1).flatten()]
 
     def _disturbed(self, windows: Tensor) -> Tensor:
         """Windows some of whose joints are on the way to those of another window."""
-        count, joints, device = len(windows), windows.shape[2], windows.device
-        others = self._recorded[torch.randint(len(self._recorded), (count,), device=device)]
-        share = torch.rand(count, 1, 1, 1, device=device)
-        taken = torch.rand(count, 1, joints, 1, device=device) < _DISTURBED_JOINTS
+        pairs, joints, device = len(windows) // 2, windows.shape[2], windows.device
+        others = self._moments(pairs, torch.ones(pairs, dtype=torch.long, device=device))
+        share = _twice(torch.rand(pairs, 1, 1, 1, device=device))
+        taken = _twice(torch.rand(pairs, 1, joints, 1, device=device)) < _DISTURBED_JOINTS
         return slerp_towards(windows, others, (share * taken).expand_as(windows[..., :1]))
 
-    def _take_hands(self, rows: Tensor, windows: Tensor) -> None:
+    def _take_hands(self, rows: Tensor, windows: Tensor, later: Tensor) -> None:
         """Hands for dances that begin on windows (R, T, M, 4), and the answers to them."""
-        settings, count, device = self._settings, len(rows), rows.device
-        held = self._weights(count, windows.shape[2], device)
-        hands = self._recorded[torch.randint(len(self._recorded), (count,), device=device)].clone()
-        wild = torch.rand(count, device=device) < settings.wild
-        hands[wild] = _turning_anywhere(hands[wild])
-        frozen = torch.rand(count, device=device) < settings.frozen
+        settings, pairs, device = self._settings, len(rows) // 2, rows.device
+        held = _twice(self._weights(pairs, windows.shape[2], device))
+        hands = self._moments(pairs, later)
+        wild = torch.rand(pairs, device=device) < settings.wild
+        hands[_twice(wild)] = _turning_anywhere(hands[_twice(wild)], later[wild])
+        frozen = _twice(torch.rand(pairs, device=device) < settings.frozen)
         hands[frozen] = hands[frozen][:, :1].expand_as(hands[frozen])
         found = self._repertoire.answers(windows, hands, held)
         reach = torch.where(held > 0, held, held.amax(dim=1, keepdim=True))
@@ -148,11 +157,18 @@ class Answers:
 _TENSORS = ("start", "windows", "answer", "hands", "held", "age", "passes")
 
 
-def _turning_anywhere(windows: Tensor) -> Tensor:
-    """Orientations (R, T, M, 4) anywhere, turning about any axis."""
+def _twice(values: Tensor) -> Tensor:
+    """Values (pairs, ...) for both dances of each pair."""
+    return values.repeat_interleave(2, dim=0)
+
+
+def _turning_anywhere(windows: Tensor, later: Tensor) -> Tensor:
+    """Orientations (R, T, M, 4) anywhere, turning about any axis; of a pair the second is `later` poses on."""
     count, poses, joints, _ = windows.shape
-    start = rotation.normalize(torch.randn(count, 1, joints, 4, device=windows.device))
-    time = torch.arange(poses, device=windows.device)[None, :, None, None] - poses / 2
-    half = _WILD_SPEED * torch.randn(count, 1, joints, 3, device=windows.device) * time
+    pairs, device = count // 2, windows.device
+    start = _twice(rotation.normalize(torch.randn(pairs, 1, joints, 4, device=device)))
+    begins = torch.stack([torch.zeros_like(later), later], dim=1).flatten()
+    time = (begins[:, None] + torch.arange(poses, device=device) - poses / 2)[:, :, None, None]
+    half = _WILD_SPEED * _twice(torch.randn(pairs, 1, joints, 3, device=device)) * time
     turn = torch.cat([torch.ones_like(half[..., :1]), half], dim=-1)
     return rotation.normalize(rotation.multiply(turn, start.expand(-1, poses, -1, -1)))

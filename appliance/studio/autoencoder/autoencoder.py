@@ -53,9 +53,13 @@ class Autoencoder(nn.Module):
             return self.network.encode_held(windows, start, goal, held)
         return self.encode(slerp_towards(windows, goal, held[:, None, :, None]))
 
-    def decode_raw(self, latents: Tensor) -> Tensor:
-        """Latents -> heading-free windows before normalisation."""
-        return self.network.decode(latents).view(-1, self.shape.window, self.shape.joints, 4)
+    def decode_raw(self, latents: Tensor, start: Tensor | None = None, held: Tensor | None = None) -> Tensor:
+        """Latents -> heading-free windows before normalisation; start and held: as encode_held had them."""
+        if start is not None and held is not None and isinstance(self.network, Conditional):
+            raw = self.network.decode_held(latents, start, held)
+        else:
+            raw = self.network.decode(latents)
+        return raw.view(-1, self.shape.window, self.shape.joints, 4)
 
     def decode(self, latents: Tensor) -> Tensor:
         return rotation.normalize(self.decode_raw(latents))
@@ -84,9 +88,12 @@ class Autoencoder(nn.Module):
             held = (mask.float() * weights).expand(len(x), -1)
             goal = self.without_heading(targets.expand_as(x), facing)
         for k in range(coding_iterations):
-            interactive = k < interaction_iterations
-            latents = self.encode_held(x, start, goal, held) if interactive else self.encode(x)
-            x = self.decode(latents)
+            if k < interaction_iterations:
+                latents = self.encode_held(x, start, goal, held)
+                x = rotation.normalize(self.decode_raw(latents, start, held))
+            else:
+                latents = self.encode(x)
+                x = self.decode(latents)
         if interaction_iterations >= coding_iterations:
             x = slerp_towards(x, goal, held[:, None, :, None])
         return self.with_heading(x, facing), latents

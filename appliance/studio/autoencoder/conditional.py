@@ -6,7 +6,8 @@ one for each pose, without the double cover of quaternions, so that a hand that 
 revolutions never makes its input jump. Beside them it sees the window that the iteration began with: the
 phrase is where the answer starts from, and however often it is coded, its own gestures are not forgotten.
 What it is told costs the iteration nothing: it is computed once for a window and enters as the bias of the
-first layer. A pass in which nothing is held is told nothing.
+first layer, and, for the phrase's gestures that a latent of 64 numbers would smooth away, of the last. A pass
+in which nothing is held is told nothing: it is a plain autoencoder.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from appliance.studio.autoencoder.networks import Mlp, MlpEncoder, Shape
+from appliance.studio.autoencoder.networks import Mlp, MlpDecoder, MlpEncoder, Shape
 
 # A rotation matrix, row by row, from the products of a quaternion's parts (w, x, y, z) x (w, x, y, z).
 _PRODUCTS = (
@@ -59,17 +60,39 @@ class ConditionalEncoder(MlpEncoder):
         return latent
 
 
-class Conditional(Mlp):
-    """The mlp whose encoder knows the held joints."""
-
-    encoder: ConditionalEncoder
+class ConditionalDecoder(MlpDecoder):
+    """The decoder of an mlp with one more input: the window that the iteration began with."""
 
     def __init__(self, shape: Shape) -> None:
         super().__init__(shape)
-        self.encoder = ConditionalEncoder(shape)
+        self.phrase = nn.Linear(shape.curves * shape.pose, shape.curves * shape.pose, bias=False)
+        nn.init.zeros_(self.phrase.weight)
+
+    def forward(self, latent: Tensor, start: Tensor | None = None, held: Tensor | None = None) -> Tensor:
+        amounts: Tensor = self.stack(latent)
+        if start is not None and held is not None:
+            strongest = held.amax(dim=1, keepdim=True)
+            amounts = amounts + strongest * self.phrase(self.time.project(start.flatten(1)))
+        return self.time.unfold(amounts)
+
+
+class Conditional(Mlp):
+    """The mlp that knows the held joints, and while any is held the window that it began with."""
+
+    encoder: ConditionalEncoder
+    decoder: ConditionalDecoder
+
+    def __init__(self, shape: Shape) -> None:
+        super().__init__(shape)
+        self.encoder, self.decoder = ConditionalEncoder(shape), ConditionalDecoder(shape)
 
     def encode_held(self, window: Tensor, start: Tensor, targets: Tensor, held: Tensor) -> Tensor:
         """Latents (B, Z) of windows whose joints give way to targets (B, T, M, 4) by held (B, M)."""
         left = (window * (1 - held)[:, None, :, None]).flatten(1)
         latent: Tensor = self.encoder(left, self.encoder.condition(start, targets, held))
         return latent
+
+    def decode_held(self, latent: Tensor, start: Tensor, held: Tensor) -> Tensor:
+        """Latents (B, Z) of encode_held -> flat windows."""
+        window: Tensor = self.decoder(latent, start, held)
+        return window

@@ -23,6 +23,7 @@ class LossWeights:
     unit_norm: float = 0.1
     position: float = 1.0
     prior: float = 0.003
+    advance: float = 1.0
 
 
 def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:
@@ -42,6 +43,16 @@ def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSke
         "unit_norm": (norms - 1).square().mean(),
         "position": (distance + 1e-8).sqrt().mean(),
     }
+
+
+def advance_loss(raw: Tensor, windows: Tensor) -> Tensor:
+    """What changes from the first half of a batch to its second, the same dances a few poses later.
+
+    In radians, as `pace`: overlapping windows are blended, so that the dance moves as fast as its windows
+    change from one tick to the next, however fast each of them moves by itself.
+    """
+    (made, later), (given, given_later) = rotation.normalize(raw).chunk(2), windows.chunk(2)
+    return 2 * _length((later - made) - (given_later - given))
 
 
 def prior_loss(critic: PriorCritic, latents: Tensor) -> Tensor:

@@ -125,8 +125,11 @@ class Training(Course[Report]):
         latents = self._latents(lesson)
         if self.step % settings.critic_every == 0:
             self._train_critic(latents)
-        raw = self.autoencoder.decode_raw(latents + settings.latent_noise * torch.randn_like(latents))
+        noisy = latents + settings.latent_noise * torch.randn_like(latents)
+        raw = self.autoencoder.decode_raw(noisy, lesson.start, lesson.held)
         parts = losses.reconstruction_losses(raw, lesson.answer, self.body)
+        if lesson.start is not None:  # lessons in answering come in pairs
+            parts["advance"] = losses.advance_loss(raw, lesson.answer)
         parts["prior"] = losses.prior_loss(self.critic, latents)
         total = torch.stack([getattr(settings.weights, name) * part for name, part in parts.items()]).sum()
         self.optimizer.zero_grad(set_to_none=True)

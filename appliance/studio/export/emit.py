@@ -44,14 +44,13 @@ def encode(
 
 def condition(
     graph: Graph, network: Conditional, shape: Shape, start: str, goal: str, weight: str, gates: str
-) -> str:
-    """(K, W): the bias of the encoder's first layer in every pass.
+) -> tuple[str, str]:
+    """(K, W) and (K, C * M * 4): the biases of the encoder's first layer and the decoder's last in every pass.
 
     start, goal (T, M, 4), weight (M), gates (K).
-    ConditionalEncoder.condition node for node, once for all passes.
+    ConditionalEncoder.condition and ConditionalDecoder.forward node for node, once for all passes.
     """
-    encoder, first = network.encoder, network.encoder.stack[0]
-    assert isinstance(first, nn.Linear)
+    encoder = network.encoder
     column = graph.op("Unsqueeze", goal, graph.constant("axis_last", [-1], np.int64))
     row = graph.op("Unsqueeze", goal, graph.constant("axis_before_last", [-2], np.int64))
     products = _reshaped(graph, graph.op("Mul", column, row), shape.window, shape.joints, 16)
@@ -64,16 +63,26 @@ def condition(
     phrase = graph.op("Mul", phrase, graph.op("ReduceMax", weight, keepdims=1))
     phrase = _reshaped(graph, phrase, 1, shape.curves * shape.pose)
     seen = graph.op("Concat", held, _reshaped(graph, weight, 1, shape.joints), phrase, axis=1)
-    told = graph.constant("encoder.told.weight", encoder.told.weight.detach().numpy().T)
-    gated = graph.op("Mul", _reshaped(graph, gates, -1, 1), graph.op("MatMul", seen, told))
-    return graph.op("Add", gated, graph.constant("encoder.0.bias", first.bias.detach().numpy()))
+    gate = _reshaped(graph, gates, -1, 1)
+
+    def biases(x: str, told: nn.Linear, layer: nn.Module, name: str) -> str:
+        """What a pass in which something is held is told, on top of the layer's own bias."""
+        assert isinstance(layer, nn.Linear)
+        weights = graph.constant(f"{name}.told", told.weight.detach().numpy().T)
+        gated = graph.op("Mul", gate, graph.op("MatMul", x, weights))
+        return graph.op("Add", gated, graph.constant(f"{name}.bias", layer.bias.detach().numpy()))
+
+    return (
+        biases(seen, encoder.told, encoder.stack[0], "encoder.first"),
+        biases(phrase, network.decoder.phrase, network.decoder.stack[-1], "decoder.last"),
+    )
 
 
-def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent: str) -> str:
-    """Nodes of the decoder: latent (1, Z) -> raw window (T, M, 4)."""
+def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent: str, bias: str = "") -> str:
+    """Nodes of the decoder: latent (1, Z) -> raw window (T, M, 4); bias: of its last layer."""
     decoder = network.decoder
     if isinstance(decoder, networks.MlpDecoder):
-        amounts = _dense_stack(graph, layers, decoder.stack, latent, "decoder")
+        amounts = _dense_stack(graph, layers, decoder.stack, latent, "decoder", bias=bias)
         amounts = _reshaped(graph, amounts, shape.curves, shape.pose)
         basis = graph.constant("curves_back", decoder.time.curves.numpy().T)
         flat = graph.op("MatMul", basis, amounts)
@@ -114,8 +123,9 @@ def _dense_stack(
         if isinstance(layer, nn.Linear):
             at_latent = place == (len(steps) - 1 if side == "encoder" else 0)
             kind = EXACT if at_latent or (side == "encoder" and place == 0) else layers
-            named = out if place == len(steps) - 1 else None
-            x = kind.linear(graph, x, layer, name, named, bias if place == 0 else "")
+            is_last = place == len(steps) - 1
+            told = bias if (is_last if side == "decoder" else place == 0) else ""
+            x = kind.linear(graph, x, layer, name, out if is_last else None, told)
         elif isinstance(layer, nn.LayerNorm):
             x, _ = layers.layer_norm(graph, x, layer, name, skipped)
             skipped = ""

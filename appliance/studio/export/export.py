@@ -40,15 +40,17 @@ def export(
     body = Graph("pass_", main.constants)
     layers = Layers(int8)
     share = body.op("Gather", shares, "iteration", axis=0)
-    if isinstance(autoencoder.network, Conditional):
-        told = emit.condition(main, autoencoder.network, shape, x, goal, weight, gates)
-        held_out = body.op("Mul", "x", body.op("Gather", share, main.constant("own", [0], np.int64), axis=-1))
-        bias = body.op("Gather", told, "iteration", axis=0)
-        latent = emit.encode(body, layers, autoencoder.network, shape, held_out, "latent_out", bias)
+    network = autoencoder.network
+    if isinstance(network, Conditional):
+        told = emit.condition(main, network, shape, x, goal, weight, gates)
+        first, last = (body.op("Gather", biases, "iteration", axis=0) for biases in told)
+        own = body.op("Gather", share, main.constant("own", [0], np.int64), axis=-1)
+        seen = body.op("Mul", "x", own)
     else:
-        overwritten = _slerp(body, "x", goal, share)
-        latent = emit.encode(body, layers, autoencoder.network, shape, overwritten, "latent_out")
-    raw = emit.decode(body, layers, autoencoder.network, shape, latent)
+        first = last = ""
+        seen = _slerp(body, "x", goal, share)
+    latent = emit.encode(body, layers, network, shape, seen, "latent_out", first)
+    raw = emit.decode(body, layers, network, shape, latent, last)
     body.op("LpNormalization", raw, out="x_out", axis=-1, p=2)
     body.op("Identity", "going_on", out="going_on_out")
     loop = helper.make_graph(
