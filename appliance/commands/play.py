@@ -214,6 +214,7 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
         stage.admission.sentence(),
     ]
     lines += stage.cast.complaints
+    lines += map(str, show.idle_hands())
     if not emulate:
         lines += reach(list(stage.cast.worn), stage.box)
     return lines

@@ -14,7 +14,7 @@ SPAN = 2  # ticks over which a velocity is measured; over 1, a reading that come
 FADE = 0.7  # share of the velocity that is left after each tick of the window
 MOST_RADIANS = math.radians(45)  # from the present to the last pose; reached at 735 degrees a second
 
-# As arrays: a plain number costs the tick two microseconds more in each operation.
+# As arrays: a plain number costs the tick a microsecond more in each operation.
 _NOTHING = np.zeros((), dtype=np.float32)
 _HARDLY_ANYTHING = np.array(1e-12, dtype=np.float32)  # keeps a joint at rest from dividing by zero
 _SUM = np.ones((4, 1), dtype=np.float32)
@@ -31,7 +31,7 @@ class Extrapolation:
     and the jitter of a Wi-Fi. The blended joint is 4.1 degrees beside the hand, and 5.6 where all poses have
     the present orientation; at one turn a second it lags 26 ms instead of 70, and overshoots by 5.5 degrees
     where the hand stops from there within 100 ms. Noise at the last pose: 0.3 degrees while the hand turns,
-    0.12 while it rests. FADE 0.8 gives 3.9 and 19 ms, but 7.3 degrees of overshoot and 0.36 of noise; SPAN 1
+    0.12 while it rests. FADE 0.8 gives 3.9 and 20 ms, but 7.3 degrees of overshoot and 0.36 of noise; SPAN 1
     gives 4.2 degrees, 0.51 of noise and 1.2 times the phrase's roughness.
     """
 

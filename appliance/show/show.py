@@ -225,6 +225,31 @@ class Show:
         if problems:
             raise ConfigError(problems)
 
+    def idle_hands(self) -> list[Problem]:
+        """Where hands hold joints and no iteration is interactive, so that they move nothing.
+
+        A show may begin like this on purpose, so it is a warning. A cue that lets hands go says `hands: []`.
+        """
+        if not self.config.hands:
+            return []
+        problems = []
+        dancer = self.config.dancer
+        if dancer.interaction_iterations == 0:
+            line = self.file.line(("dancer", "interaction_iterations"))
+            words = "The hands move nothing: interaction_iterations is 0."
+            cure = f"Write {max(dancer.coding_iterations - 1, 1)}, or remove the hands."
+            problems.append(Problem(self.file.path, line, words, cure))
+        for place, cue in enumerate(self.config.cues):
+            if cue.iterations is not None and cue.iterations[1] == 0 and cue.hands != []:
+                line = self.file.line(("cues", place, "iterations"))
+                words = (
+                    f"The hands move nothing in the cue '{cue.name}': none of its iterations is interactive."
+                )
+                coding = cue.iterations[0]
+                cure = f"Write [{coding}, {max(coding - 1, 1)}], or `hands: []` where they are to let go."
+                problems.append(Problem(self.file.path, line, words, cure))
+        return problems
+
 
 def load_show(directory: Path | str) -> Show:
     """Read a show bundle: show.yaml and skeleton.bvh; network and phrase are only known to be there.

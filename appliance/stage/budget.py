@@ -50,10 +50,11 @@ class Admission:
                 f"{self.coding} coding iterations cost {self.p99_ms:.1f} ms (p99, paced) "
                 f"of a budget of {self.budget_ms:.1f} ms; up to {self.most_coding} would fit."
             )
+        idle = " The hands move nothing." if self.interaction == 0 < self.asked_interaction else ""
         return (
             f"{self.asked_coding} coding iterations do not fit: they cost {self.p99_ms:.1f} ms (p99, paced) "
             f"of a budget of {self.budget_ms:.1f} ms. On stage the dancer runs with {self.coding}, "
-            f"{self.interaction} of them interactive, and follows the phrase more closely. "
+            f"{self.interaction} of them interactive, and follows the phrase more closely.{idle} "
             f"Lower dancer.coding_iterations to {self.most_coding}, choose a faster network, "
             "or raise limits.tick_budget_ms."
         )

@@ -36,7 +36,10 @@ def obey(order: Order, cast: Cast, iterations: Iterations, usual_rate: float) ->
             return True, _hold(order, cast)
         elif order.name == "iterations":
             coding, interaction = (int(value) for value in order.values)
-            return True, iterations.ask(coding, interaction)
+            words = iterations.ask(coding, interaction)
+            if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in cast.hands.puppeteers):
+                words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
+            return True, words
         elif order.name == "phrase":
             name = str(order.text)
             goes_over = cast.motion.play(name, *order.values)

@@ -17,6 +17,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 class NetworkName(StrEnum):
     """Architectures, as networks.NETWORKS has them."""
 
+    conditional = "conditional"
     mlp = "mlp"
     conv = "conv"
     lstm = "lstm"
@@ -43,7 +44,7 @@ Phrase = Annotated[
 def train(
     out: Annotated[Path, typer.Option(help="Folder of the show that comes out of it.")],
     recordings: Recordings = None,
-    network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.mlp,
+    network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.conditional,
     minutes: Annotated[
         float | None, typer.Option(min=0.01, help="How long to train.", show_default="45")
     ] = None,

@@ -12,7 +12,7 @@ import torch
 from rich.console import Console
 from rich.progress import track
 
-from appliance.studio.autoencoder.losses import LossWeights
+from appliance.studio.autoencoder.architectures import DEFAULT
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.autoencoder.training_run import TrainingRun, parameters
 from appliance.studio.data import sources
@@ -31,7 +31,7 @@ class Wish:
 
     out: Path
     recordings: Path | None = None
-    network: str = "mlp"
+    network: str = DEFAULT
     minutes: float | None = None
     steps: int | None = None
     seed: int = 1
@@ -113,8 +113,7 @@ def _beginning(wish: Wish, checkpoint: Path) -> tuple[Settings, Sources, dict[st
         if not checkpoint.exists():
             raise StudioError(f"{wish.out} has no checkpoint.pt to go on from. Leave --resume out to begin.")
         state = load_checkpoint(checkpoint)[1]
-        saved = state["settings"]
-        settings = Settings(**{**saved, "weights": LossWeights(**saved["weights"])})
+        settings = Settings.from_state(state["settings"])
         return _paced(settings, wish), sources.remembered(state, wish.recordings, checkpoint), state
     if checkpoint.exists():
         raise StudioError(

@@ -16,8 +16,8 @@ import torch
 from appliance.dancer.puppet import Puppet
 from appliance.pose.bvh import read_bvh
 from appliance.show.bundle import default_show_path
+from appliance.studio.autoencoder.architectures import NETWORKS, build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.autoencoder.networks import NETWORKS, build
 from appliance.studio.export.export import export
 from tests.studio.tiny import moving, skeleton, swaying
 

@@ -61,6 +61,34 @@ def test_a_cue_says_what_it_changes_and_leaves_the_rest(with_cues: Callable[[str
     assert config.names["look"] == ("marble", "wires")
 
 
+def test_hands_that_move_nothing_are_a_warning_with_their_line(with_cues: Callable[[str], Path]) -> None:
+    directory = with_cues(
+        "  - {name: free, iterations: [3, 0], hands: []}\n"
+        "  - {name: copied, iterations: [1, 0]}\n"
+        "  - {name: forgotten, iterations: [4, 0], hands: [lShldr]}\n"
+        "  - {name: held, iterations: [1, 1]}\n"
+    )
+    write_checksums(directory)
+    first, second = verify_bundle(directory)
+    assert {first.level, second.level} == {"warning"}
+    assert (first.line, second.line) == (FIRST_CUE + 1, FIRST_CUE + 2)
+    assert "The hands move nothing in the cue 'copied'" in first.message and "[1, 1]" in first.cure
+    assert "'forgotten'" in second.message and "[4, 3]" in second.cure and "`hands: []`" in second.cure
+
+
+def test_a_dancer_whose_hands_move_nothing_is_a_warning(
+    bundle: Path, show_yaml: Callable[[str], Path]
+) -> None:
+    dancer = "name: x\ndancer:\n  coding_iterations: 6\n  interaction_iterations: 0\n"
+    write_checksums(show_yaml(dancer))
+    assert verify_bundle(bundle) == []  # there are no hands
+    write_checksums(show_yaml(dancer + "hands:\n  - {kept: true, joint: lShldr}\n"))
+    (finding,) = verify_bundle(bundle)
+    assert (finding.level, finding.line) == ("warning", 4)
+    assert finding.message == "The hands move nothing: interaction_iterations is 0."
+    assert finding.cure == "Write 5, or remove the hands."
+
+
 def test_without_looks_the_built_in_ones_may_be_named(bundle: Path, show_yaml: Callable[[str], Path]) -> None:
     config = load_show(
         show_yaml("name: x\ncues:\n- {name: a, look: plaster}\n- {name: b, look: ink}\n")

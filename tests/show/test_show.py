@@ -33,7 +33,7 @@ def test_a_sound_bundle_is_read(bundle: Path) -> None:
     ]
 
 
-def test_all_four_kinds_of_hand_are_read(show_yaml: ShowYaml) -> None:
+def test_all_five_kinds_of_hand_are_read(show_yaml: ShowYaml) -> None:
     directory = show_yaml(
         "name: x\n"
         "hands:\n"
@@ -41,9 +41,10 @@ def test_all_four_kinds_of_hand_are_read(show_yaml: ShowYaml) -> None:
         "  - {turning: {axis: [0, 2, 0], seconds_per_turn: 1}, joint: chest}\n"
         "  - {fixed: {orientation: [0.6, 0.8, 0, 0]}, joint: hip, weight: 0.5}\n"
         "  - {osc: true, joint: rShldr}\n"
+        "  - {kept: true, joint: lForeArm, weight: 0.4}\n"
     )
     hands = load_show(directory).config.hands
-    assert [hand.kind for hand in hands] == ["sensor", "turning", "fixed", "osc"]
+    assert [hand.kind for hand in hands] == ["sensor", "turning", "fixed", "osc", "kept"]
     assert hands[0].neutral == (1.0, 0.0, 0.0, 0.0)
     assert hands[1].turning is not None and hands[1].turning.axis == (0.0, 1.0, 0.0)
     assert hands[2].fixed is not None and hands[2].fixed.orientation == pytest.approx((0.6, 0.8, 0, 0))

@@ -57,6 +57,7 @@ def test_a_cost_that_is_no_straight_line_is_lowered_until_it_really_fits() -> No
     admission = admit(dance, 12, 6, 10.0, clock=time.monotonic)
     assert admission.coding == 2
     assert admission.interaction == 0
+    assert "The hands move nothing." in admission.sentence()
 
 
 def test_one_iteration_runs_even_if_it_does_not_fit() -> None:

@@ -21,11 +21,13 @@ from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.wearing import Wearing
 from tests.stage.bundles import write_show
 
+BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+
 
 @pytest.fixture
 def cast(tmp_path: Path) -> Iterator[Cast]:
     show = load_show(write_show(tmp_path / "show", [{"osc": True, "joint": "lShldr"}]))
-    cast = assemble(show, BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[])))
+    cast = assemble(show, BOX)
     yield cast
     cast.close()
 
@@ -70,6 +72,30 @@ def test_a_joint_is_held_and_released_by_osc(cast: Cast) -> None:
     for tick in range(100):
         cast.hands.pull(12.0 + 0.02 * tick, cast.puppet.select(cast.motion.window()))
     assert cast.hands.weights[place] == 0.0
+
+
+def test_a_kept_joint_holds_and_lets_go_by_order(tmp_path: Path) -> None:
+    cast = assemble(load_show(write_show(tmp_path / "kept", [{"kept": True, "joint": "Chest"}])), BOX)
+    iterations, place = Iterations(3, 3, 8), cast.hand_places[0]
+    for holds, begins in ((1.0, 0), (0.0, 60), (1.0, 120)):
+        assert obey(Order("hand", (holds,), "Chest"), cast, iterations, 1.0)[0]
+        for tick in range(60):
+            window = cast.puppet.select(cast.motion.window())
+            cast.hands.pull(10.0 + 0.02 * (begins + tick), window)
+            assert np.array_equal(cast.hands.targets[:, place], window[:, place])
+            cast.motion.advance()
+        assert cast.hands.weights[place] == holds
+    done, words = obey(Order("hold", (1.0, 0.0, 0.0, 1.0), "Chest"), cast, iterations, 1.0)
+    assert not done and "by OSC" in words
+    cast.close()
+
+
+def test_iterations_that_leave_the_hands_idle_are_told(cast: Cast) -> None:
+    iterations = Iterations(3, 2, 8)
+    done, words = obey(Order("iterations", (1.0, 0.0)), cast, iterations, 1.0)
+    assert done and words == "None of the iterations is interactive: the hands move nothing."
+    cast.hands.puppeteers[0].enabled = False
+    assert obey(Order("iterations", (1.0, 0.0)), cast, iterations, 1.0) == (True, "")
 
 
 def test_a_joint_that_no_hand_holds_by_osc_is_refused_in_words(cast: Cast) -> None:

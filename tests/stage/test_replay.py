@@ -26,9 +26,10 @@ HANDS: list[dict[str, object]] = [
     {"sensor": "left-wrist", "joint": "lShldr"},
     {"osc": True, "joint": "Chest"},
     {"turning": {"axis": [0, 1, 0], "seconds_per_turn": 5.0}, "joint": "rThigh", "weight": 0.7},
+    {"kept": True, "joint": "lForeArm"},
 ]
 CUES = [
-    {"name": "storm", "phrase": "slow", "iterations": [8, 7], "hands": ["Chest"], "fade_s": 3.0},
+    {"name": "storm", "phrase": "slow", "iterations": [8, 7], "hands": ["Chest", "lForeArm"], "fade_s": 3.0},
     {"name": "calm", "phrase": "main", "iterations": [2, 2], "hands": ["lShldr", "rThigh"], "fade_s": 1.0},
 ]
 STILL, TURNED, OTHER = (1.0, 0.0, 0.0, 0.0), (0.8, 0.6, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0)
@@ -40,7 +41,7 @@ def show(tmp_path: Path) -> Path:
 
 
 def write_eventful_show(folder: Path) -> Path:
-    """Two phrases, cues, hands of three kinds, a network that fails at seven iterations."""
+    """Two phrases, cues, hands of four kinds, a network that fails at seven iterations."""
     write_show(folder, HANDS, "fragile")
     write_bvh(folder / "slow.bvh", swaying_phrase(7.0))
     config = yaml.safe_load((folder / "show.yaml").read_text())

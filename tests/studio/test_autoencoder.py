@@ -8,8 +8,9 @@ import torch
 from torch import Tensor
 
 from appliance.studio.autoencoder import losses, rotation
+from appliance.studio.autoencoder.architectures import NETWORKS
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
-from appliance.studio.autoencoder.networks import NETWORKS
+from appliance.studio.autoencoder.conditional import matrix_of_products
 from tests.studio.tiny import moving, swaying, untrained
 
 
@@ -83,12 +84,42 @@ def test_each_window_of_a_batch_may_have_targets_and_weights_of_its_own() -> Non
         torch.testing.assert_close(together[place], alone[0], atol=1e-5, rtol=0)
 
 
+def test_a_conditional_network_sees_rotations_not_quaternions() -> None:
+    """A target and its negative are the same rotation: a hand that passes half a turn makes no jump."""
+    autoencoder, windows = untrained("conditional"), some_windows()
+    held = torch.zeros(len(windows), autoencoder.shape.joints)
+    held[:, 3] = 1.0
+    latents = autoencoder.encode_held(windows, windows, windows.roll(1, 0), held)
+    torch.testing.assert_close(autoencoder.encode_held(windows, windows, -windows.roll(1, 0), held), latents)
+    elsewhere = windows.clone()
+    elsewhere[:, :, 3] = windows[:, :, 4]  # where a held joint was does not matter
+    torch.testing.assert_close(autoencoder.encode_held(elsewhere, windows, windows.roll(1, 0), held), latents)
+
+
+def test_a_hand_without_weight_is_no_hand() -> None:
+    autoencoder, windows = untrained("conditional"), some_windows()
+    nothing = torch.zeros(len(windows), autoencoder.shape.joints)
+    told = autoencoder.encode_held(windows, windows, windows.roll(1, 0), nothing)
+    torch.testing.assert_close(told, autoencoder.encode(windows))
+
+
+def test_the_matrix_of_products_is_the_rotation() -> None:
+    turn = torch.nn.functional.normalize(torch.randn(50, 4), dim=-1)
+    matrices = ((turn[:, :, None] * turn[:, None, :]).flatten(1) @ matrix_of_products()).view(-1, 3, 3)
+    vectors = torch.randn(50, 3)
+    torch.testing.assert_close(
+        (matrices @ vectors[..., None])[..., 0], rotation.rotate(turn, vectors), atol=1e-5, rtol=1e-4
+    )
+
+
 @pytest.mark.parametrize("network", sorted(NETWORKS))
 def test_the_priors_gradient_reaches_every_layer_of_the_encoder(network: str) -> None:
     """The published code of the paper's line has exactly zero here: its critic runs without gradients."""
     autoencoder = untrained(network).requires_grad_(True)
     critic = PriorCritic(autoencoder.shape.latent)
-    losses.prior_loss(critic, autoencoder.encode(some_windows())).backward()
+    windows = some_windows()
+    held = torch.ones(len(windows), autoencoder.shape.joints) / 2
+    losses.prior_loss(critic, autoencoder.encode_held(windows, windows, windows, held)).backward()
     for name, parameter in autoencoder.network.encoder.named_parameters():
         assert parameter.grad is not None and parameter.grad.abs().max() > 0, name
     assert all(p.grad is None for p in autoencoder.network.decoder.parameters())

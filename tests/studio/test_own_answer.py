@@ -105,8 +105,9 @@ def test_a_slow_network_is_measured_on_less(monkeypatch: pytest.MonkeyPatch) -> 
     assert work == sorted(work, reverse=True) and sizes[-1].ticks == own_answer.FEWEST_TICKS
 
 
-def figures(answer: float, fit: float, energy: float) -> dict[str, Any]:
+def figures(answer: float, fit: float, energy: float, plausibility: float = 0.9) -> dict[str, Any]:
     row = {"answer": answer, "fit": fit, "fit_own": 10.0, "fit_bare": 13.0, "energy": energy}
+    row["plausibility"] = plausibility
     return {"lShldr": {"10_9": row, "onset_ticks": 3.0}, "head": {"10_9": row, "onset_ticks": 3.0}}
 
 
@@ -118,6 +119,7 @@ def figures(answer: float, fit: float, energy: float) -> dict[str, Any]:
         (figures(3.0, 13.1, 1.1), 2.0, "it learned from 2.0 minutes"),
         (figures(6.0, 9.4, 1.0), 11.0, "answers a little"),
         (figures(11.0, 9.4, 0.46), 11.0, "answers a little.*comes nearly to rest"),
+        (figures(8.7, 12.0, 1.05, 1.22), 11.0, "answers a little.*poses are not the dancer's"),
         (figures(11.0, 19.0, 2.06), 11.0, "answers a little.*nothing that the dancer did.*restless"),
     ],
 )

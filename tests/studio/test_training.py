@@ -10,11 +10,14 @@ import pytest
 import torch
 
 from appliance.studio.autoencoder import losses
+from appliance.studio.autoencoder.answers import AnswerSettings
 from appliance.studio.autoencoder.losses import LossWeights
+from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder, save_checkpoint
 from appliance.studio.data.dataset import Dataset, load_dataset
 
-TINY = Settings(steps=40, width=32, latent=12, batch=32)
+SMALL_POOL = AnswerSettings(pool=96, nearness=Nearness(neighbours=4, candidates=256))
+TINY = Settings(steps=40, width=32, latent=12, batch=32, answers=SMALL_POOL)
 
 
 @pytest.fixture(scope="module")
@@ -41,10 +44,10 @@ def same(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
-LEARNED = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer", "random", "step")
+LEARNED = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer", "lessons", "random", "step")
 
 
-@pytest.mark.parametrize("network", ["mlp", "lstm"])
+@pytest.mark.parametrize("network", ["conditional", "mlp", "lstm"])
 def test_interrupted_and_resumed_is_uninterrupted_bit_for_bit(
     dancer: Dataset, tmp_path: Path, network: str
 ) -> None:

@@ -11,8 +11,8 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
+from appliance.studio.autoencoder.architectures import build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.autoencoder.networks import build
 from appliance.studio.export import packing
 from appliance.studio.export.export import export
 

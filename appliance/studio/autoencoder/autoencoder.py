@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from appliance.studio.autoencoder import rotation
+from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.networks import Network, Shape
 
 NEAR = 1.0 - 1e-6  # length of a goal: its cosine with a pose stays below 1, so that no weight vanishes
@@ -42,6 +43,16 @@ class Autoencoder(nn.Module):
         """Heading-free windows -> latents (B, Z)."""
         return self.network.encode(windows.flatten(1))
 
+    def encode_held(self, windows: Tensor, start: Tensor, goal: Tensor, held: Tensor) -> Tensor:
+        """Latents (B, Z) of heading-free windows, overwritten by goal (B, T, M, 4) as held (B, M) says.
+
+        A conditional network is told the goal and the window that the iteration started with; for every
+        other one the window's joints are overwritten by SLERP.
+        """
+        if isinstance(self.network, Conditional):
+            return self.network.encode_held(windows, start, goal, held)
+        return self.encode(slerp_towards(windows, goal, held[:, None, :, None]))
+
     def decode_raw(self, latents: Tensor) -> Tensor:
         """Latents -> heading-free windows before normalisation."""
         return self.network.decode(latents).view(-1, self.shape.window, self.shape.joints, 4)
@@ -60,26 +71,24 @@ class Autoencoder(nn.Module):
     ) -> tuple[Tensor, Tensor]:
         """Iterative autoencoding: (B, T, M, 4) -> the same, and the last latents (B, Z).
 
-        In the first interaction_iterations passes the held joints (mask (M,)) are overwritten before coding:
-        SLERP towards targets (T, M, 4), one orientation for each pose of the window, by weights (M,); or
+        In the first interaction_iterations passes the held joints (mask (M,)) are overwritten before coding
+        by targets (T, M, 4), one orientation for each pose of the window, as far as weights (M,) say; or
         (B, T, M, 4) and (B, M), others for each window. Where all passes are interactive, the result is
         overwritten too, so that the held orientation shows; otherwise the last pass is the dancer's own.
         """
         facing = self.facing(windows)
-        x = self.without_heading(windows, facing)
+        x = start = self.without_heading(windows, facing)
         latents = x.new_zeros(len(x), self.shape.latent)
-        held = x.new_zeros(1, 1, self.shape.joints, 1)
-        goal = NEAR * x
+        held, goal = x.new_zeros(len(x), self.shape.joints), x
         if mask is not None and targets is not None and weights is not None:
-            held = (mask.float() * weights).expand(len(x), -1)[:, None, :, None]
-            goal = NEAR * self.without_heading(targets.expand_as(x), facing)
+            held = (mask.float() * weights).expand(len(x), -1)
+            goal = self.without_heading(targets.expand_as(x), facing)
         for k in range(coding_iterations):
-            if k < interaction_iterations:
-                x = slerp_towards(x, goal, held)
-            latents = self.encode(x)
+            interactive = k < interaction_iterations
+            latents = self.encode_held(x, start, goal, held) if interactive else self.encode(x)
             x = self.decode(latents)
         if interaction_iterations >= coding_iterations:
-            x = slerp_towards(x, goal, held)
+            x = slerp_towards(x, goal, held[:, None, :, None])
         return self.with_heading(x, facing), latents
 
     def _aligned(self, windows: Tensor) -> Tensor:
@@ -88,7 +97,8 @@ class Autoencoder(nn.Module):
 
 
 def slerp_towards(x: Tensor, goal: Tensor, weight: Tensor) -> Tensor:
-    """SLERP the short way from x to goal (NEAR long) by weight; weight 0 gives x, 1 gives +-goal."""
+    """SLERP the short way from x to goal by weight; weight 0 gives x, 1 gives +-goal."""
+    goal = NEAR * goal
     dot = (x * goal).sum(-1, keepdim=True)
     angle = torch.acos(dot.abs())
     towards = torch.where(dot < 0, -goal, goal)

@@ -34,7 +34,8 @@ def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSke
     made = rotation.normalize(raw)
     norms = raw.square().sum(-1)
     moments = torch.randint(raw.shape[1], (POSITION_POSES,), device=raw.device)
-    distance = (body(made[:, moments]) - body(windows[:, moments])).square().sum(-1)
+    here, there = body(torch.cat([made[:, moments], windows[:, moments]])).chunk(2)
+    distance = (here - there).square().sum(-1)
     return {
         "rotation": 2 * _length(made - windows),
         "pace": 2 * _length((made[:, 1:] - made[:, :-1]) - (windows[:, 1:] - windows[:, :-1])),

@@ -1,12 +1,11 @@
 """The networks: encoders and decoders of a window of poses, one class an architecture.
 
 Each maps a flat window (B, 8 * M * 4) to a latent (B, Z) and back to raw quaternions of the same shape.
-`NETWORKS` names them for the command line.
+architectures.py names them for the command line.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -92,7 +91,7 @@ class TimeBasis(nn.Module):
         return torch.matmul(self.curves.T, steps).flatten(1)
 
 
-class _MlpEncoder(nn.Module):
+class MlpEncoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.time = TimeBasis(shape)
@@ -103,7 +102,7 @@ class _MlpEncoder(nn.Module):
         return latent
 
 
-class _MlpDecoder(nn.Module):
+class MlpDecoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.time = TimeBasis(shape)
@@ -136,7 +135,7 @@ class Mlp(Network):
 
     def __init__(self, shape: Shape) -> None:
         super().__init__()
-        self.encoder, self.decoder = _MlpEncoder(shape), _MlpDecoder(shape)
+        self.encoder, self.decoder = MlpEncoder(shape), MlpDecoder(shape)
 
 
 class _ConvEncoder(nn.Module):
@@ -254,19 +253,3 @@ class LstmAutoregressive(Network):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.encoder, self.decoder = _LstmEncoder(shape), _AutoregressiveDecoder(shape)
-
-
-NETWORKS: dict[str, tuple[Callable[[Shape], Network], dict[str, int]]] = {
-    "mlp": (Mlp, {"latent": 64, "width": 384, "depth": 1}),
-    "conv": (Conv, {"latent": 64, "width": 160}),
-    "lstm": (Lstm, {"latent": 32, "width": 512}),
-    "lstm-autoregressive": (LstmAutoregressive, {"latent": 32, "width": 512}),
-    "lstm256": (Lstm, {"latent": 64, "width": 256}),
-}
-
-
-def build(name: str, window: int, joints: int, **sizes: int) -> tuple[Network, Shape]:
-    """A network by name, its sizes overridden where given (latent, width, depth)."""
-    make, defaults = NETWORKS[name]
-    shape = Shape(window, joints, **{**defaults, **{k: v for k, v in sizes.items() if v}})
-    return make(shape), shape

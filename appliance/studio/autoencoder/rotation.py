@@ -79,7 +79,17 @@ class MovingSkeleton(torch.nn.Module):
             parents.append(moving.index(parent) if parent >= 0 else -1)
             turns.append(turn)
             reaches.append(reach)
-        self.parents = parents
+        depth: list[int] = []
+        for parent in parents:
+            depth.append(0 if parent < 0 else depth[parent] + 1)
+        # Joints of the same depth are turned together: a third of the operations of joint by joint.
+        self.levels = [[j for j, d in enumerate(depth) if d == level] for level in range(max(depth) + 1)]
+        self.above = [
+            [self.levels[level - 1].index(parents[j]) for j in joints]
+            for level, joints in enumerate(self.levels[1:], start=1)
+        ]
+        order = [joint for level in self.levels for joint in level]
+        self.places = [order.index(joint) for joint in range(len(order))]
         self.turns: Tensor
         self.reaches: Tensor
         self.register_buffer("turns", torch.stack(turns))
@@ -87,16 +97,12 @@ class MovingSkeleton(torch.nn.Module):
 
     def forward(self, pose: Tensor) -> Tensor:
         """(..., M, 4) -> positions (..., M, 3) in metres, relative to the root joint."""
-        world: list[Tensor] = []
-        places: list[Tensor] = []
-        for joint, parent in enumerate(self.parents):
-            local = pose[..., joint, :]
-            if parent < 0:
-                world.append(local)
-                places.append(torch.zeros_like(local[..., 1:]))
-                continue
-            above = world[parent]
-            reach = self.reaches[joint].expand_as(places[parent])
-            places.append(places[parent] + rotate(above, reach))
-            world.append(multiply(multiply(above, self.turns[joint].expand_as(above)), local))
-        return torch.stack(places, dim=-2)
+        world = pose[..., self.levels[0], :]
+        places = [torch.zeros_like(world[..., 1:])]
+        for joints, above in zip(self.levels[1:], self.above, strict=True):
+            parents = world[..., above, :]
+            reach = rotate(parents, self.reaches[joints].expand(*parents.shape[:-1], 3))
+            places.append(places[-1][..., above, :] + reach)
+            turned = multiply(parents, self.turns[joints].expand_as(parents))
+            world = multiply(turned, pose[..., joints, :])
+        return torch.cat(places, dim=-2)[..., self.places, :]

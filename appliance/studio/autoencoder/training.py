@@ -14,9 +14,14 @@ import torch
 from torch import Tensor
 
 from appliance.studio.autoencoder import losses, rotation
+from appliance.studio.autoencoder.answers import Answers, AnswerSettings
+from appliance.studio.autoencoder.architectures import DEFAULT, build
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
-from appliance.studio.autoencoder.networks import build
+from appliance.studio.autoencoder.conditional import Conditional
+from appliance.studio.autoencoder.lessons import Copies, Lesson, Lessons
+from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.course import Course
+from appliance.studio.data.bones import reaches
 from appliance.studio.data.dataset import WINDOW, Dataset, windows
 
 
@@ -24,7 +29,7 @@ from appliance.studio.data.dataset import WINDOW, Dataset, windows
 class Settings:
     """How to train. minutes bounds the wall time and paces the learning rate; steps does so where given."""
 
-    network: str = "mlp"
+    network: str = DEFAULT
     latent: int = 0
     width: int = 0
     depth: int = 0
@@ -38,7 +43,22 @@ class Settings:
     latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
     input_noise_degrees: float = 0.0
     mirror: bool = True
+    critic_every: int = 4  # steps; the prior moves slowly
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
+    answers: AnswerSettings = field(default_factory=AnswerSettings)
+
+    @staticmethod
+    def from_state(saved: Mapping[str, Any]) -> Settings:
+        """The settings of a checkpoint."""
+        answers = saved["answers"]
+        nearness = Nearness(**answers["nearness"])
+        return Settings(
+            **{
+                **saved,
+                "weights": losses.LossWeights(**saved["weights"]),
+                "answers": AnswerSettings(**{**answers, "nearness": nearness}),
+            }
+        )
 
 
 @dataclass
@@ -85,6 +105,12 @@ class Training(Course[Report]):
         self.critic_optimizer = torch.optim.Adam(
             self.critic.parameters(), lr=settings.critic_learning_rate, betas=(0.5, 0.999), fused=True
         )
+        conditional = isinstance(network, Conditional)
+        self.lessons: Lessons = (
+            Answers(self.train_windows, self._chances(), settings.answers)
+            if conditional
+            else Copies(self.train_windows, settings.input_noise_degrees)
+        )
         self.origin: dict[str, Any] = {}  # where the recordings lie and what is known of them
 
     def line(self, means: Mapping[str, float]) -> Report:
@@ -95,17 +121,12 @@ class Training(Course[Report]):
         """One step of the critic and one of the autoencoder on a random batch."""
         settings = self.settings
         self._pace_learning()
-        rows = torch.randint(len(self.train_windows), (settings.batch,), device=self.device)
-        batch = self.train_windows[rows]
-        latents = self.autoencoder.encode(_shaken(batch, settings.input_noise_degrees))
-        noise = torch.randn_like(latents)
-        critic = losses.critic_loss(self.critic, latents, noise)
-        self.critic_optimizer.zero_grad(set_to_none=True)
-        critic.backward()  # type: ignore[no-untyped-call]
-        self.critic_optimizer.step()
-
+        lesson = self.lessons.draw(settings.batch)
+        latents = self._latents(lesson)
+        if self.step % settings.critic_every == 0:
+            self._train_critic(latents)
         raw = self.autoencoder.decode_raw(latents + settings.latent_noise * torch.randn_like(latents))
-        parts = losses.reconstruction_losses(raw, batch, self.body)
+        parts = losses.reconstruction_losses(raw, lesson.answer, self.body)
         parts["prior"] = losses.prior_loss(self.critic, latents)
         total = torch.stack([getattr(settings.weights, name) * part for name, part in parts.items()]).sum()
         self.optimizer.zero_grad(set_to_none=True)
@@ -113,10 +134,27 @@ class Training(Course[Report]):
         torch.nn.utils.clip_grad_norm_(self.autoencoder.parameters(), 1.0)
         self.optimizer.step()
         self._average()
+        self.lessons.follow(lesson, rotation.normalize(raw.detach()))
         self.step += 1
         with torch.no_grad():
             spread = {"latent_mean": latents.mean(0).abs().mean(), "latent_std": latents.std(0).mean()}
-        return {name: part.detach() for name, part in {**parts, "critic": critic, **spread}.items()}
+        return {name: part.detach() for name, part in {**parts, **spread}.items()}
+
+    def _latents(self, lesson: Lesson) -> Tensor:
+        if lesson.start is None or lesson.goal is None or lesson.held is None:
+            return self.autoencoder.encode(lesson.windows)
+        return self.autoencoder.encode_held(lesson.windows, lesson.start, lesson.goal, lesson.held)
+
+    def _train_critic(self, latents: Tensor) -> None:
+        loss = losses.critic_loss(self.critic, latents, torch.randn_like(latents))
+        self.critic_optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        self.critic_optimizer.step()
+
+    def _chances(self) -> Tensor:
+        """(M,): how often a joint is held while learning: more, the more of the body hangs on it."""
+        reach = reaches(self.dataset.skeleton)[list(self.dataset.moving)]
+        return torch.tensor(np.sqrt(reach / reach.max()), dtype=torch.float32, device=self.device)
 
     @torch.no_grad()
     def held_out_degrees(self, sample: int = 2048) -> float | None:
@@ -141,6 +179,7 @@ class Training(Course[Report]):
             "critic_optimizer": self.critic_optimizer.state_dict(),
             "random": torch.get_rng_state(),
             "random_gpu": torch.cuda.get_rng_state(self.device) if self.device.type == "cuda" else None,
+            "lessons": self.lessons.state(),
             "origin": self.origin,
             "step": self.step,
             "seconds": self.seconds,
@@ -151,6 +190,7 @@ class Training(Course[Report]):
         """Go on where a saved training stood."""
         for name in ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer"):
             getattr(self, name).load_state_dict(state[name])
+        self.lessons.restore(state["lessons"])
         torch.set_rng_state(state["random"].cpu())
         if self.device.type == "cuda" and state.get("random_gpu") is not None:
             torch.cuda.set_rng_state(state["random_gpu"].cpu(), self.device)
@@ -205,12 +245,3 @@ def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]
     autoencoder = Autoencoder(network, built, torch.zeros(shape["joints"], 4))
     autoencoder.load_state_dict(state["averaged"])
     return autoencoder.requires_grad_(False).eval(), state["joints"], state
-
-
-def _shaken(batch: Tensor, degrees: float) -> Tensor:
-    """The batch with every joint turned by one small random rotation a window."""
-    if degrees <= 0:
-        return batch
-    half = math.radians(degrees) / 2 * torch.randn(len(batch), 1, batch.shape[2], 3, device=batch.device)
-    turn = torch.cat([torch.ones_like(half[..., :1]), half], dim=-1)
-    return rotation.normalize(rotation.multiply(batch, turn.expand(-1, batch.shape[1], -1, -1)))

@@ -24,37 +24,47 @@ class OwnTakes:
 
 def own_takes(dataset: Dataset) -> OwnTakes:
     """The best that there is. Raises StudioError where the recordings are too few or too short."""
-    apart, training = dataset.held_out, dataset.training
-    if len({take.take for take in apart}) > 1:
-        return OwnTakes(pair_up(apart, apart), training, "on takes that it never saw")
+    apart = _longest_of_each(dataset.held_out)
+    if len(apart) > 1:
+        return OwnTakes(pair_up(apart, apart), dataset.training, "on takes that it never saw")
     if apart:
-        longest = max(apart, key=lambda take: len(take.recording))
-        if longest.recording.seconds >= HALVES_S:
-            phrase, hand = _part(longest, 0, 2), _part(longest, 1, 2)
-            return OwnTakes(
-                pair_up([phrase], [hand]), training, f"on two halves of {longest.name}, never seen"
-            )
-        if len({take.take for take in training}) == 1:
-            hand, rest = (_part(training[0], number, 2) for number in range(2))
-            words = f"on {longest.name}, never seen, with the hand of {hand.name}, which it learned"
-            return OwnTakes(pair_up([longest], [hand]), [rest], words)
-        return OwnTakes(
-            pair_up([longest], training[:1]),
-            apart_from(dataset, training[:1]),
-            f"on {longest.name}, never seen, with hands of {training[0].name}",
-        )
-    longest = max(training, key=lambda take: len(take.recording))
-    if longest.recording.seconds < 3 * SHORTEST_S:
+        return _on_one_apart(apart[0], dataset)
+    return _on_thirds(_longest_of_each(dataset.training)[0])
+
+
+def _on_one_apart(apart: Take, dataset: Dataset) -> OwnTakes:
+    """A take kept apart as phrase; the hand is its other half, or a take that was learned."""
+    training = _longest_of_each(dataset.training)
+    if apart.recording.seconds >= HALVES_S:
+        phrase, hand = _part(apart, 0, 2), _part(apart, 1, 2)
+        words = f"on two halves of {apart.name}, never seen"
+        return OwnTakes(pair_up([phrase], [hand]), dataset.training, words)
+    if len(training) == 1:
+        hand, rest = (_part(training[0], number, 2) for number in range(2))
+        words = f"on {apart.name}, never seen, with the hand of {hand.name}, which it learned"
+        return OwnTakes(pair_up([apart], [hand]), [rest], words)
+    words = f"on {apart.name}, never seen, with hands of {training[0].name}"
+    return OwnTakes(pair_up([apart], training[:1]), apart_from(dataset, training[:1]), words)
+
+
+def _on_thirds(take: Take) -> OwnTakes:
+    """A take alone: its beginning as phrase, its end as hand, what is between them as reference."""
+    if take.recording.seconds < 3 * SHORTEST_S:
         raise StudioError(
-            f"{longest.name} is {longest.recording.seconds:.0f} s long, too short to be phrase, hand and "
+            f"{take.name} is {take.recording.seconds:.0f} s long, too short to be phrase, hand and "
             "what the dancer did besides. Record more."
         )
-    phrase, rest, hand = (_part(longest, number, 3) for number in range(3))
-    return OwnTakes(
-        pair_up([phrase], [hand]),
-        [rest],
-        f"on thirds of {longest.name}, which it learned: the figures flatter it, keep a take apart",
-    )
+    phrase, rest, hand = (_part(take, number, 3) for number in range(3))
+    words = f"on thirds of {take.name}, which it learned: the figures flatter it, keep a take apart"
+    return OwnTakes(pair_up([phrase], [hand]), [rest], words)
+
+
+def _longest_of_each(takes: Sequence[Take]) -> list[Take]:
+    """Of partners in a take the one with the most sound poses; the longest take first."""
+    best: dict[str, Take] = {}
+    for take in sorted(takes, key=lambda take: int(take.sound.sum()), reverse=True):
+        best.setdefault(take.take, take)
+    return list(best.values())
 
 
 def _part(take: Take, number: int, parts: int) -> Take:

@@ -4,8 +4,8 @@ A phrase that nobody trained on, and as hand one joint's own orientation over ti
 orientations of the same dancer, unrelated to the phrase. 'Others': the moving joints that are not held. All
 angles are mean joint angles in degrees, heading removed. What the dancer ever did is the reference: the sound
 poses of the training takes without their mirror images. With those, plausibility and fit_own of three takes
-kept apart come out 0 to 0.5 degrees lower, fit_bare 0.1 to 2.2 (most where few recorded poses hold a joint so):
-a puppet would be told that it fits where only its mirror image ever did.
+kept apart come out 0 to 0.5 degrees lower, fit_bare 0.1 to 2.2 (most where few poses hold a joint so): a
+puppet would be told that it fits where only its mirror image ever did.
 """
 
 from __future__ import annotations

@@ -15,20 +15,23 @@ import torch
 from torch import nn
 
 from appliance.studio.autoencoder import networks
+from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.networks import Network, Shape
 from appliance.studio.export.graph import Graph, Layers, lstm_weights
 
 EXACT = Layers(int8=False)
 
 
-def encode(graph: Graph, layers: Layers, network: Network, shape: Shape, window: str, out: str) -> str:
-    """Nodes of the encoder: window (T, M, 4) -> latent (1, Z), named out."""
+def encode(
+    graph: Graph, layers: Layers, network: Network, shape: Shape, window: str, out: str, bias: str = ""
+) -> str:
+    """Nodes of the encoder: window (T, M, 4) -> latent (1, Z), named out; bias: of its first layer."""
     encoder = network.encoder
-    if isinstance(encoder, networks._MlpEncoder):
+    if isinstance(encoder, networks.MlpEncoder):
         steps = _reshaped(graph, window, shape.window, shape.pose)
         basis = graph.constant("curves", encoder.time.curves.numpy())
         amounts = _reshaped(graph, graph.op("MatMul", basis, steps), 1, shape.curves * shape.pose)
-        return _dense_stack(graph, layers, encoder.stack, amounts, "encoder", out)
+        return _dense_stack(graph, layers, encoder.stack, amounts, "encoder", out, bias)
     if isinstance(encoder, networks._ConvEncoder):
         return _conv_encoder(graph, layers, encoder, shape, window, out)
     if isinstance(encoder, networks._LstmEncoder):
@@ -39,10 +42,37 @@ def encode(graph: Graph, layers: Layers, network: Network, shape: Shape, window:
     raise TypeError(f"No ONNX form is known for the encoder {type(encoder).__name__}.")
 
 
+def condition(
+    graph: Graph, network: Conditional, shape: Shape, start: str, goal: str, weight: str, gates: str
+) -> str:
+    """(K, W): the bias of the encoder's first layer in every pass.
+
+    start, goal (T, M, 4), weight (M), gates (K).
+    ConditionalEncoder.condition node for node, once for all passes.
+    """
+    encoder, first = network.encoder, network.encoder.stack[0]
+    assert isinstance(first, nn.Linear)
+    column = graph.op("Unsqueeze", goal, graph.constant("axis_last", [-1], np.int64))
+    row = graph.op("Unsqueeze", goal, graph.constant("axis_before_last", [-2], np.int64))
+    products = _reshaped(graph, graph.op("Mul", column, row), shape.window, shape.joints, 16)
+    matrices = graph.op("MatMul", products, graph.constant("matrix", encoder.matrix.numpy()))
+    matrices = graph.op("Mul", matrices, _reshaped(graph, weight, 1, shape.joints, 1))
+    steps = _reshaped(graph, matrices, shape.window, shape.joints * 9)
+    basis = graph.constant("curves", encoder.time.curves.numpy())
+    held = _reshaped(graph, graph.op("MatMul", basis, steps), 1, shape.curves * shape.joints * 9)
+    phrase = graph.op("MatMul", basis, _reshaped(graph, start, shape.window, shape.pose))
+    phrase = graph.op("Mul", phrase, graph.op("ReduceMax", weight, keepdims=1))
+    phrase = _reshaped(graph, phrase, 1, shape.curves * shape.pose)
+    seen = graph.op("Concat", held, _reshaped(graph, weight, 1, shape.joints), phrase, axis=1)
+    told = graph.constant("encoder.told.weight", encoder.told.weight.detach().numpy().T)
+    gated = graph.op("Mul", _reshaped(graph, gates, -1, 1), graph.op("MatMul", seen, told))
+    return graph.op("Add", gated, graph.constant("encoder.0.bias", first.bias.detach().numpy()))
+
+
 def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent: str) -> str:
     """Nodes of the decoder: latent (1, Z) -> raw window (T, M, 4)."""
     decoder = network.decoder
-    if isinstance(decoder, networks._MlpDecoder):
+    if isinstance(decoder, networks.MlpDecoder):
         amounts = _dense_stack(graph, layers, decoder.stack, latent, "decoder")
         amounts = _reshaped(graph, amounts, shape.curves, shape.pose)
         basis = graph.constant("curves_back", decoder.time.curves.numpy().T)
@@ -68,7 +98,13 @@ def _reshaped(graph: Graph, x: str, *sizes: int) -> str:
 
 
 def _dense_stack(
-    graph: Graph, layers: Layers, stack: nn.Sequential, x: str, side: str, out: str | None = None
+    graph: Graph,
+    layers: Layers,
+    stack: nn.Sequential,
+    x: str,
+    side: str,
+    out: str | None = None,
+    bias: str = "",
 ) -> str:
     """Linear, residual, norm and ELU layers in their order; the sum of a residual goes with the next norm."""
     steps = list(stack)
@@ -78,7 +114,8 @@ def _dense_stack(
         if isinstance(layer, nn.Linear):
             at_latent = place == (len(steps) - 1 if side == "encoder" else 0)
             kind = EXACT if at_latent or (side == "encoder" and place == 0) else layers
-            x = kind.linear(graph, x, layer, name, out if place == len(steps) - 1 else None)
+            named = out if place == len(steps) - 1 else None
+            x = kind.linear(graph, x, layer, name, named, bias if place == 0 else "")
         elif isinstance(layer, nn.LayerNorm):
             x, _ = layers.layer_norm(graph, x, layer, name, skipped)
             skipped = ""

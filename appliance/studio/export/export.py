@@ -10,6 +10,7 @@ import onnx
 from onnx import TensorProto, helper
 
 from appliance.studio.autoencoder.autoencoder import NEAR, Autoencoder
+from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.export import emit
 from appliance.studio.export.graph import MICROSOFT, OPSET, Graph, Layers, info
 
@@ -31,13 +32,22 @@ def export(
     level = _turned_root(main, poses, facing, inverse=True)
     x, goal = _split_goal(main, _aligned(main, level, autoencoder.rest.cpu().numpy()), shape.window)
     goal = main.op("Mul", goal, main.constant("near", NEAR))
-    held = _held(main, shape.joints)
-    shares = _shares(main, held)
+    weight = main.op("Mul", main.op("Cast", "mask", to=TensorProto.FLOAT), "weights")
+    held = _held(main, weight, shape.joints)
+    gates = _gates(main)
+    shares = _gated(main, held, gates)
 
     body = Graph("pass_", main.constants)
     layers = Layers(int8)
-    overwritten = _slerp(body, "x", goal, body.op("Gather", shares, "iteration", axis=0))
-    latent = emit.encode(body, layers, autoencoder.network, shape, overwritten, "latent_out")
+    share = body.op("Gather", shares, "iteration", axis=0)
+    if isinstance(autoencoder.network, Conditional):
+        told = emit.condition(main, autoencoder.network, shape, x, goal, weight, gates)
+        held_out = body.op("Mul", "x", body.op("Gather", share, main.constant("own", [0], np.int64), axis=-1))
+        bias = body.op("Gather", told, "iteration", axis=0)
+        latent = emit.encode(body, layers, autoencoder.network, shape, held_out, "latent_out", bias)
+    else:
+        overwritten = _slerp(body, "x", goal, share)
+        latent = emit.encode(body, layers, autoencoder.network, shape, overwritten, "latent_out")
     raw = emit.decode(body, layers, autoencoder.network, shape, latent)
     body.op("LpNormalization", raw, out="x_out", axis=-1, p=2)
     body.op("Identity", "going_on", out="going_on_out")
@@ -144,23 +154,22 @@ def _split_goal(graph: Graph, poses: str, window: int) -> tuple[str, str]:
     return x, goal
 
 
-def _held(graph: Graph, joints: int) -> str:
-    """(1, M, 2): what an interactive pass adds to the shares (1, 0) of pose and target."""
-    weight = graph.op("Mul", graph.op("Cast", "mask", to=TensorProto.FLOAT), "weights")
-    weight = graph.op("Reshape", weight, graph.constant(f"shape_1x{joints}x1", [1, joints, 1], np.int64))
-    return graph.op("Mul", weight, graph.constant("give_and_take", [[[-1.0, 1.0]]]))
+def _held(graph: Graph, weight: str, joints: int) -> str:
+    """(1, M, 2): what an interactive pass adds to the shares (1, 0) of pose and target; weight (M)."""
+    column = graph.op("Reshape", weight, graph.constant(f"shape_1x{joints}x1", [1, joints, 1], np.int64))
+    return graph.op("Mul", column, graph.constant("give_and_take", [[[-1.0, 1.0]]]))
 
 
-def _shares(graph: Graph, held: str) -> str:
-    """(K, 1, M, 2): shares of pose and target in every pass; (1, 0) once the interactive ones are over."""
+def _gates(graph: Graph) -> str:
+    """(K, 1, 1, 1): 1 in the interactive passes, 0 once they are over."""
     zero, one = graph.constant("zero_int", 0, np.int64), graph.constant("one_int", 1, np.int64)
     passes = graph.op("Range", zero, "coding_iterations", one)
     interactive = graph.op("Cast", graph.op("Less", passes, "interaction_iterations"), to=TensorProto.FLOAT)
-    column = graph.constant("shape_column", [-1, 1, 1, 1], np.int64)
-    return _gated(graph, held, graph.op("Reshape", interactive, column))
+    return graph.op("Reshape", interactive, graph.constant("shape_column", [-1, 1, 1, 1], np.int64))
 
 
 def _gated(graph: Graph, held: str, gate: str) -> str:
+    """Shares of pose and target (.., M, 2) where a gate is open; (1, 0) where it is closed."""
     return graph.op("Add", graph.op("Mul", held, gate), graph.constant("pose_alone", [[[1.0, 0.0]]]))
 
 

@@ -13,7 +13,9 @@ from appliance.pose import quaternion
 from appliance.studio.data.dataset import WINDOW, Take, window_starts
 from appliance.studio.evaluation.coders import Coder, Poses
 
-LIMITS_DEGREES = {1: 0.25, 10: 1.5}  # mean between int8 and fp32 after so many iterations
+# Coding and interaction iterations; with a hand, each joint is held in its share of the windows.
+PASSES = {"1": (1, 0), "10": (10, 0), "10/9": (10, 9)}
+LIMITS_DEGREES = {"1": 0.25, "10": 1.5, "10/9": 1.5}  # mean between int8 and fp32 after them
 SAMPLE = 256  # windows, evenly spread over the takes
 
 
@@ -21,8 +23,8 @@ SAMPLE = 256  # windows, evenly spread over the takes
 class Verdict:
     """Mean and largest difference of int8 to fp32 in degrees, by iterations, and what follows from it."""
 
-    mean: dict[int, float]
-    largest: dict[int, float]
+    mean: dict[str, float]
+    largest: dict[str, float]
 
     @property
     def passed(self) -> bool:
@@ -49,13 +51,26 @@ class Verdict:
 def judge(fp32: Coder, int8: Coder, windows: Poses) -> Verdict:
     """Run both on windows (N, 8, M, 4) and compare."""
     apart = {}
-    for k in LIMITS_DEGREES:
-        one, other = fp32.iterate(windows, k)[0], int8.iterate(windows, k)[0]
+    for k, (coding, interaction) in PASSES.items():
+        one, other = (_answers(coder, windows, coding, interaction) for coder in (fp32, int8))
         apart[k] = np.degrees(quaternion.angle_between(one, other))
     return Verdict(
         {k: float(v.mean()) if np.isfinite(v).all() else float("inf") for k, v in apart.items()},
         {k: float(v.max()) for k, v in apart.items()},
     )
+
+
+def _answers(coder: Coder, windows: Poses, coding: int, interaction: int) -> Poses:
+    """Windows (N, 8, M, 4) coded; in the interactive passes each holds one joint as another window has it."""
+    if not interaction:
+        return coder.iterate(windows, coding)[0]
+    made, joints = np.empty_like(windows), windows.shape[2]
+    hands = np.roll(windows, len(windows) // 2, axis=0)
+    for joint in range(min(joints, len(windows))):
+        rows, mask = slice(joint, None, joints), np.arange(joints) == joint
+        held = mask, hands[rows], mask.astype(np.float32)
+        made[rows] = coder.iterate(windows[rows], coding, interaction, *held)[0]
+    return made
 
 
 def sample_windows(takes: Sequence[Take], places: Sequence[int], count: int = SAMPLE) -> Poses:

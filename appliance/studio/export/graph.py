@@ -62,10 +62,12 @@ class Layers:
     def __init__(self, int8: bool) -> None:
         self.int8 = int8
 
-    def linear(self, graph: Graph, x: str, layer: nn.Linear, name: str, out: str | None = None) -> str:
-        """(B, in) -> (B, out)."""
+    def linear(
+        self, graph: Graph, x: str, layer: nn.Linear, name: str, out: str | None = None, bias: str = ""
+    ) -> str:
+        """(B, in) -> (B, out); bias: a value of the graph in place of the layer's own."""
         weight = _array(layer.weight).T
-        bias = graph.constant(f"{name}.bias", _array(layer.bias))
+        bias = bias or graph.constant(f"{name}.bias", _array(layer.bias))
         if not self.int8:
             return graph.op("Gemm", x, graph.constant(f"{name}.weight", weight), bias, out=out)
         quantized = _quantized(graph, f"{name}.weight", weight)

@@ -1,0 +1,158 @@
+"""Lessons in answering: from a window and a hand towards what the dancer does with that joint held so.
+
+A pool of dances that are under way. Each starts on a recorded window; most have hands: one to three joints
+with the orientations of another moment, sometimes a frozen one, sometimes one that no dancer ever had. Each
+pass shows the network what it made of the dance so far and asks for a step towards the answer of the
+repertoire. So the network learns on its own windows, the ones that it meets when it iterates, and learns
+iterative autoencoding with a purpose: from the phrase to the nearest thing that this dancer does with that
+arm, further with each pass. A dance without hands should stay as it is; some are disturbed, and the
+network should lead them back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from appliance.studio.autoencoder import rotation
+from appliance.studio.autoencoder.autoencoder import slerp_towards
+from appliance.studio.autoencoder.lessons import Lesson
+from appliance.studio.autoencoder.repertoire import Nearness, Repertoire
+
+_REFILL_PASSES = 16  # dances that have ended begin anew together: the search is a matrix product
+_REFILL_ROWS = 512
+_HANDS = (0.7, 0.2, 0.1)  # shares of dances with one, two, three hands
+_DISTURBED_JOINTS = 0.15
+_WILD_SPEED = 0.06  # half angles (radians) a pose of hands that no dancer had: up to half a turn a second
+
+
+@dataclass(frozen=True)
+class AnswerSettings:
+    """How answering is taught. Shares are of dances, steps of the way that is left."""
+
+    step: float = 0.4  # of the way to the answer in one pass
+    pool: int = 2048
+    passes: float = 10.0  # of a dance in the mean
+    free: float = 0.4  # dances without a hand
+    disturbed: float = 0.4  # of these: some joints are those of another window
+    let_go: float = 0.12  # passes of a dance with hands in which nothing is held, as in the last one on stage
+    let_go_step: float = 0.1
+    light: float = 0.2  # of the dances with hands: weights between 0 and 1
+    frozen: float = 0.3  # hands that stand still
+    wild: float = 0.15  # hands at orientations that no dancer had
+    nearness: Nearness = field(default_factory=Nearness)
+
+
+class Answers:
+    """P dances: first and present window, answer, hands (P, T, M, 4), weights (P, M), age and length."""
+
+    def __init__(self, windows: Tensor, chances: Tensor, settings: AnswerSettings) -> None:
+        """windows (N, T, M, 4), heading-free; chances (M,): how often each joint is held."""
+        self._settings = settings
+        self._recorded, self._chances = windows, chances
+        self._repertoire = Repertoire(windows, settings.nearness)
+        joints, device = windows.shape[2], windows.device
+        self._windows = windows.new_zeros(settings.pool, *windows.shape[1:])
+        self._start, self._answer = self._windows.clone(), self._windows.clone()
+        self._hands = self._windows.clone()
+        self._held = torch.zeros(settings.pool, joints, device=device)
+        self._age = torch.zeros(settings.pool, device=device)
+        self._passes = torch.zeros(settings.pool, device=device)
+        self._drawn = 0
+
+    def draw(self, batch: int) -> Lesson:
+        """A random part of the pool, one pass further."""
+        if self._drawn % _REFILL_PASSES == 0:
+            for rows in torch.split((self._age >= self._passes).nonzero()[:, 0], _REFILL_ROWS):
+                self._begin(rows)
+        self._drawn += 1
+        settings = self._settings
+        rows = torch.randperm(len(self._age), device=self._age.device)[:batch]
+        windows, answer = self._windows[rows], self._answer[rows]
+        is_held = (self._held[rows] > 0).any(dim=1)
+        holds = torch.rand(len(rows), device=rows.device) >= settings.let_go
+        held = self._held[rows] * holds[:, None]
+        step = torch.where(holds, settings.step, settings.let_go_step)
+        step = torch.where(is_held, step, torch.ones_like(step))[:, None, None, None]
+        # A held joint is asked for at once: it is not shown where it was.
+        share = torch.maximum(step, held[:, None, :, None]).expand_as(answer[..., :1])
+        wanted = slerp_towards(windows, answer, share)
+        return Lesson(windows, wanted, self._start[rows], self._hands[rows], held, rows)
+
+    def follow(self, lesson: Lesson, made: Tensor) -> None:
+        """The dances go on from what the network made of them."""
+        self._windows[lesson.rows] = made.detach()
+        self._age[lesson.rows] += 1
+
+    def state(self) -> dict[str, Any]:
+        return {"drawn": self._drawn, **{name: getattr(self, f"_{name}") for name in _TENSORS}}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self._drawn = state["drawn"]
+        for name in _TENSORS:
+            getattr(self, f"_{name}").copy_(state[name])
+
+    def _begin(self, rows: Tensor) -> None:
+        """New dances in the rows (R,) of the pool."""
+        settings, count, device = self._settings, len(rows), rows.device
+        windows = self._recorded[torch.randint(len(self._recorded), (count,), device=device)]
+        self._start[rows] = self._windows[rows] = self._answer[rows] = windows
+        self._held[rows], self._age[rows] = 0.0, 0.0
+        # Most dances are as long as those on stage; a few long ones show the network where it drifts.
+        longest = torch.where(torch.rand(count, device=device) < 0.2, 4.0, 1.2) * settings.passes
+        self._passes[rows] = 1 + longest * torch.rand(count, device=device)
+        free = torch.rand(count, device=device) < settings.free
+        disturbed = free & (torch.rand(count, device=device) < settings.disturbed)
+        self._windows[rows[disturbed]] = self._disturbed(windows[disturbed])
+        with_hands = rows[~free]
+        if len(with_hands):
+            self._take_hands(with_hands, windows[~free])
+
+    def _disturbed(self, windows: Tensor) -> Tensor:
+        """Windows some of whose joints are on the way to those of another window."""
+        count, joints, device = len(windows), windows.shape[2], windows.device
+        others = self._recorded[torch.randint(len(self._recorded), (count,), device=device)]
+        share = torch.rand(count, 1, 1, 1, device=device)
+        taken = torch.rand(count, 1, joints, 1, device=device) < _DISTURBED_JOINTS
+        return slerp_towards(windows, others, (share * taken).expand_as(windows[..., :1]))
+
+    def _take_hands(self, rows: Tensor, windows: Tensor) -> None:
+        """Hands for dances that begin on windows (R, T, M, 4), and the answers to them."""
+        settings, count, device = self._settings, len(rows), rows.device
+        held = self._weights(count, windows.shape[2], device)
+        hands = self._recorded[torch.randint(len(self._recorded), (count,), device=device)].clone()
+        wild = torch.rand(count, device=device) < settings.wild
+        hands[wild] = _turning_anywhere(hands[wild])
+        frozen = torch.rand(count, device=device) < settings.frozen
+        hands[frozen] = hands[frozen][:, :1].expand_as(hands[frozen])
+        found = self._repertoire.answers(windows, hands, held)
+        reach = torch.where(held > 0, held, held.amax(dim=1, keepdim=True))
+        reach = reach[:, None, :, None].expand_as(windows[..., :1])
+        self._answer[rows] = slerp_towards(windows, found, reach)
+        self._hands[rows], self._held[rows] = hands, held
+
+    def _weights(self, count: int, joints: int, device: torch.device) -> Tensor:
+        """(count, M): weights of one to three held joints, most of them 1."""
+        most = min(len(_HANDS), joints)
+        number = torch.multinomial(torch.tensor(_HANDS[:most], device=device), count, replacement=True) + 1
+        chosen = torch.multinomial(self._chances.expand(count, -1), most)
+        taken = torch.arange(most, device=device) < number[:, None]
+        held = torch.zeros(count, joints, device=device).scatter_(1, chosen, taken.float())
+        light = torch.rand(count, 1, device=device) < self._settings.light
+        return torch.where(light, held * torch.rand(count, joints, device=device), held)
+
+
+_TENSORS = ("start", "windows", "answer", "hands", "held", "age", "passes")
+
+
+def _turning_anywhere(windows: Tensor) -> Tensor:
+    """Orientations (R, T, M, 4) anywhere, turning about any axis."""
+    count, poses, joints, _ = windows.shape
+    start = rotation.normalize(torch.randn(count, 1, joints, 4, device=windows.device))
+    time = torch.arange(poses, device=windows.device)[None, :, None, None] - poses / 2
+    half = _WILD_SPEED * torch.randn(count, 1, joints, 3, device=windows.device) * time
+    turn = torch.cat([torch.ones_like(half[..., :1]), half], dim=-1)
+    return rotation.normalize(rotation.multiply(turn, start.expand(-1, poses, -1, -1)))

@@ -1,0 +1,75 @@
+"""Lessons: what a network is shown in a training step and what it should make of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor
+
+from appliance.studio.autoencoder import rotation
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """A batch of B heading-free windows (B, T, M, 4) and the windows that should come out of one pass.
+
+    start (B, T, M, 4): the windows that the iteration began with; goal (B, T, M, 4): orientations of joints
+    that are held by `held` (B, M); None for lessons without hands. rows: where they stand in their pool.
+    """
+
+    windows: Tensor
+    answer: Tensor
+    start: Tensor | None = None
+    goal: Tensor | None = None
+    held: Tensor | None = None
+    rows: Tensor | None = None
+
+
+class Lessons(Protocol):
+    """Gives lessons, and learns what became of them."""
+
+    def draw(self, batch: int) -> Lesson:
+        """The next lesson."""
+
+    def follow(self, lesson: Lesson, made: Tensor) -> None:
+        """Take note of the windows that the network made of a lesson."""
+
+    def state(self) -> dict[str, Any]:
+        """What the lessons to come depend on beside the random numbers, for `restore`."""
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the lessons did that gave this state."""
+
+
+class Copies:
+    """The papers' autoencoder: what goes in should come out."""
+
+    def __init__(self, windows: Tensor, noise_degrees: float = 0.0) -> None:
+        self._windows, self._noise_degrees = windows, noise_degrees
+
+    def draw(self, batch: int) -> Lesson:
+        windows = self._windows[torch.randint(len(self._windows), (batch,), device=self._windows.device)]
+        return Lesson(_shaken(windows, self._noise_degrees), windows)
+
+    def follow(self, lesson: Lesson, made: Tensor) -> None:
+        return
+
+    def state(self) -> dict[str, Any]:
+        return {}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        return
+
+
+def _shaken(windows: Tensor, degrees: float) -> Tensor:
+    """The windows with every joint turned by one small random rotation a window."""
+    if degrees <= 0:
+        return windows
+    half = (
+        math.radians(degrees) / 2 * torch.randn(len(windows), 1, windows.shape[2], 3, device=windows.device)
+    )
+    turn = torch.cat([torch.ones_like(half[..., :1]), half], dim=-1)
+    return rotation.normalize(rotation.multiply(windows, turn.expand(-1, windows.shape[1], -1, -1)))

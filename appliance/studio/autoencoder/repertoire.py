@@ -1,0 +1,113 @@
+"""The repertoire: every window of the recordings, searched for what the dancer does with a joint held so.
+
+What the dancer usually does near a window is the mean of the nearest recorded windows, weighted by how near
+they are (a kernel regression); with a hand, of the nearest ones among those whose joint is held so. One
+nearest window alone would jump between takes from tick to tick. The answer is what the hand changes: from the
+usual without it to the usual with it, and on top of that what the window has of its own, as far as `own`
+says. So a hand that holds a joint where the phrase has it anyway changes little, and the phrase's gestures
+live on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from appliance.studio.autoencoder import rotation
+from appliance.studio.autoencoder.autoencoder import slerp_towards
+
+_SHARPNESS = 3.0  # the furthest of the neighbours counts e^-3 of the nearest
+
+
+@dataclass(frozen=True)
+class Nearness:
+    """What makes a recorded window the answer to a hand.
+
+    Squared angles (radians, as chords) are summed: poses of the joints that nobody holds, their change over
+    the window times `change`, and the held joints' distance to the hand times `hand` and `hand_change`. So a
+    held joint 10 degrees off weighs as much as others that are a third of that further away.
+    """
+
+    neighbours: int = 24
+    candidates: int = 16_000  # drawn anew for each block of lessons
+    change: float = 1.5
+    hand: float = 80.0
+    hand_change: float = 2.0
+    own: float = 0.6  # of what distinguishes the window from the usual, kept in the joints that nobody holds
+
+
+class Repertoire:
+    """Heading-free windows (N, T, M, 4) with the features that are searched."""
+
+    def __init__(self, windows: Tensor, nearness: Nearness) -> None:
+        self.windows, self._nearness = windows, nearness
+        self._middle, self._change = middle(windows), change(windows)
+        self._features = _features(self._middle, self._change, nearness.change)
+
+    def answers(self, windows: Tensor, hands: Tensor, held: Tensor) -> Tensor:
+        """What the dancer does nearest to windows with hands, both (L, T, M, 4), that hold by (L, M)."""
+        near = self._nearness
+        drawn = torch.randint(
+            len(self.windows), (min(near.candidates, 2 * len(self.windows)),), device=windows.device
+        )
+        cost = self._distance_of_the_free(windows, held, drawn)
+        usual = self._mean_of_the_nearest(cost, drawn)
+        hand_middle, hand_change = middle(hands), change(hands)
+        for joint in range(windows.shape[2]):
+            rows = (held[:, joint] > 0).nonzero()[:, 0]
+            if len(rows):
+                cosine = hand_middle[rows, joint] @ self._middle[drawn, joint].T
+                angle = 2 * torch.acos(cosine.abs().clamp(max=1.0))
+                theirs = self._change[drawn, joint]
+                apart = (
+                    hand_change[rows, joint].square().sum(-1)[:, None]
+                    + theirs.square().sum(-1)
+                    - 2 * cosine.sign() * (hand_change[rows, joint] @ theirs.T)
+                )
+                weight = held[rows, joint][:, None]
+                cost[rows] += weight * (near.hand * angle.square() + near.hand_change * apart)
+        with_hand = self._mean_of_the_nearest(cost, drawn)
+        own = rotation.multiply(rotation.inverse(usual), windows)
+        still = torch.tensor([1.0, 0.0, 0.0, 0.0], device=windows.device).expand_as(own)
+        share = (near.own * (held == 0))[:, None, :, None].expand_as(own[..., :1])
+        return rotation.multiply(with_hand, slerp_towards(still, own, share))
+
+    def _mean_of_the_nearest(self, cost: Tensor, drawn: Tensor) -> Tensor:
+        """(L, T, M, 4): mean of the windows `drawn` (C,) with the least cost (L, C)."""
+        distance, nearest = cost.topk(min(self._nearness.neighbours, len(drawn)), largest=False)
+        spread = (distance[:, -1:] - distance[:, :1]).clamp_min(1e-6)
+        share = torch.softmax(-_SHARPNESS * (distance - distance[:, :1]) / spread, dim=-1)
+        return rotation.normalize(torch.einsum("lk,lktmq->ltmq", share, self.windows[drawn[nearest]]))
+
+    def _distance_of_the_free(self, windows: Tensor, held: Tensor, drawn: Tensor) -> Tensor:
+        """(L, C): squared distance of windows to the drawn ones in all joints that nobody holds."""
+        free = (held == 0).float()
+        features = _features(middle(windows), change(windows), self._nearness.change) * free[..., None]
+        theirs = self._features[drawn]
+        return (
+            features.square().sum((1, 2))[:, None]
+            + free @ theirs.square().sum(-1).T
+            - 2 * features.flatten(1) @ theirs.flatten(1).T
+        )
+
+
+def middle(windows: Tensor) -> Tensor:
+    """(N, T, M, 4) -> (N, M, 4): the orientation halfway through."""
+    half = windows.shape[1] // 2
+    return rotation.normalize(windows[:, half - 1] + _same_side(windows[:, half], windows[:, half - 1]))
+
+
+def change(windows: Tensor) -> Tensor:
+    """(N, T, M, 4) -> (N, M, 4): the chord from the first pose to the last."""
+    return windows[:, -1] - _same_side(windows[:, 0], windows[:, -1])
+
+
+def _features(middles: Tensor, changes: Tensor, weight: float) -> Tensor:
+    return torch.cat([middles, weight * changes], dim=-1)
+
+
+def _same_side(q: Tensor, other: Tensor) -> Tensor:
+    """q or -q, whichever lies on the side of the other."""
+    return torch.where((q * other).sum(-1, keepdim=True) < 0, -q, q)
