@@ -12,6 +12,7 @@ from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from appliance.studio.data.capture_errors import APART, JUMP, CaptureError, find_capture_errors, sound_frames
 from appliance.studio.data.dataset import load_dataset
+from tests.studio.bodies import body, moved
 from tests.studio.tiny import moving, skeleton, swaying
 
 RATES = (30.0, 60.0, 120.0)
@@ -101,6 +102,14 @@ def test_a_fight_among_waltzes_is_no_error() -> None:
     for second in range(1, 19):
         fight = turned(fight, "rShin", gesture(120.0, 110.0, 0.11, 0.0), second * 120)
     assert errors_of(calm, fight, swaying(20.0, seed=1, fps=120.0)) == [[], [], []]
+
+
+def test_a_finger_that_twitches_costs_no_frame() -> None:
+    dance = moved(body(fingers=5))
+    spike = quaternion.from_axis_angle([0.3, 1.0, 0.0], np.radians([70.0]))
+    for joint, count in (("LeftFinger2", 0), ("LeftFinger2Tip", 0), ("LeftHand", 1), ("RightFoot", 1)):
+        (found,) = find_capture_errors([turned(dance, joint, spike, 300)], range(len(dance.skeleton)))
+        assert len(found) == count, joint
 
 
 def test_nothing_is_found_in_nothing() -> None:

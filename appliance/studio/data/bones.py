@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from appliance.pose.skeleton import Skeleton
 
+SMALL = 0.042  # of the body's span: a finger has 0.04 at most, a toe 0.03, a head 0.045, a foot 0.054
 LIMB_END = 0.15  # of the skeleton's reach: what hangs below a head, hand or foot is no longer than this
 
 
@@ -19,6 +20,13 @@ def reaches(skeleton: Skeleton) -> NDArray[np.float64]:
         above = skeleton.parents[joint]
         reach[above] = max(reach[above], reach[joint] + float(np.linalg.norm(skeleton.offsets[joint])))
     return reach
+
+
+def small_parts(skeleton: Skeleton) -> set[int]:
+    """Fingers, toes, eyes: joints below which there is little, or nothing where their own bone is short."""
+    reach, least = reaches(skeleton), SMALL * span_m(skeleton)
+    known = (reach > 0) | (np.linalg.norm(skeleton.offsets, axis=-1) < least)
+    return set(np.flatnonzero(known & (reach < least)).tolist()) - {0}
 
 
 def span_m(skeleton: Skeleton) -> float:

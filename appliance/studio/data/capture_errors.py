@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.studio.data.bones import limb_ends
+from appliance.studio.data.bones import limb_ends, small_parts
 from appliance.studio.data.jumps import Runs, bend_limits, bends, jumps, runs, visible
 
 SNAP = 0.5  # of a jump's limit: no error by itself, but a way in which a joint is put into a wrong place
@@ -50,39 +50,28 @@ def find_capture_errors(
 ) -> list[list[CaptureError]]:
     """Errors of each take of one dancer, at its recorded rate; moving: the joints to look at.
 
+    A finger or a toe that twitches costs no frame: nobody sees it, and gloves twitch all the time.
     usual: joints to orientations (4,) in which they usually are; for the others it is the mean of the takes.
     """
     if not recordings:
         return []
+    skeleton = recordings[0].skeleton
+    judged = [joint for joint in moving if joint not in small_parts(skeleton)]
     bent = [bends(recording.poses, recording.fps) for recording in recordings]
-    limits = bend_limits(bent)
-    given = list(zip(recordings, bent, limits, strict=True))
-    jumped = [visible(one, _of(moving, jumps(one, bend, limit))) for one, bend, limit in given]
-    snapped = [visible(one, _of(moving, jumps(one, bend, SNAP * limit))) for one, bend, limit in given]
+    given = list(zip(recordings, bent, bend_limits(bent), strict=True))
+    jumped = [visible(one, _of(judged, jumps(one, bend, limit))) for one, bend, limit in given]
+    snapped = [visible(one, _of(judged, jumps(one, bend, SNAP * limit))) for one, bend, limit in given]
     errors = [
         [_jump(recording, joint, *ends) for joint, found in one.items() for ends in found]
         for recording, one in zip(recordings, jumped, strict=True)
     ]
-    skeleton = recordings[0].skeleton
     ends = limb_ends(skeleton)
-    for joint in moving:
-        if joint == 0:
-            continue
-        poses = [recording.poses[:, joint] for recording in recordings]
-        jumps_here = [one.get(joint, []) for one in jumped]
-        snaps_here = [one.get(joint, []) for one in snapped] if joint in ends else jumps_here
-        middle = usual[joint] if usual and joint in usual else _mean(poses, jumps_here)
-        stretches = [
-            _Stretch(number, first, end)
-            for number, cuts in enumerate(snaps_here)
-            for first, end in _between(cuts, len(poses[number]))
-        ]
-        looked_at = _Joint([one.fps for one in recordings], poses, jumps_here, middle, joint in ends)
-        for stretch in looked_at.apart(stretches):
-            fps, name = recordings[stretch.take].fps, skeleton.names[joint]
-            away = looked_at.away[stretch.take][stretch.first : stretch.end]
-            span = (stretch.first / fps, (stretch.end - 1) / fps)
-            errors[stretch.take].append(CaptureError(name, *span, APART, float(np.median(away))))
+    for joint in judged:
+        if joint:  # a root may stand anywhere
+            cuts = snapped if joint in ends else jumped
+            looked_at = _Joint(recordings, joint, jumped, joint in ends, (usual or {}).get(joint))
+            for stretch in looked_at.apart([one.get(joint, []) for one in cuts]):
+                errors[stretch.take].append(looked_at.error(stretch))
     return [sorted(one, key=lambda error: error.start_s) for one in errors]
 
 
@@ -126,26 +115,38 @@ class _Joint:
 
     def __init__(
         self,
-        fps: Sequence[float],
-        poses: Sequence[Array],
-        jumped: Sequence[Sequence[tuple[int, int]]],
-        usual: Array,
+        recordings: Sequence[Recording],
+        joint: int,
+        jumped: Sequence[Mapping[int, Runs]],
         limb_end: bool,
+        usual: Array | None,
     ) -> None:
-        self.fps, self.poses, self.jumped, self.usual, self.limb_end = fps, poses, jumped, usual, limb_end
-        self.away = [np.degrees(quaternion.angle_between(q, usual)) for q in poses]
+        self.name, self.limb_end = recordings[0].skeleton.names[joint], limb_end
+        self.fps = [recording.fps for recording in recordings]
+        self.poses = [recording.poses[:, joint] for recording in recordings]
+        self.jumped = [one.get(joint, []) for one in jumped]
+        self.usual = _mean(self.poses, self.jumped) if usual is None else usual
+        self.away = [np.degrees(quaternion.angle_between(q, self.usual)) for q in self.poses]
         self.far = FAR_DEGREES if limb_end else AWAY_DEGREES
 
-    def apart(self, stretches: Sequence[_Stretch]) -> list[_Stretch]:
-        """Those in which the joint is wrong for as long as they last, with the way there and back."""
+    def apart(self, cuts: Sequence[Runs]) -> list[_Stretch]:
+        """The stretches between cuts in which the joint is wrong throughout, with the way there and back."""
+        stretches = [
+            _Stretch(take, first, end)
+            for take, here in enumerate(cuts)
+            for first, end in runs(_free(here, len(self.poses[take])))
+        ]
         suspects = [one for one in stretches if self._is_suspect(one)]
         if not suspects:
             return []
         others = [one for one in stretches if one not in suspects]
         rest = np.concatenate([self.usual[None], *map(self._few, others)])
-        return [
-            self._fitted(one) for one in suspects if self._is_put(one) or self._gap(one, rest) > GAP_DEGREES
-        ]
+        wrong = [one for one in suspects if self._is_put(one) or self._gap(one, rest) > GAP_DEGREES]
+        return [self._fitted(one) for one in wrong]
+
+    def error(self, one: _Stretch) -> CaptureError:
+        fps, away = self.fps[one.take], self.away[one.take][one.first : one.end]
+        return CaptureError(self.name, one.first / fps, (one.end - 1) / fps, APART, float(np.median(away)))
 
     def _is_suspect(self, one: _Stretch) -> bool:
         return bool(np.median(self.away[one.take][one.first : one.end]) > self.far) and (
@@ -196,11 +197,6 @@ def _jump(recording: Recording, joint: int, first: int, last: int) -> CaptureErr
     q, fps = recording.poses[first : last + 1, joint], recording.fps
     degrees = np.degrees(quaternion.angle_between(q, q[:1])).max()
     return CaptureError(recording.skeleton.names[joint], first / fps, last / fps, JUMP, float(degrees))
-
-
-def _between(cuts: Sequence[tuple[int, int]], count: int) -> list[tuple[int, int]]:
-    """Frames (first, last + 1) of the stretches between cuts."""
-    return runs(_free(cuts, count))
 
 
 def _free(cuts: Sequence[tuple[int, int]], count: int) -> NDArray[np.bool_]:

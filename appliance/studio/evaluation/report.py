@@ -31,7 +31,9 @@ def write_up(
     median_ms: dict[str, float],
 ) -> dict[str, Any]:
     """The report as JSON. difference: largest between ONNX and PyTorch in any quaternion component."""
-    ranges = joint_ranges(coder.autoencoder, windows(dataset.training, _places(coder, dataset), mirror=True))
+    ranges = joint_ranges(
+        coder.autoencoder, windows(dataset.training, _places(coder, dataset), mirror=dataset.mirrors)
+    )
     return {
         "network": {
             "architecture": state["settings"]["network"],
