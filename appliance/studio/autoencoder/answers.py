@@ -6,7 +6,7 @@ pass shows the network what it made of the dance so far and asks for a step towa
 repertoire. So the network learns on its own windows, the ones that it meets when it iterates, and learns
 iterative autoencoding with a purpose: from the phrase to the nearest thing that this dancer does with that
 arm, further with each pass. A dance without hands should stay as it is; some are disturbed, and the
-network should lead them back. Dances come in pairs, one a few poses after the other, so that the network learns
+network should lead them back. Dances come in pairs, one a few poses after the other: so the network learns
 how an answer changes from tick to tick.
 """
 
@@ -39,7 +39,7 @@ class AnswerSettings:
     pool: int = 2048
     passes: float = 10.0  # of a dance in the mean
     free: float = 0.4  # dances without a hand
-    disturbed: float = 0.4  # of these: some joints are those of another window
+    disturbed: float = 0.25  # of these: some joints are those of another window
     let_go: float = 0.12  # passes of a dance with hands in which nothing is held, as in the last one on stage
     let_go_step: float = 0.1
     light: float = 0.2  # of the dances with hands: weights between 0 and 1
@@ -115,7 +115,7 @@ class Answers:
             self._take_hands(rows[~_twice(free)], windows[~_twice(free)], later[~free])
 
     def _moments(self, pairs: int, later: Tensor) -> Tensor:
-        """(2 * pairs, T, M, 4): recorded windows, each followed by the one that is `later` (pairs,) poses on."""
+        """(2 * pairs, T, M, 4): recorded windows, each followed by the one `later` (pairs,) poses on."""
         first = torch.randint(len(self._recorded), (pairs,), device=later.device)
         second = (first + later).clamp(max=len(self._recorded) - 1)
         return self._recorded[torch.stack([first, second], dim=1).flatten()]
@@ -163,7 +163,7 @@ def _twice(values: Tensor) -> Tensor:
 
 
 def _turning_anywhere(windows: Tensor, later: Tensor) -> Tensor:
-    """Orientations (R, T, M, 4) anywhere, turning about any axis; of a pair the second is `later` poses on."""
+    """Orientations (R, T, M, 4) anywhere, turning about any axis; the second of a pair `later` poses on."""
     count, poses, joints, _ = windows.shape
     pairs, device = count // 2, windows.device
     start = _twice(rotation.normalize(torch.randn(pairs, 1, joints, 4, device=device)))

@@ -30,12 +30,12 @@ class Nearness:
     held joint 10 degrees off weighs as much as others that are a third of that further away.
     """
 
-    neighbours: int = 24
+    neighbours: int = 128
     candidates: int = 16_000  # drawn anew for each block of lessons
     change: float = 1.5
-    hand: float = 80.0
+    hand: float = 150.0
     hand_change: float = 2.0
-    own: float = 0.6  # of what distinguishes the window from the usual, kept in the joints that nobody holds
+    own: float = 0.85  # of what distinguishes the window from the usual, kept in the joints that nobody holds
 
 
 class Repertoire:

@@ -111,6 +111,7 @@ class Training(Course[Report]):
             if conditional
             else Copies(self.train_windows, settings.input_noise_degrees)
         )
+        self._critic_paid = torch.zeros((), device=self.device)
         self.origin: dict[str, Any] = {}  # where the recordings lie and what is known of them
 
     def line(self, means: Mapping[str, float]) -> Report:
@@ -124,7 +125,7 @@ class Training(Course[Report]):
         lesson = self.lessons.draw(settings.batch)
         latents = self._latents(lesson)
         if self.step % settings.critic_every == 0:
-            self._train_critic(latents)
+            self._critic_paid = self._train_critic(latents)
         noisy = latents + settings.latent_noise * torch.randn_like(latents)
         raw = self.autoencoder.decode_raw(noisy, lesson.start, lesson.held)
         parts = losses.reconstruction_losses(raw, lesson.answer, self.body)
@@ -141,18 +142,21 @@ class Training(Course[Report]):
         self.step += 1
         with torch.no_grad():
             spread = {"latent_mean": latents.mean(0).abs().mean(), "latent_std": latents.std(0).mean()}
-        return {name: part.detach() for name, part in {**parts, **spread}.items()}
+        return {
+            name: part.detach() for name, part in {**parts, "critic": self._critic_paid, **spread}.items()
+        }
 
     def _latents(self, lesson: Lesson) -> Tensor:
         if lesson.start is None or lesson.goal is None or lesson.held is None:
             return self.autoencoder.encode(lesson.windows)
         return self.autoencoder.encode_held(lesson.windows, lesson.start, lesson.goal, lesson.held)
 
-    def _train_critic(self, latents: Tensor) -> None:
+    def _train_critic(self, latents: Tensor) -> Tensor:
         loss = losses.critic_loss(self.critic, latents, torch.randn_like(latents))
         self.critic_optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         self.critic_optimizer.step()
+        return loss.detach()
 
     def _chances(self) -> Tensor:
         """(M,): how often a joint is held while learning: more, the more of the body hangs on it."""

@@ -45,7 +45,7 @@ def encode(
 def condition(
     graph: Graph, network: Conditional, shape: Shape, start: str, goal: str, weight: str, gates: str
 ) -> tuple[str, str]:
-    """(K, W) and (K, C * M * 4): the biases of the encoder's first layer and the decoder's last in every pass.
+    """(K, W), (K, C * M * 4): biases of the encoder's first layer and the decoder's last in every pass.
 
     start, goal (T, M, 4), weight (M), gates (K).
     ConditionalEncoder.condition and ConditionalDecoder.forward node for node, once for all passes.
