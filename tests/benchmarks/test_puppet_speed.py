@@ -23,7 +23,12 @@ from tests.studio.tiny import moving, skeleton, swaying
 
 GROUP = "ten coding iterations, one thread"
 NAMES = [skeleton().names[j] for j in moving()]
-TITLES = {"mlp": "default", "lstm": "paper's LSTM", "lstm-autoregressive": "paper's LSTM, autoregressive"}
+TITLES = {
+    "conditional": "default",
+    "mlp": "plain mlp",
+    "lstm": "paper's LSTM",
+    "lstm-autoregressive": "paper's LSTM, autoregressive",
+}
 
 
 def untrained(network: str) -> Autoencoder:

@@ -1,6 +1,7 @@
 """What 'Puppeteering an AI' found about iterative autoencoding holds for the default show's dancer.
 
 Each finding is stated on the default show's own phrase and on recordings that the network was not trained on.
+The answer is how far the joints that nobody holds are from the same dance without a hand.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ DEFAULT_SHOW = Path(appliance.show.__file__).parent / "default_show"
 HELD_OUT = {"salsa_29": 60.0, "indian_13": 120.0}  # takes kept apart from training, with their true rates
 SETTLING = 50  # ticks until every hand has taken its joint
 TICKS = 250
+ANSWER = 7.0  # degrees, at 10/9, with a hand 60 degrees off that stands still
+LARGEST_STEP_DEGREES = 36.0  # of any joint in a tick of the recordings
 
 
 @dataclass(frozen=True)
@@ -79,16 +82,23 @@ class Dancer:
         """Places of the joints that the hand does not hold."""
         return [place for place in range(len(self.puppet.joints)) if place != self.place(joint)]
 
-    def far_target(self, joint: str) -> np.ndarray:
-        """An orientation about 60 degrees from how the dancer usually carries a joint."""
-        turn = quaternion.from_axis_angle([1.0, 0.5, 0.3], 1.0).astype(np.float32)
+    def target(self, joint: str, radians: float = 1.0) -> np.ndarray:
+        """An orientation so far (about 60 degrees) from how the dancer usually carries a joint."""
+        turn = quaternion.from_axis_angle([1.0, 0.5, 0.3], radians).astype(np.float32)
         return quaternion.multiply(turn, self.puppet.rest[self.place(joint)])
 
+    def answer(self, coding: int, interaction: int, joint: str, weight: float = 1.0) -> float:
+        """Degrees between the others with a hand on a joint and the same dance without it."""
+        others, free = self.others(joint), self.dance(coding, 0)
+        hand = FixedOrientation(joint, self.target(joint).tolist(), weight)
+        held = self.hold(coding, interaction, joint) if weight == 1 else self.dance(coding, interaction, hand)
+        return float(degrees(held.danced[:, others], free.danced[:, others]).mean())
+
     def hold(self, coding: int, interaction: int, joint: str) -> Dance:
-        """A dance with one joint held at its far target; each is danced once."""
+        """A dance with one joint held 60 degrees off; each is danced once."""
         key = coding, interaction, joint
         if key not in self.held_dances:
-            hand = FixedOrientation(joint, self.far_target(joint).tolist())
+            hand = FixedOrientation(joint, self.target(joint).tolist())
             self.held_dances[key] = self.dance(coding, interaction, hand)
         return self.held_dances[key]
 
@@ -134,32 +144,70 @@ def still(dancer: Dancer) -> Dancer:
     return Dancer(dancer.puppet, Recording(phrase.skeleton, poses, roots, 50.0))
 
 
-@pytest.mark.parametrize("joint", ["lShldr", "rForeArm"])
-def test_one_coding_and_one_interaction_leave_the_other_joints_nearly_untouched(
-    dancer: Dancer, joint: str
+@pytest.mark.parametrize("joint", ["lShldr", "rShldr", "head"])
+def test_the_others_answer_the_hand_more_with_each_iteration(dancer: Dancer, joint: str) -> None:
+    """A plain autoencoder that copies gets 3 degrees at 10/9."""
+    answers = [dancer.answer(coding, coding - 1, joint) for coding in (2, 4, 10)]
+    assert answers[0] > 3.0 and answers[2] > ANSWER
+    assert np.all(np.diff(answers) > 0.5), answers
+    assert dancer.answer(1, 1, joint) < 0.6 * answers[2]
+
+
+def test_the_answer_grows_with_the_distance_of_the_hand(dancer: Dancer) -> None:
+    others, free = dancer.others("lShldr"), dancer.dance(10, 0)
+    answers = []
+    for radians in (0.4, 1.0, 1.8):
+        hand = FixedOrientation("lShldr", dancer.target("lShldr", radians).tolist())
+        held = dancer.dance(10, 9, hand)
+        answers.append(float(degrees(held.danced[:, others], free.danced[:, others]).mean()))
+    assert np.all(np.diff(answers) > 1.0), answers
+
+
+def test_the_answer_grows_smoothly_with_the_weight(dancer: Dancer) -> None:
+    answers = [dancer.answer(10, 9, "lShldr", weight) for weight in (0.25, 0.5, 0.75, 1.0)]
+    steps = np.diff([0.0, *answers])
+    assert np.all(steps > -0.3), answers
+    assert steps.max() < 0.7 * answers[-1], answers
+
+
+@pytest.mark.parametrize("joint", ["lShldr", "head"])
+def test_the_whole_body_goes_along_and_keeps_its_own_pace(dancer: Dancer, joint: str) -> None:
+    """Torso, legs and the other arm: a body whose legs are the phrase's, frame for frame, does not answer."""
+    held, free = dancer.hold(10, 9, joint), dancer.dance(10, 0)
+    for group in (("abdomen", "chest"), ("rThigh", "lThigh", "rShin", "lShin"), ("rShldr", "rForeArm")):
+        places = [dancer.place(name) for name in group]
+        assert degrees(held.danced[:, places], free.danced[:, places]).mean() > 3.0, group
+    others = dancer.others(joint)
+    assert 0.6 < pace(held.danced[:, others]) / pace(held.phrase[:, others]) < 1.3
+
+
+def test_a_joint_that_is_kept_where_the_phrase_has_it_changes_little(dancer: Dancer) -> None:
+    others, free = dancer.others("lShldr"), dancer.dance(10, 0)
+    kept = dancer.dance(10, 9, Kept("lShldr"))
+    assert degrees(kept.danced[:, others], free.danced[:, others]).mean() < 0.6 * dancer.answer(
+        10, 9, "lShldr"
+    )
+
+
+@pytest.mark.parametrize("axis", [(0, 1, 0), (0, 0, 1)])
+def test_nothing_snaps_while_a_hand_turns_smoothly_through_whole_revolutions(
+    dancer: Dancer, axis: tuple[float, float, float]
 ) -> None:
-    others, held = dancer.others(joint), dancer.place(joint)
-    free = dancer.dance(1, 0)
-    once = dancer.hold(1, 1, joint)
-    hand = degrees(once.danced[:, held], free.danced[:, held]).mean()
-    touched = degrees(once.danced[:, others], free.danced[:, others]).mean()
-    assert hand > 30
-    assert touched < 0.08 * hand
-    through = dancer.hold(10, 9, joint)
-    assert degrees(through.danced[:, others], through.phrase[:, others]).mean() > 2 * touched
+    turning = dancer.dance(10, 9, TurningAxis("lShldr", axis, 6.0), ticks=SETTLING + 350).danced
+    assert degrees(turning[1:], turning[:-1]).max() < 2 * LARGEST_STEP_DEGREES
 
 
 def test_the_held_orientation_shows_when_every_pass_is_interactive_and_not_otherwise(dancer: Dancer) -> None:
     off_free = []
     for joint in ("lShldr", "rForeArm", "chest"):
-        held, target = dancer.place(joint), dancer.far_target(joint)
+        held, target = dancer.place(joint), dancer.target(joint)
         for times in (1, 4):
             mirrored = dancer.hold(times, times, joint).danced[:, held]
             assert degrees(mirrored, target).max() < 0.5
         let_go = dancer.hold(10, 9, joint).danced[:, held]
         off_free.append(degrees(let_go, target).mean())
     assert min(off_free) > 1.0
-    assert np.mean(off_free) > 8.0
+    assert np.mean(off_free) > 4.0
 
 
 @pytest.mark.parametrize("joint", ["lShldr", "rForeArm", "head"])

@@ -105,10 +105,12 @@ class Answers:
         windows = self._moments(pairs, later)
         self._start[rows] = self._windows[rows] = self._answer[rows] = windows
         self._held[rows], self._age[rows] = 0.0, 0.0
-        # Most dances are as long as those on stage; a few long ones show the network where it drifts.
-        longest = torch.where(torch.rand(pairs, device=device) < 0.2, 4.0, 1.2) * settings.passes
-        self._passes[rows] = _twice(1 + longest * torch.rand(pairs, device=device))
+        # Most dances are as long as those on stage, and without hands short, because a dance that has drifted
+        # teaches to smooth; a few long ones show the network where it drifts.
         free = torch.rand(pairs, device=device) < settings.free
+        usual = torch.where(free, 0.3, 1.2)
+        longest = torch.where(torch.rand(pairs, device=device) < 0.2, 4.0, usual) * settings.passes
+        self._passes[rows] = _twice(1 + longest * torch.rand(pairs, device=device))
         disturbed = _twice(free & (torch.rand(pairs, device=device) < settings.disturbed))
         self._windows[rows[disturbed]] = self._disturbed(windows[disturbed])
         if not free.all():

@@ -24,6 +24,7 @@ class LossWeights:
     position: float = 1.0
     prior: float = 0.003
     advance: float = 1.0
+    energy: float = 2.0
 
 
 def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:
@@ -45,14 +46,20 @@ def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSke
     }
 
 
-def advance_loss(raw: Tensor, windows: Tensor) -> Tensor:
+def advance_losses(raw: Tensor, windows: Tensor) -> dict[str, Tensor]:
     """What changes from the first half of a batch to its second, the same dances a few poses later.
 
-    In radians, as `pace`: overlapping windows are blended, so that the dance moves as fast as its windows
-    change from one tick to the next, however fast each of them moves by itself.
+    Overlapping windows are blended, so that the dance moves as fast as its windows change from one tick to the
+    next, however fast each of them moves by itself. In radians, as `pace`: advance, the change as a vector;
+    energy, its size alone. Of an answer that it cannot foretell a network makes the mean, which hardly moves:
+    that a joint should move so much must be asked of it beside where to.
     """
     (made, later), (given, given_later) = rotation.normalize(raw).chunk(2), windows.chunk(2)
-    return 2 * _length((later - made) - (given_later - given))
+    change, wanted = later - made, given_later - given
+    return {
+        "advance": 2 * _length(change - wanted),
+        "energy": 2 * (_sizes(change) - _sizes(wanted)).abs().mean(),
+    }
 
 
 def prior_loss(critic: PriorCritic, latents: Tensor) -> Tensor:
@@ -78,4 +85,8 @@ def critic_loss(critic: PriorCritic, latents: Tensor, noise: Tensor, steepness: 
 
 
 def _length(differences: Tensor) -> Tensor:
-    return (differences.square().sum(-1) + 1e-8).sqrt().mean()
+    return _sizes(differences).mean()
+
+
+def _sizes(differences: Tensor) -> Tensor:
+    return (differences.square().sum(-1) + 1e-8).sqrt()

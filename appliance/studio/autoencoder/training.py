@@ -43,7 +43,7 @@ class Settings:
     latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
     input_noise_degrees: float = 0.0
     mirror: bool = True
-    critic_every: int = 4  # steps; the prior moves slowly
+    critic_every: int = 2  # steps; the prior moves slowly
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
     answers: AnswerSettings = field(default_factory=AnswerSettings)
 
@@ -130,7 +130,7 @@ class Training(Course[Report]):
         raw = self.autoencoder.decode_raw(noisy, lesson.start, lesson.held)
         parts = losses.reconstruction_losses(raw, lesson.answer, self.body)
         if lesson.start is not None:  # lessons in answering come in pairs
-            parts["advance"] = losses.advance_loss(raw, lesson.answer)
+            parts.update(losses.advance_losses(raw, lesson.answer))
         parts["prior"] = losses.prior_loss(self.critic, latents)
         total = torch.stack([getattr(settings.weights, name) * part for name, part in parts.items()]).sum()
         self.optimizer.zero_grad(set_to_none=True)
