@@ -23,8 +23,8 @@ class LossWeights:
     unit_norm: float = 0.1
     position: float = 1.0
     prior: float = 0.003
-    advance: float = 1.0
-    energy: float = 2.0
+    advance: float = 2.0
+    energy: float = 6.0
 
 
 def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:
@@ -49,10 +49,10 @@ def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSke
 def advance_losses(raw: Tensor, windows: Tensor) -> dict[str, Tensor]:
     """What changes from the first half of a batch to its second, the same dances a few poses later.
 
-    Overlapping windows are blended, so that the dance moves as fast as its windows change from one tick to the
-    next, however fast each of them moves by itself. In radians, as `pace`: advance, the change as a vector;
-    energy, its size alone. Of an answer that it cannot foretell a network makes the mean, which hardly moves:
-    that a joint should move so much must be asked of it beside where to.
+    Overlapping windows are blended: the dance moves as fast as its windows change from one tick to the next,
+    however fast each of them moves by itself. In radians, as `pace`: advance, the change as a vector; energy,
+    its size alone. Of an answer that it cannot foretell a network makes the mean, which hardly moves; so how
+    much a joint should move is asked for beside where to.
     """
     (made, later), (given, given_later) = rotation.normalize(raw).chunk(2), windows.chunk(2)
     change, wanted = later - made, given_later - given
