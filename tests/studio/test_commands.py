@@ -147,7 +147,7 @@ def test_export_keeps_what_the_artist_wrote(trained: Trained, tmp_path: Path) ->
 def test_where_the_gate_refuses_fp32_ships_and_the_report_says_so(
     trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(gate.LIMITS_DEGREES, 10, 1e-6)
+    monkeypatch.setitem(gate.LIMITS_DEGREES, "10", 1e-6)
     result = bunraku("export", trained[0], "--out", tmp_path / "show")
     assert "fp32 ships" in said(result)
     report = json.loads((tmp_path / "show" / "report.json").read_text())

@@ -38,6 +38,7 @@ class AnswerSettings:
     step: float = 0.4  # of the way to the answer in one pass
     pool: int = 2048
     passes: float = 10.0  # of a dance in the mean
+    led: float = 0.8  # passes after which a dance goes on from what was asked for, not from what was made
     free: float = 0.4  # dances without a hand
     disturbed: float = 0.25  # of these: some joints are those of another window
     let_go: float = 0.12  # passes of a dance with hands in which nothing is held, as in the last one on stage
@@ -86,8 +87,16 @@ class Answers:
         return Lesson(windows, wanted, self._start[rows], self._hands[rows], held, rows)
 
     def follow(self, lesson: Lesson, made: Tensor) -> None:
-        """The dances go on from what the network made of them."""
-        self._windows[lesson.rows] = made.detach()
+        """The dances go on: most from what was asked for, the others from what the network made of them.
+
+        A dance that is led ends on what this dancer does, and the network learns to go there from anywhere on
+        the way. On its own windows alone it would learn the mean of all answers, which hardly moves.
+        """
+        pairs = len(made) // 2
+        led = torch.rand(pairs, device=made.device) < self._settings.led
+        self._windows[lesson.rows] = torch.where(
+            led.repeat(2)[:, None, None, None], lesson.answer, made.detach()
+        )
         self._age[lesson.rows] += 1
 
     def state(self) -> dict[str, Any]:

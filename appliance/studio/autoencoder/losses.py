@@ -23,8 +23,8 @@ class LossWeights:
     unit_norm: float = 0.1
     position: float = 1.0
     prior: float = 0.003
-    advance: float = 2.0
-    energy: float = 6.0
+    advance: float = 1.0
+    energy: float = 3.0
 
 
 def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:
