@@ -137,3 +137,12 @@ def test_dances_come_in_pairs_a_few_poses_apart() -> None:
     a_pose = math.degrees(2 / 3999)
     assert 0.9 * a_pose < apart[apart > 0].min() and apart.max() < 8.5 * a_pose
     torch.testing.assert_close(*lesson.held.chunk(2))
+
+
+def test_dances_that_are_led_go_on_from_what_was_asked_for(recorded: Tensor) -> None:
+    for led, asked in ((1.0, True), (0.0, False)):
+        answers = pool(recorded, free=0.0, led=led)
+        lesson = answers.draw(400)
+        made = lesson.windows.roll(1, 0)
+        answers.follow(lesson, made)
+        torch.testing.assert_close(answers._windows[lesson.rows], lesson.answer if asked else made)

@@ -35,10 +35,10 @@ _WILD_SPEED = 0.06  # half angles (radians) a pose of hands that no dancer had: 
 class AnswerSettings:
     """How answering is taught. Shares are of dances, steps of the way that is left."""
 
-    step: float = 0.4  # of the way to the answer in one pass
+    step: float = 0.6  # of the way to the answer in one pass
     pool: int = 2048
     passes: float = 10.0  # of a dance in the mean
-    led: float = 0.8  # passes after which a dance goes on from what was asked for, not from what was made
+    led: float = 0.7  # passes after which a dance goes on from what was asked for, not from what was made
     free: float = 0.4  # dances without a hand
     disturbed: float = 0.25  # of these: some joints are those of another window
     let_go: float = 0.12  # passes of a dance with hands in which nothing is held, as in the last one on stage

@@ -30,10 +30,10 @@ class Nearness:
     held joint 10 degrees off weighs as much as others that are a third of that further away.
     """
 
-    neighbours: int = 4
+    neighbours: int = 16
     candidates: int = 16_000  # drawn anew for each block of lessons
     change: float = 1.5
-    hand: float = 100.0
+    hand: float = 120.0
     hand_change: float = 2.0
     own: float = 0.1  # of what distinguishes the window from the usual, kept in the joints that nobody holds
 
