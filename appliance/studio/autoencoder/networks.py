@@ -131,11 +131,24 @@ def _start_at(layer: nn.Module, rest: Tensor) -> None:
 
 
 class Mlp(Network):
-    """The window as four curves through residual dense layers: the compact default."""
+    """The window as four curves through residual dense layers: compact."""
+
+    encoder: MlpEncoder
+    decoder: MlpDecoder
 
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.encoder, self.decoder = MlpEncoder(shape), MlpDecoder(shape)
+
+    @torch.no_grad()
+    def standardise(self, mean: Tensor, deviation: Tensor) -> None:
+        """Move latents of this mean and deviation (Z,) to the prior's 0 and 1; windows come out as before."""
+        last, first = self.encoder.stack[-1], self.decoder.stack[0]
+        assert isinstance(last, nn.Linear) and isinstance(first, nn.Linear)
+        last.weight /= deviation[:, None]
+        last.bias.sub_(mean).div_(deviation)
+        first.bias.add_(first.weight @ mean)
+        first.weight *= deviation
 
 
 class _ConvEncoder(nn.Module):

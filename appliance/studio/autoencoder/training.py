@@ -19,6 +19,7 @@ from appliance.studio.autoencoder.architectures import DEFAULT, build
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
 from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.lessons import Copies, Lesson, Lessons
+from appliance.studio.autoencoder.networks import Mlp
 from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.course import Course
 from appliance.studio.data.bones import reaches
@@ -173,8 +174,15 @@ class Training(Course[Report]):
         made, _ = self.averaged.iterate(batch, 1)
         return math.degrees(float(rotation.angle_between(made, batch).mean()))
 
+    @torch.no_grad()
+    def latent_moments(self, sample: int = 8192) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation (Z,) of the averaged network's latents of the training windows."""
+        rows = torch.linspace(0, len(self.train_windows) - 1, min(sample, len(self.train_windows))).long()
+        latents = self.averaged.encode(self.train_windows[rows])
+        return latents.mean(0), latents.std(0).clamp_min(1e-3)
+
     def state(self) -> dict[str, Any]:
-        """Everything that a resumed training needs."""
+        """Everything that a resumed training needs, and the moments that load_autoencoder takes out."""
         return {
             "settings": asdict(self.settings),
             "joints": list(self.dataset.moving_names),
@@ -186,6 +194,7 @@ class Training(Course[Report]):
             "critic_optimizer": self.critic_optimizer.state_dict(),
             "random": torch.get_rng_state(),
             "random_gpu": torch.cuda.get_rng_state(self.device) if self.device.type == "cuda" else None,
+            "latent_moments": self.latent_moments(),
             "lessons": self.lessons.state(),
             "origin": self.origin,
             "step": self.step,
@@ -237,7 +246,11 @@ def save_checkpoint(training: Training, path: Path) -> None:
 
 
 def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]]:
-    """The averaged network of a checkpoint, its joint names, and the whole state."""
+    """The averaged network of a checkpoint, its joint names, and the whole state.
+
+    The critic shapes the latents, but their mean and scale stay some tenths off the prior's, because other
+    losses pull at them; what is left is taken out here exactly, without a change to any window.
+    """
     state = torch.load(path, map_location="cpu", weights_only=True)
     shape = state["shape"]
     network, built = build(
@@ -251,4 +264,6 @@ def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]
     )
     autoencoder = Autoencoder(network, built, torch.zeros(shape["joints"], 4))
     autoencoder.load_state_dict(state["averaged"])
+    if isinstance(network, Mlp):
+        network.standardise(*state["latent_moments"])
     return autoencoder.requires_grad_(False).eval(), state["joints"], state
