@@ -37,7 +37,8 @@ class AnswerSettings:
 
     step: float = 0.6  # of the way to the answer in one pass
     pool: int = 2048
-    passes: float = 10.0  # of a dance in the mean
+    passes: float = 4.0  # of a dance at most: after so many it is near its answer, and teaches to copy only
+    long: float = 0.1  # dances ten times as long, which show the network where it drifts
     led: float = 0.7  # passes after which a dance goes on from what was asked for, not from what was made
     free: float = 0.4  # dances without a hand
     disturbed: float = 0.25  # of these: some joints are those of another window
@@ -114,11 +115,8 @@ class Answers:
         windows = self._moments(pairs, later)
         self._start[rows] = self._windows[rows] = self._answer[rows] = windows
         self._held[rows], self._age[rows] = 0.0, 0.0
-        # Most dances are as long as those on stage, and without hands short, because a dance that has drifted
-        # teaches to smooth; a few long ones show the network where it drifts.
         free = torch.rand(pairs, device=device) < settings.free
-        usual = torch.where(free, 0.3, 1.2)
-        longest = torch.where(torch.rand(pairs, device=device) < 0.2, 4.0, usual) * settings.passes
+        longest = torch.where(torch.rand(pairs, device=device) < settings.long, 10.0, 1.0) * settings.passes
         self._passes[rows] = _twice(1 + longest * torch.rand(pairs, device=device))
         disturbed = _twice(free & (torch.rand(pairs, device=device) < settings.disturbed))
         self._windows[rows[disturbed]] = self._disturbed(windows[disturbed])
