@@ -329,21 +329,21 @@ folders_of_links() {
         sed 's|/[^/]*$||' | sort -u
 }
 
-# Links through `current` that are there, as "where to".
+# Links through `current` that are there, as "where<tab>to": a path may have spaces.
 links() {
     local folder folders=()
     while read -r folder; do
         if [ -d "$root/$folder" ]; then folders+=("$root/$folder"); fi
     done < <(folders_of_links)
-    [ ${#folders[@]} = 0 ] || find "${folders[@]}" -maxdepth 1 -type l -lname "$home/current/*" -printf '%p %l\n'
+    [ ${#folders[@]} = 0 ] || find "${folders[@]}" -maxdepth 1 -type l -lname "$home/current/*" -printf '%p\t%l\n'
 }
 
 # Links that the chosen release does not have any more, and what a power cut left.
 unlink_left_over() {
     local where to
-    links | while read -r where to; do [[ -e $root$to && $where != *.new ]] || rm "$where"; done
-    find "$root/etc/systemd/system" -type l -lname "/$units/*" -printf '%p %l\n' |
-        while read -r where to; do [[ -L $root$to || -e $root$to ]] || rm "$where"; done
+    links | while IFS=$'\t' read -r where to; do [[ -e $root$to && $where != *.new ]] || rm "$where"; done
+    find "$root/etc/systemd/system" -type l -lname "/$units/*" -printf '%p\t%l\n' |
+        while IFS=$'\t' read -r where to; do [[ -L $root$to || -e $root$to ]] || rm "$where"; done
 }
 
 switch_to() {
