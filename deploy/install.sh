@@ -350,7 +350,7 @@ switch_to() {
     local file before where to
     local -A linked=()
     name=$1 before=$(current)
-    while read -r where to; do linked[$where]=$to; done < <(links)
+    while IFS=$'\t' read -r where to; do linked[$where]=$to; done < <(links)
     while read -r file; do
         case $file in
         usr/*)
