@@ -2,12 +2,11 @@
 
 A pool of dances that are under way. Each starts on a recorded window; most have hands: one to three joints
 with the orientations of another moment, sometimes a frozen one, sometimes one that no dancer ever had. Each
-pass shows the network what it made of the dance so far and asks for a step towards the answer of the
-repertoire. So the network learns on its own windows, the ones that it meets when it iterates, and learns
-iterative autoencoding with a purpose: from the phrase to the nearest thing that this dancer does with that
-arm, further with each pass. A dance without hands should stay as it is; some are disturbed, and the
-network should lead them back. Dances come in pairs, one a few poses after the other: so the network learns
-how an answer changes from tick to tick.
+pass asks for a step towards the answer of the repertoire: iterative autoencoding with a purpose, from the
+phrase to what this dancer does with that arm, further with each pass. Most passes are led: the dance goes on
+from what was asked for. The others go on from what the network made, as it will on stage. A dance without
+hands should stay as it is; some are disturbed, and the network should lead them back. Dances come in pairs,
+one a few poses after the other: so the network learns how an answer changes from tick to tick.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _REFILL_ROWS = 512
 _HANDS = (0.7, 0.2, 0.1)  # shares of dances with one, two, three hands
 _LATER_POSES = 8  # at most, of the second dance of a pair
 _DISTURBED_JOINTS = 0.15
-_WILD_SPEED = 0.06  # half angles (radians) a pose of hands that no dancer had: up to half a turn a second
+_WILD_SPEED = 0.06  # half angles (radians) a pose of hands that no dancer had: about a turn a second
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class AnswerSettings:
 
     step: float = 0.6  # of the way to the answer in one pass
     pool: int = 2048
-    passes: float = 4.0  # of a dance at most: after so many it is near its answer, and teaches to copy only
+    passes: float = 4.0  # of most dances, at most: a longer one is near its answer, and teaches to copy only
     long: float = 0.1  # dances ten times as long, which show the network where it drifts
     led: float = 0.7  # passes after which a dance goes on from what was asked for, not from what was made
     free: float = 0.4  # dances without a hand

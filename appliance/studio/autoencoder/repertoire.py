@@ -4,8 +4,7 @@ What the dancer usually does near a window is the mean of the nearest recorded w
 they are (a kernel regression); with a hand, of the nearest ones among those whose joint is held so. One
 nearest window alone would jump between takes from tick to tick. The answer is what the hand changes: from the
 usual without it to the usual with it, and on top of that what the window has of its own, as far as `own`
-says. So a hand that holds a joint where the phrase has it anyway changes little, and the phrase's gestures
-live on.
+says: with 1, a hand that holds a joint where the phrase has it anyway changes nothing.
 """
 
 from __future__ import annotations
@@ -25,9 +24,9 @@ _SHARPNESS = 3.0  # the furthest of the neighbours counts e^-3 of the nearest
 class Nearness:
     """What makes a recorded window the answer to a hand.
 
-    Squared angles (radians, as chords) are summed: poses of the joints that nobody holds, their change over
-    the window times `change`, and the held joints' distance to the hand times `hand` and `hand_change`. So a
-    held joint 10 degrees off weighs as much as others that are a third of that further away.
+    Summed are squared chords (half the angle) of the joints that nobody holds, and of their change over the
+    window times `change`; the held joints' squared angle to the hand (radians) times `hand`, and the squared
+    chord between their changes times `hand_change`.
     """
 
     neighbours: int = 16

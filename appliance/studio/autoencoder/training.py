@@ -25,6 +25,8 @@ from appliance.studio.course import Course
 from appliance.studio.data.bones import reaches
 from appliance.studio.data.dataset import WINDOW, Dataset, windows
 
+SHORTEST_REACH = 0.04  # of the longest limb's, for what a joint without any bone below it counts
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -160,9 +162,13 @@ class Training(Course[Report]):
         return loss.detach()
 
     def _chances(self) -> Tensor:
-        """(M,): how often a joint is held while learning: more, the more of the body hangs on it."""
+        """(M,): how often a joint is held while learning: more, the more of the body hangs on it.
+
+        A head or hand whose bone has no end in the file counts as short: it must be learned as well.
+        """
         reach = reaches(self.dataset.skeleton)[list(self.dataset.moving)]
-        return torch.tensor(np.sqrt(reach / reach.max()), dtype=torch.float32, device=self.device)
+        share = np.maximum(reach / max(float(reach.max()), 1e-9), SHORTEST_REACH)
+        return torch.tensor(np.sqrt(share), dtype=torch.float32, device=self.device)
 
     @torch.no_grad()
     def held_out_degrees(self, sample: int = 2048) -> float | None:
