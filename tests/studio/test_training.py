@@ -16,8 +16,8 @@ from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder, save_checkpoint
 from appliance.studio.data.dataset import Dataset, load_dataset
 
-SMALL_POOL = AnswerSettings(pool=96, nearness=Nearness(neighbours=4, candidates=256))
-TINY = Settings(steps=40, width=32, latent=12, batch=32, answers=SMALL_POOL)
+FEW = AnswerSettings(reserve=96, wandering=16, nearness=Nearness(neighbours=4, searched=256))
+TINY = Settings(steps=40, width=32, latent=12, batch=32, answers=FEW)
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def test_training_reduces_the_error(dancer: Dataset, tmp_path: Path, network: st
 
 def test_only_a_prior_of_some_weight_moves_the_encoder(dancer: Dataset) -> None:
     nothing = LossWeights(rotation=0.0, pace=0.0, unit_norm=0.0, position=0.0, prior=0.0)
-    nothing = replace(nothing, advance=0.0, energy=0.0)
+    nothing = replace(nothing, hands=0.0)
     for prior, moves in ((0.0, False), (0.01, True)):
         training = Training(dancer, replace(TINY, weights=replace(nothing, prior=prior)))
         before = {k: v.clone() for k, v in training.autoencoder.network.encoder.state_dict().items()}

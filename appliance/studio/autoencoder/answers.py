@@ -1,12 +1,14 @@
-"""Lessons in answering: from a window and a hand towards what the dancer does with that joint held so.
+"""Lessons in answering: from a window and a hand to what the dancer does with that joint held so.
 
-A pool of dances that are under way. Each starts on a recorded window; most have hands: one to three joints
-with the orientations of another moment, sometimes a frozen one, sometimes one that no dancer ever had. Each
-pass asks for a step towards the answer of the repertoire: iterative autoencoding with a purpose, from the
-phrase to what this dancer does with that arm, further with each pass. Most passes are led: the dance goes on
-from what was asked for. The others go on from what the network made, as it will on stage. A dance without
-hands should stay as it is; some are disturbed, and the network should lead them back. Dances come in pairs,
-one a few poses after the other: so the network learns how an answer changes from tick to tick.
+Dances with hands are iterated as on stage: a number of passes with one to three joints held as they are at
+another moment, sometimes frozen, sometimes as no dancer ever held them, then one pass of the dancer's
+own. The gradient runs back through all of them: what is asked for is what the audience sees in the end, and
+a good part of it after the first pass. Dances come in pairs, one a few poses after the other: so the network
+learns how an answer changes from tick to tick.
+
+Windows without a hand should come out as they went in; some are disturbed and led back. Others wander: they
+are coded over and over, and the longer they have wandered the more they are pulled to what the dancer
+usually does.
 """
 
 from __future__ import annotations
@@ -19,137 +21,160 @@ from torch import Tensor
 
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import slerp_towards
-from appliance.studio.autoencoder.lessons import Lesson
+from appliance.studio.autoencoder.lessons import Hands, Lesson
 from appliance.studio.autoencoder.repertoire import Nearness, Repertoire
 
-_REFILL_PASSES = 16  # dances that have ended begin anew together: the search is a matrix product
-_REFILL_ROWS = 512
 _HANDS = (0.7, 0.2, 0.1)  # shares of dances with one, two, three hands
 _LATER_POSES = 8  # at most, of the second dance of a pair
 _DISTURBED_JOINTS = 0.15
 _WILD_SPEED = 0.06  # half angles (radians) a pose of hands that no dancer had: about a turn a second
+_WEAK_SHARE, _FULL_SHARE = 0.25, 0.45  # of the lessons: with 2 passes, with the most; the others lie between
+_FULL_PROGRESS = 0.4  # of the training, when the most passes are reached: a new network would run away
+_SEARCH_EVERY = 16  # lessons, after which what the wandering windows are pulled to is looked up anew
+_PULL_AGE = 10  # passes until a wandering window is pulled fully
 
 
 @dataclass(frozen=True)
 class AnswerSettings:
-    """How answering is taught. Shares are of dances, steps of the way that is left."""
+    """How answering is taught. Shares are of dances, steps and pulls of the way that is left."""
 
     step: float = 0.6  # of the way to the answer in one pass
-    pool: int = 2048
-    passes: float = 4.0  # of most dances, at most: a longer one is near its answer, and teaches to copy only
-    long: float = 0.1  # dances ten times as long, which show the network where it drifts
-    led: float = 0.7  # passes after which a dance goes on from what was asked for, not from what was made
-    free: float = 0.4  # dances without a hand
-    disturbed: float = 0.25  # of these: some joints are those of another window
-    let_go: float = 0.12  # passes of a dance with hands in which nothing is held, as in the last one on stage
-    let_go_step: float = 0.1
-    light: float = 0.2  # of the dances with hands: weights between 0 and 1
+    passes: int = 10  # at most, the last one without hands
+    reserve: int = 1024  # dances whose answers are searched for together
+    uses: int = 2  # of each dance, with different numbers of passes
+    light: float = 0.2  # weights between 0 and 1
     frozen: float = 0.3  # hands that stand still
     wild: float = 0.15  # hands at orientations that no dancer had
+    with_hands: float = 0.5  # of a batch; the others are without hands
+    disturbed: float = 0.25  # of the windows without hands: some joints are those of another window
+    wandering: int = 512  # windows that are coded over and over: half of those without hands
+    wander: int = 100  # passes at most
+    pull: float = 0.15
     nearness: Nearness = field(default_factory=Nearness)
 
 
 class Answers:
-    """P dances: first and present window, answer, hands (P, T, M, 4), weights (P, M), age and length."""
+    """Lessons for a network that is told its hands."""
 
     def __init__(self, windows: Tensor, chances: Tensor, settings: AnswerSettings) -> None:
         """windows (N, T, M, 4), heading-free; chances (M,): how often each joint is held."""
         self._settings = settings
         self._recorded, self._chances = windows, chances
         self._repertoire = Repertoire(windows, settings.nearness)
-        joints, device = windows.shape[2], windows.device
-        self._windows = windows.new_zeros(settings.pool, *windows.shape[1:])
-        self._start, self._answer = self._windows.clone(), self._windows.clone()
-        self._hands = self._windows.clone()
-        self._held = torch.zeros(settings.pool, joints, device=device)
-        self._age = torch.zeros(settings.pool, device=device)
-        self._passes = torch.zeros(settings.pool, device=device)
+        self._start = windows.new_zeros(settings.reserve, *windows.shape[1:])
+        self._answer, self._goal = self._start.clone(), self._start.clone()
+        self._held = windows.new_zeros(settings.reserve, windows.shape[2])
+        self._order = torch.zeros(settings.uses * settings.reserve // 2, dtype=torch.long)
+        self._next = len(self._order)
+        self._wandering = self._moments(settings.wandering)
+        self._usual = self._wandering.clone()
+        self._age = windows.new_zeros(settings.wandering)
         self._drawn = 0
 
-    def draw(self, batch: int) -> Lesson:
-        """A random part of the pool, one pass further: first halves of pairs, then their second halves."""
-        if self._drawn % _REFILL_PASSES == 0:
-            for rows in torch.split((self._age >= self._passes).nonzero()[:, 0], _REFILL_ROWS):
-                self._begin(rows)
-        self._drawn += 1
-        settings = self._settings
-        first = 2 * torch.randperm(len(self._age) // 2, device=self._age.device)[: batch // 2]
-        rows = torch.cat([first, first + 1])
-        windows, answer = self._windows[rows], self._answer[rows]
-        is_held = (self._held[rows] > 0).any(dim=1)
-        holds = (torch.rand(len(first), device=rows.device) >= settings.let_go).repeat(2)
-        held = self._held[rows] * holds[:, None]
-        step = torch.where(holds, settings.step, settings.let_go_step)
-        step = torch.where(is_held, step, torch.ones_like(step))[:, None, None, None]
-        # A held joint is asked for at once: it is not shown where it was.
-        share = torch.maximum(step, held[:, None, :, None]).expand_as(answer[..., :1])
-        wanted = slerp_towards(windows, answer, share)
-        return Lesson(windows, wanted, self._start[rows], self._hands[rows], held, rows)
+    def draw(self, batch: int, progress: float) -> list[Lesson]:
+        """Dances with hands, and windows without: fresh ones, then wandering ones."""
+        pairs = max(round(self._settings.with_hands * batch / 2), 1)
+        return [self._dances(pairs, progress), self._without_hands(max(batch - 2 * pairs, 2))]
 
     def follow(self, lesson: Lesson, made: Tensor) -> None:
-        """The dances go on: most from what was asked for, the others from what the network made of them.
-
-        A dance that is led ends on what this dancer does, and the network learns to go there from anywhere on
-        the way. On its own windows alone it would learn the mean of all answers, which hardly moves.
-        """
-        pairs = len(made) // 2
-        led = torch.rand(pairs, device=made.device) < self._settings.led
-        self._windows[lesson.rows] = torch.where(
-            led.repeat(2)[:, None, None, None], lesson.answer, made.detach()
-        )
-        self._age[lesson.rows] += 1
+        """The wandering windows go on from what the network made of them."""
+        if lesson.rows is not None:
+            self._wandering[lesson.rows] = made[-len(lesson.rows) :].detach()
+            self._age[lesson.rows] += 1
 
     def state(self) -> dict[str, Any]:
-        return {"drawn": self._drawn, **{name: getattr(self, f"_{name}") for name in _TENSORS}}
+        numbers = {"next": self._next, "drawn": self._drawn}
+        return {**numbers, **{name: getattr(self, f"_{name}") for name in _TENSORS}}
 
     def restore(self, state: dict[str, Any]) -> None:
-        self._drawn = state["drawn"]
+        self._next, self._drawn = state["next"], state["drawn"]
         for name in _TENSORS:
             getattr(self, f"_{name}").copy_(state[name])
 
-    def _begin(self, rows: Tensor) -> None:
-        """New dances in the rows (R,) of the pool, pair by pair."""
-        settings, pairs, device = self._settings, len(rows) // 2, rows.device
-        later = torch.randint(1, _LATER_POSES + 1, (pairs,), device=device)
-        windows = self._moments(pairs, later)
-        self._start[rows] = self._windows[rows] = self._answer[rows] = windows
-        self._held[rows], self._age[rows] = 0.0, 0.0
-        free = torch.rand(pairs, device=device) < settings.free
-        longest = torch.where(torch.rand(pairs, device=device) < settings.long, 10.0, 1.0) * settings.passes
-        self._passes[rows] = _twice(1 + longest * torch.rand(pairs, device=device))
-        disturbed = _twice(free & (torch.rand(pairs, device=device) < settings.disturbed))
-        self._windows[rows[disturbed]] = self._disturbed(windows[disturbed])
-        if not free.all():
-            self._take_hands(rows[~_twice(free)], windows[~_twice(free)], later[~free])
+    def _dances(self, pairs: int, progress: float) -> Lesson:
+        """First dances of the pairs, then their second ones."""
+        if self._next + pairs > len(self._order):
+            self._refill()
+        first = 2 * self._order[self._next : self._next + pairs].to(self._held.device)
+        self._next += pairs
+        rows = torch.cat([first, first + 1])
+        passes = self._passes(progress)
+        start, answer, held = self._start[rows], self._answer[rows], self._held[rows]
+        hands = Hands(self._goal[rows], held, self._on_the_way(start, answer, held, 1))
+        return Lesson(start, self._on_the_way(start, answer, held, passes - 1), passes, hands)
 
-    def _moments(self, pairs: int, later: Tensor) -> Tensor:
+    def _passes(self, progress: float) -> int:
+        """2, the most, or any number between; the most grows at the beginning."""
+        most = 2 + round((self._settings.passes - 2) * min(progress / _FULL_PROGRESS, 1.0))
+        kind = float(torch.rand(()))
+        if kind < _WEAK_SHARE:
+            return 2
+        return most if kind < _WEAK_SHARE + _FULL_SHARE else int(torch.randint(2, most + 1, ()))
+
+    def _on_the_way(self, start: Tensor, answer: Tensor, held: Tensor, passes: int) -> Tensor:
+        """Where a dance should be after passes with its hands; the joints held are there at once."""
+        share = 1 - (1 - self._settings.step) ** passes
+        share_of_each = held.clamp_min(share)[:, None, :, None].expand_as(answer[..., :1])
+        return slerp_towards(start, answer, share_of_each)
+
+    def _without_hands(self, count: int) -> Lesson:
+        fresh, wandering = count - count // 2, min(count // 2, self._settings.wandering)
+        if self._drawn % _SEARCH_EVERY == 0:
+            self._let_wander()
+        self._drawn += 1
+        answer = self._moments(fresh)
+        windows = self._disturbed(answer)
+        rows = torch.randperm(self._settings.wandering)[:wandering].to(answer.device)
+        pull = self._settings.pull * (self._age[rows] / _PULL_AGE).clamp(max=1.0)
+        lost = self._wandering[rows]
+        back = slerp_towards(lost, self._usual[rows], pull[:, None, None, None].expand_as(lost[..., :1]))
+        return Lesson(torch.cat([windows, lost]), torch.cat([answer, back]), rows=rows)
+
+    def _let_wander(self) -> None:
+        """Windows that have wandered enough begin anew; the others learn where they are pulled to."""
+        wander = torch.rand_like(self._age).square() * self._settings.wander
+        ended = (self._age > wander + 1).nonzero()[:, 0]
+        self._wandering[ended] = self._moments(len(ended))
+        self._age[ended] = 0
+        self._usual.copy_(self._repertoire.usual(self._wandering))
+
+    def _refill(self) -> None:
+        """New dances, pair by pair, and the answers to their hands."""
+        settings, device = self._settings, self._held.device
+        pairs = settings.reserve // 2
+        later = torch.randint(1, _LATER_POSES + 1, (pairs,), device=device)
+        self._start.copy_(self._pairs_of_moments(later))
+        self._goal.copy_(self._pairs_of_moments(later))
+        wild = torch.rand(pairs, device=device) < settings.wild
+        self._goal[_twice(wild)] = _turning_anywhere(self._goal[_twice(wild)], later[wild])
+        frozen = _twice(torch.rand(pairs, device=device) < settings.frozen)
+        self._goal[frozen] = self._goal[frozen][:, :1].expand_as(self._goal[frozen]).clone()
+        self._held.copy_(_twice(self._weights(pairs, self._held.shape[1], device)))
+        found = self._repertoire.answers(self._start, self._goal, self._held)
+        reach = torch.where(self._held > 0, self._held, self._held.amax(dim=1, keepdim=True))
+        reach = reach[:, None, :, None].expand_as(found[..., :1])
+        self._answer.copy_(slerp_towards(self._start, found, reach))
+        self._order.copy_(torch.cat([torch.randperm(pairs) for _ in range(settings.uses)]))
+        self._next = 0
+
+    def _moments(self, count: int) -> Tensor:
+        """(count, T, M, 4): recorded windows."""
+        return self._recorded[torch.randint(len(self._recorded), (count,), device=self._recorded.device)]
+
+    def _pairs_of_moments(self, later: Tensor) -> Tensor:
         """(2 * pairs, T, M, 4): recorded windows, each followed by the one `later` (pairs,) poses on."""
-        first = torch.randint(len(self._recorded), (pairs,), device=later.device)
+        first = torch.randint(len(self._recorded), later.shape, device=later.device)
         second = (first + later).clamp(max=len(self._recorded) - 1)
         return self._recorded[torch.stack([first, second], dim=1).flatten()]
 
     def _disturbed(self, windows: Tensor) -> Tensor:
-        """Windows some of whose joints are on the way to those of another window."""
-        pairs, joints, device = len(windows) // 2, windows.shape[2], windows.device
-        others = self._moments(pairs, torch.ones(pairs, dtype=torch.long, device=device))
-        share = _twice(torch.rand(pairs, 1, 1, 1, device=device))
-        taken = _twice(torch.rand(pairs, 1, joints, 1, device=device)) < _DISTURBED_JOINTS
-        return slerp_towards(windows, others, (share * taken).expand_as(windows[..., :1]))
-
-    def _take_hands(self, rows: Tensor, windows: Tensor, later: Tensor) -> None:
-        """Hands for dances that begin on windows (R, T, M, 4), and the answers to them."""
-        settings, pairs, device = self._settings, len(rows) // 2, rows.device
-        held = _twice(self._weights(pairs, windows.shape[2], device))
-        hands = self._moments(pairs, later)
-        wild = torch.rand(pairs, device=device) < settings.wild
-        hands[_twice(wild)] = _turning_anywhere(hands[_twice(wild)], later[wild])
-        frozen = _twice(torch.rand(pairs, device=device) < settings.frozen)
-        hands[frozen] = hands[frozen][:, :1].expand_as(hands[frozen])
-        found = self._repertoire.answers(windows, hands, held)
-        reach = torch.where(held > 0, held, held.amax(dim=1, keepdim=True))
-        reach = reach[:, None, :, None].expand_as(windows[..., :1])
-        self._answer[rows] = slerp_towards(windows, found, reach)
-        self._hands[rows], self._held[rows] = hands, held
+        """Some of the windows with some joints on the way to those of another window."""
+        count, joints, device = len(windows), windows.shape[2], windows.device
+        share = torch.rand(count, 1, 1, 1, device=device)
+        taken = torch.rand(count, 1, joints, 1, device=device) < _DISTURBED_JOINTS
+        chosen = torch.rand(count, 1, 1, 1, device=device) < self._settings.disturbed
+        towards = (share * taken * chosen).expand_as(windows[..., :1])
+        return slerp_towards(windows, self._moments(count), towards)
 
     def _weights(self, count: int, joints: int, device: torch.device) -> Tensor:
         """(count, M): weights of one to three held joints, most of them 1."""
@@ -162,7 +187,7 @@ class Answers:
         return torch.where(light, held * torch.rand(count, joints, device=device), held)
 
 
-_TENSORS = ("start", "windows", "answer", "hands", "held", "age", "passes")
+_TENSORS = ("start", "answer", "goal", "held", "order", "wandering", "usual", "age")
 
 
 def _twice(values: Tensor) -> Tensor:

@@ -13,26 +13,37 @@ from appliance.studio.autoencoder import rotation
 
 
 @dataclass(frozen=True)
-class Lesson:
-    """A batch of B heading-free windows (B, T, M, 4) and the windows that should come out of one pass.
+class Hands:
+    """Joints held in the passes of a lesson, in all but the last as on stage.
 
-    start (B, T, M, 4): the windows that the iteration began with; goal (B, T, M, 4): orientations of joints
-    that are held by `held` (B, M); None for lessons without hands. rows: where they stand in their pool.
+    goal (B, T, M, 4): their orientations; held (B, M): how firmly; first (B, T, M, 4): the windows that the
+    first pass should give. The second half of the batch are the same dances a few poses later.
+    """
+
+    goal: Tensor
+    held: Tensor
+    first: Tensor
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """A batch of B heading-free windows (B, T, M, 4) and what should come out of a number of passes.
+
+    rows: where the windows that go on wandering stand in their pool.
     """
 
     windows: Tensor
     answer: Tensor
-    start: Tensor | None = None
-    goal: Tensor | None = None
-    held: Tensor | None = None
+    passes: int = 1
+    hands: Hands | None = None
     rows: Tensor | None = None
 
 
 class Lessons(Protocol):
     """Gives lessons, and learns what became of them."""
 
-    def draw(self, batch: int) -> Lesson:
-        """The next lesson."""
+    def draw(self, batch: int, progress: float) -> list[Lesson]:
+        """The next lessons, `batch` windows in all, at a progress of 0 to 1 through the training."""
 
     def follow(self, lesson: Lesson, made: Tensor) -> None:
         """Take note of the windows that the network made of a lesson."""
@@ -50,9 +61,9 @@ class Copies:
     def __init__(self, windows: Tensor, noise_degrees: float = 0.0) -> None:
         self._windows, self._noise_degrees = windows, noise_degrees
 
-    def draw(self, batch: int) -> Lesson:
+    def draw(self, batch: int, progress: float) -> list[Lesson]:
         windows = self._windows[torch.randint(len(self._windows), (batch,), device=self._windows.device)]
-        return Lesson(_shaken(windows, self._noise_degrees), windows)
+        return [Lesson(_shaken(windows, self._noise_degrees), windows)]
 
     def follow(self, lesson: Lesson, made: Tensor) -> None:
         return

@@ -9,6 +9,7 @@ says: with 1, a hand that holds a joint where the phrase has it anyway changes n
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -17,6 +18,7 @@ from torch import Tensor
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import slerp_towards
 
+_SEARCH_ROWS = 512  # at a time: a search is a matrix product
 _SHARPNESS = 3.0  # the furthest of the neighbours counts e^-3 of the nearest
 
 
@@ -29,37 +31,45 @@ class Nearness:
     chord between their changes times `hand_change`.
     """
 
-    neighbours: int = 16
-    candidates: int = 16_000  # drawn anew for each block of lessons
+    neighbours: int = 60
+    searched: int = 24_000  # windows at most, evenly spaced: always the same, so that there is one answer
     change: float = 1.5
     hand: float = 120.0
     hand_change: float = 2.0
-    own: float = 0.1  # of what distinguishes the window from the usual, kept in the joints that nobody holds
+    own: float = 0.9  # of what distinguishes the window from the usual, kept in the joints that nobody holds
 
 
 class Repertoire:
-    """Heading-free windows (N, T, M, 4) with the features that are searched."""
+    """Heading-free windows (N, T, M, 4), thinned out, with the features that are searched."""
 
     def __init__(self, windows: Tensor, nearness: Nearness) -> None:
-        self.windows, self._nearness = windows, nearness
-        self._middle, self._change = middle(windows), change(windows)
+        self._nearness = nearness
+        self._windows = windows[:: max(math.ceil(len(windows) / nearness.searched), 1)].contiguous()
+        self._middle, self._change = middle(self._windows), change(self._windows)
         self._features = _features(self._middle, self._change, nearness.change)
+
+    def usual(self, windows: Tensor) -> Tensor:
+        """What the dancer usually does near windows (L, T, M, 4)."""
+        nobody = windows.new_zeros(1, windows.shape[2])
+        costs = (self._distance_of_the_free(rows, nobody) for rows in torch.split(windows, _SEARCH_ROWS))
+        return torch.cat([self._mean_of_the_nearest(cost) for cost in costs])
 
     def answers(self, windows: Tensor, hands: Tensor, held: Tensor) -> Tensor:
         """What the dancer does nearest to windows with hands, both (L, T, M, 4), that hold by (L, M)."""
+        rows = (torch.split(all_rows, _SEARCH_ROWS) for all_rows in (windows, hands, held))
+        return torch.cat([self._answers(*row) for row in zip(*rows, strict=True)])
+
+    def _answers(self, windows: Tensor, hands: Tensor, held: Tensor) -> Tensor:
         near = self._nearness
-        drawn = torch.randint(
-            len(self.windows), (min(near.candidates, 2 * len(self.windows)),), device=windows.device
-        )
-        cost = self._distance_of_the_free(windows, held, drawn)
-        usual = self._mean_of_the_nearest(cost, drawn)
+        cost = self._distance_of_the_free(windows, held)
+        usual = self._mean_of_the_nearest(cost)
         hand_middle, hand_change = middle(hands), change(hands)
         for joint in range(windows.shape[2]):
             rows = (held[:, joint] > 0).nonzero()[:, 0]
             if len(rows):
-                cosine = hand_middle[rows, joint] @ self._middle[drawn, joint].T
+                cosine = hand_middle[rows, joint] @ self._middle[:, joint].T
                 angle = 2 * torch.acos(cosine.abs().clamp(max=1.0))
-                theirs = self._change[drawn, joint]
+                theirs = self._change[:, joint]
                 apart = (
                     hand_change[rows, joint].square().sum(-1)[:, None]
                     + theirs.square().sum(-1)
@@ -67,24 +77,24 @@ class Repertoire:
                 )
                 weight = held[rows, joint][:, None]
                 cost[rows] += weight * (near.hand * angle.square() + near.hand_change * apart)
-        with_hand = self._mean_of_the_nearest(cost, drawn)
+        with_hand = self._mean_of_the_nearest(cost)
         own = rotation.multiply(rotation.inverse(usual), windows)
         still = torch.tensor([1.0, 0.0, 0.0, 0.0], device=windows.device).expand_as(own)
         share = (near.own * (held == 0))[:, None, :, None].expand_as(own[..., :1])
         return rotation.multiply(with_hand, slerp_towards(still, own, share))
 
-    def _mean_of_the_nearest(self, cost: Tensor, drawn: Tensor) -> Tensor:
-        """(L, T, M, 4): mean of the windows `drawn` (C,) with the least cost (L, C)."""
-        distance, nearest = cost.topk(min(self._nearness.neighbours, len(drawn)), largest=False)
+    def _mean_of_the_nearest(self, cost: Tensor) -> Tensor:
+        """(L, T, M, 4): mean of the windows with the least cost (L, N)."""
+        distance, nearest = cost.topk(min(self._nearness.neighbours, cost.shape[1]), largest=False)
         spread = (distance[:, -1:] - distance[:, :1]).clamp_min(1e-6)
         share = torch.softmax(-_SHARPNESS * (distance - distance[:, :1]) / spread, dim=-1)
-        return rotation.normalize(torch.einsum("lk,lktmq->ltmq", share, self.windows[drawn[nearest]]))
+        return rotation.normalize(torch.einsum("lk,lktmq->ltmq", share, self._windows[nearest]))
 
-    def _distance_of_the_free(self, windows: Tensor, held: Tensor, drawn: Tensor) -> Tensor:
-        """(L, C): squared distance of windows to the drawn ones in all joints that nobody holds."""
+    def _distance_of_the_free(self, windows: Tensor, held: Tensor) -> Tensor:
+        """(L, N): squared distance of windows to the recorded ones in all joints that nobody holds."""
         free = (held == 0).float()
         features = _features(middle(windows), change(windows), self._nearness.change) * free[..., None]
-        theirs = self._features[drawn]
+        theirs = self._features
         return (
             features.square().sum((1, 2))[:, None]
             + free @ theirs.square().sum(-1).T

@@ -125,34 +125,51 @@ class Training(Course[Report]):
         """One step of the critic and one of the autoencoder on a random batch."""
         settings = self.settings
         self._pace_learning()
-        lesson = self.lessons.draw(settings.batch)
-        latents = self._latents(lesson)
+        total = torch.zeros((), device=self.device)
+        told: dict[str, Tensor] = {}
+        latents = []
+        for lesson in self.lessons.draw(settings.batch, self.fraction):
+            raw, coded, parts = self._code(lesson)
+            weight, words = (settings.weights.hands, "_with_hands") if lesson.hands else (1.0, "")
+            for name, part in parts.items():
+                total = total + weight * getattr(settings.weights, name) * part
+                told[name + words] = part
+            latents.append(coded)
+            self.lessons.follow(lesson, rotation.normalize(raw.detach()))
+        coded = torch.cat(latents)
         if self.step % settings.critic_every == 0:
-            self._critic_paid = self._train_critic(latents)
-        noisy = latents + settings.latent_noise * torch.randn_like(latents)
-        raw = self.autoencoder.decode_raw(noisy, lesson.start, lesson.held)
-        parts = losses.reconstruction_losses(raw, lesson.answer, self.body)
-        if lesson.start is not None:  # lessons in answering come in pairs
-            parts.update(losses.advance_losses(raw, lesson.answer))
-        parts["prior"] = losses.prior_loss(self.critic, latents)
-        total = torch.stack([getattr(settings.weights, name) * part for name, part in parts.items()]).sum()
+            self._critic_paid = self._train_critic(coded)
+        prior = losses.prior_loss(self.critic, coded)
         self.optimizer.zero_grad(set_to_none=True)
-        total.backward()  # type: ignore[no-untyped-call]
+        (total + settings.weights.prior * prior).backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.autoencoder.parameters(), 1.0)
         self.optimizer.step()
         self._average()
-        self.lessons.follow(lesson, rotation.normalize(raw.detach()))
         self.step += 1
         with torch.no_grad():
-            spread = {"latent_mean": latents.mean(0).abs().mean(), "latent_std": latents.std(0).mean()}
-        return {
-            name: part.detach() for name, part in {**parts, "critic": self._critic_paid, **spread}.items()
-        }
+            spread = {"latent_mean": coded.mean(0).abs().mean(), "latent_std": coded.std(0).mean()}
+        told = {**told, "prior": prior, "critic": self._critic_paid, **spread}
+        return {name: part.detach() for name, part in told.items()}
 
-    def _latents(self, lesson: Lesson) -> Tensor:
-        if lesson.start is None or lesson.goal is None or lesson.held is None:
-            return self.autoencoder.encode(lesson.windows)
-        return self.autoencoder.encode_held(lesson.windows, lesson.start, lesson.goal, lesson.held)
+    def _code(self, lesson: Lesson) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
+        """The passes of a lesson: raw windows (B, T, M, 4) and latents (B, Z) of the last, and the losses.
+
+        The latents are noisy where they are decoded, and come without the noise: so the critic sees them.
+        """
+        windows, hands, parts = lesson.windows, lesson.hands, {}
+        for taken in range(lesson.passes - 1 if hands is not None else 0):
+            assert hands is not None
+            coded = self.autoencoder.encode_held(windows, lesson.windows, hands.goal, hands.held)
+            raw = self.autoencoder.decode_raw(coded, lesson.windows, hands.held)
+            if taken == 0:
+                parts["first"] = losses.rotation_loss(raw, hands.first)
+            windows = rotation.normalize(raw)
+        coded = self.autoencoder.encode(windows)
+        raw = self.autoencoder.decode_raw(coded + self.settings.latent_noise * torch.randn_like(coded))
+        parts.update(losses.reconstruction_losses(raw, lesson.answer, self.body))
+        if hands is not None:
+            parts.update(losses.advance_losses(raw, lesson.answer))
+        return raw, coded, parts
 
     def _train_critic(self, latents: Tensor) -> Tensor:
         loss = losses.critic_loss(self.critic, latents, torch.randn_like(latents))
