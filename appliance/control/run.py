@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import select
 import signal
 import socket
@@ -113,7 +112,6 @@ class ControlProcess:
 
 def control(settings: Settings, say: Callable[[str], None]) -> int:
     """Show control until SIGTERM, Ctrl-C or a closed terminal; the exit status."""
-    logging.disable(logging.CRITICAL)  # python-osc logs what it cannot read, in the sender's own signs
     with _waking_stop_signals() as (ended, wake):
         process = ControlProcess(settings, say)
         try:
