@@ -11,8 +11,9 @@ from pythonosc.parsing import osc_types
 Message = tuple[str | int | float, ...]  # an OSC address and its arguments
 MOST_MESSAGES = 64  # of a bundle; a desk that sends more at once sends several bundles
 DEEPEST_BUNDLE = 8
+BUNDLE = b"#bundle\0"  # how a bundle begins
 
-_BUNDLE, _HEAD_BYTES = b"#bundle\0", 16  # of a bundle: its name, then the time tag
+_HEAD_BYTES = 16  # of a bundle: BUNDLE, then the time tag
 _NUMBERS = {tag: struct.Struct(f">{packed}") for tag, packed in zip("ifhd", "ifqd", strict=True)}
 _CONSTANTS = {"T": True, "F": False, "N": None}
 _BANG = "I"  # a type tag without a value
@@ -58,7 +59,7 @@ def is_readable(values: Sequence[object]) -> bool:
 
 def _elements(packet: bytes, depth: int) -> Iterator[bytes]:
     """The messages of a packet, in their order, unread."""
-    if not packet.startswith(_BUNDLE):
+    if not packet.startswith(BUNDLE):
         yield packet
         return
     if len(packet) < _HEAD_BYTES or depth == DEEPEST_BUNDLE:

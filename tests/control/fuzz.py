@@ -47,6 +47,13 @@ def message(address: str, *arguments: object) -> bytes:
     return _text(address) + _text(tags) + body
 
 
+def bundle(*elements: bytes) -> bytes:
+    """What is in it is not looked at."""
+    return (
+        b"#bundle\0" + struct.pack(">Q", 1) + b"".join(struct.pack(">i", len(one)) + one for one in elements)
+    )
+
+
 def _text(text: str) -> bytes:
     packed = text.encode() + b"\0"
     return packed + b"\0" * (-len(packed) % 4)

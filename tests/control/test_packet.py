@@ -22,12 +22,12 @@ from pythonosc.osc_packet import OscPacket
 from appliance.control.command import command
 from appliance.control.packet import DEEPEST_BUNDLE, MOST_MESSAGES, messages_in
 from tests.control.doubles import Asker, control_process
-from tests.control.fuzz import message
+from tests.control.fuzz import bundle, message
 
 COUNT = 30_000
 READ_WITHIN_S = 300.0
 MEMORY_BYTES = 1 << 30  # of show control while it hears these; two of the larger ones would need more
-BUNDLE = b"#bundle\0" + struct.pack(">Q", 1)
+BUNDLE = bundle()
 TURNS_FOR_EVER = bytes.fromhex("2362756e646c65000000000000000001fffffffc")
 
 
@@ -43,10 +43,6 @@ def watchdog() -> Iterator[None]:
     yield
     signal.alarm(0)
     signal.signal(signal.SIGALRM, before)
-
-
-def bundle(*elements: bytes) -> bytes:
-    return BUNDLE + b"".join(struct.pack(">i", len(one)) + one for one in elements)
 
 
 def grows_for_ever(text_bytes: int) -> bytes:
