@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from pythonosc.osc_message import OscMessage
-
 from appliance.control.desk import SENSORS_REPLY as REPLY
 from appliance.control.errands import PATIENCE_S as ERRAND_S
-from appliance.control.packet import Message, datagram, readable
+from appliance.control.packet import Message, datagram, messages_in, readable
 from appliance.control.port import Address
 from appliance.control.roster import END, SENSOR, RosterLine
 from appliance.show.box import BoxConfig
@@ -74,9 +72,9 @@ class RunningBox:
         """
         answer, asked = None, time.monotonic()
         with contextlib.closing(self._replies((address, *arguments))) as replies:
-            for reply in replies:
-                if reply.address == REPLY and len(reply.params) == 3 and reply.params[0] == address:
-                    answer = Answer(bool(reply.params[1]), readable(str(reply.params[2])))
+            for about, values in replies:
+                if about == REPLY and len(values) == 3 and values[0] == address:
+                    answer = Answer(bool(values[1]), readable(str(values[2])))
                     if answer.done or time.monotonic() - asked < ERRAND_S:  # refused, for good
                         return answer
         if answer is None:
@@ -87,21 +85,17 @@ class RunningBox:
         """How all its sensors are. Raises NoBoxError."""
         lines: list[RosterLine] = []
         with contextlib.closing(self._replies(("/sensors/list",))) as replies:
-            for reply in replies:
-                if reply.address == SENSOR and _is_made_of(_LINE, reply.params):
-                    lines.append(RosterLine(*(_shown(value) for value in reply.params)))
-                elif (
-                    reply.address == END
-                    and _is_made_of(_ENDING, reply.params)
-                    and reply.params[0] == len(lines)
-                ):
-                    _, age_s, key_file = reply.params
+            for about, values in replies:
+                if about == SENSOR and _is_made_of(_LINE, values):
+                    lines.append(RosterLine(*(_shown(value) for value in values)))
+                elif about == END and _is_made_of(_ENDING, values) and values[0] == len(lines):
+                    _, age_s, key_file = values
                     return Roll(lines, float(age_s), Path(_shown(key_file)) if key_file else None)
-                elif reply.address == REPLY and reply.params[:2] == ["/sensors/list", 0]:
-                    raise NoBoxError(readable(str(reply.params[-1])))
+                elif about == REPLY and values[:2] == ["/sensors/list", 0]:
+                    raise NoBoxError(readable(str(values[-1])))
         raise self._nobody()
 
-    def _replies(self, message: Message) -> Generator[OscMessage, None, None]:
+    def _replies(self, message: Message) -> Generator[tuple[str, list[Any]], None, None]:
         """What the box sends back, until patience ends; nothing when no port is open there.
 
         To be closed by whoever asks: what is left to the collector would swallow a Ctrl-C in its closing.
@@ -115,11 +109,8 @@ class RunningBox:
             while (left_s := until - time.monotonic()) > 0:
                 asker.settimeout(left_s)
                 received = asker.recv(_LARGEST_DATAGRAM)
-                try:
-                    reply = OscMessage(received)
-                except Exception:  # python-osc raises many kinds; who listens there may be no box
-                    continue
-                yield reply
+                with contextlib.suppress(ValueError):  # no OSC: what listens there may be no box
+                    yield from messages_in(received)
 
     def _nobody(self) -> NoBoxError:
         if self._control is None:

@@ -39,13 +39,18 @@ STAGE_HUNG = Fallback(
     "starts it again, and the dance goes on where it was. If it goes on, look at its messages: "
     "journalctl -u bunraku-stage.",
 )
+COMMANDS_DROPPED = Fallback(
+    "commands-dropped",
+    "More commands came at once than show control carries out: the oldest gave way, without a reply. Panic, "
+    "blackout, stop and go went before them, and the dance goes on. Look which desk sends so many.",
+)
 SHOW_REFUSED = Fallback(
     "show-refused", "A show or box file is broken and was refused; the last good one dances."
 )
 SHOW_PUT_ASIDE = Fallback(
     "show-put-aside", "A new show did not dance and was put aside; the one before it dances."
 )
-OF_THE_COMPANY = (*DIED.values(), STAGE_HUNG, SHOW_REFUSED, SHOW_PUT_ASIDE)
+OF_THE_COMPANY = (*DIED.values(), STAGE_HUNG, COMMANDS_DROPPED, SHOW_REFUSED, SHOW_PUT_ASIDE)
 
 
 class CompanyWriter:

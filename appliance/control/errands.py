@@ -41,11 +41,31 @@ class _Errand:
 
 @dataclass(slots=True)
 class _Way:
-    """To one place: what waits, and how much may still be sent until when."""
+    """To one place: what waits, what goes before it, and how much may still be sent until when."""
 
+    first: _Errand | None = None
     waiting: deque[_Errand] = field(default_factory=deque)
     left: int = AT_ONCE
     fills_at: float = 0.0  # monotonic seconds
+
+    def next(self) -> _Errand | None:
+        """What is sent next; it stays until it is removed."""
+        return self.first or (self.waiting[0] if self.waiting else None)
+
+    def remove_next(self) -> None:
+        """It went, or nobody waits for it any more."""
+        if self.first:
+            self.first = None
+        else:
+            self.waiting.popleft()
+
+    def remove_late(self, now: float) -> list[_Errand]:
+        """What is older than anyone waits for."""
+        late = [self.first] if self.first and self.first.order.until < now else []
+        self.first = None if late else self.first
+        while self.waiting and self.waiting[0].order.until < now:
+            late.append(self.waiting.popleft())
+        return late
 
 
 class Errands:
@@ -61,13 +81,19 @@ class Errands:
         self._given_up: dict[int, _Errand] = {}
         self._asks = int.from_bytes(os.urandom(6), "little")  # answers to an earlier process are none of ours
 
-    def begin(self, place: Place, order: Order, now: float, then: Then) -> None:
-        """Have an order carried out within PATIENCE_S; `then` hears of it, later or at once."""
+    def begin(self, place: Place, order: Order, now: float, then: Then, first: bool = False) -> None:
+        """Have an order carried out within PATIENCE_S; `then` hears of it, later or at once.
+
+        first: before all that wait, in the place of the one that went first until now.
+        """
         self._asks += 1
-        order = replace(order, ask=self._asks, until=now + PATIENCE_S)
-        waiting = self._ways[place].waiting
-        given_way = waiting.popleft() if len(waiting) >= WAITING else None
-        waiting.append(_Errand(place, order, then))
+        errand = _Errand(place, replace(order, ask=self._asks, until=now + PATIENCE_S), then)
+        way = self._ways[place]
+        if first:
+            given_way, way.first = way.first, errand
+        else:
+            given_way = way.waiting.popleft() if len(way.waiting) >= WAITING else None
+            way.waiting.append(errand)
         if given_way is not None:
             given_way.then(False, _TOO_MANY)
         self._send(place, now)
@@ -83,7 +109,7 @@ class Errands:
     def due(self, now: float) -> float:
         """Monotonic seconds at which go_on has something to do without any answer; infinite: nothing."""
         times = [errand.order.until + ANSWER_S for errand in self._sent.values()]
-        times += [max(way.fills_at, now) for way in self._ways.values() if way.waiting]
+        times += [max(way.fills_at, now) for way in self._ways.values() if way.next()]
         return min(times, default=float("inf"))
 
     def _hear(self, answer: Answer) -> None:
@@ -97,12 +123,12 @@ class Errands:
         way = self._ways[place]
         if now >= way.fills_at:
             way.left, way.fills_at = AT_ONCE, now + EVERY_S
-        while way.waiting and way.left:
-            delivery = self._sender.send(place, way.waiting[0].order)
+        while way.left and (errand := way.next()):
+            delivery = self._sender.send(place, errand.order)
             if delivery == "full":
                 way.left = 0
                 return
-            errand = way.waiting.popleft()
+            way.remove_next()
             way.left -= 1
             if delivery == "sent":
                 self._sent[errand.order.ask] = errand
@@ -112,8 +138,7 @@ class Errands:
     def _give_up(self, now: float) -> None:
         """End what is older than anyone waits for."""
         for way in self._ways.values():
-            while way.waiting and way.waiting[0].order.until < now:
-                errand = way.waiting.popleft()
+            for errand in way.remove_late(now):
                 errand.then(False, _SILENT[errand.place])
         for ask in [ask for ask, errand in self._sent.items() if errand.order.until + ANSWER_S < now]:
             errand = self._given_up[ask] = self._sent.pop(ask)

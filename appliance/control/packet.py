@@ -1,29 +1,39 @@
-"""OSC packets as plain messages, both ways, with python-osc; what is none raises ValueError, nothing else."""
+"""OSC packets as plain messages, both ways; what is none raises ValueError, nothing else."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import struct
+from collections.abc import Iterator, Sequence
 
 from pythonosc.osc_message_builder import BuildError, OscMessageBuilder
-from pythonosc.osc_packet import OscPacket
 from pythonosc.parsing import osc_types
 
 Message = tuple[str | int | float, ...]  # an OSC address and its arguments
 MOST_MESSAGES = 64  # of a bundle; a desk that sends more at once sends several bundles
+DEEPEST_BUNDLE = 8
+BUNDLE = b"#bundle\0"  # how a bundle begins
+
+_HEAD_BYTES = 16  # of a bundle: BUNDLE, then the time tag
+_NUMBERS = {tag: struct.Struct(f">{packed}") for tag, packed in zip("ifhd", "ifqd", strict=True)}
+_CONSTANTS = {"T": True, "F": False, "N": None}
+_BANG = "I"  # a type tag without a value
+_NO_OSC = "This is no OSC."
 
 
 def messages_in(received: bytes) -> list[tuple[str, list[object]]]:
-    """Addresses and arguments of a datagram, bundles flattened, time tags taken as 'now'.
+    """Addresses and arguments of a datagram, bundles flattened in their order, time tags taken as 'now'.
 
-    Raises ValueError for what is no OSC, and for bundles of more than MOST_MESSAGES.
+    Each step goes forward in the datagram, so its length bounds time and memory. (python-osc's parser turns
+    for ever at an element of -4 bytes.) An argument of a type that no command takes, or that cannot be read,
+    is None, and the last one: /panic is heard whatever comes with it. Raises ValueError for what is no OSC,
+    and for bundles of more than MOST_MESSAGES or deeper than DEEPEST_BUNDLE.
     """
-    try:
-        messages = [timed.message for timed in OscPacket(received).messages]
-    except Exception as error:  # python-osc raises many kinds, RecursionError among them
-        raise ValueError("This is no OSC.") from error
-    if len(messages) > MOST_MESSAGES:
-        raise ValueError(f"A bundle of {len(messages)} messages is too long: send {MOST_MESSAGES} at most.")
-    return [(message.address, message.params) for message in messages]
+    messages: list[tuple[str, list[object]]] = []
+    for element in _elements(received, 0):
+        if len(messages) == MOST_MESSAGES:
+            raise ValueError(f"A bundle of so many messages is too long: send {MOST_MESSAGES} at most.")
+        messages.append(_message(element))
+    return messages
 
 
 def datagram(message: Message) -> bytes:
@@ -45,3 +55,67 @@ def readable(text: str) -> str:
 def is_readable(values: Sequence[object]) -> bool:
     """Whether the texts among them have no control characters in them."""
     return all(value.isprintable() for value in values if isinstance(value, str))
+
+
+def _elements(packet: bytes, depth: int) -> Iterator[bytes]:
+    """The messages of a packet, in their order, unread."""
+    if not packet.startswith(BUNDLE):
+        yield packet
+        return
+    if len(packet) < _HEAD_BYTES or depth == DEEPEST_BUNDLE:
+        raise ValueError(_NO_OSC)
+    at = _HEAD_BYTES
+    while at < len(packet):
+        size = int.from_bytes(packet[at : at + 4], "big", signed=True)
+        at += 4
+        if size <= 0 or size % 4 or at + size > len(packet):
+            raise ValueError(_NO_OSC)
+        yield from _elements(packet[at : at + size], depth + 1)
+        at += size
+
+
+def _message(packet: bytes) -> tuple[str, list[object]]:
+    try:
+        address, at = _text(packet, 0)
+    except ValueError:
+        raise ValueError(_NO_OSC) from None
+    if not address.startswith("/"):
+        raise ValueError(_NO_OSC)
+    return address, list(_arguments(packet, at))
+
+
+def _arguments(packet: bytes, at: int) -> Iterator[object]:
+    if at == len(packet):  # some senders leave the type tags out where there are no arguments
+        return
+    try:
+        tags, at = _text(packet, at)
+        if not tags.startswith(","):
+            raise ValueError(_NO_OSC)
+        for tag in tags[1:]:
+            if tag in _CONSTANTS:
+                yield _CONSTANTS[tag]
+            elif tag != _BANG:
+                value, at = _value(packet, at, tag)
+                yield value
+    except (ValueError, KeyError, struct.error):
+        yield None
+
+
+def _value(packet: bytes, at: int, tag: str) -> tuple[object, int]:
+    """An argument of this type, and the place behind it. Raises ValueError, KeyError, struct.error."""
+    if tag in "sS":
+        return _text(packet, at)
+    number = _NUMBERS[tag]
+    packed = packet[at : at + number.size]
+    if tag == "f":
+        packed = packed.ljust(number.size, b"\0")  # Reaktor leaves out zeros at the end
+    return number.unpack(packed)[0], at + number.size
+
+
+def _text(packet: bytes, at: int) -> tuple[str, int]:
+    """A text, and the place behind the zeros that fill it up. Raises ValueError."""
+    end = packet.index(0, at)
+    behind = end + 4 - (end - at) % 4
+    if behind > len(packet):
+        raise ValueError(_NO_OSC)
+    return packet[at:end].decode(), behind

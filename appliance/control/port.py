@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import socket
+import struct
 from collections.abc import Sequence
 
 from appliance.control.packet import Message, datagram
@@ -12,7 +13,8 @@ from appliance.sensor.ways.udp import bind_early
 
 LARGEST_DATAGRAM = 4096  # no command comes near; what is larger is none
 _SAY_EVERY_S = 60.0
-_WAITING_BYTES = 1 << 20  # or as much as the kernel allows: what may wait behind somebody's noise
+_WAITING_BYTES = 4 << 20  # or as much as net.core.rmem_max allows: what comes while this process does not run
+_SO_MEMINFO, _DROPS = 55, 8  # Linux, asm-generic/socket.h and linux/sock_diag.h: nine numbers, the last one
 
 Address = tuple[str, int]
 
@@ -67,6 +69,11 @@ class Port:
             self.too_large += 1
             return b"", sender
         return received, sender
+
+    def dropped(self) -> int:
+        """How many datagrams the kernel dropped, because too many waited."""
+        told = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * (_DROPS + 1))
+        return int(struct.unpack_from("=I", told, 4 * _DROPS)[0])
 
     def send(self, to: Address, message: Message) -> None:
         """Tell somebody; dropped when the network does not take it at once."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import select
 import signal
 import socket
@@ -16,6 +15,7 @@ from appliance.control.desk import Desk
 from appliance.control.errands import Errands
 from appliance.control.heartbeat import Heartbeat
 from appliance.control.house import House, HouseReader, HouseWriter
+from appliance.control.intake import Intake
 from appliance.control.key_file import KeyFile
 from appliance.control.news import News, held_back
 from appliance.control.notify import Notifier
@@ -26,7 +26,7 @@ from appliance.control.sight import StageSight
 from appliance.control.stop_signals import stop_signals
 
 _LONGEST_SLEEP_S = 0.25  # a stage that was started anew is found so soon
-_AT_ONCE = 64  # datagrams; then answers, heartbeat and signals have their turn
+_AT_ONCE = 16  # datagrams; then answers, heartbeat and signals have their turn
 _REST_S = 0.002  # after so many at once: a flood leaves the processor to others
 
 
@@ -41,18 +41,19 @@ class ControlProcess:
         with ExitStack() as opened:
             self.port = Port(socket.socket(fileno=settings.descriptor), settings.senders)
             opened.callback(self.port.close)
+            self._intake = Intake(self.port)
             house = _house_left(folder, now)
             writer = HouseWriter(folder)
             opened.callback(writer.close)
             sender = OrderSender(folder)
             opened.callback(sender.close)
-            sight = StageSight(folder)
-            opened.callback(sight.close)
+            self.sight = StageSight(folder)
+            opened.callback(self.sight.close)
             self._errands = Errands(sender)
             self._heartbeat = Heartbeat(settings.heartbeat, now)
             opened.callback(self._heartbeat.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
-            self.desk = Desk(house, sight, self._errands, keys, self.port.send, writer.write, monotonic)
+            self.desk = Desk(house, self.sight, self._errands, keys, self.port.send, writer.write, monotonic)
             self._poll = select.poll()
             for one in (self.port, sender):
                 self._poll.register(one.fileno(), select.POLLIN)
@@ -73,18 +74,17 @@ class ControlProcess:
         notifier.stopping()
 
     def turn(self) -> None:
-        """Everything that waits or is due.
+        """What waits, urgent commands first and no more than _AT_ONCE, and what is due.
 
         The clock is read after each datagram has come: this process may have been held up while it took it.
         """
         taken = 0
-        while taken < _AT_ONCE and (found := self.port.take()) is not None:
-            received, asker = found
+        while taken < _AT_ONCE and (found := self._intake.take()) is not None:
             taken += 1
-            if received:
-                self.desk.hear(received, asker, self._monotonic())
+            self.desk.hear(*found, self._monotonic())
         self._errands.go_on(self._monotonic())
         now = self._monotonic()
+        self.sight.note_dropped(self._intake.dropped + self.port.dropped(), now)
         self.desk.look(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.desk.status(self.port.strangers, now), now)
@@ -107,13 +107,14 @@ class ControlProcess:
         self._closing.close()
 
     def _sleep_s(self, now: float) -> float:
+        if not self._intake.is_empty:
+            return 0.0
         due = min(self._heartbeat.due, self._errands.due(now), now + _LONGEST_SLEEP_S)
         return max(due - now, 0.0)
 
 
 def control(settings: Settings, say: Callable[[str], None]) -> int:
     """Show control until SIGTERM, Ctrl-C or a closed terminal; the exit status."""
-    logging.disable(logging.CRITICAL)  # python-osc logs what it cannot read, in the sender's own signs
     with _waking_stop_signals() as (ended, wake):
         process = ControlProcess(settings, say)
         try:

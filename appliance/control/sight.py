@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from appliance.control.company import STAGE_HUNG, Company
+from appliance.control.company import COMMANDS_DROPPED, STAGE_HUNG, Company
 from appliance.control.fallback import Fallbacks, Fallen, fallen
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
@@ -19,7 +19,7 @@ class StageSight:
     def __init__(self, folder: Path) -> None:
         self._reader = FrameReader(folder)
         self._company = Company(folder)
-        self._seen = Fallbacks((STAGE_HUNG,))
+        self._seen = Fallbacks((STAGE_HUNG, COMMANDS_DROPPED))
 
     def state(self, now: float) -> StageState:
         """hung: the process lives, but no frame came for half a second; absent: no process, or none yet."""
@@ -37,6 +37,10 @@ class StageSight:
     def health(self) -> dict[str, Any]:
         """What the stage last said about itself; empty before it did."""
         return self._reader.health() or {}
+
+    def note_dropped(self, total: int, now: float) -> None:
+        """How many datagrams at the control port gave way, since it was opened."""
+        self._seen.follow(COMMANDS_DROPPED.name, total, now)
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
         """Process and fallback, of all processes of the box, as far as they ever happened."""

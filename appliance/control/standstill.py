@@ -50,4 +50,4 @@ class Standstill:
             if done:
                 self._stands = name == "stop"
 
-        self._errands.begin("stage", Order(name), now, then)
+        self._errands.begin("stage", Order(name), now, then, first=True)

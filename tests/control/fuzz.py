@@ -1,13 +1,22 @@
-"""Datagrams that nobody should send: noise, damaged commands, bundles, nests, numbers out of all bounds."""
+"""Datagrams that nobody should send: noise, damaged commands, bundles, nests, numbers out of all bounds.
+
+`python -m tests.control.fuzz SEED COUNT` reads them under limits of time and memory.
+"""
 
 from __future__ import annotations
 
 import math
+import os
 import random
+import resource
+import signal
 import struct
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 from appliance.control.command import FORMS
+from appliance.control.packet import MOST_MESSAGES, messages_in
 
 _NUMBERS = [0, 1, -1, 2, 65, 2**31 - 1, -(2**31)]
 _FLOATS = [0.0, 1.0, 0.5, -1.0, 1e30, math.nan, math.inf, -math.inf, 60.1]
@@ -36,6 +45,13 @@ def message(address: str, *arguments: object) -> bytes:
         else:
             tags, body = tags + "s", body + _text(str(argument))
     return _text(address) + _text(tags) + body
+
+
+def bundle(*elements: bytes) -> bytes:
+    """What is in it is not looked at."""
+    return (
+        b"#bundle\0" + struct.pack(">Q", 1) + b"".join(struct.pack(">i", len(one)) + one for one in elements)
+    )
 
 
 def _text(text: str) -> bytes:
@@ -75,9 +91,31 @@ def _bundle(chance: random.Random, depth: int = 0) -> bytes:
     bundle = b"#bundle\0" + chance.choice([struct.pack(">Q", 1), chance.randbytes(8)])
     for _ in range(chance.choice([0, 1, 2, 5, 70])):
         inner = _bundle(chance, depth + 1) if depth < 3 and chance.random() < 0.1 else _some_command(chance)
-        size = len(inner) if chance.random() < 0.9 else chance.choice([-1, 0, 3, 2**31 - 1])
+        size = len(inner) if chance.random() < 0.9 else chance.choice(_sizes(len(bundle)))
         bundle += struct.pack(">i", size) + inner
     return bundle
+
+
+def _sizes(at: int) -> list[int]:
+    """Of an element at this byte, untrue: back to itself, to the one before it, to all places before."""
+    return [-4, -8, -12, -20, -24, -4 - at, 12 - at, -at, -1, 0, 3, 4, 2**31 - 1, -(2**31)]
+
+
+def _returns(chance: random.Random) -> bytes:
+    """A bundle of a few messages, and sizes that lead back into them."""
+    bundle = b"#bundle\0" + struct.pack(">Q", 1)
+    for _ in range(chance.randrange(4)):
+        inner = _some_command(chance)
+        bundle += struct.pack(">i", len(inner)) + inner
+    return bundle + struct.pack(">i", chance.choice(_sizes(len(bundle))))
+
+
+def _blobs(chance: random.Random) -> bytes:
+    """Texts and blobs of untrue lengths, which lead back to the texts."""
+    count = chance.choice([1, 10, 400])
+    body = b"x" * chance.choice([0, 4, 1000]) + b"\0" * 4
+    body += b"".join(struct.pack(">i", chance.choice(_sizes(len(body)))) for _ in range(count))
+    return _text(chance.choice(list(FORMS))) + _text("," + "sb" * count) + body
 
 
 def _nest(chance: random.Random) -> bytes:
@@ -98,6 +136,37 @@ _KINDS = (
     *(_noise,) * 4,
     *(_tags,) * 2,
     *(_bundle,) * 2,
+    _returns,
+    _blobs,
     _nest,
     _huge,
 )
+
+
+_WITHIN_S, _WITHIN_BYTES = 5, 64 << 20  # for one datagram; more than it has so far, for all
+
+
+def _read_all(seed: int, count: int) -> None:
+    """Ends the process with words about the datagram that takes too long, too much, or raises."""
+    has_bytes = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (has_bytes + _WITHIN_BYTES,) * 2)
+    received = b""
+
+    def end(*_: object) -> None:
+        print(f"seed {seed}: not read within {_WITHIN_S} s: {received.hex()}", flush=True)
+        os._exit(1)
+
+    signal.signal(signal.SIGALRM, end)
+    for received in datagrams(seed, count):
+        signal.alarm(_WITHIN_S)
+        try:
+            assert len(messages_in(received)) <= MOST_MESSAGES
+        except ValueError:
+            continue
+        except BaseException as error:
+            sys.exit(f"seed {seed}: {error!r}: {received.hex()}")
+    print("all read")
+
+
+if __name__ == "__main__":
+    _read_all(int(sys.argv[1]), int(sys.argv[2]))

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import time
-from collections.abc import Iterator
 from pathlib import Path
-
-import pytest
 
 from appliance.control.desk import Desk
 from appliance.control.errands import WAITING, Errands
@@ -25,15 +21,6 @@ COUNT, OVER_THE_SOCKET = 100_000, 10_000
 SOMEBODY = ("127.0.0.1", 5000)
 
 
-@pytest.fixture
-def quiet_library() -> Iterator[None]:
-    """As in the process: python-osc logs each type tag that it does not know."""
-    logging.disable(logging.CRITICAL)
-    yield
-    logging.disable(logging.NOTSET)
-
-
-@pytest.mark.usefixtures("quiet_library")
 def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
     folder: Path, key_file: Path, stage: StageDouble
 ) -> None:

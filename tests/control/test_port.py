@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.control.packet import datagram, messages_in
+from appliance.control.packet import datagram
 from appliance.control.port import LARGEST_DATAGRAM, Address, Port, open_port
 from tests.control.doubles import Asker, ControlInThread, until
 from tests.system.namespace import Cable, Namespace, why_not
@@ -160,18 +160,6 @@ def test_an_asker_out_of_reach_hears_nothing_and_nothing_happens(send: Callable[
     send(port)
     port.take()
     port.close()
-
-
-def test_time_tags_are_now_and_bundles_are_flat() -> None:
-    from pythonosc.osc_bundle_builder import OscBundleBuilder
-    from pythonosc.osc_message_builder import OscMessageBuilder
-
-    inner = OscBundleBuilder(2_000_000_000)
-    inner.add_content(OscMessageBuilder("/go").build())
-    outer = OscBundleBuilder(2_050_000_000)
-    outer.add_content(inner.build())
-    outer.add_content(OscMessageBuilder("/stop").build())
-    assert sorted(messages_in(outer.build().dgram)) == [("/go", []), ("/stop", [])]
 
 
 def test_a_port_takes_over_the_socket_that_another_process_has_bound() -> None:

@@ -31,7 +31,8 @@ class Errands:
         self.names: list[str] = []
         self.thens: list[Then] = []
 
-    def begin(self, place: str, order: Order, now: float, then: Then) -> None:
+    def begin(self, place: str, order: Order, now: float, then: Then, first: bool = False) -> None:
+        assert first  # before all that wait
         self.names.append(order.name)
         self.thens.append(then)
 
