@@ -13,8 +13,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from appliance.control.lifeline import hold_lifeline
-from appliance.stage.realtime import prepare_environment, spare_the_collector
+from appliance.box.parent_death import hold_lifeline
+from appliance.box.realtime import prepare_environment, spare_the_collector
 
 _PATHS = ("--show", "--box", "--journal", "--chosen")
 _SECONDS, _ALONE = "--seconds", "--alone"
@@ -30,12 +30,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         faulthandler.enable()  # the watchdog's signal prints the line that hung
     given = list(sys.argv[1:] if arguments is None else arguments)
     if given[:1] == ["preflight"] and "--help" not in given:
-        from appliance.commands.preflight import main as preflight
+        from appliance.cli.preflight import main as preflight
 
         sys.exit(preflight(given[1:]))
     wishes = wishes_to_play(given)
     if wishes is None:
-        from appliance.cli import main as any_command
+        from appliance.cli.app import main as any_command
 
         any_command(given)
         return
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         sys.exit(_play(wishes))
     except Exception as error:
-        from appliance.cli import refuse
+        from appliance.cli.app import refuse
 
         refuse(error)
 
@@ -75,11 +75,11 @@ def wishes_to_play(given: Sequence[str]) -> Wishes | None:
 
 
 def _play(wishes: Wishes) -> int:
-    from appliance.commands.play import play_show
+    from appliance.cli.play import play_show
 
     chosen = wishes.pop("chosen", None)
     if isinstance(chosen, Path):
-        from appliance.commands.trying import ended_well, pair_to_dance
+        from appliance.release.start_attempts import ended_well, pair_to_dance
 
         pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
         wishes |= {"show": pair.show, "box": pair.box}

@@ -207,7 +207,7 @@ build() {
     in_root "$inside/bin/python" -I -m compileall -q -j 0 -s "$inside" -p "$home/releases/$name" "$inside/lib" ||
         fail "a part of bunraku $version cannot be read by Python (above). The box dances as before."
     # What the show that comes with the box needs at its start is worked out now, not at each power-on.
-    in_root "$inside/bin/python" -I -m appliance.commands.prepare_show ||
+    in_root "$inside/bin/python" -I -m appliance.cli.prepare_show ||
         echo "The show that comes with the box is not prepared (above): the box starts somewhat slower."
     for file in system release SHA256SUMS install.sh; do mv "$part/source/$file" "$part/"; done
     chmod 755 "$part/install.sh"

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from appliance.pictures.figure import Frame, render
 from appliance.pose import quaternion
 from appliance.pose.body import Body
 from appliance.pose.bvh import read_bvh
-from appliance.pose.figure import Frame, render
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 

@@ -79,7 +79,7 @@ def test_the_trap_for_torch_works() -> None:
 
 
 def test_the_command_answers_without_torch() -> None:
-    done = run_blocked("from appliance.cli import main\nmain(['--help'])")
+    done = run_blocked("from appliance.cli.app import main\nmain(['--help'])")
     assert done.returncode == 0, done.stderr
     for command in ("play", "check", "filmstrip", "emulate"):
         assert re.search(rf"\b{command}\b", done.stdout), done.stdout

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from appliance import cli
-from appliance.commands.play import play_show
+from appliance.cli import app as cli
+from appliance.cli.play import play_show
 from appliance.start import wishes_to_play
 
 
@@ -90,7 +90,7 @@ def test_mistakes_are_one_line_as_everywhere(tmp_path: Path) -> None:
 
 def test_playing_loads_no_parser_no_simulation_and_no_other_process_s_parts() -> None:
     """What a start loads keeps the stage black after a crash."""
-    words = "import sys, appliance.start, appliance.commands.play; print(*sorted(sys.modules))"
+    words = "import sys, appliance.start, appliance.cli.play; print(*sorted(sys.modules))"
     ran = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
     loaded = set(ran.stdout.split())
     needless = {
@@ -101,7 +101,7 @@ def test_playing_loads_no_parser_no_simulation_and_no_other_process_s_parts() ->
         "matplotlib",
         "onnx",
         "torch",
-        "appliance.commands.emulation",
+        "appliance.cli.emulation",
     }
-    needless |= {"appliance.cli", "appliance.commands.companions", "appliance.projector", "subprocess"}
+    needless |= {"appliance.cli", "appliance.cli.companions", "appliance.projector", "subprocess"}
     assert not loaded & needless

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 import time
 
-from appliance.control.notify import Notifier
-from appliance.control.stop_signals import stop_signals
+from appliance.box.notify import Notifier
+from appliance.box.stop_signals import stop_signals
 
 _WORDS = "The technician's page comes with a later release. Nothing listens here."
 _LOOK_S = 0.2  # at power-off the stage waits for it

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from appliance.dancer.figure import Figure, soles_of
+from appliance.dancer.forward_kinematics import Figure, soles_of
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from appliance.lights.patch import Patch
-from appliance.pose.filmstrip import MissingPicturesError
+from appliance.pictures.filmstrip import MissingPicturesError
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.show.lights import FixtureConfig

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from appliance.control.house import House
-from appliance.control.pace import Pace
+from appliance.box.pace import Pace
+from appliance.box.show_state import House
 from appliance.lights.colour import mixed
 from appliance.lights.dance import Dance
 from appliance.lights.head import LONGEST_STEP_S

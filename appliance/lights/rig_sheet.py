@@ -8,14 +8,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from appliance.control.house import House
+from appliance.box.show_state import House
 from appliance.lights.patch import Patch
 from appliance.lights.plan import draw_plan
 from appliance.lights.rig import Rig
 from appliance.lights.run import rig_problems, say
 from appliance.outputs.frame_reader import SeenFrame
+from appliance.pictures.filmstrip import MissingPicturesError
 from appliance.pose.bvh import read_bvh
-from appliance.pose.filmstrip import MissingPicturesError
 from appliance.pose.recording import Recording
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path

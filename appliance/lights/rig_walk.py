@@ -6,11 +6,11 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from appliance.control.stop_signals import stop_signals
+from appliance.box.runtime_folder import Claim, runtime_folder
+from appliance.box.stop_signals import stop_signals
 from appliance.lights.patch import Patch
 from appliance.lights.run import require_wires, rig_here, say, wired
 from appliance.lights.walk import steps, walk
-from appliance.outputs.runtime_folder import Claim, runtime_folder
 from appliance.show.box import load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.config_error import ConfigError, Problem, did_you_mean

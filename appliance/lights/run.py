@@ -9,20 +9,20 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
-from appliance.control.company import CompanyWriter
-from appliance.control.fallback import Fallbacks
-from appliance.control.house import HouseReader
-from appliance.control.notify import Notifier
-from appliance.control.speaker import Speaker
-from appliance.control.stop_signals import stop_signals
-from appliance.lights.bill import Bill
+from appliance.box.fallback import Fallbacks
+from appliance.box.log_writer import Speaker
+from appliance.box.notify import Notifier
+from appliance.box.process_health import CompanyWriter
+from appliance.box.runtime_folder import Claim, runtime_folder
+from appliance.box.show_state import HouseReader
+from appliance.box.stop_signals import stop_signals
+from appliance.lights.active_show import Bill
 from appliance.lights.fallback import DMX_AWAY, OF_THE_LIGHTS, STAGE_UNSEEN
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
 from appliance.outputs.dmx.open_wire import open_universes
 from appliance.outputs.dmx.pace import Universe
 from appliance.outputs.frame_reader import FrameReader, SeenFrame
-from appliance.outputs.runtime_folder import Claim, runtime_folder
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError, NotAskedForError, Problem
 from appliance.show.lights import LightsConfig

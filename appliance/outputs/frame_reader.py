@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.outputs.ring_file import RingFileReader
+from appliance.box.ring_file import RingFileReader
 from appliance.outputs.shared_frame import (
     FACTS,
     FILE,

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from appliance.box.ring_file import RingFileWriter
 from appliance.outputs.joint_frame import JointFrame
-from appliance.outputs.ring_file import RingFileWriter
 from appliance.pose.skeleton import Skeleton
 
 FILE, KIND, FORMAT, WRITER = "frame", "frame", 1, "the stage (bunraku play)"

@@ -12,8 +12,8 @@ from typing import Any
 
 import yaml
 
+from appliance.box.private_file import replace_private
 from appliance.projector.corners import WHOLE, Corners, complaint
-from appliance.sensor.private_file import replace_private
 from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from appliance.control.fallback import Fallback
+from appliance.box.fallback import Fallback
 
 STAGE_UNSEEN = Fallback(
     "picture-black",

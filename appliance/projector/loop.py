@@ -8,7 +8,7 @@ from typing import Protocol
 import moderngl
 import numpy as np
 
-from appliance.control.house import HouseReader
+from appliance.box.show_state import HouseReader
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
 from appliance.pose.skeleton import Skeleton

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from appliance.control.pace import Pace
+from appliance.box.pace import Pace
 from appliance.projector.pacing import USUAL_RATE
 
 STALE_S = 0.5

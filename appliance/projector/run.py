@@ -10,13 +10,12 @@ from pathlib import Path
 
 import moderngl
 
-from appliance.control.company import CompanyWriter
-from appliance.control.fallback import Fallbacks
-from appliance.control.house import HouseReader
-from appliance.control.notify import Notifier
-from appliance.control.orders import OrderInbox
+from appliance.box.fallback import Fallbacks
+from appliance.box.notify import Notifier
+from appliance.box.process_health import CompanyWriter
+from appliance.box.runtime_folder import AlreadyHereError, Claim, runtime_folder
+from appliance.box.show_state import HouseReader
 from appliance.outputs.frame_reader import FrameReader
-from appliance.outputs.runtime_folder import AlreadyHereError, Claim, runtime_folder
 from appliance.projector.advice import about_resolution, about_software
 from appliance.projector.alignment import AlignmentFile, alignment_folder
 from appliance.projector.context import GlContext
@@ -32,6 +31,7 @@ from appliance.projector.resolution import Resolution
 from appliance.projector.watchdog import Patience, end_process, guarded
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
+from appliance.show_control.orders import OrderInbox
 
 _ORDERS_A_PICTURE = 8
 _REPORT_S = 1.0

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import yaml
 
+from appliance.box.private_file import put_in_place, write_beside
 from appliance.sensor.keys import (
     HEADER,
     KeyFileError,
@@ -24,7 +25,6 @@ from appliance.sensor.keys import (
     read_text,
     unknown_sensor,
 )
-from appliance.sensor.private_file import put_in_place, write_beside
 
 _PATIENCE_S = 2.0  # another change of the file takes milliseconds; a provisioning, as long as its cable
 

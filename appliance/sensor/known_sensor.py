@@ -10,7 +10,7 @@ from appliance.sensor.keys import SensorKey
 from appliance.sensor.pairing import LOST_S, Pairing
 from appliance.sensor.plausibility import Orientation, PlausibilityGate
 from appliance.sensor.state import Reception, SensorReading, SensorState
-from appliance.sensor.ways.intake import Way
+from appliance.sensor.transports.transport import Way
 
 
 class KnownSensor:

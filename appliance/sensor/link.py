@@ -16,9 +16,9 @@ from appliance.sensor.memory_text import with_profile
 from appliance.sensor.pairing import NO_HAND, Pairing
 from appliance.sensor.state import SensorReading as SensorReading
 from appliance.sensor.state import SensorState as SensorState
-from appliance.sensor.ways.intake import Intake, Way
-from appliance.sensor.ways.serial import SerialIntake
-from appliance.sensor.ways.udp import UdpIntake
+from appliance.sensor.transports.serial import SerialIntake
+from appliance.sensor.transports.transport import Intake, Way
+from appliance.sensor.transports.udp import UdpIntake
 
 ATTEND_S = 1.0
 HEARTBEATS_APART = 8  # sensors in the key file's order get theirs at different eighths of a second

@@ -18,7 +18,7 @@ from appliance.sensor import wire
 from appliance.sensor.answering import Answering
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.sequence import SequenceWindow
-from appliance.sensor.ways.intake import Way
+from appliance.sensor.transports.transport import Way
 
 RATE_HZ = 50
 HEARTBEAT_S = 1.0

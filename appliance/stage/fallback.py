@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from appliance.control.fallback import Fallback, Fallbacks, Fallen
+from appliance.box.fallback import Fallback, Fallbacks, Fallen
 from appliance.dancer.puppeteers import HOLD_S
-from appliance.stage.budget import Admission
-from appliance.stage.cast import Cast
+from appliance.stage.admission import Admission
 from appliance.stage.health import Health
-from appliance.stage.resuming import Resuming
+from appliance.stage.resume import Resuming
+from appliance.stage.stage_parts import Cast
 
 SENSOR_SILENT = Fallback(
     "sensor-silent",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from appliance.stage.clock import TICK_S
+from appliance.box.clock import TICK_S
 
 WINDOW = 64  # arrivals, 1.3 s: at 200 ppm of clock drift their phase smears by 0.26 ms
 ENOUGH = 16  # arrivals before the grid moves at all

@@ -7,24 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from appliance.control.orders import Order
+from appliance.box.clock import Slot
 from appliance.dancer.puppet import Puppet
 from appliance.dancer.slerp import FloatArray
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.keyframe import unpacked
+from appliance.recorder.reading import DAMAGED, Run
+from appliance.recorder.record import NOT_FINITE, ORDER
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show
-from appliance.stage.cast import assemble
-from appliance.stage.clock import Slot
+from appliance.show_control.orders import Order
+from appliance.stage.carry_out import carry_out
+from appliance.stage.comparison import Comparison
 from appliance.stage.iterations import Iterations
-from appliance.stage.journal.comparison import Comparison
-from appliance.stage.journal.journal_error import JournalError
-from appliance.stage.journal.keyframe import unpacked
-from appliance.stage.journal.reading import DAMAGED, Run
-from appliance.stage.journal.record import NOT_FINITE, ORDER
-from appliance.stage.obey import carry_out
+from appliance.stage.sensor_fit import Wearing
 from appliance.stage.sensor_memory import SensorMemory
+from appliance.stage.stage_parts import assemble
 from appliance.stage.tick import Tick
-from appliance.stage.wearing import Wearing
 
 _NO_PORTS = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]), control=None)
 

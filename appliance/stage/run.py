@@ -6,33 +6,33 @@ from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
 
-from appliance.control.house import HouseReader
-from appliance.control.notify import Notifier
-from appliance.control.orders import Order, OrderInbox
+from appliance.box.clock import Slot, TickClock
+from appliance.box.notify import Notifier
+from appliance.box.realtime import enter_realtime, leave_realtime
+from appliance.box.show_state import HouseReader
+from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
 from appliance.sensor.link import SensorState
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
-from appliance.stage.admitted import admitted
-from appliance.stage.budget import Admission
-from appliance.stage.cast import Cast, assemble
-from appliance.stage.clock import Slot, TickClock
+from appliance.show_control.orders import Order, OrderInbox
+from appliance.stage.admission import Admission
+from appliance.stage.admission_cache import admitted
+from appliance.stage.carry_out import carry_out, resume
 from appliance.stage.fallback import StageFallbacks
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
-from appliance.stage.journal.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
-from appliance.stage.journal.recorder import Recorder
-from appliance.stage.obey import carry_out, resume
 from appliance.stage.phase_lock import PhaseLock
-from appliance.stage.prepared import MEMORY
-from appliance.stage.realtime import enter_realtime, leave_realtime
-from appliance.stage.resuming import Resuming
-from appliance.stage.roster import roster_lines
+from appliance.stage.phrase_cache import MEMORY
+from appliance.stage.recorder import Recorder
+from appliance.stage.resume import Resuming
+from appliance.stage.sensor_fit import Wearing
+from appliance.stage.sensor_lines import roster_lines
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.sharing import Sharing, facts_of
 from appliance.stage.stage_error import StageError
+from appliance.stage.stage_parts import Cast, assemble
 from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
-from appliance.stage.wearing import Wearing
 
 _ORDERS_A_TICK = 4  # show control sends no more in that time
 _WARM_UP_MARGIN_MS = 0.5

@@ -6,9 +6,9 @@ import contextlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from appliance.sensor.memory_block import FILE_NAME, MemoryReader, MemoryWriter, text_on_disk
 from appliance.sensor.memory_text import DamagedMemoryError, Worn, memory_text, remembered, with_profile
 from appliance.sensor.neutral import NeutralPose
-from appliance.stage.sensor_memory_block import FILE_NAME, MemoryReader, MemoryWriter, text_on_disk
 
 
 class SensorMemory:

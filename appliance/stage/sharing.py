@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from appliance.outputs.runtime_folder import Claim, RuntimeFolderError, runtime_folder
+from appliance.box.runtime_folder import Claim, RuntimeFolderError, runtime_folder
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
-from appliance.stage.cast import Cast
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.stage_error import StageError
+from appliance.stage.stage_parts import Cast
 from appliance.stage.thermometer import Thermometer
 
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.box.clock import Slot
 from appliance.outputs.joint_frame import JointFrame
+from appliance.recorder.record import SECTIONS
 from appliance.sensor.link import SensorReading
-from appliance.stage.cast import Cast
-from appliance.stage.clock import Slot
 from appliance.stage.iterations import Iterations
-from appliance.stage.journal.record import SECTIONS
-from appliance.stage.wearing import Wearing
+from appliance.stage.sensor_fit import Wearing
+from appliance.stage.stage_parts import Cast
 
 _STANDING = ("pose", "world", "positions", "root")  # arrays of a frame
 DRAIN, MOTION, HANDS, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))

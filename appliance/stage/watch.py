@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence, Set
 
 from appliance.sensor import wire
 from appliance.sensor.state import LOW_BATTERY, SensorState
-from appliance.stage.cast import Cast
+from appliance.stage.stage_parts import Cast
 
 SILENT_S = 0.5
 CHARGED = 25  # percent: above it a low battery may be said again

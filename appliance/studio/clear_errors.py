@@ -30,8 +30,8 @@ def clear_errors(command: str) -> Iterator[None]:
 
 
 def _is_for_people(error: Exception) -> bool:
+    from appliance.pictures.filmstrip import MissingPicturesError
     from appliance.pose.bvh import BvhError
-    from appliance.pose.filmstrip import MissingPicturesError
     from appliance.show.config_error import ConfigError
     from appliance.studio.data.dataset import DatasetError
     from appliance.studio.studio_error import StudioError

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from tests.control.doubles import Asker, control_process
-from tests.control.flood import KINDS, STRANGERS, stranger
+from tests.show_control.doubles import Asker, control_process
+from tests.show_control.flood import KINDS, STRANGERS, stranger
 
 GROUP = "/panic -> its reply, 10,000 other datagrams a second"
 ROUNDS = 200
@@ -30,7 +30,7 @@ def flooded(folder: Path, tmp_path: Path) -> Iterator[Callable[[str], Asker]]:
             desk = opened.enter_context(closing(Asker(port)))
             assert desk.ask("/ping") == ["/pong"]
             if kind in KINDS:
-                command = [sys.executable, "-m", "tests.control.flood", str(port), kind]
+                command = [sys.executable, "-m", "tests.show_control.flood", str(port), kind]
                 flood = opened.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE))
                 opened.callback(lambda: _end(flood))
                 assert flood.stdout is not None and flood.stdout.readline()

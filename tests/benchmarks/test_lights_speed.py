@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.control.house import House
+from appliance.box.show_state import House
 from appliance.lights.patch import Patch
 from appliance.lights.rig import Rig
 from appliance.outputs.frame_reader import SeenFrame

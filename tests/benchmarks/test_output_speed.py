@@ -12,7 +12,7 @@ import pypsn
 import pytest
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from appliance.dancer.figure import Figure
+from appliance.dancer.forward_kinematics import Figure
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.osc.dialects import DIALECTS

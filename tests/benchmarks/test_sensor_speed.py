@@ -14,8 +14,8 @@ import pytest
 
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, open_link
-from appliance.sensor.ways import udp
-from appliance.sensor.ways.udp import UdpIntake
+from appliance.sensor.transports import udp
+from appliance.sensor.transports.udp import UdpIntake
 from tests.sensor.flood import flood
 from tests.sensor.peers import KEYS, Wearable
 from tests.sensor.test_udp import Radio

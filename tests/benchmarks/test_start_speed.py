@@ -15,9 +15,9 @@ import yaml
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
-from appliance.stage.cast import assemble
 from appliance.stage.iterations import Iterations
-from appliance.stage.resuming import Resuming
+from appliance.stage.resume import Resuming
+from appliance.stage.stage_parts import assemble
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST
 

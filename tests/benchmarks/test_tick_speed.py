@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
+from appliance.box.clock import TICK_S, Slot
 from appliance.sensor.keys import SensorKey, create_keys
-from appliance.sensor.ways.udp import UdpIntake
+from appliance.sensor.transports.udp import UdpIntake
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig, UdpConfig
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
-from appliance.stage.cast import Cast, assemble
-from appliance.stage.clock import TICK_S, Slot
 from appliance.stage.iterations import Iterations
+from appliance.stage.sensor_fit import Wearing
 from appliance.stage.sensor_memory import SensorMemory
+from appliance.stage.stage_parts import Cast, assemble
 from appliance.stage.tick import Tick
-from appliance.stage.wearing import Wearing
 from hw_sim.motions import turning
 from tests.hw_sim.paired import PairedSensor
 

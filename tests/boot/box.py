@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from appliance.stage.place import Place, PlaceReader
+from appliance.box.checkpoint import Place, PlaceReader
 from tests.boot.disk import DataDisk
 from tests.boot.hall import Hall, box_file
 from tests.boot.machine import PATIENCE_S, Machine, PowerOn

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from appliance.stage.place import Place
+from appliance.box.checkpoint import Place
 from tests.boot.box import KEYS, Box
 from tests.boot.figures import Figures
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from appliance.stage.place import Place
+from appliance.box.checkpoint import Place
 from tests.boot.box import STAGE, Box
 from tests.boot.figures import Figures
 from tests.boot.pauses import Seen, lives, missing_ticks, step_m

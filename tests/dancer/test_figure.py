@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from appliance.dancer.figure import Figure, soles_of
+from appliance.dancer.forward_kinematics import Figure, soles_of
 from appliance.dancer.grounding import sole_positions
 from appliance.pose.bvh import read_bvh
 from appliance.pose.skeleton import Skeleton

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.stage.keeper import END_S
+from appliance.keeper.keeper import END_S
 
 SYSTEM = Path(__file__).resolve().parents[2] / "deploy" / "system"
 UNITS = SYSTEM / "usr/lib/systemd/system"

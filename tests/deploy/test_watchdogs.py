@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.control.supervisor import Supervisor
+from tests.show_control.supervisor import Supervisor
 
 PATIENCE_S = 60.0  # a machine that does ten other things starts a process slowly
 NO_DISPLAY = {"SDL_VIDEODRIVER": "none-such"}
 LATE_DISPLAY = """
 import sys
 from pathlib import Path
-from appliance.projector import project_command
+from appliance.cli import project as project_command
 project_command._RETRY_S = 0.2
 window = project_command.wish(True, False, None, None, None, False)
 sys.exit(project_command.project_show(Path(sys.argv[1]), window, waits=True))

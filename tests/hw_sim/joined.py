@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, SensorReading
-from appliance.sensor.ways.intake import Origin
+from appliance.sensor.transports.transport import Origin
 from hw_sim.device import Device, Way
 from hw_sim.emulator import Emulator, Sent
 from hw_sim.motions import Quaternion

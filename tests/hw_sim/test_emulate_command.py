@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorLink, SensorReading, open_link
-from appliance.sensor.ways.udp import UdpIntake
+from appliance.sensor.transports.udp import UdpIntake
 from hw_sim.__main__ import main
 from tests.hw_sim.conftest import Emulate
 from tests.hw_sim.null_modem import NullModem

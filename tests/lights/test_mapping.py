@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from appliance.control.house import House
+from appliance.box.show_state import House
 from appliance.lights.curve import bent, eased, share
 from appliance.lights.dance import lean, turn
 from appliance.lights.rig import Rig

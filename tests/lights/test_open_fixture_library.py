@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from appliance.cli import app
+from appliance.cli.app import app
 from appliance.lights.open_fixture_library import LibraryError, profile_values
 from appliance.lights.patch import Patch
 from appliance.show.fixture_profile import load_profile
@@ -230,7 +230,7 @@ def test_modes_larger_than_a_universe_are_left_out_and_said() -> None:
 def test_other_files_are_refused_in_words_and_nothing_is_written(
     tmp_path: Path, content: str, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from appliance.cli import main
+    from appliance.cli.app import main
 
     source = tmp_path / "x.json"
     source.write_text(content)

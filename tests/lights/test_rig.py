@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.control.house import House
+from appliance.box.show_state import House
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LEAVING_FADE_S, LOST_S, SAFE_FADE_S, Rig
 from tests.lights.rigs import SKELETON, frame, lights, rig

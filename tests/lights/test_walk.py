@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 import yaml
 
-from appliance.cli import main
+from appliance.box.runtime_folder import Claim
+from appliance.cli.app import main
 from appliance.lights.patch import Patch
 from appliance.lights.walk import Walk, introduction, steps, walk
-from appliance.outputs.runtime_folder import Claim
 from appliance.show.bundle import default_show_path
 from hw_sim.dmx.artnet import ArtNetReceiver
 from hw_sim.peers import HOST

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from appliance.outputs.block import BlockReader, BlockWriter
-from appliance.outputs.ring import Ring
+from appliance.box.block import BlockReader, BlockWriter
+from appliance.box.ring import Ring
 
 KIND, CAPACITY = "test", 1000
 RING = Ring(at=128, slots=2, capacity=CAPACITY)

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from appliance.outputs.runtime_folder import AlreadyHereError, Claim, RuntimeFolderError, runtime_folder
+from appliance.box.runtime_folder import AlreadyHereError, Claim, RuntimeFolderError, runtime_folder
 from appliance.show.box import BoxConfig
 
 HOLDS = (
     "import sys, time\n"
     "from pathlib import Path\n"
-    "from appliance.outputs.runtime_folder import Claim\n"
+    "from appliance.box.runtime_folder import Claim\n"
     "claim = Claim(Path(sys.argv[1]), 'stage')\n"
     "print('held', flush=True)\n"
     "time.sleep(60)\n"

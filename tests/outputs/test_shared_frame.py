@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.box.ring import Ring
+from appliance.box.ring_file import RingFileWriter
 from appliance.outputs import shared_frame
 from appliance.outputs.frame_reader import STALE_S, FrameReader, SeenFrame
 from appliance.outputs.joint_frame import JointFrame
-from appliance.outputs.ring import Ring
-from appliance.outputs.ring_file import RingFileWriter
 from appliance.outputs.shared_frame import FRAME_SLOTS, Facts, FrameLayout, FrameWriter
 from appliance.pose.skeleton import Skeleton
 from tests.outputs.conftest import fill

@@ -11,10 +11,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from appliance.pictures.figure import Frame, floor_shadow, render
+from appliance.pictures.filmstrip import VERMILION, Strip, draw_filmstrip, draw_strips
 from appliance.pose import quaternion
 from appliance.pose.body import Body, Cones
-from appliance.pose.figure import Frame, floor_shadow, render
-from appliance.pose.filmstrip import VERMILION, Strip, draw_filmstrip, draw_strips
 from appliance.pose.skeleton import Skeleton
 
 FRAME = Frame(100, 80, 50.0, 40.0, 100.0)
@@ -195,7 +195,7 @@ WITHOUT_MATPLOTLIB = """
 import sys
 sys.modules["matplotlib"] = None
 import numpy as np
-from appliance.pose.filmstrip import MissingPicturesError, draw_filmstrip
+from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
 from appliance.pose.skeleton import Skeleton
 lonely = Skeleton(("hip",), (-1,), np.zeros((1, 3)))
 try:

@@ -12,7 +12,7 @@ import pytest
 
 from appliance.projector import keyboards as module
 from appliance.projector.keyboards import Key, Keyboards
-from tests.control.doubles import Clock
+from tests.show_control.doubles import Clock
 
 Q, C, LEFT, SHIFT, A = 16, 46, 105, 42, 30
 KEY, SYNC = 1, 0

@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from appliance.control.house import House, HouseReader, HouseWriter
+from appliance.box.show_state import House, HouseReader, HouseWriter
 from appliance.outputs.frame_reader import FrameReader
 from appliance.projector.alignment import Alignment
 from appliance.projector.context import offscreen

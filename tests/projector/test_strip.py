@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from appliance.commands.pictures import danced, rendered
-from appliance.commands.rehearsal import has_display, rehearsal_picture
+from appliance.cli.pictures import danced, rendered
+from appliance.cli.rehearsal import has_display, rehearsal_picture
 from appliance.projector.strip import COLUMNS, PICTURE, ROWS, strip
 from appliance.show.look import looks_by_name
 from appliance.show.show import load_show

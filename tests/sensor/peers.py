@@ -9,7 +9,7 @@ from math import cos, radians, sin
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, SensorReading
-from appliance.sensor.ways.intake import Origin
+from appliance.sensor.transports.transport import Origin
 
 KEYS = {
     "left-wrist": SensorKey("left-wrist", 0x11, bytes(range(16))),

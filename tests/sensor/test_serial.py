@@ -19,8 +19,8 @@ import serial
 from appliance.sensor import wire
 from appliance.sensor.framing import Deframer, frame
 from appliance.sensor.link import SensorLink, SensorReading, open_link
-from appliance.sensor.ways.serial import UNSENT_PACKETS, SerialIntake
-from appliance.sensor.ways.udp import UdpIntake
+from appliance.sensor.transports.serial import UNSENT_PACKETS, SerialIntake
+from appliance.sensor.transports.udp import UdpIntake
 from tests.sensor.peers import KEYS, Wearable
 
 PATIENCE_S = 20.0

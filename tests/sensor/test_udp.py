@@ -12,8 +12,8 @@ import pytest
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, open_link
-from appliance.sensor.ways import udp
-from appliance.sensor.ways.udp import SO_TIMESTAMPNS, TIMESPEC, PortError, UdpIntake, is_own
+from appliance.sensor.transports import udp
+from appliance.sensor.transports.udp import SO_TIMESTAMPNS, TIMESPEC, PortError, UdpIntake, is_own
 from tests.sensor.flood import flood
 from tests.sensor.peers import KEYS, Wearable
 

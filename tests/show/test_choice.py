@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from appliance.show.arrivals import Arrival, look
-from appliance.show.box import load_box
-from appliance.show.choice import (
+from appliance.release.arrivals import Arrival, look
+from appliance.release.choice import (
     APPLIANCE_BOX,
     CHOSEN,
     EMBEDDED_SHOW,
@@ -22,9 +21,10 @@ from appliance.show.choice import (
     box_of,
     write_whole,
 )
-from appliance.show.choosing import Outcome, Places, choose, remembered
+from appliance.release.choosing import Outcome, Places, choose, remembered
+from appliance.release.shelf import NoRoomError, Shelf, UnreadableError
+from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
-from appliance.show.shelf import NoRoomError, Shelf, UnreadableError
 
 BROKEN = "broken"
 

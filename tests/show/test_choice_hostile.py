@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from appliance.show.arrivals import look
-from appliance.show.choice import CHOSEN, Choice, Pair, alone_in
-from appliance.show.choosing import choose, remembered
-from appliance.show.shelf import Shelf, UnreadableError
+from appliance.release.arrivals import look
+from appliance.release.choice import CHOSEN, Choice, Pair, alone_in
+from appliance.release.choosing import choose, remembered
+from appliance.release.shelf import Shelf, UnreadableError
 from tests.show.test_choice import BROKEN, Venue, dancing
 
 NO_TEXT = os.fsdecode(b"\xff\xfe.bvh")
@@ -155,7 +155,7 @@ def test_memory_is_never_filled_by_a_show(venue: Venue) -> None:
 _AS_THE_BOX = """
 import os
 from pathlib import Path
-from appliance.show.choice import Choice
+from appliance.release.choice import Choice
 os.setuid(990)
 choice = Choice.read(Path({file!r}))
 print([one.is_there for one in choice.pairs], choice.complete().first.id)

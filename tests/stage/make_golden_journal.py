@@ -10,7 +10,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from appliance.stage.journal.export import export
+from appliance.recorder.export import export
 from tests.stage.bundles import write_show
 from tests.stage.night import Night, reading
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from appliance.control.orders import Order
+from appliance.box.clock import TICK_S, Slot
+from appliance.keeper.journal_carrier import JournalCarrier
+from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.cast import assemble
-from appliance.stage.clock import TICK_S, Slot
+from appliance.show_control.orders import Order
+from appliance.stage.carry_out import carry_out
 from appliance.stage.iterations import Iterations
-from appliance.stage.journal.carrier import JournalCarrier
-from appliance.stage.journal.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
-from appliance.stage.journal.recorder import Recorder
-from appliance.stage.obey import carry_out
+from appliance.stage.recorder import Recorder
+from appliance.stage.sensor_fit import Wearing
 from appliance.stage.sensor_memory import SensorMemory
+from appliance.stage.stage_parts import assemble
 from appliance.stage.tick import Tick
-from appliance.stage.wearing import Wearing
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
 LATEST_START_S = 0.005

@@ -11,10 +11,10 @@ import yaml
 
 from appliance.show.box import BoxConfig, LimitsConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage import admitted as module
-from appliance.stage.admitted import FILE, admitted
-from appliance.stage.budget import Admission
-from appliance.stage.cast import Cast, assemble
+from appliance.stage import admission_cache as module
+from appliance.stage.admission import Admission
+from appliance.stage.admission_cache import FILE, admitted
+from appliance.stage.stage_parts import Cast, assemble
 from tests.stage.bundles import write_show
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))

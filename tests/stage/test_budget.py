@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from appliance.stage.budget import PACED, admit
+from appliance.stage.admission import PACED, admit
 from tests.stage.fakes import FakeTime
 
 

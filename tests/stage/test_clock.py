@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from appliance.stage.clock import TICK_S, TickClock
+from appliance.box.clock import TICK_S, TickClock
 from tests.stage.fakes import FakeTime
 
 

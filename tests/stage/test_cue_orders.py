@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 import yaml
 
-from appliance.control.house import House, HouseWriter
-from appliance.control.orders import Order
+from appliance.box.clock import Slot
+from appliance.box.show_state import House, HouseWriter
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
 from appliance.show.show import Show, load_show
-from appliance.stage.cast import Cast, assemble
-from appliance.stage.clock import Slot
+from appliance.show_control.orders import Order
+from appliance.stage.carry_out import obey, resume
 from appliance.stage.iterations import Iterations
-from appliance.stage.obey import obey, resume
 from appliance.stage.run import Stage
+from appliance.stage.sensor_fit import Wearing
 from appliance.stage.sensor_memory import SensorMemory
+from appliance.stage.stage_parts import Cast, assemble
 from appliance.stage.tick import Tick
-from appliance.stage.wearing import Wearing
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show
 
 CUES = [

@@ -10,20 +10,20 @@ from typing import Any, cast
 
 import pytest
 
-from appliance.control.company import OF_THE_COMPANY
-from appliance.control.fallback import RECENT_S, Fallback, Fallbacks, Fallen, fallen
+from appliance.box.fallback import RECENT_S, Fallback, Fallbacks, Fallen, fallen
+from appliance.box.process_health import OF_THE_COMPANY
+from appliance.keeper.keeper_health import OF_THE_KEEPER
 from appliance.lights.fallback import OF_THE_LIGHTS
 from appliance.projector.fallback import OF_THE_PROJECTOR
 from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig, SerialConfig
 from appliance.show.show import load_show
 from appliance.stage import fallback as rows
-from appliance.stage.budget import Admission
-from appliance.stage.cast import Cast, assemble
+from appliance.stage.admission import Admission
 from appliance.stage.fallback import OF_THE_STAGE, StageFallbacks
 from appliance.stage.health import Health
-from appliance.stage.keeper_health import OF_THE_KEEPER
-from appliance.stage.resuming import Resuming
+from appliance.stage.resume import Resuming
+from appliance.stage.stage_parts import Cast, assemble
 from tests.stage.bundles import write_show
 
 FITS = Admission(3, 2, 3, 2, 64, 0.1, 0.2, 0.3, 10.0)

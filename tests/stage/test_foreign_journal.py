@@ -12,18 +12,18 @@ from typing import Any
 
 import pytest
 
-from appliance.cli import main
-from appliance.commands.replay import replay_journal
+from appliance.cli.app import main
+from appliance.cli.replay import replay_journal
+from appliance.recorder import chunks, log
+from appliance.recorder.environment import fingerprints
+from appliance.recorder.export import export
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.keyframe import POSITION
+from appliance.recorder.reading import last_kept, read_journal
+from appliance.recorder.record import EVENT, TICK
+from appliance.recorder.segments import segment_paths
 from appliance.show.show import load_show
-from appliance.stage.journal import chunks, log
-from appliance.stage.journal.comparison import Comparison
-from appliance.stage.journal.environment import fingerprints
-from appliance.stage.journal.export import export
-from appliance.stage.journal.journal_error import JournalError
-from appliance.stage.journal.keyframe import POSITION
-from appliance.stage.journal.reading import last_kept, read_journal
-from appliance.stage.journal.record import EVENT, TICK
-from appliance.stage.journal.segments import segment_paths
+from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from tests.stage.bundles import write_show
 from tests.stage.night import Night

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.commands.pictures import danced
-from appliance.commands.replay import TOLERANCE_DEGREES, replay_journal
+from appliance.cli.pictures import danced
+from appliance.cli.replay import TOLERANCE_DEGREES, replay_journal
+from appliance.recorder.reading import Run, read_journal
+from appliance.recorder.record import NOT_FINITE, RESENT
 from appliance.show.show import load_show
-from appliance.stage.journal.comparison import Comparison
-from appliance.stage.journal.reading import Run, read_journal
-from appliance.stage.journal.record import NOT_FINITE, RESENT
+from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from tests.stage.bundles import FIGURE
 from tests.stage.make_golden_journal import (

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.stage.clock import TICK_S
-from appliance.stage.journal import chunks
-from appliance.stage.journal.export import export
-from appliance.stage.journal.journal_error import JournalError
-from appliance.stage.journal.reading import read_journal
-from appliance.stage.journal.recorder import EVENT_BYTES, FILE, LOG_SLOTS
-from appliance.stage.journal.segments import segment_paths
+from appliance.box.clock import TICK_S
+from appliance.recorder import chunks
+from appliance.recorder.export import export
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.reading import read_journal
+from appliance.recorder.segments import segment_paths
+from appliance.stage.recorder import EVENT_BYTES, FILE, LOG_SLOTS
 from tests.stage.bundles import FIGURE, WORN, write_show
 from tests.stage.night import Night, reading
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.outputs.runtime_folder import Claim
+from appliance.box.checkpoint import Place, PlaceReader, PlaceWriter
+from appliance.box.clock import TICK_S
+from appliance.box.runtime_folder import Claim
+from appliance.keeper.journal_carrier import RETRY_S
+from appliance.keeper.keeper import END_S, TURN_S, keep_on, keep_rest
+from appliance.recorder.reading import read_journal
+from appliance.recorder.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
 from appliance.show.box import BoxConfig
-from appliance.stage.clock import TICK_S
-from appliance.stage.journal.carrier import RETRY_S
-from appliance.stage.journal.reading import read_journal
-from appliance.stage.journal.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
-from appliance.stage.keeper import END_S, TURN_S, keep_on, keep_rest
-from appliance.stage.place import Place, PlaceReader, PlaceWriter
 from tests.stage.bundles import write_show
 from tests.stage.fakes import FakeTime
 from tests.stage.night import Night

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.control.orders import Order
 from appliance.pose import quaternion
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.cast import Cast, assemble
+from appliance.show_control.orders import Order
+from appliance.stage.carry_out import obey, obey_for_sensors
 from appliance.stage.iterations import Iterations
-from appliance.stage.obey import obey, obey_for_sensors
+from appliance.stage.sensor_fit import Wearing
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.wearing import Wearing
+from appliance.stage.stage_parts import Cast, assemble
 from tests.stage.bundles import write_show
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))

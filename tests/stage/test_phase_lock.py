@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from appliance.stage.clock import TICK_S, TickClock
+from appliance.box.clock import TICK_S, TickClock
 from appliance.stage.phase_lock import PhaseLock
 from tests.stage.fakes import FakeTime
 

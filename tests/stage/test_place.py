@@ -16,9 +16,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from appliance.outputs import ring_file
-from appliance.outputs.ring_file import RingFileWriter
-from appliance.stage.place import FILE, LARGEST, Place, PlaceReader, PlaceWriter, boot_id, packed, unpacked
+from appliance.box import ring_file
+from appliance.box.checkpoint import FILE, LARGEST, Place, PlaceReader, PlaceWriter, boot_id, packed, unpacked
+from appliance.box.ring_file import RingFileWriter
 
 PLACE = Place(
     "Évora, night",
@@ -107,7 +107,7 @@ WRITER = """
 import sys
 from dataclasses import replace
 from pathlib import Path
-from appliance.stage.place import PlaceWriter, unpacked
+from appliance.box.checkpoint import PlaceWriter, unpacked
 PLACE = unpacked(bytes.fromhex(sys.argv[3]))
 writer, tick = PlaceWriter(Path(sys.argv[1])), int(sys.argv[2])
 while True:
@@ -163,7 +163,7 @@ def test_who_looks_whether_the_stage_lives_does_not_keep_the_next_one_from_its_p
 BEGINNER = """
 import os, signal, sys
 from pathlib import Path
-from appliance.outputs.ring_file import RingFileWriter
+from appliance.box.ring_file import RingFileWriter
 RingFileWriter.new(Path(sys.argv[1]), "place", 1, [(2, 1000)])
 os.kill(os.getpid(), signal.SIGKILL)
 """

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from appliance.stage.place import FILE, Place, PlaceWriter, packed
-from appliance.stage.place_file import (
+from appliance.box.checkpoint import FILE, Place, PlaceWriter, packed
+from appliance.box.checkpoint_file import (
     EVERY_S,
     RETRY_S,
     SLOT_BYTES,
@@ -229,8 +229,8 @@ def test_a_disk_that_fails_in_the_middle(tmp_path: Path, carried: Carried) -> No
 WRITER = """
 import sys
 from pathlib import Path
-from appliance.stage.place import Place
-from appliance.stage.place_file import PlaceFile
+from appliance.box.checkpoint import Place
+from appliance.box.checkpoint_file import PlaceFile
 file, tick = PlaceFile(Path(sys.argv[1])), int(sys.argv[2])
 while True:
     tick += 1

@@ -11,8 +11,8 @@ from appliance.dancer.grounding import survey
 from appliance.dancer.motion_source import Playback
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.skeleton import Skeleton
-from appliance.stage import prepared
-from appliance.stage.prepared import FOLDER, SUFFIX, Preparations, prepare
+from appliance.stage import phrase_cache as prepared
+from appliance.stage.phrase_cache import FOLDER, SUFFIX, Preparations, prepare
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show
 
 

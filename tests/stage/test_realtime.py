@@ -10,7 +10,7 @@ import pytest
 
 SETTINGS = """
 import gc, os, sys, threading
-from appliance.stage.realtime import enter_realtime
+from appliance.box.realtime import enter_realtime
 {before}
 missing = enter_realtime(10)
 child = []
@@ -58,7 +58,7 @@ def test_what_a_unit_has_given_is_used_where_nothing_more_may_be_asked_for() -> 
     ).returncode:
         pytest.skip(f"user {os.getuid()} may not have real-time priority here")
     measured = """
-from appliance.stage.realtime import borrowed_priority
+from appliance.box.realtime import borrowed_priority
 with borrowed_priority(10):
     pass
 """

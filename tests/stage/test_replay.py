@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import yaml
 
-from appliance.commands.replay import replay_journal
+from appliance.box.clock import TICK_S
+from appliance.cli.replay import replay_journal
 from appliance.pose.bvh import write_bvh
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.keyframe import packed, unpacked
+from appliance.recorder.reading import Run, read_journal
+from appliance.recorder.record import NOT_FINITE, RESENT
 from appliance.show.show import load_show
-from appliance.stage.clock import TICK_S
-from appliance.stage.journal.comparison import Comparison
-from appliance.stage.journal.journal_error import JournalError
-from appliance.stage.journal.keyframe import packed, unpacked
-from appliance.stage.journal.reading import Run, read_journal
-from appliance.stage.journal.record import NOT_FINITE, RESENT
+from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from tests.stage.bundles import swaying_phrase, write_show
 from tests.stage.night import Night, reading

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 import yaml
 
-from appliance.control.house import House, HouseWriter
-from appliance.control.orders import Order
+from appliance.box.checkpoint import FILE, Place, PlaceReader, PlaceWriter, boot_id
+from appliance.box.checkpoint_file import PlaceFile
+from appliance.box.clock import TICK_S, Slot
+from appliance.box.show_state import House, HouseWriter
 from appliance.dancer.motion_source import Playback
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
 from appliance.show.show import Show, load_show
-from appliance.stage.cast import Cast, assemble
-from appliance.stage.clock import TICK_S, Slot
+from appliance.show_control.orders import Order
+from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
-from appliance.stage.obey import obey
-from appliance.stage.place import FILE, Place, PlaceReader, PlaceWriter, boot_id
-from appliance.stage.place_file import PlaceFile
-from appliance.stage.resuming import TRIES, Resuming
+from appliance.stage.resume import TRIES, Resuming
 from appliance.stage.run import Stage
+from appliance.stage.stage_parts import Cast, assemble
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show
 
 CUES = [{"name": "storm", "phrase": "walk", "iterations": [6, 5], "hands": ["Chest"], "fade_s": 0.2}]

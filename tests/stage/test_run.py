@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from appliance.control.orders import Order
+from appliance.box.clock import TICK_S, TickClock
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
 from appliance.show.show import load_show
+from appliance.show_control.orders import Order
 from appliance.stage import run
-from appliance.stage.clock import TICK_S, TickClock
 from appliance.stage.fallback import SENSOR_SILENT
 from appliance.stage.run import Stage
 from tests.stage.bundles import write_show

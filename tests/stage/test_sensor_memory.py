@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from appliance.keeper.sensor_memory_carrier import RETRY_S, MemoryCarrier
+from appliance.sensor.memory_block import FILE_NAME, MemoryWriter, forget_memory
 from appliance.sensor.memory_text import IMU_ID_BYTES, LARGEST, MOST_PROFILES
 from appliance.sensor.neutral import NeutralPose
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.sensor_memory_block import FILE_NAME, MemoryWriter, forget_memory
-from appliance.stage.sensor_memory_carrier import RETRY_S, MemoryCarrier
 
 POSE = NeutralPose((0.5, -0.5, 0.5, 0.5), 0.25, 0xFFFFFFFF)
 OTHER = NeutralPose((1.0, 0.0, 0.0, 0.0), -3.0, 7)

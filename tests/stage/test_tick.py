@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.box.clock import TICK_S, Slot
 from appliance.pose import quaternion
 from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.cast import Cast, assemble
-from appliance.stage.clock import TICK_S, Slot
 from appliance.stage.iterations import Iterations
+from appliance.stage.sensor_fit import Wearing
 from appliance.stage.sensor_memory import SensorMemory
+from appliance.stage.stage_parts import Cast, assemble
 from appliance.stage.tick import Tick
-from appliance.stage.wearing import Wearing
 from hw_sim.osc_receiver import OscReceiver
 from tests.stage.bundles import FIGURE, write_show
 

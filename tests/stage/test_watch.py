@@ -10,7 +10,7 @@ import pytest
 from appliance.sensor.link import SensorReading, SensorState
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.cast import Cast, assemble
+from appliance.stage.stage_parts import Cast, assemble
 from appliance.stage.watch import Watch
 from hw_sim.osc_receiver import OscReceiver
 from tests.stage.bundles import write_show

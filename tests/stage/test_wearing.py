@@ -14,9 +14,9 @@ from appliance.sensor.link import SensorReading
 from appliance.sensor.neutral import NeutralPose
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.cast import Cast, assemble
+from appliance.stage.sensor_fit import Wearing
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.wearing import Wearing
+from appliance.stage.stage_parts import Cast, assemble
 from tests.stage.bundles import write_show
 
 SENSOR = "left-wrist"

@@ -14,9 +14,9 @@ from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.cast import assemble
+from appliance.stage.sensor_fit import Wearing
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.wearing import Wearing
+from appliance.stage.stage_parts import assemble
 from hw_sim.device import Device
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.firmware import FirmwareSensor, firmware_maker

@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib.image
 import torch
 
-from appliance.pose.filmstrip import VERMILION
+from appliance.pictures.filmstrip import VERMILION
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.evaluation.findings import findings
 from appliance.studio.evaluation.masked import draw_masked, masked_stretches

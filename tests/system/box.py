@@ -89,11 +89,11 @@ class Box:
 
         Show control of a killed box ends by itself: while it holds the port, the next box would be refused.
         """
-        companions = children_that_say(self.process.pid, "appliance.control")
+        companions = children_that_say(self.process.pid, "appliance.show_control")
         self.process.send_signal(number)
         status = self.process.wait(PATIENCE_S)
         until = time.monotonic() + PATIENCE_S
-        while any(says(pid, "appliance.control") for pid in companions):
+        while any(says(pid, "appliance.show_control") for pid in companions):
             assert time.monotonic() < until, self.words
             time.sleep(0.005)
         return status

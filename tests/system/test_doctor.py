@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from appliance.commands.doctor import box_state, processor, storage, venue
-from appliance.commands.doctor.doctor_command import CHECKS, findings
-from appliance.commands.doctor.finding import Finding
-from appliance.commands.doctor.patient import LivingStage, Patient
-from appliance.commands.doctor.sample import Sample, sample
-from appliance.control.fallback import Fallen
+from appliance.box.fallback import Fallen
+from appliance.cli.doctor import box_state, processor, storage, venue
+from appliance.cli.doctor.doctor_command import CHECKS, findings
+from appliance.cli.doctor.finding import Finding
+from appliance.cli.doctor.host_view import LivingStage, Patient
+from appliance.cli.doctor.sample import Sample, sample
+from appliance.release.choice import Choice
 from appliance.show.box import BoxConfig
-from appliance.show.choice import Choice
 from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, playing
 

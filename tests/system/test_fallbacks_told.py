@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from appliance.control.company import Company
-from appliance.control.fallback import Fallen
+from appliance.box.fallback import Fallen
+from appliance.box.process_health import Company
 from appliance.lights.fallback import DMX_AWAY
 from appliance.lights.fallback import STAGE_UNSEEN as LIGHTS_SAFE
 from appliance.projector.fallback import STAGE_UNSEEN as PICTURE_BLACK

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.commands.firewall import rules
+from appliance.cli.firewall import rules
 from appliance.show.box import load_box
 from tests.stage.bundles import write_show
 from tests.system.box import playing

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 import yaml
 
+from appliance.box.checkpoint import PlaceReader
 from appliance.pose.bvh import write_bvh
-from appliance.stage.journal.journal_error import JournalError
-from appliance.stage.journal.reading import read_journal
-from appliance.stage.journal.segments import segment_paths
-from appliance.stage.place import PlaceReader
-from tests.control.doubles import Asker
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.reading import read_journal
+from appliance.recorder.segments import segment_paths
+from tests.show_control.doubles import Asker
 from tests.stage.bundles import swaying_phrase, write_show
 from tests.system.box import PATIENCE_S, Box, playing
 from tests.system.processes import children_that_say

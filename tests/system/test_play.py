@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from pythonosc.udp_client import SimpleUDPClient
 
-from appliance.stage.journal.journal_error import JournalError
-from appliance.stage.journal.reading import read_journal
-from appliance.stage.journal.record import LATE, NOT_FINITE
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.reading import read_journal
+from appliance.recorder.record import LATE, NOT_FINITE
 from hw_sim.peers import HOST, free_ports
 from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, PLAY, is_free, playing
@@ -42,7 +42,7 @@ WITHOUT_TORCH = (
     "-c",
     "import sys\n"
     "for name in ('torch', 'onnx', 'hw_sim', 'appliance.studio'): sys.modules[name] = None\n"
-    "from appliance.cli import main\n"
+    "from appliance.cli.app import main\n"
     "main(['play', *sys.argv[1:]])",
 )
 

@@ -13,19 +13,19 @@ from pathlib import Path
 
 import pytest
 
-from appliance.commands import candidate
-from appliance.commands import preflight as commands
-from appliance.commands.giving_up import GivenUpError, within
-from appliance.commands.preflight import ANEW, Options, candidate_problems, preflight
+from appliance.cli import candidate
+from appliance.cli import preflight as commands
+from appliance.cli.preflight import ANEW, Options, candidate_problems, preflight
+from appliance.cli.run_with_timeout import GivenUpError, within
+from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, alone_in
 from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
-from appliance.show.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, alone_in
 from appliance.show.show import load_show
-from appliance.stage.prepared import FOLDER, SUFFIX
+from appliance.stage.phrase_cache import FOLDER, SUFFIX
 from tests.stage.bundles import write_show
 
 PATIENCE_S = 120.0
-PREFLIGHT = (sys.executable, "-m", "appliance.commands.preflight")
+PREFLIGHT = (sys.executable, "-m", "appliance.cli.preflight")
 HEAVY = (
     "numpy",
     "onnxruntime",
@@ -166,7 +166,7 @@ def test_with_nothing_new_nothing_heavy_is_imported(machine: Machine) -> None:
     machine.preflight()
     asked = (
         "import sys\nfrom pathlib import Path\n"
-        "from appliance.commands.preflight import Options, preflight\n"
+        "from appliance.cli.preflight import Options, preflight\n"
         f"folders = [Path(one) for one in {[str(one) for one in machine.options[:4]]}]\n"
         "assert preflight(Options(*folders), print, 10.0) == 0\n"
         f"print(*({set(HEAVY)} & set(sys.modules)))\n"

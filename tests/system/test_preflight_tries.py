@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from appliance.commands.giving_up import within
-from appliance.commands.proof import Proof
-from appliance.commands.trying import ANEW, TRIES, ended_well, pair_to_dance
+from appliance.cli.run_with_timeout import within
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
-from appliance.show.choice import CHOSEN, Choice, Pair, alone_in
-from tests.control.doubles import facts
+from appliance.release.choice import CHOSEN, Choice, Pair, alone_in
+from appliance.release.promote_show import Proof
+from appliance.release.start_attempts import ANEW, TRIES, ended_well, pair_to_dance
+from tests.show_control.doubles import facts
 from tests.stage.bundles import FIGURE, write_show
 
 PATIENCE_S = 60.0

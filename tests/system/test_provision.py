@@ -15,11 +15,11 @@ from typing import Any
 
 import pytest
 
+from appliance.recorder import chunks
+from appliance.recorder.reading import segments_of
 from appliance.sensor.keys import SensorKey, load_keys
 from appliance.sensor.link import open_link
 from appliance.sensor.provisioning.wearable_console import WearableConsole
-from appliance.stage.journal import chunks
-from appliance.stage.journal.reading import segments_of
 from hw_sim.firmware_library import State
 from tests.stage.bundles import write_show
 from tests.system.bench import NETWORK, PASSWORD, Bench

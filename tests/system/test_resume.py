@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from appliance.stage.place import FILE, Place, PlaceReader
-from appliance.stage.place_file import PlaceFile, read_place
+from appliance.box.checkpoint import FILE, Place, PlaceReader
+from appliance.box.checkpoint_file import PlaceFile, read_place
 from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from appliance.dancer.puppeteers import HOLD_S, TAKE_S
-from appliance.stage.journal.reading import read_journal
+from appliance.recorder.reading import read_journal
 from hw_sim.emulator import Sent
 from tests.hw_sim.null_modem import NullModem
 from tests.stage.bundles import FIGURE, MOVING, write_show

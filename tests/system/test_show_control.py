@@ -20,11 +20,11 @@ import numpy as np
 import pytest
 import yaml
 
-from appliance.control.house import House, HouseReader
+from appliance.box.show_state import House, HouseReader
 from appliance.outputs.frame_reader import FrameReader
-from appliance.stage.journal.reading import read_journal
+from appliance.recorder.reading import read_journal
 from hw_sim.peers import HOST, free_ports
-from tests.control.doubles import Asker, until
+from tests.show_control.doubles import Asker, until
 from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, PLAY, Box, is_free, playing
 from tests.system.processes import children_that_say
@@ -41,7 +41,7 @@ SPINNING = (
     sys.executable,
     "-c",
     "import sys\n"
-    "from appliance.cli import main\n"
+    "from appliance.cli.app import main\n"
     "from appliance.stage.tick import Tick\n"
     "run = Tick.run\n"
     "def spin(self, slot):\n"
@@ -57,7 +57,7 @@ STANDING = (
     sys.executable,
     "-c",
     "import os, signal, sys\n"
-    "from appliance.cli import main\n"
+    "from appliance.cli.app import main\n"
     "from appliance.stage.tick import Tick\n"
     "run, stood = Tick.run, []\n"
     "def stand(self, slot):\n"
@@ -120,7 +120,7 @@ def await_stage(folder: Path, state: str) -> None:
 
 def control_of(pid: int) -> int:
     """The process of show control among a box's children."""
-    [found] = children_that_say(pid, "appliance.control")
+    [found] = children_that_say(pid, "appliance.show_control")
     return found
 
 

@@ -19,6 +19,7 @@ from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import slerp_towards
 
 _SEARCH_ROWS = 512  # at a time: a search is a matrix product
+_BELIEVED_RADIANS = 0.7  # a hand that far from all that the dancer does counts e^-1
 _SHARPNESS = 3.0  # the furthest of the neighbours counts e^-3 of the nearest
 
 
@@ -75,7 +76,8 @@ class Repertoire:
                     + theirs.square().sum(-1)
                     - 2 * cosine.sign() * (hand_change[rows, joint] @ theirs.T)
                 )
-                weight = held[rows, joint][:, None]
+                believed = torch.exp(-(angle.amin(dim=1, keepdim=True) / _BELIEVED_RADIANS).square())
+                weight = held[rows, joint][:, None] * believed
                 cost[rows] += weight * (near.hand * angle.square() + near.hand_change * apart)
         with_hand = self._mean_of_the_nearest(cost)
         own = rotation.multiply(rotation.inverse(usual), windows)

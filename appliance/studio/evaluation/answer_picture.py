@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from appliance.pose.filmstrip import Strip, draw_strips
+from appliance.pictures.filmstrip import Strip, draw_strips
 from appliance.studio.data.dataset import FPS
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.evaluation.measurement import Iterations, Measurement

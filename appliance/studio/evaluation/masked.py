@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from appliance.pose.filmstrip import draw_rows
-from appliance.pose.filmstrip_stage import Row
+from appliance.pictures.filmstrip import draw_rows
+from appliance.pictures.filmstrip_stage import Row
 from appliance.studio.data.capture_errors import REASONS, CaptureError
 from appliance.studio.data.takes import FPS, Take
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.pose.filmstrip import draw_filmstrip
+from appliance.pictures.filmstrip import draw_filmstrip
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, WINDOW, Take
 from appliance.studio.evaluation.coders import Coder

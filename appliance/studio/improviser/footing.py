@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from appliance.dancer.figure import soles_of
+from appliance.dancer.forward_kinematics import soles_of
 from appliance.dancer.grounding import PLANTED_PERCENTILE, sole_positions
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array

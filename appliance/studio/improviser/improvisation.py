@@ -12,8 +12,8 @@ import torch
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
+from appliance.pictures.filmstrip import draw_filmstrip
 from appliance.pose.bvh import write_bvh
-from appliance.pose.filmstrip import draw_filmstrip
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.training import load_autoencoder

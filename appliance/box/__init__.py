@@ -1,0 +1,1 @@
+"""Box: what all processes of a running show share."""

@@ -1,0 +1,65 @@
+"""Blocks: bytes that one process writes and any number of others read, whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from appliance.box.ring_file import RingFileReader, RingFileWriter
+
+_SLOTS = 2  # while one is written, the other one holds what was there before
+
+
+class BlockWriter:
+    """A small file of one kind with the newest payload in it, at most `capacity` bytes.
+
+    Continues a sound file of the same kind (readers notice nothing), otherwise or when `fresh` puts a new one
+    in its place. Raises BlockingIOError while another process writes the one to continue, and OSError where
+    the folder takes no file.
+    """
+
+    def __init__(self, path: Path, kind: str, capacity: int, fresh: bool = False, version: int = 1) -> None:
+        shapes = [(_SLOTS, capacity)]
+        resumed = None if fresh else RingFileWriter.resumed(path, kind, version, shapes)
+        self._file = resumed or RingFileWriter.new(path, kind, version, shapes)
+        if resumed is None:
+            self._file.publish()
+
+    def write(self, payload: bytes) -> None:
+        """Publish; raises ValueError above the capacity."""
+        self._file.rings[0].write(payload)
+
+    def close(self) -> None:
+        """Let go of the file; it stays, with its last payload."""
+        self._file.close()
+
+
+class BlockReader:
+    """Reads what a BlockWriter of the same kind wrote; finds a file that was replaced by itself.
+
+    A file that is gone is read on until there is another one: its writer may still be at work in it.
+    `writer`: what people call the program that writes it.
+    """
+
+    def __init__(self, path: Path, kind: str, version: int = 1, writer: str = "its writer") -> None:
+        self._file = RingFileReader(path, kind, version, writer)
+
+    @property
+    def complaint(self) -> str:
+        """Why nothing is read although there is a file, in a sentence; else empty."""
+        return self._file.complaint
+
+    def writer_lives(self) -> bool:
+        """Whether the process that wrote what was read last still has the file."""
+        return self._file.writer_lives()
+
+    def read(self) -> bytes | None:
+        """The newest whole payload; None before the first one. Never waits, never raises."""
+        self._file.look()
+        for ring in self._file.rings:
+            newest = ring.newest()
+            return newest[1] if newest else None
+        return None
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()

@@ -1,0 +1,170 @@
+"""The place of the dance: what a stage that starts anew must know to go on where the last one was."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+from appliance.box.block import BlockReader, BlockWriter
+
+FILE, KIND = "place", "place"
+LARGEST = 4000  # bytes of a packed place; one slot on the disk is a page of 4096
+
+_NUMBERS = struct.Struct("<q9d4HBB")
+_ENDED = 1
+_MOST = 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a show is, right before its next tick.
+
+    phrase, position_s: which pose comes next; excerpt: first and last second of the part that plays;
+    rate: its speed; x, z (metres), heading (radians about +Y): where the phrase's root stands on the stage;
+    strayed: how far grounding has moved the figure from there (metres); let_go: joints whose hands were told
+    to let go; boot: the machine's boot id; tick: of the last frame; restarts, power_cuts: how often the show
+    went on after one; ended: the show was ended as it should; tries: starts from here of which no frame left.
+    """
+
+    show: str
+    phrase: str
+    position_s: float
+    excerpt: tuple[float, float]
+    rate: float = 1.0
+    x: float = 0.0
+    z: float = 0.0
+    heading: float = 0.0
+    strayed: tuple[float, float] = (0.0, 0.0)
+    coding: int = 1
+    interaction: int = 0
+    cue: str = ""
+    let_go: tuple[str, ...] = ()
+    boot: str = ""
+    tick: int = 0
+    restarts: int = 0
+    power_cuts: int = 0
+    ended: bool = False
+    tries: int = 0
+
+
+def packed(place: Place) -> bytes:
+    """A place as bytes, at most LARGEST; raises ValueError for names that are longer than that."""
+    numbers = _NUMBERS.pack(
+        place.tick,
+        place.position_s,
+        *place.excerpt,
+        place.rate,
+        place.x,
+        place.z,
+        place.heading,
+        *place.strayed,
+        place.coding,
+        place.interaction,
+        min(place.restarts, _MOST),
+        min(place.power_cuts, _MOST),
+        _ENDED * place.ended,
+        place.tries,
+    )
+    payload = numbers + _names(place.show, place.phrase, place.cue, place.let_go, place.boot)
+    if len(payload) > LARGEST:
+        raise ValueError(f"A place of {len(payload)} bytes is longer than {LARGEST}.")
+    return payload
+
+
+def unpacked(payload: bytes) -> Place | None:
+    """The place in these bytes; None when they are none that this program knows."""
+    try:
+        tick, position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, *small = (
+            _NUMBERS.unpack_from(payload)
+        )
+        show, phrase, cue, let_go, boot = json.loads(payload[_NUMBERS.size :])
+        place = Place(
+            str(show),
+            str(phrase),
+            position_s,
+            (start_s, end_s),
+            rate,
+            x,
+            z,
+            heading,
+            (strayed_x, strayed_z),
+            small[0],
+            small[1],
+            str(cue),
+            tuple(str(joint) for joint in let_go),
+            str(boot),
+            tick,
+            small[2],
+            small[3],
+            bool(small[4] & _ENDED),
+            small[5],
+        )
+    except (struct.error, ValueError, TypeError):
+        return None
+    sound = (position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z)
+    return place if all(math.isfinite(number) for number in sound) else None
+
+
+class PlaceWriter:
+    """The stage's end: the place in memory, renewed after each frame. Raises OSError without room for it.
+
+    It costs some microseconds, waits for nothing, and outlives the process.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._block = BlockWriter(folder / FILE, KIND, LARGEST)
+
+    def write(self, place: Place) -> None:
+        """Readers see this one from now on; raises ValueError as `packed` does."""
+        self._block.write(packed(place))
+
+    def close(self) -> None:
+        """Let go of the file; it stays, with its last place."""
+        self._block.close()
+
+
+class PlaceReader:
+    """Reads the place in memory; the stage may be there or not."""
+
+    def __init__(self, folder: Path) -> None:
+        self._block = BlockReader(folder / FILE, KIND)
+
+    def read(self) -> Place | None:
+        """The newest place; None where none was written. Never waits, never raises."""
+        payload = self._block.read()
+        return None if payload is None else unpacked(payload)
+
+    def goes_on(self) -> bool:
+        """Whether a show is on: a stage lives, and has not said that its show has ended. Never raises."""
+        place = self.read()
+        return place is not None and not place.ended and self.stage_lives()
+
+    def stage_lives(self) -> bool:
+        """Whether the stage that wrote what was read last is still there."""
+        return self._block.writer_lives()
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._block.close()
+
+
+def boot_id() -> str:
+    """Which start of this machine it is; "" where the kernel does not say."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    except OSError:
+        return ""
+
+
+_packed_names: tuple[tuple[object, ...], bytes] = ((), b"")
+
+
+def _names(*names: object) -> bytes:
+    """They change seldom, and places are written at each tick: the last ones are kept."""
+    global _packed_names
+    if _packed_names[0] != names:
+        _packed_names = names, json.dumps(names, ensure_ascii=False, separators=(",", ":")).encode()
+    return _packed_names[1]

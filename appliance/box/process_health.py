@@ -1,0 +1,171 @@
+"""Company: a small block of each process in the runtime folder, so that show control knows how all are."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from appliance.box.block import BlockReader, BlockWriter
+from appliance.box.fallback import Fallback, Fallbacks, Fallen, fallen
+
+WHO = ("lights", "projector", "keeper")
+BEAT_S, LATE_S = 1.0, 5.0
+_KIND, _LARGEST = "company", 8192
+_CHOSEN = "chosen.json"
+
+DIED = {
+    "lights": Fallback(
+        "lights-died",
+        "The lights' process died or hangs. The nodes hold or fade as they are set, and it is started again "
+        "within two seconds. If it goes on, look at its messages: journalctl -u bunraku-lights.",
+    ),
+    "projector": Fallback(
+        "projector-died",
+        "The projector's process died or hangs. The wall is black, and the picture is back within two "
+        "seconds. If it goes on, look at its messages: journalctl -u bunraku-projector.",
+    ),
+    "keeper": Fallback(
+        "keeper-died",
+        "The keeper died or hangs. The audience sees nothing of it; journal and place are kept again when it "
+        "is back. If it goes on, look at the disk: bunraku doctor.",
+    ),
+}
+STAGE_HUNG = Fallback(
+    "stage-hung",
+    "No frame came from the stage for half a second. Outputs pause, the picture fades to black; its watchdog "
+    "starts it again, and the dance goes on where it was. If it goes on, look at its messages: "
+    "journalctl -u bunraku-stage.",
+)
+COMMANDS_DROPPED = Fallback(
+    "commands-dropped",
+    "More commands came at once than show control carries out: the oldest gave way, without a reply. Panic, "
+    "blackout, stop and go went before them, and the dance goes on. Look which desk sends so many.",
+)
+SHOW_REFUSED = Fallback(
+    "show-refused", "A show or box file is broken and was refused; the last good one dances."
+)
+SHOW_PUT_ASIDE = Fallback(
+    "show-put-aside", "A new show did not dance and was put aside; the one before it dances."
+)
+OF_THE_COMPANY = (*DIED.values(), STAGE_HUNG, COMMANDS_DROPPED, SHOW_REFUSED, SHOW_PUT_ASIDE)
+
+
+class CompanyWriter:
+    """A process says once a second how it is; without a place for it, it says nothing and works on."""
+
+    def __init__(self, folder: Path, who: str, fallbacks: Fallbacks) -> None:
+        self._fallbacks = fallbacks
+        self._due = 0.0
+        self._block: BlockWriter | None = None
+        before = _read(folder, who)
+        self._starts = 1 if before is None or before.get("ended") else int(before.get("starts", 0)) + 1
+        with contextlib.suppress(OSError):
+            self._block = BlockWriter(folder / f"{who}.health", _KIND, _LARGEST)
+
+    def tell(self, now: float) -> None:
+        """Call it as often as you like; monotonic seconds."""
+        if now >= self._due:
+            self._due = now + BEAT_S
+            self._write(now, ended=False)
+
+    def end(self, now: float) -> None:
+        """It ends as it should: who only closes, as an error passes by, will have died."""
+        self._write(now, ended=True)
+
+    def close(self) -> None:
+        """Let go of the block."""
+        if self._block is not None:
+            self._block.close()
+            self._block = None
+
+    def _write(self, now: float, ended: bool) -> None:
+        if self._block is None:
+            return
+        told = self._fallbacks.told(now)
+        values = {"pid": os.getpid(), "starts": self._starts, "beat": now, "ended": ended, "fallbacks": told}
+        packed = json.dumps(values).encode()
+        while len(packed) > _LARGEST and told:
+            values["fallbacks"] = told = told[:-1]
+            packed = json.dumps(values).encode()
+        self._block.write(packed)
+
+
+class Member(NamedTuple):
+    """A process beside the stage, as it last said. late: it said nothing for LATE_S, and did not end."""
+
+    who: str
+    starts: int
+    late: bool
+    fallbacks: tuple[Fallen, ...]
+
+
+class Company:
+    """What all of them said; never waits, never raises."""
+
+    def __init__(self, folder: Path) -> None:
+        self._blocks = {who: BlockReader(folder / f"{who}.health", _KIND) for who in WHO}
+        self._chosen, self._chosen_at = folder / _CHOSEN, -1
+        self._of_choice: tuple[Fallen, ...] = ()
+
+    def members(self, now: float) -> list[Member]:
+        """Those who are or were there since power-on."""
+        found = []
+        for who, block in self._blocks.items():
+            values = _parsed(block.read())
+            if values is not None:
+                late = not values.get("ended") and now - float(values.get("beat", now)) > LATE_S
+                starts, fallbacks = int(values.get("starts", 1)), fallen(values.get("fallbacks"))
+                found.append(Member(who, starts, late, fallbacks))
+        return found
+
+    def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
+        """Process and fallback: what each said, what shows that it died, what became of shows."""
+        found = []
+        for member in self.members(now):
+            died = DIED[member.who]
+            deaths = member.starts - 1 + member.late
+            if deaths:
+                found.append((member.who, Fallen(died.name, deaths, member.late, died.words)))
+            found += [(member.who, one) for one in member.fallbacks]
+        return found + [("preflight", one) for one in self._choice()]
+
+    def close(self) -> None:
+        """Let go of all blocks."""
+        for block in self._blocks.values():
+            block.close()
+
+    def _choice(self) -> tuple[Fallen, ...]:
+        """Shows and box files that do not dance, as the preflight and the stage have noted them."""
+        try:
+            changed = self._chosen.stat().st_mtime_ns
+            if changed != self._chosen_at:
+                self._chosen_at = changed
+                values = json.loads(self._chosen.read_bytes())
+                self._of_choice = tuple(_of_choice(values["refused"], values["aside"]))
+        except (OSError, ValueError, KeyError, TypeError):
+            self._of_choice = ()
+        return self._of_choice
+
+
+def _of_choice(refused: list[str], aside: list[str]) -> list[Fallen]:
+    """The stage notes the pairs that it has put aside behind what the preflight refused."""
+    put_aside = refused[len(refused) - len(aside) :]
+    broken = refused[: len(refused) - len(aside)]
+    both = ((SHOW_REFUSED, broken), (SHOW_PUT_ASIDE, put_aside))
+    return [Fallen(one.name, len(words), True, " ".join(words)) for one, words in both if words]
+
+
+def _read(folder: Path, who: str) -> dict[str, Any] | None:
+    with contextlib.closing(BlockReader(folder / f"{who}.health", _KIND)) as block:
+        return _parsed(block.read())
+
+
+def _parsed(payload: bytes | None) -> dict[str, Any] | None:
+    try:
+        values = json.loads(payload) if payload else None
+    except ValueError:
+        return None
+    return values if isinstance(values, dict) else None

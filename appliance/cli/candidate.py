@@ -1,0 +1,58 @@
+"""Can this show dance on this box? Checked in a process of its own: a broken network may crash it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import sys
+from pathlib import Path
+
+from appliance.box.realtime import prepare_environment
+
+prepare_environment()
+
+from appliance.box.runtime_folder import RuntimeFolderError  # noqa: E402
+from appliance.cli.check import verified  # noqa: E402  (numpy must find the environment prepared)
+from appliance.cli.prepare_show import prepare_show  # noqa: E402
+from appliance.pose.bvh import BvhError  # noqa: E402
+from appliance.show.config_error import ConfigError  # noqa: E402
+from appliance.stage.stage_error import StageError  # noqa: E402
+
+_OF_ALL_MEMORY, _LEAST_MEMORY_BYTES = 0.2, 400 << 20
+
+
+def main(show: str, box: str) -> int:
+    """0: it dances; 1: it does not, and stderr says why.
+
+    Sensors without keys are no reason, they can be provisioned later; nor are iterations that the stage has
+    to lower: another program may have come between at the measurement, as many do while a box starts. A
+    network is too slow when half of its runs are, were they of one iteration alone.
+    """
+    _limit_memory()
+    try:
+        _, verdict = verified(Path(show), Path(box))
+    except (BvhError, ConfigError, RuntimeFolderError, StageError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    except MemoryError:
+        print(f"{show}: it takes more memory than this box has for a show.", file=sys.stderr)
+        return 1
+    if verdict.p50_ms > verdict.asked_coding * verdict.budget_ms:
+        print(verdict.sentence(), file=sys.stderr)
+        return 1
+    with contextlib.suppress(Exception):  # it dances all the same, and starts somewhat later
+        prepare_show(Path(show))
+    return 0
+
+
+def _limit_memory() -> None:
+    """A show that takes all memory ends this check, and not the preflight that waits for it, or the dance."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    most = max(_LEAST_MEMORY_BYTES, int(_OF_ALL_MEMORY * memory))
+    with contextlib.suppress(OSError, ValueError):  # a lower limit holds already
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

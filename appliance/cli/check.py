@@ -1,0 +1,94 @@
+"""`bunraku check` and `pack`: is the bundle whole, is the box file right, does the dance fit this machine?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
+from appliance.show.bundle import CHECKSUMS, bundle_bytes, bundle_files, default_show_path, write_checksums
+from appliance.show.check import verify_bundle
+from appliance.show.config_error import ConfigError
+from appliance.show.cues import too_much
+from appliance.show.posistagenet import misfits
+from appliance.show.show import Show, load_show
+from appliance.show.venue_rig import misplaced, unwired
+from appliance.stage.admission import Admission
+from appliance.stage.open_sensors import reach
+from appliance.stage.stage_error import StageError
+from appliance.stage.stage_parts import Cast, admission, assemble
+
+
+def check_show(directory: Path | None, box_file: Path | None) -> None:
+    """Print what was found; raises StageError or ConfigError with all that is wrong."""
+    directory = directory or default_show_path()
+    cast, verdict = verified(directory, box_file)
+    show, box = load_show(directory), load_box(box_file)
+    if box.sensors.keys is not None and cast.complaints:
+        raise StageError("\n".join(cast.complaints))
+    if not verdict.fits:
+        raise StageError(verdict.sentence())
+    print(f"{show.config.name}: the bundle is whole.")
+    print(verdict.sentence())
+    too_many = too_much(show.config.cues, verdict.most_coding, show.file)
+    for warning in (*reach(list(cast.worn), box), *unwired(show, box), *too_many):
+        print(warning)
+
+
+def verified(directory: Path, box_file: Path | None) -> tuple[Cast, Admission]:
+    """A show that can dance on this box, all ports closed, and what its iterations cost here.
+
+    Raises StageError or ConfigError with all that is wrong.
+    """
+    box = load_box(box_file)
+    _refuse_damage(directory)
+    show = load_show(directory)
+    _refuse_misfits(show, box, box_file)
+    cast = assemble(show, without_ports(box))
+    verdict = admission(cast, show, box)
+    cast.close()
+    return cast, verdict
+
+
+def pack_show(directory: Path) -> None:
+    """Write new checksums over a changed bundle, then check it; the old ones return if it is not sound."""
+    checksums = directory / CHECKSUMS
+    before = checksums.read_bytes() if checksums.exists() else None
+    load_show(directory)
+    write_checksums(directory)
+    try:
+        _refuse_damage(directory)
+    except StageError:
+        checksums.unlink() if before is None else checksums.write_bytes(before)
+        raise
+    size_mb = bundle_bytes(directory) / 1e6
+    print(f"{directory}: {len(bundle_files(directory))} files, {size_mb:.1f} MB, packed in {CHECKSUMS}.")
+
+
+def _refuse_damage(directory: Path) -> None:
+    findings = verify_bundle(directory)
+    for warning in (finding for finding in findings if finding.level == "warning"):
+        print(warning)
+    errors = [str(finding) for finding in findings if finding.level == "error"]
+    if errors:
+        raise StageError("\n".join(["This show cannot be danced.", *errors]))
+
+
+def _refuse_misfits(show: Show, box: BoxConfig, box_file: Path | None) -> None:
+    """Whether what the box file says about joints and fixtures fits this show; raises ConfigError."""
+    problems = [
+        *misfits(box.outputs.posistagenet, show.skeleton.names, box_file),
+        *misplaced(show, box, box_file),
+    ]
+    if problems:
+        raise ConfigError(problems)
+
+
+def without_ports(box: BoxConfig) -> BoxConfig:
+    """The same box with its ports closed: a check may run beside the show."""
+    return box.model_copy(
+        update={
+            "sensors": SensorsConfig(udp=None, keys=box.sensors.keys),
+            "outputs": OutputsConfig(osc=[]),
+            "control": None,
+        }
+    )

@@ -1,0 +1,93 @@
+"""`bunraku preflight --check-release`: can this release dance on this machine? Before it is switched to."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from appliance.box.realtime import prepare_environment
+from appliance.release.choice import Pair
+
+prepare_environment()
+
+import numpy as np  # noqa: E402  (it must find the environment prepared)
+
+_TICKS = 100
+_LEFT_OUT = ("appliance.studio",)  # the workstation's
+_MAY_MISS = ("appliance.projector",)  # a machine without a graphics driver still dances
+
+
+def check_release(data: Path) -> int:
+    """0: it can; 1: it cannot, and stderr says why. Opens no port and writes nothing."""
+    problems = list(_missing())
+    if not problems:
+        from appliance.release.choosing import remembered
+
+        for pair in (Pair(), *remembered(data).pairs[:1]):
+            problems += _undanced(pair)
+    for words in problems:
+        print(words, file=sys.stderr)
+    print("This release can dance here." if not problems else "This release cannot dance here.")
+    return 1 if problems else 0
+
+
+def _missing() -> Iterator[str]:
+    """Modules of the box that cannot be imported: a wheel that is missing, or one for another machine."""
+    import appliance
+
+    for found in pkgutil.walk_packages(appliance.__path__, "appliance.", onerror=lambda _: None):
+        if found.name.startswith(_LEFT_OUT) or found.name.endswith("__main__"):
+            continue
+        try:
+            importlib.import_module(found.name)
+        except Exception as error:
+            if not found.name.startswith(_MAY_MISS):
+                yield f"{found.name} cannot be imported ({error}). The release is not whole: copy it again."
+            else:
+                print(f"{found.name} cannot be imported ({error}): no picture on this machine.")
+
+
+def _undanced(pair: Pair) -> list[str]:
+    """Why this release does not dance a show in time; nothing when it does."""
+    try:
+        usual_ms, budget_ms = _danced(pair)
+    except Exception as error:
+        return [f"{pair.source}: this release does not dance it. {error}"]
+    print(f"{pair.source}: {_TICKS} ticks, {usual_ms:.1f} ms each, of a budget of {budget_ms:g} ms.")
+    if usual_ms > budget_ms:
+        return [f"{pair.source}: a tick takes {usual_ms:.1f} ms here, more than {budget_ms:g} ms. Too slow."]
+    return []
+
+
+def _danced(pair: Pair) -> tuple[float, float]:
+    """The usual cost of a tick, and its budget, ms: the stage's own tick, without ports and receivers."""
+    from appliance.box.clock import TICK_S, Slot
+    from appliance.cli.check import verified, without_ports
+    from appliance.show.box import load_box
+    from appliance.show.show import load_show
+    from appliance.stage.iterations import Iterations
+    from appliance.stage.sensor_fit import Wearing
+    from appliance.stage.sensor_memory import SensorMemory
+    from appliance.stage.stage_parts import assemble
+    from appliance.stage.tick import Tick
+
+    verdict = verified(pair.show, pair.box)[1]
+    box = load_box(pair.box)
+    cast, memory = assemble(load_show(pair.show), without_ports(box)), SensorMemory(None, print)
+    iterations = Iterations(verdict.coding, verdict.interaction, verdict.most_coding)
+    tick = Tick(cast, Wearing(cast, memory, print), iterations, latest_start_s=TICK_S)
+    costs_ms: list[float] = []
+    for number in range(_TICKS):
+        begun = time.monotonic()
+        slot = Slot(number, begun, begun, 0)
+        tick.run(slot)
+        costs_ms.append(tick.after(slot))
+        if not np.isfinite(tick.frame.pose).all():
+            raise ValueError("The poses are not numbers.")
+    cast.close()
+    memory.close()
+    return sorted(costs_ms)[_TICKS // 2], box.limits.tick_budget_ms

@@ -1,0 +1,163 @@
+"""Companions: show control, lights, projector: children of `bunraku play`, started again when they die."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+
+from appliance.box.parent_death import PARENT, TOLD
+
+SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0
+UNAVAILABLE = 69  # sysexits.h: what it needs is not here, or not yet: a projector is switched on late
+RETRY_S = 10.0
+_LIVED_S = 10.0  # whoever lived so long begins with the shortest pause again
+_SAID = 3  # deaths in a row that are told one by one
+_MOST_DOUBLINGS = 10  # of the pause: beyond it is the longest one anyway
+_LOOK_S = 0.1
+_LAST_WORDS_S = 3.0
+
+
+@dataclass(frozen=True)
+class Companion:
+    """One process beside the stage.
+
+    meanwhile: what is missing while it is away, a sentence. may_close: a person may end it, and then it stays
+    ended. descriptors: what it inherits.
+    """
+
+    name: str
+    command: tuple[str, ...]
+    meanwhile: str
+    may_close: bool = False
+    descriptors: tuple[int, ...] = ()
+
+
+class Companions:
+    """A context: starts them when `may_start` says so, from a thread of its own, and ends them with itself.
+
+    The stage's first frame does not wait for them. They end by themselves when this process is killed.
+    """
+
+    def __init__(
+        self, companions: Sequence[Companion], say: Callable[[str], None], may_start: Callable[[], bool]
+    ) -> None:
+        self._may_start = may_start
+        self._running = [_Running(companion, say) for companion in companions]
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._attend, name="companions", daemon=True)
+
+    def __enter__(self) -> Companions:
+        if self._running:
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closing.set()
+        if self._running:
+            self._thread.join()
+
+    def _attend(self) -> None:
+        """All children are this thread's: Linux ends them when the thread that started them ends."""
+        while not self._may_start():
+            if self._closing.wait(_LOOK_S / 4):
+                return
+        while True:
+            for running in self._running:
+                running.look(time.monotonic())
+            if self._closing.wait(_LOOK_S):
+                break
+        for running in self._running:
+            running.ask_to_end()
+        until = time.monotonic() + _LAST_WORDS_S
+        for running in self._running:
+            running.end(max(0.0, until - time.monotonic()))
+
+
+class _Running:
+    """A companion and its process."""
+
+    def __init__(self, companion: Companion, say: Callable[[str], None]) -> None:
+        self._companion, self._say = companion, say
+        self._process: subprocess.Popen[bytes] | None = None
+        self._started_at = 0.0
+        self._starts_at = 0.0
+        self._deaths = 0
+        self._told: int | None = None
+        self._is_over = False
+
+    def look(self, now: float) -> None:
+        """Start it when it is time to; notice when it has died."""
+        if self._process is not None and (status := self._process.poll()) is not None:
+            self._process = None
+            self._note(status, now)
+        if self._process is None and not self._is_over and now >= self._starts_at:
+            self._start(now)
+
+    def ask_to_end(self) -> None:
+        if self._process is not None:
+            self._process.terminate()
+
+    def end(self, within_s: float) -> None:
+        """Wait for its end; kill what does not end."""
+        if self._process is None:
+            return
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(within_s)
+        self._process.kill()
+        self._process.wait()
+
+    def _start(self, now: float) -> None:
+        self._started_at = now
+        try:
+            self._process = subprocess.Popen(
+                self._companion.command,
+                stdin=subprocess.DEVNULL,
+                env=self._environment(),
+                pass_fds=self._companion.descriptors,
+                start_new_session=True,  # Ctrl-C is for the box, which then ends them
+            )
+        except OSError as error:
+            self._again(f"cannot be started ({error.strerror})", now)
+
+    def _environment(self) -> dict[str, str]:
+        told = {} if self._told is None else {TOLD: str(self._told)}
+        return {**os.environ, PARENT: str(os.getpid()), **told}
+
+    def _note(self, status: int, now: float) -> None:
+        companion = self._companion
+        if companion.may_close and status == 0:
+            self._is_over = True
+            self._say(f"{companion.name} was closed. The dance goes on.")
+        elif status == UNAVAILABLE:
+            if self._told is None:
+                self._say(
+                    f"{companion.name} cannot run now. The dance goes on without, and it is tried again "
+                    f"each {RETRY_S:g} s."
+                )
+            self._told = status
+            self._starts_at = now + RETRY_S
+        elif status < 0:
+            self._again(f"was killed (signal {-status})", now)
+        else:
+            self._again(f"ended by itself (status {status})", now)
+
+    def _again(self, what: str, now: float) -> None:
+        self._told = None
+        self._deaths = 1 if now - self._started_at > _LIVED_S else self._deaths + 1
+        doublings = min(self._deaths - 1, _MOST_DOUBLINGS)
+        self._starts_at = now + min(SHORTEST_PAUSE_S * 2**doublings, LONGEST_PAUSE_S)
+        if self._deaths <= _SAID:
+            self._say(f"{self._companion.name} {what}. {self._companion.meanwhile} It is started again.")
+        elif self._deaths == _SAID + 1:
+            self._say(
+                f"{self._companion.name} {what}, {self._deaths} times in a row. {self._companion.meanwhile} "
+                f"It is tried again each {LONGEST_PAUSE_S:g} s. What it said above tells why."
+            )

@@ -1,0 +1,103 @@
+"""`bunraku control`: opens the control port as the box file says, and becomes show control."""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import sys
+import time
+from pathlib import Path
+
+from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.config_error import NotAskedForError, Problem
+from appliance.show.control import ControlConfig
+from appliance.show_control.port import open_port
+from appliance.show_control.settings import Settings
+from appliance.stage.stage_error import StageError
+
+_FIRST_OF_SYSTEMD = 3  # sd_listen_fds(3)
+_FREED_WITHIN_S, _LOOK_S = 2.0, 0.05
+
+
+def control_box(box_file: Path | None, descriptor: int | None) -> None:
+    """Never returns: this process becomes one that has loaded nothing that show control does not need.
+
+    `descriptor`: the port's socket where somebody has opened it already. Raises StageError, ConfigError.
+    """
+    box = load_box(box_file)
+    if box.control is None:
+        words = "This box file says `control: null`, so nobody commands this box."
+        cure = "Write `control: {port: 9002}`."
+        raise NotAskedForError([Problem(box_file or Path("box.yaml"), 0, words, cure)])
+    if descriptor is None:
+        descriptor = _from_systemd()
+    if descriptor is None:
+        descriptor = open_control_port(box.control).detach()
+    _require_udp(descriptor)
+    os.set_inheritable(descriptor, True)
+    command = control_command(box, descriptor)
+    os.execv(command[0], command)
+
+
+def open_control_port(control: ControlConfig) -> socket.socket:
+    """The port's socket, bound. Raises StageError with what to do when it is taken.
+
+    The show control of a box that was killed may hold it for a moment still.
+    """
+    until = time.monotonic() + _FREED_WITHIN_S
+    while True:
+        try:
+            return open_port(control.host, control.port)
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE or time.monotonic() >= until:
+                raise _taken(control, error) from error
+        time.sleep(_LOOK_S)
+
+
+def _taken(control: ControlConfig, error: OSError) -> StageError:
+    return StageError(
+        f"UDP port {control.port} on {control.host} cannot be opened for commands ({error.strerror}). "
+        "Nobody would hear commands, so nothing is started. Is a second bunraku running? Stop it, or "
+        "give another port under control: in the box file, or `control: null` for none."
+    )
+
+
+def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
+    """How to start show control for a box whose port is open; `box.control` is there. Raises StageError."""
+    control = box.control or ControlConfig()
+    try:
+        folder = runtime_folder(box)
+    except RuntimeFolderError as error:
+        raise StageError(str(error)) from error
+    settings = Settings(
+        folder=str(folder),
+        descriptor=descriptor,
+        senders=tuple(control.senders),
+        heartbeat=tuple((one.host, one.port) for one in control.heartbeat),
+        key_file=str(box.sensors.keys or ""),
+    )
+    return sys.executable, "-m", "appliance.show_control", settings.packed()
+
+
+def _from_systemd() -> int | None:
+    """The socket that a socket unit has opened for this process."""
+    ours = os.environ.get("LISTEN_PID") == str(os.getpid()) and os.environ.get("LISTEN_FDS", "0") != "0"
+    return _FIRST_OF_SYSTEMD if ours else None
+
+
+def _require_udp(descriptor: int) -> None:
+    try:
+        one = socket.socket(fileno=os.dup(descriptor))
+    except OSError as error:
+        raise StageError(
+            f"Descriptor {descriptor} is no open socket ({error.strerror}). Nobody hears commands. "
+            "Leave --socket-fd out, and the port is opened here."
+        ) from error
+    with one:
+        if (one.family, one.type) != (socket.AF_INET, socket.SOCK_DGRAM):
+            raise StageError(
+                f"The socket with descriptor {descriptor} is not UDP over IPv4. Nobody hears commands. "
+                "In a socket unit, write ListenDatagram= with an IPv4 address."
+            )

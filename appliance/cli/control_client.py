@@ -1,0 +1,133 @@
+"""Asks the running box about its sensors over its control port, from another process."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import socket
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from appliance.show.box import BoxConfig
+from appliance.show_control.command_handler import SENSORS_REPLY as REPLY
+from appliance.show_control.order_dispatch import PATIENCE_S as ERRAND_S
+from appliance.show_control.packet import Message, datagram, messages_in, readable
+from appliance.show_control.port import Address
+from appliance.show_control.sensor_roster import END, SENSOR, RosterLine
+
+PATIENCE_S = 2.0  # show control answers within 0.6 s, and later while it starts
+_LARGEST_DATAGRAM = 4096
+_LINE = tuple(get_type_hints(RosterLine).values())
+_ENDING = (int, float, str)
+
+
+class NoBoxError(Exception):
+    """No box answers: a sentence for people."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the box replied: whether it was done, and a sentence."""
+
+    done: bool
+    words: str
+
+
+@dataclass(frozen=True)
+class Roll:
+    """All sensors of the running box, how old that is (negative: it starts), and which key file it reads."""
+
+    lines: list[RosterLine]
+    age_s: float
+    key_file: Path | None
+
+
+class RunningBox:
+    """The box behind a control port; each question opens a socket of its own."""
+
+    def __init__(self, control: Address | None, patience_s: float = PATIENCE_S) -> None:
+        self._control = control
+        self._patience_s = patience_s
+
+    @classmethod
+    def of(cls, box: BoxConfig) -> RunningBox:
+        """The box that plays with this box file on this machine."""
+        control = box.control
+        if control is None or control.port == 0:
+            return cls(None)
+        return cls(("127.0.0.1" if control.host == "0.0.0.0" else control.host, control.port))
+
+    @property
+    def has_port(self) -> bool:
+        """Whether it can be asked at all."""
+        return self._control is not None
+
+    def ask(self, address: str, *arguments: str) -> Answer:
+        """Have one command carried out. Raises NoBoxError.
+
+        That nobody carried it out in time may be corrected by a second reply, which is waited for.
+        """
+        answer, asked = None, time.monotonic()
+        with contextlib.closing(self._replies((address, *arguments))) as replies:
+            for about, values in replies:
+                if about == REPLY and len(values) == 3 and values[0] == address:
+                    answer = Answer(bool(values[1]), readable(str(values[2])))
+                    if answer.done or time.monotonic() - asked < ERRAND_S:  # refused, for good
+                        return answer
+        if answer is None:
+            raise self._nobody()
+        return answer
+
+    def roll(self) -> Roll:
+        """How all its sensors are. Raises NoBoxError."""
+        lines: list[RosterLine] = []
+        with contextlib.closing(self._replies(("/sensors/list",))) as replies:
+            for about, values in replies:
+                if about == SENSOR and _is_made_of(_LINE, values):
+                    lines.append(RosterLine(*(_shown(value) for value in values)))
+                elif about == END and _is_made_of(_ENDING, values) and values[0] == len(lines):
+                    _, age_s, key_file = values
+                    return Roll(lines, float(age_s), Path(_shown(key_file)) if key_file else None)
+                elif about == REPLY and values[:2] == ["/sensors/list", 0]:
+                    raise NoBoxError(readable(str(values[-1])))
+        raise self._nobody()
+
+    def _replies(self, message: Message) -> Generator[tuple[str, list[Any]], None, None]:
+        """What the box sends back, until patience ends; nothing when no port is open there.
+
+        To be closed by whoever asks: what is left to the collector would swallow a Ctrl-C in its closing.
+        """
+        if self._control is None:
+            return
+        until = time.monotonic() + self._patience_s
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asker, contextlib.suppress(OSError):
+            asker.connect(self._control)  # so that a port with nobody behind it is told at once
+            asker.send(datagram(message))
+            while (left_s := until - time.monotonic()) > 0:
+                asker.settimeout(left_s)
+                received = asker.recv(_LARGEST_DATAGRAM)
+                with contextlib.suppress(ValueError):  # no OSC: what listens there may be no box
+                    yield from messages_in(received)
+
+    def _nobody(self) -> NoBoxError:
+        if self._control is None:
+            return NoBoxError(
+                "This box file has no control port that could be asked. Write `control: {port: 9002}` in it."
+            )
+        host, port = self._control
+        return NoBoxError(f"No box answers on {host}:{port}.")
+
+
+def _is_made_of(kinds: Sequence[type], values: Sequence[object]) -> bool:
+    """Whether these are finite numbers and texts as a box sends them: on its port, anyone may listen."""
+    return len(values) == len(kinds) and all(
+        isinstance(value, int | float) and math.isfinite(value) if kind is float else isinstance(value, kind)
+        for value, kind in zip(values, kinds, strict=True)
+    )
+
+
+def _shown(value: Any) -> Any:
+    return readable(value) if isinstance(value, str) else value

@@ -1,0 +1,123 @@
+"""The box itself: its units, its stage, its watchdog, its clock."""
+
+from __future__ import annotations
+
+import ctypes
+import datetime
+import shutil
+import subprocess
+from collections.abc import Iterator
+
+from appliance.cli.doctor.finding import Finding, better, ok, wrong
+from appliance.cli.doctor.host_view import Patient
+from appliance.release.choice import CHOSEN, RUN
+
+_EARLIEST = 2026  # this program did not exist before
+_TIME_ERROR = 5  # adjtimex(2): nobody keeps the clock right
+_ASK_S = 3.0
+_LATE_SHARE = 0.001
+
+
+def stage(patient: Patient) -> Iterator[Finding]:
+    """How the dance that runs here fares."""
+    if patient.stage is None:
+        if patient.at(RUN / CHOSEN).exists():  # the units run, or should
+            yield wrong(
+                *("stage", "Nothing dances, though the box is on: the audience sees black."),
+                "`journalctl -b -u bunraku-stage` says why. No time? The second box.",
+            )
+        else:
+            yield ok("stage", "Nothing dances here now.")
+        return
+    health = patient.stage.health
+    ticks, late = (
+        int(health.get("ticks") or 0),
+        int(health.get("late") or 0) + int(health.get("skipped") or 0),
+    )
+    words = f"{health.get('rate_hz', 0.0):.1f} Hz; {late} of {ticks} ticks late or skipped."
+    if ticks and late > _LATE_SHARE * ticks:
+        yield better("stage", f"{words} Nobody sees a few.", "Look at wake-ups and other programs here.")
+    else:
+        yield ok("stage", words)
+    for complaint in health.get("complaints") or []:
+        yield better("stage", str(complaint), "docs/technician.md has more.")
+    for whose, fallback in patient.stage.fallbacks:
+        if fallback.active and whose != "preflight":  # what that one refused stands beside the show
+            yield better(f"{whose}: {fallback.name}", fallback.words, "docs/technician.md has more.")
+
+
+def units(patient: Patient) -> Iterator[Finding]:
+    """What systemd says about the box's units."""
+    if not patient.is_here or not patient.at("/run/systemd/system").is_dir():
+        return
+    for unit in _asked_about("bunraku*.service", "bunraku.target"):
+        name, state = unit.get("Id", ""), unit.get("ActiveState", "")
+        restarts = unit.get("NRestarts", "0")
+        if state == "failed":
+            yield wrong(
+                name, f"It has failed ({unit.get('Result')}).", f"`journalctl -b -u {name}` says why."
+            )
+        elif restarts not in ("", "0"):
+            yield better(
+                *(name, f"{state}; it was started again {restarts} times since the box was switched on."),
+                f"`journalctl -b -u {name}` says why.",
+            )
+        else:
+            yield ok(name, f"{state} ({unit.get('SubState')}).")
+
+
+def _asked_about(*patterns: str) -> list[dict[str, str]]:
+    if shutil.which("systemctl") is None:
+        return []
+    properties = "--property=Id,ActiveState,SubState,NRestarts,Result"
+    try:
+        done = subprocess.run(
+            ["systemctl", "show", properties, *patterns],
+            capture_output=True,
+            text=True,
+            timeout=_ASK_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return []
+    blocks = [block for block in done.stdout.split("\n\n") if block.strip()]
+    return [dict(line.split("=", 1) for line in block.splitlines() if "=" in line) for block in blocks]
+
+
+def watchdog(patient: Patient) -> Iterator[Finding]:
+    """Does a machine that hangs as a whole switch itself off and on?"""
+    devices = patient.found("/sys/class/watchdog/watchdog[0-9]*")
+    cure = "RuntimeWatchdogSec=10s in /etc/systemd/system.conf; the installed box does that by itself."
+    if not devices:
+        yield better(
+            "watchdog",
+            "This machine has none: if it hangs as a whole, it stays so.",
+            "A Raspberry Pi or a NUC has one.",
+        )
+    elif any(patient.text(device / "state") == "active" for device in devices):
+        seconds = patient.text(devices[0] / "timeout")
+        yield ok("watchdog", f"It restarts the machine after {seconds} s of silence.")
+    else:
+        yield better("watchdog", "Nobody uses it: a machine that hangs as a whole stays so.", cure)
+
+
+def clock(patient: Patient) -> Iterator[Finding]:
+    """The dance needs none; the times in the journal do."""
+    if not patient.is_here:
+        return
+    year, what = datetime.datetime.now(datetime.UTC).year, "clock"
+    if year < _EARLIEST:
+        yield better(
+            *(what, f"It says {year}. The dance does not mind; journals and logs carry wrong dates."),
+            "A network with the time, or a battery for the clock (Pi 5: its socket J5).",
+        )
+    elif _is_kept_right():
+        yield ok(what, "It is kept right by a time server.")
+    else:
+        yield ok(what, "Nobody keeps it right. The dance does not mind; dates may be off by minutes.")
+
+
+def _is_kept_right() -> bool:
+    """adjtimex(2) with nothing to set: its result tells how the clock is."""
+    empty = ctypes.create_string_buffer(512)  # struct timex is shorter
+    return int(ctypes.CDLL(None).adjtimex(empty)) != _TIME_ERROR

@@ -1,0 +1,92 @@
+"""`bunraku doctor`: one check after the other, a table, an exit status."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from appliance.cli.doctor import box_state, processor, storage, venue
+from appliance.cli.doctor.finding import ORDER, Finding, wrong
+from appliance.cli.doctor.host_view import Patient, living_stage
+from appliance.cli.doctor.sample import Sample, sample
+from appliance.release.installed_box import box_here
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.config_error import ConfigError
+
+CHECKS = (
+    *(box_state.stage, storage.choice, storage.releases, box_state.units),
+    *(processor.realtime_rights, processor.locked_memory),
+    *(processor.governor, processor.warmth, processor.power, storage.memory, storage.data_folders),
+    *(
+        storage.media,
+        storage.system_partition,
+        storage.wear,
+        box_state.watchdog,
+        box_state.clock,
+        venue.ports,
+    ),
+    *(venue.network, venue.radios, venue.cables, venue.adapters, venue.display),
+)
+LOOKS = (processor.wake_ups, processor.others, processor.interrupts)
+_COLOURS = {"wrong": "bold red", "better": "yellow", "ok": "green"}
+
+
+def doctor(box_file: Path | None, chosen: Path | None, as_json: bool) -> int:
+    """Say how everything is; exit status 1 when something is wrong, else 0.
+
+    With neither file, the one that was chosen at power-on, on a box that has such.
+    """
+    found: list[Finding] = []
+    try:
+        box = load_box(box_here(box_file, chosen))
+    except ConfigError as error:
+        box = BoxConfig()
+        found.append(wrong("box file", str(error), "Below, a box without a box file is looked at."))
+    found += findings(Patient(box=box, stage=living_stage(box)))
+    found.sort(key=lambda finding: ORDER.index(finding.verdict))
+    if as_json:
+        print(json.dumps([finding._asdict() for finding in found], indent=1))
+    else:
+        _show(found)
+    return int(any(finding.verdict == "wrong" for finding in found))
+
+
+def findings(patient: Patient) -> Iterator[Finding]:
+    """Of all checks; a second of measuring for those that need it."""
+    for check in CHECKS:
+        yield from check(patient)
+    if patient.is_here:
+        seen = _sampled(patient)
+        for look in LOOKS:
+            yield from look(seen)
+
+
+def _sampled(patient: Patient) -> Sample:
+    """A second, in which the box's own processes may use what they use."""
+    ours = {os.getpid()}
+    for folder in patient.found("/proc/[0-9]*"):
+        command = patient.text(folder / "cmdline") or ""
+        if "appliance." in command or "/bunraku" in command:
+            ours.add(int(folder.name))
+    return sample(patient.box.realtime.priority, frozenset(ours))
+
+
+def _show(found: list[Finding]) -> None:
+    table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
+    for _ in range(3):
+        table.add_column(overflow="fold")
+    for finding in found:
+        words = Text(finding.words)
+        if finding.cure:
+            words.append(f"\n-> {finding.cure}", style="dim")
+        table.add_row(Text(finding.verdict, style=_COLOURS[finding.verdict]), Text(finding.what), words)
+    console = Console(highlight=False)
+    console.print(table)
+    count = {verdict: sum(one.verdict == verdict for one in found) for verdict in ORDER}
+    console.print(f"\n{count['ok']} ok, {count['better']} could be better, {count['wrong']} wrong.")

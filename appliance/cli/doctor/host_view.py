@@ -1,0 +1,94 @@
+"""Who is looked at: a machine's file system, a venue's box file, and the stage, where one dances."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from appliance.box.fallback import Fallen, fallen
+from appliance.box.process_health import Company
+from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
+from appliance.outputs.frame_reader import FrameReader
+from appliance.release.choice import RUN
+from appliance.show.box import BoxConfig
+
+
+@dataclass(frozen=True)
+class LivingStage:
+    """The stage that dances here: its process, and what it last said about itself."""
+
+    pid: int
+    health: dict[str, Any]
+    fallbacks: tuple[tuple[str, Fallen], ...] = ()  # of all processes of the box: whose, and which
+
+
+@dataclass(frozen=True)
+class Patient:
+    """A machine seen from `root`: what /proc, /sys and /etc say is read from there.
+
+    `is_here`: it is this machine, so that its clock, ports and processor can be asked as well. Nothing here
+    raises where a file is missing or cannot be read.
+    """
+
+    root: Path = Path("/")
+    box: BoxConfig = field(default_factory=BoxConfig)
+    stage: LivingStage | None = None
+
+    @property
+    def is_here(self) -> bool:
+        return self.root == Path("/")
+
+    def at(self, path: Path | str) -> Path:
+        """Where this absolute path of the machine lies for us."""
+        return self.root / str(path).lstrip("/")
+
+    def text(self, path: Path | str) -> str | None:
+        """What a file says, without blanks at its ends; None where it says nothing."""
+        try:
+            return self.at(path).read_text(errors="replace").strip()
+        except OSError:
+            return None
+
+    def number(self, path: Path | str) -> int | None:
+        """The number in a file, decimal or with 0x."""
+        try:
+            return int(self.text(path) or "", 0)
+        except ValueError:
+            return None
+
+    def found(self, pattern: str) -> list[Path]:
+        """Files of this pattern, in order, as paths of the machine."""
+        with contextlib.suppress(OSError):
+            return [
+                Path("/") / path.relative_to(self.root)
+                for path in sorted(self.root.glob(pattern.lstrip("/")))
+            ]
+        return []
+
+    def mounts(self) -> dict[str, tuple[str, Sequence[str]]]:
+        """Mount point -> kind of file system, its options."""
+        rows = (line.split() for line in (self.text("/proc/mounts") or "").splitlines())
+        return {row[1]: (row[2], row[3].split(",")) for row in rows if len(row) >= 4}
+
+
+def living_stage(box: BoxConfig) -> LivingStage | None:
+    """The stage of this box, if one lives; found also by root, whose folder it is not."""
+    folder = box.runtime
+    if folder is None and (RUN / "frame").exists():
+        folder = RUN
+    if folder is None:
+        try:
+            folder = runtime_folder(box)
+        except RuntimeFolderError:
+            return None
+    with contextlib.closing(FrameReader(folder)) as reader:
+        if not reader.is_alive(time.monotonic()) or reader.facts is None:
+            return None
+        health, now = reader.health() or {}, time.monotonic()
+        with contextlib.closing(Company(folder)) as company:
+            told = [("stage", one) for one in fallen(health.get("fallbacks"))] + company.fallbacks(now)
+        return LivingStage(reader.facts.pid, health, tuple(told))

@@ -1,0 +1,206 @@
+"""What is plugged in and reachable: ports, network, radios, cables, lights' adapters, display."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from serial.tools.list_ports_common import ListPortInfo
+
+from appliance.cli.doctor.finding import Finding, better, ok, wrong
+from appliance.cli.doctor.host_view import Patient
+from appliance.outputs.dmx.adapter_wire import AdapterError
+from appliance.outputs.dmx.serial_port import find_device, is_bare_ftdi, is_usb_pro
+from appliance.show.box import out_of_reach
+from appliance.show.dmx import IN_WORDS, DmxConfig
+
+_KINDS: dict[str, Callable[[ListPortInfo], bool]] = {"usb-pro": is_usb_pro, "open-dmx": is_bare_ftdi}
+_UDMX = ("16c0", "05dc")
+_ASK_S = 2.0
+
+
+def ports(patient: Patient) -> Iterator[Finding]:
+    """The box's own ports are free, or the box has them."""
+    udp, control = patient.box.sensors.udp, patient.box.control
+    wanted = [("sensors", udp.host, udp.port)] if udp is not None else []
+    wanted += [("commands", control.host, control.port)] if control is not None else []
+    for whose, host, port in wanted:
+        holders = _holders(patient, port) if port else []
+        ours = [name for name, command in holders if "appliance" in command or "bunraku" in command]
+        if not holders:
+            yield ok(f"port for {whose}", f"{host}:{port} is free.")
+        elif len(ours) == len(holders):
+            yield ok(f"port for {whose}", f"{host}:{port}: the box listens.")
+        else:
+            names = ", ".join(name for name, _ in holders if name not in ours)
+            yield wrong(
+                *(f"port for {whose}", f"{names} has UDP port {port}: the box would hear nothing there."),
+                "End that program, or give the box another port in its box file.",
+            )
+    if (words := out_of_reach(patient.box.sensors)) is not None:
+        yield better("sensors by Wi-Fi", words, "For sensors on cables alone: leave it.")
+
+
+def _holders(patient: Patient, port: int) -> list[tuple[str, str]]:
+    """(name, command line) of each process that has this UDP port."""
+    rows = [line.split() for line in (patient.text("/proc/net/udp") or "").splitlines()]
+    inodes = {f"socket:[{row[9]}]" for row in rows if len(row) > 9 and row[1].endswith(f":{port:04X}")}
+    found = []
+    for folder in patient.found("/proc/[0-9]*") if inodes else []:
+        if inodes & set(_links(patient.at(folder / "fd"))):
+            command = (patient.text(folder / "cmdline") or "").replace("\0", " ")
+            found.append((f"{patient.text(folder / 'comm')} (process {folder.name})", command))
+    return found or [("another user's program", "")] * bool(inodes)
+
+
+def _links(folder: Path) -> Iterator[str]:
+    """What the links in a folder lead to, without those that are gone when they are read."""
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(folder):
+            with contextlib.suppress(OSError):
+                yield str(Path(entry.path).readlink())
+
+
+def network(patient: Patient) -> Iterator[Finding]:
+    """Is any network there?"""
+    names = [card.parent.name for card in patient.found("/sys/class/net/*/carrier")]
+    cards = [name for name in names if name != "lo" and _is_card(patient, name)]
+    connected = [name for name in cards if patient.text(f"/sys/class/net/{name}/carrier") == "1"]
+    if connected:
+        yield ok("network", f"{', '.join(connected)}: connected.")
+    elif cards:
+        yield better(
+            *(
+                "network",
+                f"{', '.join(cards)}: nothing is connected. Sensors by Wi-Fi and receivers miss the box.",
+            ),
+            "Plug in the router, and look at the lamps of both sockets.",
+        )
+
+
+def _is_card(patient: Patient, name: str) -> bool:
+    """A real one, and none that a program made."""
+    return patient.at(f"/sys/class/net/{name}/device").exists()
+
+
+def radios(patient: Patient) -> Iterator[Finding]:
+    """Wi-Fi that sleeps or is switched off, Bluetooth that disturbs, a Pi's own access point."""
+    for switch in patient.found("/sys/class/rfkill/rfkill*"):
+        kind, name = patient.text(switch / "type"), patient.text(switch / "name")
+        blocked = patient.text(switch / "soft") == "1" or patient.text(switch / "hard") == "1"
+        if kind == "bluetooth" and not blocked:
+            yield better(
+                *("bluetooth", f"{name} is on. It shares 2.4 GHz with the sensors."),
+                "`sudo rfkill block bluetooth`",
+            )
+        elif kind == "wlan" and blocked:
+            yield ok(
+                "wi-fi", f"{name} is switched off here: the sensors need a router, which is better anyway."
+            )
+    for card in (path.parent for path in patient.found("/sys/class/net/*/phy80211")):
+        driver = patient.at(card / "device/driver").resolve().name
+        if driver.startswith("brcmf") and _is_access_point(patient):
+            yield better(
+                *(
+                    "wi-fi",
+                    f"{card.name} is the access point, on a Pi's own radio: it loses clients after hours.",
+                ),
+                "A router for 2.4 GHz on Ethernet; docs/touring.md.",
+            )
+        if patient.is_here and "on" in _asked("iw", "dev", card.name, "get", "power_save").split()[-1:]:
+            yield better(
+                *("wi-fi", f"{card.name} saves power: readings wait for up to 100 ms."),
+                f"`sudo iw dev {card.name} set power_save off`, or wifi.powersave=2 for NetworkManager.",
+            )
+
+
+def _is_access_point(patient: Patient) -> bool:
+    """As `bunraku-access-point` makes it."""
+    return bool(patient.found("/data/network/sensors.nmconnection"))
+
+
+def _asked(*command: str) -> str:
+    if shutil.which(command[0]) is None:
+        return ""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_ASK_S, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout
+
+
+def cables(patient: Patient) -> Iterator[Finding]:
+    """Sensors on cables that the box file names."""
+    for cable in patient.box.sensors.serial:
+        yield _device(patient, f"sensor on {cable.device}", cable.device)
+    if patient.found("/run/systemd/units/invocation:ModemManager.service"):
+        yield better(
+            *("cables", "ModemManager runs: it speaks to each new cable first, for seconds."),
+            "`sudo systemctl disable --now ModemManager`",
+        )
+
+
+def adapters(patient: Patient) -> Iterator[Finding]:
+    """The lights' USB adapters that the box file names."""
+    for wire in patient.box.outputs.dmx:
+        what = f"lights, universe {wire.universe}"
+        if wire.wire == "udmx":
+            yield _udmx(patient, what)
+        elif wire.wire in _KINDS:
+            yield _adapter(patient, what, wire)
+
+
+def _udmx(patient: Patient, what: str) -> Finding:
+    for device in patient.found("/sys/bus/usb/devices/*/idVendor"):
+        if (patient.text(device), patient.text(device.with_name("idProduct"))) == _UDMX:
+            return ok(what, "The uDMX is plugged in.")
+    return wrong(
+        what, "No uDMX is plugged in: its lamps stay as they are.", "Plug it in: it is taken by itself."
+    )
+
+
+def _adapter(patient: Patient, what: str, wire: DmxConfig) -> Finding:
+    if not patient.is_here:
+        return ok(what, "It is looked for on the machine itself.")
+    try:
+        device = find_device(wire.device, wire.serial, _KINDS[wire.wire])
+    except AdapterError as error:
+        return wrong(
+            *(what, f"{IN_WORDS[wire.wire]}: {error}. Its lamps stay as they are."),
+            "Plug it in: it is taken by itself.",
+        )
+    return _device(patient, what, device)
+
+
+def _device(patient: Patient, what: str, device: str) -> Finding:
+    there = patient.at(device)
+    if not there.exists():
+        return wrong(what, f"{device} is not plugged in.", "Plug it in: it is taken by itself.")
+    if not os.access(there, os.R_OK | os.W_OK):
+        return wrong(
+            what, f"This user may not open {device}.", "`sudo usermod -aG dialout USER`, log in again."
+        )
+    return ok(what, f"{device} is there.")
+
+
+def display(patient: Patient) -> Iterator[Finding]:
+    """Is there somewhere to project, and something that draws?"""
+    sockets = patient.found("/sys/class/drm/card*-*/status")
+    connected = [path.parent.name for path in sockets if patient.text(path) == "connected"]
+    if connected:
+        yield ok("display", f"{', '.join(connected)}: connected.")
+    else:
+        yield better(
+            *("display", "None is connected: no picture. Dance and lights go on."),
+            "Projector on, cable in; `video=HDMI-A-1:1920x1080M@60D` for one that sleeps "
+            "(docs/technician.md).",
+        )
+    if not patient.found("/dev/dri/renderD*"):
+        yield better(
+            *("graphics", "No graphics card: the processor draws, in fewer and smaller pictures."),
+            "The card's driver, or a machine with one. A dance without a projector needs none.",
+        )

@@ -1,0 +1,90 @@
+"""The words of `bunraku lights ...` on the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from appliance.release.choice import box_of
+
+ShowFolder = Annotated[
+    Path | None, typer.Option(help="Show bundle; left out: the show that comes with the box.")
+]
+BoxFile = Annotated[Path | None, typer.Option(help="box.yaml of the venue: its wires and places.")]
+ChosenFile = Annotated[
+    Path | None, typer.Option("--chosen", help="Instead of --box: as `bunraku preflight` chose.")
+]
+
+lights = typer.Typer(
+    help="Light the rig by the dance; walk through it, look at it, convert fixture profiles.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+@lights.callback(invoke_without_command=True)
+def light(
+    context: typer.Context,
+    show: Annotated[
+        Path | None, typer.Option(help="Show bundle; left out: the one that the stage dances.")
+    ] = None,
+    box: BoxFile = None,
+    chosen: ChosenFile = None,
+) -> None:
+    """Light the rig by the dance that `bunraku play` dances, until Ctrl-C; `play` starts this by itself."""
+    if context.invoked_subcommand is not None:
+        if (show, box, chosen) != (None, None, None):
+            raise typer.BadParameter(f"write options behind '{context.invoked_subcommand}'")
+        return
+    from appliance.lights.run import light_up
+
+    light_up(show, box_of(box, chosen))
+
+
+@lights.command("test")
+def walk_through(
+    show: ShowFolder = None,
+    box: BoxFile = None,
+    fixture: Annotated[
+        list[str] | None, typer.Option(help="This fixture alone; may be given several times.")
+    ] = None,
+    attribute: Annotated[str | None, typer.Option(help="This attribute alone; `aim` for heads.")] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, max=600, help="How long each attribute moves.")] = 3.0,
+) -> None:
+    """Walk through the rig, fixture by fixture, attribute by attribute, and say what should be seen."""
+    from appliance.lights.rig_walk import walk_rig
+    from appliance.release.installed_box import pair_here
+
+    show, box = pair_here(show, box)
+    walk_rig(show, box, fixture or [], attribute, seconds)
+
+
+@lights.command("show")
+def show_rig(
+    show: ShowFolder = None,
+    box: BoxFile = None,
+    out: Annotated[Path, typer.Option(help="The picture.")] = Path("rig.png"),
+    mapping: Annotated[
+        str | None, typer.Option(help="Heads as in this mapping; left out: the first.")
+    ] = None,
+    at: Annotated[float, typer.Option(min=0.0, help="Second of the phrase that is shown.")] = 2.0,
+) -> None:
+    """Print the patch as a table and draw the rig: fixtures, dancer, where the heads point."""
+    from appliance.lights.rig_sheet import print_rig
+
+    print_rig(show, box, out, mapping, at)
+
+
+@lights.command()
+def convert(
+    fixture: Annotated[Path, typer.Argument(help="A fixture of the Open Fixture Library, as JSON.")],
+    out: Annotated[
+        Path | None, typer.Option(help="The profile; left out: beside the file, ending with .yaml.")
+    ] = None,
+) -> None:
+    """Turn a fixture of the Open Fixture Library into a profile, for the folder `profiles` of a show."""
+    from appliance.lights.convert import convert_file
+
+    convert_file(fixture, out)

@@ -1,0 +1,88 @@
+"""Pictures of journals and recordings: what was danced, drawn as a filmstrip or rendered in a look."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from appliance.box.clock import TICK_S
+from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
+from appliance.pose.bvh import read_bvh
+from appliance.pose.quaternion import Array
+from appliance.pose.skeleton import Skeleton
+from appliance.projector.projector_error import ProjectorError
+from appliance.recorder.reading import read_journal
+from appliance.show.look import LookConfig, looks_by_name
+from appliance.show.show import load_show
+from appliance.stage.stage_error import StageError
+
+
+@dataclass(frozen=True)
+class Danced:
+    """Poses (N, J, 4) and roots (N, 3) at `fps`; the joints that hands held; what it is called."""
+
+    skeleton: Skeleton
+    poses: Array
+    roots: Array
+    fps: float
+    held: tuple[int, ...]
+    title: str
+
+    def part(self, start_s: float, seconds: float) -> Danced:
+        """So many seconds from a start on; a negative start counts from the end. Raises StageError."""
+        count = len(self.poses)
+        first = round(start_s * self.fps) if start_s >= 0.0 else max(0, count + round(start_s * self.fps))
+        if first >= count:
+            raise StageError(
+                f"{self.title}: nothing was danced after second {start_s:g}. Choose an earlier start."
+            )
+        kept = slice(first, first + max(1, round(seconds * self.fps)))
+        return Danced(self.skeleton, self.poses[kept], self.roots[kept], self.fps, self.held, self.title)
+
+
+def danced(source: Path, metres_per_unit: float = 0.01) -> Danced:
+    """All of a BVH recording or of a journal. Raises BvhError or JournalError."""
+    if source.suffix.lower() == ".bvh":
+        recording = read_bvh(source, metres_per_unit=metres_per_unit)
+        return Danced(recording.skeleton, recording.poses, recording.roots, recording.fps, (), source.stem)
+    journal = read_journal(source)
+    held = tuple(journal.skeleton.index(hand["joint"]) for hand in journal.header["hands"])
+    return Danced(
+        journal.skeleton, journal.ticks["pose"], journal.ticks["root"], 1.0 / TICK_S, held, source.stem
+    )
+
+
+def drawn(dance: Danced, out: Path) -> Path:
+    """A filmstrip of lit figures in rows, held joints highlighted. Raises StageError."""
+    try:
+        return draw_filmstrip(
+            out, dance.skeleton, dance.poses, dance.roots, dance.fps, held=dance.held, title=dance.title
+        )
+    except MissingPicturesError as error:
+        raise StageError(str(error)) from error
+    except OSError as error:
+        raise _unwritable(out, error) from error
+
+
+def rendered(dance: Danced, out: Path, look: str, show: Path | None) -> Path:
+    """A strip of pictures as the projector shows them, in a look of a show or, without a show, a built-in
+    one. Raises ConfigError, or StageError where the look is unknown or nothing can be rendered here."""
+    looks = looks_by_name(() if show is None else load_show(show).config.looks)
+    _refuse_unknown(look, looks)
+    try:
+        from appliance.projector.strip import strip
+
+        return strip(out, dance.skeleton, looks, look, dance.poses, dance.roots, dance.fps, dance.held)
+    except ProjectorError as error:
+        raise StageError(str(error)) from error
+    except OSError as error:
+        raise _unwritable(out, error) from error
+
+
+def _refuse_unknown(look: str, looks: dict[str, LookConfig]) -> None:
+    if look not in looks:
+        raise StageError(f"There is no look '{look}'. There are: {', '.join(looks)}.")
+
+
+def _unwritable(out: Path, error: OSError) -> StageError:
+    return StageError(f"{out}: the picture cannot be written ({error.strerror}).")

@@ -1,0 +1,255 @@
+"""`bunraku play`: load, say what will dance, dance, say what was danced."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from appliance.box.log_writer import Speaker
+from appliance.box.show_state import forget_house
+from appliance.box.stop_signals import stop_signals
+from appliance.sensor.memory_block import forget_memory
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.bundle import default_show_path
+from appliance.show.control import ControlConfig
+from appliance.show.show import Show, load_show
+from appliance.stage.open_sensors import reach
+from appliance.stage.run import Stage
+from appliance.stage.stage_error import StageError
+
+if TYPE_CHECKING:
+    from appliance.cli.companions import Companion
+
+PICTURED_MINUTES = 0.5  # a journal that only serves the picture at the end keeps little more than is drawn
+_NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
+# In a technician's words; what is not here goes by its name in docs/wire.md.
+_REFUSALS = {
+    "no packets of ours": ("length", "magic", "version", "kind"),
+    "from sensors without a key": ("device",),
+    "forged or damaged": ("tag",),
+    "of an earlier link": ("old_session", "old_hello"),
+    "doubled or too late": ("duplicate", "reordered", "old"),
+    "no orientation that a hand could have": ("zero", "norm", "torn", "rate"),
+    "damaged on the cable": ("frame_length", "frame_stuffing", "frame_crc"),
+}
+
+
+def play_show(
+    directory: Path | None = None,
+    box_file: Path | None = None,
+    seconds: float | None = None,
+    emulate: bool = False,
+    journal: Path | None = None,
+    filmstrip: Path | None = None,
+    alone: bool = False,
+    window: bool = False,
+    rehearse: Path | None = None,
+) -> int:
+    """Dance until the seconds are over or a signal comes; the exit status.
+
+    alone: start no companions. window: show the projection in a window. rehearse: the same where there is
+    a display, and a picture of the projection at the end.
+    """
+    show, box = load_show(directory or default_show_path()), load_box(box_file)
+    with ExitStack() as opened:
+        stopped = opened.enter_context(stop_signals())
+        scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
+        if emulate and scratch:
+            box = _emulated(show, box, scratch, opened)
+        keeper = None if journal is None else _keeper(box_file, _new_folder(journal), box.journal.minutes)
+        journal = journal or box.journal.folder
+        if (filmstrip or rehearse) is not None and scratch and (alone or journal is None):
+            journal = scratch / "dance.journal"
+            keeper = _keeper(box_file, journal, PICTURED_MINUTES)
+        elif keeper is None and not alone and (journal or (box.state_folder and not emulate)):
+            keeper = _keeper(box_file, journal, box.journal.minutes)
+        speaker = Speaker()
+        opened.callback(speaker.close)
+        shown = rehearse is not None and _has_display()
+        control = None if alone or box.control is None else _opened(box.control, opened)
+        stage = Stage(show, box, speaker.say, box_file)
+        with closing(stage):
+            for line in _introduction(stage, emulate, control):
+                speaker.say(line)
+            company = () if alone else tuple(_company(show, box, box_file, control, window or shown))
+            with _accompanied(company + (() if keeper is None else (keeper,)), speaker, stage):
+                stage.dance(seconds, stopped)
+            if keeper is not None:
+                from appliance.keeper.keeper import keep_rest
+
+                keep_rest(stage.box, stage.sharing.folder, journal, box.journal.minutes, speaker.say)
+        if not alone:
+            _forget(stage)
+        for line in _conclusion(stage):
+            speaker.say(line)
+        if filmstrip is not None and journal is not None:
+            from appliance.cli.pictures import danced, drawn
+            from appliance.cli.rehearsal import PICTURED_S
+
+            picture = drawn(danced(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
+            speaker.say(f"What was just danced, held joints highlighted: {picture}")
+        if rehearse is not None and journal is not None:
+            from appliance.cli.rehearsal import rehearsal_picture
+
+            for line in rehearsal_picture(journal, rehearse, show):
+                speaker.say(line)
+    return 0
+
+
+def _scratch(opened: ExitStack) -> Path:
+    """A folder that goes with this process."""
+    import shutil
+    import tempfile
+
+    folder = Path(tempfile.mkdtemp(prefix="bunraku-"))
+    opened.callback(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _emulated(show: Show, box: BoxConfig, scratch: Path, opened: ExitStack) -> BoxConfig:
+    """The box as emulated sensors find it, which run from now on."""
+    from appliance.cli.emulation import Emulation
+
+    return opened.enter_context(Emulation(show, box, scratch)).box
+
+
+def _has_display() -> bool:
+    from appliance.cli.rehearsal import has_display
+
+    return has_display()
+
+
+def _opened(control: ControlConfig, opened: ExitStack) -> socket.socket:
+    from appliance.cli.control import open_control_port
+
+    port = open_control_port(control)
+    opened.callback(port.close)
+    return port
+
+
+def _accompanied(
+    company: tuple[Companion, ...], speaker: Speaker, stage: Stage
+) -> AbstractContextManager[object]:
+    """While inside, they run; without any, nothing is loaded for them: a stage that is back is in a hurry."""
+    if not company:
+        return nullcontext()
+    from appliance.cli.companions import Companions
+
+    return Companions(company, speaker.say, lambda: stage.health.ticks > 0)
+
+
+def _company(
+    show: Show, box: BoxConfig, box_file: Path | None, control: socket.socket | None, window: bool
+) -> Iterator[Companion]:
+    """Who accompanies the stage."""
+    from appliance.cli.companions import Companion
+    from appliance.cli.control import control_command
+
+    if control is not None:
+        yield Companion(
+            "Show control",
+            control_command(box, control.fileno()),
+            "What is in force stays in force; commands wait for a moment.",
+            descriptors=(control.fileno(),),
+        )
+    named = () if box_file is None else ("--box", str(box_file))
+    bunraku = (sys.executable, "-m", "appliance.cli")
+    if box.outputs.dmx and show.config.lights.fixtures:
+        yield Companion(
+            "The process for the lights",
+            (*bunraku, "lights", *named),
+            "The lights stay as they are for a moment.",
+        )
+    if window:
+        yield Companion(
+            "The projector",
+            (*bunraku, "project", *named, "--window"),
+            "The picture is black for a moment.",
+            may_close=True,
+        )
+
+
+def _forget(stage: Stage) -> None:
+    """All have ended as they should: the next show begins anew."""
+    forget_house(stage.sharing.folder)
+    if stage.box.state_folder is not None:
+        forget_memory(stage.sharing.folder, stage.box.state_folder)
+
+
+def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Companion:
+    """Who carries the journal, the place and the sensors' memory to the disk."""
+    from appliance.cli.companions import Companion
+
+    named = () if box_file is None else ("--box", str(box_file))
+    kept = () if journal is None else ("--journal", str(journal), "--minutes", str(minutes))
+    return Companion(
+        "The keeper",
+        (sys.executable, "-m", "appliance.cli", "keep", *named, *kept),
+        "What is danced meanwhile waits in memory.",
+    )
+
+
+def _new_folder(journal: Path) -> Path:
+    """Refuse a file in its place: a journal is a folder."""
+    if journal.is_file():
+        raise StageError(
+            f"{journal} is a file, and a journal is a folder. Nothing is danced. Name another place, or "
+            "remove the file."
+        )
+    return journal
+
+
+def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) -> list[str]:
+    show = stage.show
+    hands = ", ".join(f"{hand.sensor or hand.kind} holds {hand.joint}" for hand in show.config.hands)
+    receivers = ", ".join(receiver.name for receiver in stage.cast.outputs.receivers) or "nobody"
+    lines = [
+        f"{show.config.name}: {hands or 'no hands, the dancer moves freely'}.",
+        f"The dance goes to {receivers}.",
+        _ears(stage, control),
+        stage.admission.sentence(),
+    ]
+    lines += stage.cast.complaints
+    lines += map(str, show.idle_hands())
+    if not emulate:
+        lines += reach(list(stage.cast.worn), stage.box)
+    return lines
+
+
+def _ears(stage: Stage, control: socket.socket | None) -> str:
+    """Where sensors and commands are heard."""
+    sensors = ", ".join(intake.name for intake in stage.cast.link.intakes) or "no port"
+    if control is not None:
+        commands = "on " + ":".join(map(str, control.getsockname()))
+    else:
+        commands = "by nobody" if stage.box.control is None else "by a process of their own (bunraku control)"
+    return f"Sensors are heard on {sensors}, commands {commands}."
+
+
+def _conclusion(stage: Stage) -> list[str]:
+    health = stage.health
+    trouble = "".join(f", {name} {count}" for name, count in health.trouble() if count)
+    lines = [
+        f"Danced {health.ticks} ticks: late {health.late}, longest tick {health.worst_ms:.1f} ms{trouble}."
+    ]
+    if stage.cast.worn:
+        lines.append(_readings(stage.cast.link.counts))
+    return lines
+
+
+def _readings(counts: dict[str, int]) -> str:
+    """What became of the sensors' packets, refusals by reason."""
+    accepted = counts["accepted"] + counts["relocated"]
+    words = {reason: words for words, reasons in _REFUSALS.items() for reason in reasons}
+    refused: dict[str, int] = {}
+    for reason, count in counts.items():
+        if count and reason not in _NO_REFUSAL:
+            said = words.get(reason, reason)
+            refused[said] = refused.get(said, 0) + count
+    lost = f", {counts['lost']} lost on the way" if counts["lost"] else ""
+    reasons = ", ".join(f"{count} {said}" for said, count in refused.items())
+    return f"Readings: {accepted} accepted{lost}" + (f"; refused: {reasons}." if refused else ".")

@@ -1,0 +1,165 @@
+"""`bunraku preflight`: decides at power-on which show dances; it imports little, for all wait for it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from appliance.cli.run_with_timeout import GivenUpError, within
+from appliance.release.arrivals import look
+from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice, alone_in
+from appliance.release.choosing import Outcome, Places, built_in_box, choose, remembered
+
+ANEW = "anew"  # touched when units have to start anew, for another show or box file dances
+_AT_ONCE_S = 120.0  # after power-on a stick takes effect at once; later no show is interrupted
+_PATIENCE_S, _CHECK_S = 45.0, 30.0  # a stick that is read for ever keeps nobody from dancing
+_TURN_S, _LATE_TURN_S = 20.0, 60.0  # how long another preflight is waited for
+_NOT_WRITTEN = 1
+
+
+class Options(NamedTuple):
+    """Where to look and where to write. late: a stick was plugged into a box that is on."""
+
+    boot: Path | None = None
+    stick: Path = STICK
+    data: Path = DATA
+    run: Path = RUN
+    late: bool = False
+
+
+def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> int:
+    """Write chosen.json into the run folder: 0 when it stands there, 1 when the folder does not take it."""
+    places = Places(options.data, options.run)
+    if options.late:
+        with contextlib.suppress(OSError):  # its unit has said so already, and allows no more
+            os.nice(19)
+    try:
+        if not options.late:  # whatever becomes of what is new: this dances, should it end this process
+            _publish(places, Outcome(remembered(places.data), False, ()), False, uptime_s, say)
+        patience_s = _LATE_TURN_S if options.late else _TURN_S
+        with alone_in(options.data, patience_s), alone_in(options.run, patience_s):
+            outcome = _found(options, places)
+            for words in outcome.words:
+                say(words)
+            _publish(places, outcome, options.late, uptime_s, say)
+    except BlockingIOError:
+        say("Another preflight has not ended. What danced before goes on. Plug the stick in again.")
+    except OSError as error:
+        say(
+            f"{places.run}: what was chosen cannot be written there ({error.strerror}). The audience "
+            "sees the show that comes with the box. Look who owns this folder."
+        )
+        return _NOT_WRITTEN
+    return 0
+
+
+def _found(options: Options, places: Places) -> Outcome:
+    """What is chosen; a stick is read in a process that can be given up."""
+    boot = options.boot or next((one for one in BOOTS if _is_folder(one)), BOOTS[-1])
+
+    def chosen() -> Outcome:
+        arrivals = [look("stick", options.stick), look("boot", boot)]
+        return choose(places, arrivals, candidate_problems, options.late)
+
+    try:
+        if _is_folder(options.stick):
+            return Outcome.unpacked(within(_PATIENCE_S, lambda: chosen().packed()))
+        return chosen()
+    except GivenUpError as error:
+        words = f"The stick could not be read ({error}). What danced before goes on. Try another stick."
+    except Exception as error:
+        words = f"What is new cannot be looked at ({error!r}). What danced before goes on. Copy it again."
+    outcome = choose(places, [], candidate_problems)
+    return Outcome(outcome.choice._replace(refused=(words, *outcome.choice.refused)), False, (words,))
+
+
+def _is_folder(path: Path) -> bool:
+    """Not one on a stick that is pulled at this moment, or gives errors."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
+def _publish(
+    places: Places, outcome: Outcome, late: bool, uptime_s: float, say: Callable[[str], None]
+) -> None:
+    """Where all processes of the box look; once a show has gone on for long, it is let be."""
+    path = places.run / CHOSEN
+    before = Choice.read(path) if late else None
+    if before is not None and (not outcome.taken or uptime_s >= _AT_ONCE_S):
+        before._replace(refused=outcome.choice.refused).write(path)
+        if outcome.taken:
+            say("The running show goes on. The new one dances after the next power-on.")
+        return
+    outcome.choice.complete(built_in_box(places))._replace(data=places.data).write(path)
+    if before is not None:
+        (places.run / ANEW).touch()
+        say("The box was switched on only just now: the new show dances at once.")
+
+
+def candidate_problems(show: Path, box: Path) -> list[str]:
+    """Why a show and a box file cannot be danced here; checked in a process that may crash or hang."""
+    import subprocess
+
+    command = (sys.executable, "-m", "appliance.cli.candidate", str(show), str(box))
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", check=False, timeout=_CHECK_S
+        )
+    except subprocess.TimeoutExpired:
+        return [f"{show}: its check did not end within {_CHECK_S:g} s. Try it with: bunraku check."]
+    except OSError as error:
+        return [f"{show}: it cannot be checked ({error.strerror})."]
+    if done.returncode == 0:
+        return []
+    lines = [line for line in done.stderr.splitlines() if line]
+    if done.returncode < 0 or not lines:
+        return [f"{show}: its check crashed (signal {-done.returncode}). Export the network again."]
+    return lines[-40:]
+
+
+def parsed(arguments: Sequence[str]) -> Options:
+    """The command line; ends the process with status 2 where it is wrong."""
+    if not arguments:
+        return Options()
+    import argparse
+
+    parser = argparse.ArgumentParser(prog="bunraku preflight", description=DESCRIPTION)
+    parser.add_argument("--boot", type=Path, help="The boot partition's folder with `show` and `box.yaml`.")
+    parser.add_argument("--stick", type=Path, default=STICK, help=f"The same on a stick; {STICK}.")
+    parser.add_argument("--data", type=Path, default=DATA, help=f"What is kept over power-off; {DATA}.")
+    parser.add_argument("--run", type=Path, default=RUN, help=f"Where all processes look; {RUN}.")
+    parser.add_argument("--late", action="store_true", help="A stick was plugged into a box that is on.")
+    return Options(**vars(parser.parse_args(list(arguments))))
+
+
+DESCRIPTION = (
+    "Decide which show dances: a new one from the stick or the boot partition when it is sound, else the "
+    "last good one, else the one that comes with the box."
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """For `python -m appliance.cli.preflight`, which units run; the exit status."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if "--check-release" in given:
+        from appliance.cli.check_release import check_release
+
+        given.remove("--check-release")
+        return check_release(parsed(given).data)
+    return preflight(parsed(given), _say, time.clock_gettime(time.CLOCK_BOOTTIME))
+
+
+def _say(words: str) -> None:
+    with contextlib.suppress(OSError):
+        print(words, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

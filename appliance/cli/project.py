@@ -1,0 +1,95 @@
+"""`bunraku project`: show what the stage dances, until somebody ends it; the exit status for a supervisor."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import typer
+
+from appliance.box.log_writer import Speaker
+from appliance.box.notify import Notifier
+from appliance.box.parent_death import was_told
+from appliance.box.stop_signals import stop_signals
+from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
+from appliance.projector.run import Run, Wish
+from appliance.projector.window import Kind, Size
+from appliance.show.box import load_box
+
+_LARGEST = 16384
+_RETRY_S = 10.0  # without a display: a projector is switched on late
+_LOOK_S = 0.25
+
+
+def wish(
+    window: bool,
+    fullscreen: bool,
+    offscreen: str | None,
+    frames: Path | None,
+    seconds: float | None,
+    info: bool,
+) -> Wish:
+    """The command line's options as one wish; raises typer.BadParameter where they contradict each other."""
+    if window + fullscreen + (offscreen is not None) > 1:
+        raise typer.BadParameter("Give one of --window, --fullscreen and --offscreen.")
+    kind: Kind | None = "window" if window else "fullscreen" if fullscreen else None
+    if offscreen is None:
+        return Wish(kind, None, frames, seconds, info)
+    return Wish("offscreen", _size(offscreen), frames, seconds, info)
+
+
+def project_show(box_file: Path | None, wish: Wish, waits: bool = False) -> int:
+    """0: ended as asked; 69: no display or no OpenGL; 73: no room for --frames; 75: reset or hung.
+
+    waits: without a display it is tried again each 10 s, in this process, until there is one.
+    """
+    with stop_signals() as stopped, closing(Speaker()) as speaker, closing(Notifier()) as notifier:
+        said = ""
+        while not stopped():
+            try:
+                _project(box_file, wish, stopped, notifier, speaker.say)
+                break
+            except ProjectorError as error:
+                if not (waits and error.status == NO_DISPLAY):
+                    if not was_told(error.status):
+                        print(f"bunraku: {error}", file=sys.stderr)
+                    return error.status
+                if str(error) != said:
+                    said = str(error)
+                    speaker.say(f"{said} It is tried again each {_RETRY_S:g} s.")
+            notifier.ready("No display. It is looked for again and again.")
+            _wait(stopped, notifier)
+    return 0
+
+
+def _project(
+    box_file: Path | None,
+    wish: Wish,
+    stopped: Callable[[], bool],
+    notifier: Notifier,
+    say: Callable[[str], None],
+) -> None:
+    with closing(Run(load_box(box_file), box_file, wish, say)) as run:
+        for line in run.introduction():
+            say(line)
+        say(f"Shown: {run.project(stopped, notifier).sentence()}.")
+
+
+def _wait(stopped: Callable[[], bool], notifier: Notifier) -> None:
+    """Until a display is worth looking for again."""
+    again = time.monotonic() + _RETRY_S
+    while not stopped() and (now := time.monotonic()) < again:
+        notifier.ping(now)
+        time.sleep(_LOOK_S)
+
+
+def _size(text: str) -> Size:
+    width, times, height = text.partition("x")
+    if not (times and width.isdecimal() and height.isdecimal()):
+        raise typer.BadParameter(f"'{text}' is no size. Write it like 1280x720.")
+    if not all(1 <= int(part) <= _LARGEST for part in (width, height)):
+        raise typer.BadParameter(f"Width and height are from 1 to {_LARGEST} pixels.")
+    return int(width), int(height)

@@ -1,0 +1,151 @@
+"""`bunraku provision`: which port, which file, the password; each step as it is done; the box told."""
+
+from __future__ import annotations
+
+import getpass
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from appliance.cli.sensors import NOT_TAKEN, Venue, clear_errors, people_console, reload, require_folder
+from appliance.sensor.provisioning.provisioning import (
+    DEFAULT_PORT,
+    Provisioned,
+    ProvisioningError,
+    Settings,
+    provision,
+)
+from appliance.sensor.provisioning.serial_ports import NoWearableError, found_ports, only_wearable
+from appliance.sensor.provisioning.wearable_console import ConsoleError, WearableConsole
+from appliance.show.box import out_of_reach
+from appliance.stage.stage_error import StageError
+
+STDIN = Path("-")
+
+
+def provision_sensor(
+    place: Venue,
+    name: str,
+    port: str | None,
+    network: str | None,
+    password_file: Path | None,
+    fusion: str | None,
+    axes: str | None,
+    takes_over: bool = False,
+) -> int:
+    """Provision the wearable on a serial port; the exit status. Raises StageError, and then it is not."""
+    console = people_console()
+
+    def say(what: str, words: str) -> None:
+        _step(console, what, words)
+
+    require_folder(place.keys)
+    try:
+        settings = Settings(name, network or "", "", _udp_port(place), fusion, _axes(axes))
+        is_asked = network is not None and password_file is None and sys.stdin.isatty()
+        if not is_asked:
+            settings = replace(settings, password=_read_password(network, password_file))
+        device = port or only_wearable(found_ports())
+        with clear_errors(place.keys), WearableConsole(device) as cable:
+            if is_asked:  # last of all: nobody likes to type it in vain
+                settings = replace(settings, password=_ask_password(settings.network))
+            with console.status(f"Asking {escape(device)}"):
+                done = provision(cable, place.keys, settings, say, takes_over)
+    except (ConsoleError, NoWearableError, ProvisioningError) as error:
+        raise StageError(str(error)) from None
+    except KeyboardInterrupt:
+        raise StageError(
+            f"Stopped half-way: {place.keys} was not changed, and the wearable may have its new key. "
+            "Run this again: that mends it."
+        ) from None
+    is_well, words = reload(place)
+    _step(console, "box", words, is_well)
+    for hint in _hints(place, done, settings, device):
+        console.print(hint, markup=False, soft_wrap=True)
+    return 0 if is_well else NOT_TAKEN
+
+
+def _step(console: Console, what: str, words: str, is_well: bool = True) -> None:
+    marks = ("[green]✓[/]", "[red]✗[/]") if console.encoding.startswith("utf") else ("ok", "!!")
+    console.print(f"{marks[not is_well]} [bold]{escape(what):<14}[/] {escape(words)}", soft_wrap=True)
+
+
+def _ask_password(network: str) -> str:
+    """Hidden, on the terminal."""
+    try:
+        return getpass.getpass(f"Password of '{network}' (nothing for an open network): ")
+    except (EOFError, KeyboardInterrupt):
+        raise StageError("No password was given. Nothing was changed.") from None
+
+
+def _read_password(network: str | None, file: Path | None) -> str:
+    """The first line of a file or of standard input; never from the command line."""
+    if network is None:
+        if file is not None:
+            raise StageError("A password needs a network: give --network with its name. Nothing was changed.")
+        return ""
+    try:
+        if file is None or file == STDIN:
+            line = sys.stdin.readline()
+        else:
+            with file.open(encoding="utf-8") as text:
+                line = text.readline()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise StageError(
+            f"{file or STDIN}: the password cannot be read ({why}). Nothing was changed."
+        ) from None
+    if not line:
+        raise StageError(
+            "No password came. Nothing was changed. Run this on a terminal, or give --password-file; "
+            "an empty line stands for an open network."
+        )
+    return line.rstrip("\r\n")
+
+
+def _udp_port(place: Venue) -> int:
+    udp = place.box.sensors.udp
+    return udp.port if udp is not None and udp.port else DEFAULT_PORT
+
+
+def _axes(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    try:
+        mapped, sign = (int(part, 16) for part in text.split(","))
+    except ValueError:
+        raise StageError(
+            "--axes takes two hexadecimal numbers, for instance 24,00. Nothing was changed."
+        ) from None
+    return mapped, sign
+
+
+def _hints(place: Venue, done: Provisioned, settings: Settings, device: str) -> list[str]:
+    """What to do next, and what in the box file would keep the wearable from coming in."""
+    name, sensors = done.sensor.name, place.box.sensors
+    hints = [""]
+    if settings.network:
+        hints.append(
+            f"{name} is ready: unplug it, switch it on, and it looks for its box on '{settings.network}'."
+        )
+        if place.box_file is not None and (why := out_of_reach(sensors)):
+            hints.append(why)
+    else:
+        hints.append(f"{name} is ready: it speaks to the box by cable, as long as it is plugged in.")
+        if device not in [line.device for line in sensors.serial]:
+            hints.append(
+                f"The box listens there with `serial: [{{device: {device}}}]` under sensors in its box file."
+            )
+    if done.was:
+        hints.append(
+            f"It was {done.was} until now: no sensor has that name any more. "
+            f"Provision another one as {done.was}, or: bunraku sensors revoke {done.was}"
+        )
+    if not done.identity.imu_id:
+        hints.append(
+            "It finds no IMU: look at the wires between the board and the BNO055 (docs/firmware.md)."
+        )
+    return hints

@@ -1,0 +1,62 @@
+"""A rehearsal: the projection in a window where there is a display, and a picture of it at the end."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from appliance.show.look import looks_by_name
+from appliance.show.show import Show
+
+PICTURED_S = 10.0
+_RENDERED_WITHIN_S = 120.0  # a processor without a graphics card takes two seconds
+
+
+def has_display(environment: Mapping[str, str] = os.environ) -> bool:
+    """Whether windows can be seen here: X11 or Wayland."""
+    return bool(environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY"))
+
+
+def rehearsal_picture(journal: Path, out: Path, show: Show) -> list[str]:
+    """Draw the last ten seconds of a journal into `out`, in the show's first look; what to say about it.
+
+    Where nothing can be rendered the figures are drawn instead, and why is said. Raises JournalError,
+    StageError.
+    """
+    look = next(iter(looks_by_name(show.config.looks)))
+    from appliance.cli.pictures import danced, drawn
+
+    trouble = _render(journal, out, show.directory, look)
+    if trouble is None:
+        return [f"What was just danced, as the projector shows it: {out}"]
+    dance = danced(journal).part(-PICTURED_S, PICTURED_S)
+    return [
+        f"The projection cannot be rendered here: {trouble}",
+        f"What was just danced, held joints highlighted: {drawn(dance, out)}",
+    ]
+
+
+def _render(journal: Path, out: Path, show: Path, look: str) -> str | None:
+    """What went wrong, or None. In a process of its own, which a broken graphics driver may take with it."""
+    command = [
+        *(sys.executable, "-m", "appliance.cli", "filmstrip", str(journal), "--out", str(out)),
+        *("--start", str(-PICTURED_S), "--seconds", str(PICTURED_S), "--look", look, "--show", str(show)),
+    ]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=_RENDERED_WITHIN_S, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return f"it took longer than {_RENDERED_WITHIN_S:g} s."
+    if done.returncode == 0:
+        return None
+    said = done.stderr.strip().splitlines()
+    if done.returncode < 0 or not said:
+        return (
+            f"the graphics driver ended it (status {done.returncode}). On Debian software rendering "
+            "needs libgl1-mesa-dri, libegl1, libgles2 and libgbm1."
+        )
+    return said[-1].removeprefix("bunraku: ")

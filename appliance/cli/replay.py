@@ -1,0 +1,110 @@
+"""`bunraku replay`: dance a journal again through the same tick, and say where it differs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from appliance.recorder.environment import differing_files, differing_software, environment
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.reading import Run, read_journal
+from appliance.show.bundle import default_show_path
+from appliance.show.show import load_show
+from appliance.show_control.packet import readable
+from appliance.stage.comparison import METRES_PER_DEGREE, Comparison
+from appliance.stage.replay import Replay
+
+# Other processors round otherwise, and iterating makes more of it: an emulated Nehalem was 0.46 degrees and
+# 1.9 mm off at worst in 25 s of the default show that a Xeon with AVX-512 had recorded (docs/journal.md).
+TOLERANCE_DEGREES = 2.0
+_PROGRESS_TICKS = 500
+
+
+def replay_journal(journal: Path, show: Path | None, from_s: float, tolerance_degrees: float | None) -> int:
+    """Print what was replayed and the first tick that differs; 0 when none does, else 1.
+
+    tolerance_degrees: None: none on the machine that recorded it, TOLERANCE_DEGREES on another.
+    Raises JournalError, StageError, ConfigError.
+    """
+    outcomes = [
+        _replay(run, show, from_s, tolerance_degrees, readable(f"Run {number} of '{run.header['show']}'"))
+        for number, run in enumerate(read_journal(journal).runs, 1)
+    ]
+    if not any(ticks for ticks, _ in outcomes):
+        raise JournalError(f"{journal}: nothing of it can be danced again. Choose an earlier second.")
+    return 0 if all(is_same for _, is_same in outcomes) else 1
+
+
+def _replay(
+    run: Run, given: Path | None, from_s: float, tolerance: float | None, name: str
+) -> tuple[int, bool]:
+    """How many ticks were danced again, and whether all of them came out the same."""
+    if not run.keyframes:
+        print(f"{name}: {len(run.ticks)} ticks, and no keyframe was kept: it can be drawn, not danced again.")
+        return 0, True
+    lasted_s = float(run.ticks["frame_time"][-1] - run.ticks["frame_time"][0])
+    if from_s > lasted_s:
+        print(f"{name}: it lasts {lasted_s:.1f} s, and is left out.")
+        return 0, True
+    directory = _show_of(run, given)
+    others = differing_software(run.header, environment())
+    files = [f"the show's {file}" for file in differing_files(run.header["show_files"], directory)]
+    if tolerance is None:
+        tolerance = TOLERANCE_DEGREES if others or files else 0.0
+    comparison = Comparison(float(run.ticks["frame_time"][0]), tolerance)
+    replay = Replay(run, load_show(directory))
+    for danced in replay.dance(comparison, from_s):
+        if danced % _PROGRESS_TICKS == 0:
+            _progress(name, danced, len(run.ticks))
+    _progress("", 0, 0)
+    for line in _told(name, comparison, replay, [*others, *files], tolerance):
+        print(readable(line))
+    return comparison.ticks, comparison.first is None
+
+
+def _told(
+    name: str, comparison: Comparison, replay: Replay, others: list[str], tolerance: float
+) -> list[str]:
+    ticks, first, worst = comparison.ticks, comparison.first, comparison.worst
+    if tolerance:
+        bound = f"within {tolerance:g} degrees and {1000 * METRES_PER_DEGREE * tolerance:g} mm"
+    else:
+        bound = "bit for bit"
+    lines = [f"{name}: {ticks} ticks danced again ({ticks / 50:.1f} s)."]
+    if others:
+        lines.append(f"Other than in the recording: {'; '.join(others)}.")
+    if replay.skipped:
+        lines.append(f"{replay.skipped} ticks were not: before the first keyframe, or around a gap.")
+    if replay.forced:
+        lines.append(
+            f"{replay.forced} ticks had a network that failed then, and not here: taken as they were."
+        )
+    if first is None:
+        lines.append(f"All are the same, {bound}.")
+    else:
+        lines.append(f"The first that differs ({bound}): {first.sentence()}")
+    if worst is not None:
+        lines.append(f"The farthest off: {worst.sentence()}")
+    return lines
+
+
+def _show_of(run: Run, given: Path | None) -> Path:
+    """The bundle that was danced: as given, where it was, or the one that comes with the box."""
+    recorded = run.header["show_directory"]
+    if given is not None:
+        return given
+    if recorded is not None and Path(recorded).is_dir():
+        return Path(recorded)
+    bundled = default_show_path()
+    if recorded is None or not differing_files(run.header["show_files"], bundled):
+        return bundled
+    raise JournalError(
+        f"The show '{run.header['show']}' is not where it was ({recorded}). Name its bundle: --show DIR."
+    )
+
+
+def _progress(name: str, danced: int, ticks: int) -> None:
+    """A line that replaces itself, for who watches; an empty one at the end."""
+    if sys.stderr.isatty():
+        words = f"{name}: {danced} of {ticks} ticks" if name else ""
+        print(f"\r{words:<78}\r" if not name else f"\r{words:<78}", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,1 @@
+"""Keeper: the process that carries things to the disk."""

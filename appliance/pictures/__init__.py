@@ -1,0 +1,1 @@
+"""Pictures: figures and filmstrips of poses, drawn with matplotlib."""

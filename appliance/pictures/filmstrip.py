@@ -1,0 +1,172 @@
+"""Filmstrip: a picture of a dance, instant beside instant, with the held joints in colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.pictures.filmstrip_stage import IVORY, MARGIN_PX, SLATE, VERMILION, Row, Stage, straight
+from appliance.pose.quaternion import Array
+from appliance.pose.skeleton import Skeleton
+
+INK, FAINT = "#efe6d8", "#9a948c"
+
+
+class MissingPicturesError(RuntimeError):
+    """The library that draws pictures is not installed."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "Pictures need matplotlib, which is not installed here. The show itself runs without it. "
+            "Install it with: pip install 'bunraku[pictures]'"
+        )
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A dance for a row of its own: local unit quaternions (N, J, 4), roots (N, 3) metres, what it is.
+
+    behind: a dance whose figures stand behind these as ghosts, so that one sees what is different.
+    """
+
+    poses: Array
+    roots: Array
+    label: str = ""
+    behind: Strip | None = None
+
+
+def draw_strips(
+    path: Path | str,
+    skeleton: Skeleton,
+    strips: Sequence[Strip],
+    fps: float,
+    held: Sequence[int] = (),
+    title: str = "",
+    columns: int = 8,
+) -> Path:
+    """Draw dances of the same length under each other, instant by instant, into a PNG and return its path.
+
+    Raises MissingPicturesError where matplotlib is missing, ValueError where there is no pose.
+    """
+    count = min((len(strip.poses) for strip in strips), default=0)
+    chosen = np.linspace(0, count - 1, min(columns, count)).round().astype(np.int64)
+    rows = [_row(strip, chosen) for strip in strips]
+    return _draw(path, skeleton, rows, fps, held, title)
+
+
+def _row(strip: Strip, chosen: NDArray[np.int64], colour: Array = IVORY) -> Row:
+    behind = None if strip.behind is None else _row(strip.behind, chosen, SLATE)
+    poses, roots = np.asarray(strip.poses, float), np.asarray(strip.roots, float)
+    return Row(poses, roots, chosen, strip.label, colour, behind)
+
+
+def draw_filmstrip(
+    path: Path | str,
+    skeleton: Skeleton,
+    poses: Array,
+    roots: Array,
+    fps: float,
+    held: Sequence[int] = (),
+    title: str = "",
+    columns: int = 10,
+    rows: int | None = None,
+    against: Array | None = None,
+    labels: tuple[str, str] = ("original", "reconstruction"),
+) -> Path:
+    """Draw columns x rows evenly spaced instants of a dance into a PNG and return its path.
+
+    poses: (N, J, 4) local unit quaternions; roots: (N, 3) metres; fps: poses a second; held: joints drawn in
+    colour with the way that they have just gone; against: other poses (N, J, 4) for a second row below the
+    first, instant by instant (original above reconstruction). Two rows unless said otherwise.
+    Raises MissingPicturesError where matplotlib is missing, ValueError where there is no pose.
+    """
+    drawn = _rows(np.asarray(poses, float), np.asarray(roots, float), columns, rows or 2, against, labels)
+    return _draw(path, skeleton, drawn, fps, held, title)
+
+
+def _draw(
+    path: Path | str, skeleton: Skeleton, rows: Sequence[Row], fps: float, held: Sequence[int], title: str
+) -> Path:
+    names = ", ".join(skeleton.names[joint] for joint in held)
+    rows = [replace(row, held=tuple(held)) for row in rows]
+    return draw_rows(path, skeleton, rows, fps, title, f"held: {names}" if names else "")
+
+
+def draw_rows(
+    path: Path | str, skeleton: Skeleton, rows: Sequence[Row], fps: float, title: str, coloured: str
+) -> Path:
+    """Draw rows under each other, each with instants, coloured joints and words of its own, into a PNG.
+
+    fps: poses a second; coloured: what the coloured joints are. Raises as draw_strips does.
+    """
+    matplotlib_figure, canvas = _matplotlib()
+    if not rows or not len(rows[0].chosen):
+        raise ValueError("a filmstrip needs at least one pose")
+    stage = Stage(skeleton, rows, fps)
+    height, width = stage.floor.shape[:2]
+    figure = matplotlib_figure(figsize=(width / 100, height / 100), dpi=100)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    place = {"interpolation": "none", "aspect": "auto", "extent": (0, width, height, 0)}
+    axes.imshow(np.clip(stage.floor, 0, 1), **place, zorder=0)
+    _draw_trails(axes, stage.trails)
+    axes.imshow(np.clip(straight(stage.figures), 0, 1), **place, zorder=2)
+    _write(axes, stage, title, coloured)
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    canvas(figure).print_png(path)
+    return path
+
+
+def _matplotlib() -> tuple[Any, Any]:
+    """matplotlib's figure and the canvas without a window, loaded when a picture is asked for."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingPicturesError from error
+    return Figure, FigureCanvasAgg
+
+
+def _rows(
+    poses: Array, roots: Array, columns: int, rows: int, against: Array | None, labels: tuple[str, str]
+) -> list[Row]:
+    if against is None:
+        count = min(columns * rows, len(poses))
+        chosen = np.linspace(0, len(poses) - 1, count).round().astype(np.int64)
+        return [Row(poses, roots, chosen[i : i + columns]) for i in range(0, count, columns)]
+    chosen = np.linspace(0, len(poses) - 1, min(columns, len(poses))).round().astype(np.int64)
+    other = np.asarray(against, float)
+    return [Row(poses, roots, chosen, labels[0], IVORY), Row(other, roots, chosen, labels[1], SLATE)]
+
+
+def _draw_trails(axes: Any, trails: list[Array]) -> None:
+    from matplotlib.collections import LineCollection
+
+    for pixels in trails:
+        pieces = np.stack([pixels[:-1], pixels[1:]], axis=1)
+        ages = np.linspace(0, 1, len(pieces))
+        colours = np.concatenate([np.tile(VERMILION, (len(pieces), 1)), ages[:, None] ** 1.3], axis=1)
+        widths = 1.0 + 3.5 * ages
+        axes.add_collection(
+            LineCollection(list(pieces), colors=colours, linewidths=widths, capstyle="butt", zorder=1)
+        )
+
+
+def _write(axes: Any, stage: Stage, title: str, coloured: str) -> None:
+    """Title, legend, labels of the rows and time stamps."""
+    axes.set_xlim(0, stage.floor.shape[1])
+    axes.set_ylim(stage.floor.shape[0], 0)
+    axes.text(MARGIN_PX, 42, title or "Filmstrip", color=INK, fontsize=19, va="center")
+    if coloured:
+        axes.plot([MARGIN_PX + 6], [78], "o", color=VERMILION, markersize=8, zorder=3)
+        axes.text(MARGIN_PX + 22, 78, coloured, color=FAINT, fontsize=11, va="center")
+    for x, y, text in stage.times:
+        axes.text(x, y, text, color=FAINT, fontsize=9.5, ha="center", va="center")
+    for y, text in stage.labels:
+        axes.text(MARGIN_PX, y, text, color=INK, fontsize=12, va="top")

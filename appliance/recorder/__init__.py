@@ -1,0 +1,1 @@
+"""Recorder: the journal of a run, written, read and compared."""

@@ -1,0 +1,83 @@
+"""Exports a journal into one file: its segments with their checksums, whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import os
+import re
+import tarfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from appliance.box.durable import sync_folder
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.reading import DAMAGED, EXPORTED, header_of, segments_of
+from appliance.recorder.segments import SUFFIX
+
+CHECKSUMS = "SHA256SUMS"
+_LONGEST_NAME = 80  # of a show, before the date
+
+
+def export(
+    journal: Path,
+    to: Path,
+    wall_clock: Callable[[], float] = time.time,
+    progress: Callable[[int, int], None] = lambda written, of: None,
+) -> Path:
+    """Write a journal to a file, or into a folder as `<show>-<date>.bunraku`; the file.
+
+    It appears under its name when it is whole and on the disk. `progress`: bytes so far, and all of them.
+    Raises JournalError with the reason.
+    """
+    show, size = _show_and_size(journal)
+    target = to / _name(show, wall_clock()) if to.is_dir() else to
+    part = target.with_name(f".{target.name}.part")
+    written, checksums = 0, []
+    try:
+        with part.open("wb") as file:
+            with tarfile.open(fileobj=file, mode="w:", format=tarfile.USTAR_FORMAT) as archive:
+                for number, (_, data) in enumerate(segments_of(journal), 1):
+                    name = f"{number:08d}{SUFFIX}"  # whatever it is called there
+                    _add(archive, name, data)
+                    checksums.append(f"{hashlib.sha256(data).hexdigest()}  {name}\n")
+                    written += len(data)
+                    progress(written, max(size, written))
+                _add(archive, CHECKSUMS, "".join(checksums).encode())
+            file.flush()
+            os.fsync(file.fileno())
+        part.rename(target)
+        sync_folder(target.parent)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise JournalError(
+            f"{target}: the journal cannot be written there ({error.strerror}). It stays on the box. Take a "
+            "stick with more room that can be written to, or name another place."
+        ) from error
+    return target
+
+
+def _show_and_size(journal: Path) -> tuple[str, int]:
+    """The newest show in it, and its bytes."""
+    show, size = "journal", 0
+    for _, data in segments_of(journal):
+        with contextlib.suppress(*DAMAGED):
+            header = header_of(data)
+            show = show if header is None else header["show"]
+        size += len(data)
+    return show, size
+
+
+def _add(archive: tarfile.TarFile, name: str, data: bytes) -> None:
+    member = tarfile.TarInfo(name)
+    member.size, member.mode = len(data), 0o644
+    archive.addfile(member, io.BytesIO(data))
+
+
+def _name(show: str, now: float) -> str:
+    """After the show, and the time by the box's clock."""
+    plain = re.sub(r"[^a-z0-9]+", "-", show.lower()).strip("-")[:_LONGEST_NAME] or "journal"
+    return f"{plain}-{time.strftime('%Y%m%d-%H%M%S', time.localtime(now))}{EXPORTED}"

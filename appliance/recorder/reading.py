@@ -1,0 +1,240 @@
+"""Journals read back: a folder of segments, one segment, or an exported file; torn ends are left out."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import struct
+import tarfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from appliance.pose.skeleton import Skeleton
+from appliance.recorder import chunks, log
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.keyframe import POSITION
+from appliance.recorder.record import EVENT, TICK, layout_of, require_sound, skeleton_of
+from appliance.recorder.segments import SUFFIX, segment_paths
+
+EXPORTED = ".bunraku"
+_OLD_MAGIC = b"bunraku journal 1\n"
+_NAME_ONE = "Name the folder of `bunraku play --journal`, a segment in it, or an exported file."
+_LARGEST = 1 << 28  # bytes of a segment: one that the keeper wrote has a hundredth of it
+# What facts, events and ticks raise that no box wrote.
+DAMAGED = (ValueError, KeyError, TypeError, AttributeError, RecursionError, struct.error)
+
+Ticks = np.ndarray[Any, np.dtype[np.void]]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a stage noted from its start to its end, as far as it was kept.
+
+    ticks: a structured array in order of time; `tick_numbers` (N,) their numbers in the log, in which events
+    have numbers too: between two that follow on each other nothing is missing. keyframes: (entries of the log
+    before it, packed state).
+    """
+
+    header: dict[str, Any]
+    ticks: Ticks
+    tick_numbers: np.ndarray[Any, np.dtype[np.uint64]]
+    events: list[tuple[int, dict[str, Any]]]
+    keyframes: list[tuple[int, bytes]]
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The figure that danced."""
+        return skeleton_of(self.header)
+
+
+@dataclass(frozen=True)
+class JournalRecording:
+    """A journal read back: its runs, oldest first; at least one of them has ticks."""
+
+    runs: tuple[Run, ...]
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """Facts of the newest run."""
+        return self.runs[-1].header
+
+    @property
+    def ticks(self) -> Ticks:
+        """Ticks of the newest run, and of those in which the same figure danced with the same hands."""
+        layout = self.runs[-1].ticks.dtype
+        alike = [run.ticks for run in self.runs if run.ticks.dtype == layout]
+        return np.concatenate(alike)
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """Everything that happened, oldest first."""
+        return [event for run in self.runs for _, event in run.events]
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The figure that danced in the newest run."""
+        return self.runs[-1].skeleton
+
+
+def read_journal(path: Path) -> JournalRecording:
+    """Read a journal, finished or torn off by a kill or a power cut. Raises JournalError with the reason."""
+    parts: dict[str, _Part] = {}
+    for name, data in segments_of(path):
+        try:
+            _add(parts, data)
+        except DAMAGED as error:
+            raise JournalError(
+                f"{path}: {name} is damaged ({error}). Remove it, and read the rest."
+            ) from error
+    try:
+        runs = tuple(part.run() for part in parts.values() if part.has_ticks)
+    except DAMAGED as error:
+        raise JournalError(
+            f"{path}: its ticks are no ticks of Bunraku ({error}). Export it again."
+        ) from error
+    if not runs:
+        raise JournalError(f"{path}: nothing was recorded in it yet. Let the show dance, then look again.")
+    return JournalRecording(runs)
+
+
+def segments_of(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Names and bytes of a journal's segments, oldest first. Raises JournalError."""
+    try:
+        if path.is_dir():
+            paths = segment_paths(path)
+            if not paths:
+                raise JournalError(f"{path}: no journal is in this folder. {_NAME_ONE}")
+            for segment in paths:
+                with contextlib.suppress(FileNotFoundError):  # the keeper let the oldest go meanwhile
+                    yield segment.name, _read(segment)
+            return
+        with path.open("rb") as file:
+            begin = file.read(512)
+        if chunks.is_segment(begin):
+            yield path.name, _read(path)
+        elif tarfile.is_tarfile(path):
+            yield from _exported(path)
+        else:
+            raise JournalError(_no_journal(path, begin))
+    except OSError as error:
+        raise JournalError(f"{path}: cannot be read ({error.strerror}). {_NAME_ONE}") from error
+    except tarfile.TarError as error:
+        raise JournalError(f"{path}: cannot be read ({error}). Export the journal again.") from error
+
+
+def header_of(data: bytes) -> dict[str, Any] | None:
+    """The facts of the run that a segment belongs to; None where its begin is damaged.
+
+    Raises what is raised for facts of something else.
+    """
+    first = next(chunks.chunks(data), None)
+    if first is None or first.kind != chunks.HEADER:
+        return None
+    header: dict[str, Any] = json.loads(first.data)
+    require_sound(header)
+    return header
+
+
+def last_kept(folder: Path, run: str) -> tuple[int, int]:
+    """Number of the last entry and position of the last keyframe of a run that are on the disk: 0 and -1 for
+    none. The run is the newest one that was kept. Raises OSError.
+    """
+    try:
+        paths = segment_paths(folder)
+    except FileNotFoundError:
+        return 0, -1
+    entries, keyframe = 0, -1
+    for path in reversed(paths[-2:]):
+        data = _read(path)
+        with contextlib.suppress(*DAMAGED):
+            header = header_of(data)
+            if header is None or header["run"] != run:
+                continue
+            for one in chunks.chunks(data):
+                if one.kind == chunks.KEYFRAME:
+                    keyframe = max(keyframe, *POSITION.unpack_from(one.data))
+                elif one.kind == chunks.LOG:
+                    entries = max(entries, *(entry.number for entry in log.unpacked(one.data)))
+    return max(entries, keyframe), keyframe
+
+
+def _read(path: Path) -> bytes:
+    if path.stat().st_size > _LARGEST:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+    return path.read_bytes()
+
+
+def _exported(path: Path) -> Iterator[tuple[str, bytes]]:
+    with tarfile.open(path, "r:") as archive:
+        members = [member for member in archive if member.isfile() and member.name.endswith(SUFFIX)]
+        if not members:
+            raise JournalError(f"{path}: no journal is in this archive. Name a file that was exported.")
+        for member in sorted(members, key=lambda member: member.name):
+            file = archive.extractfile(member)
+            if file is None or member.size > _LARGEST:
+                raise JournalError(f"{path}: a part of it is larger than any journal's. Export it again.")
+            yield PurePosixPath(member.name).name, file.read()  # a foreign archive may name any folder
+
+
+def _no_journal(path: Path, begin: bytes) -> str:
+    if begin.startswith(_OLD_MAGIC):
+        return f"{path}: a journal of an older release. Draw it with that release."
+    return f"{path}: not a journal of Bunraku. {_NAME_ONE}"
+
+
+@dataclass
+class _Part:
+    """A run that is being put together from its segments."""
+
+    header: dict[str, Any]
+    ticks: dict[int, bytes] = field(default_factory=dict)
+    events: dict[int, dict[str, Any]] = field(default_factory=dict)
+    keyframes: dict[int, bytes] = field(default_factory=dict)
+
+    @property
+    def has_ticks(self) -> bool:
+        return bool(self.ticks)
+
+    def run(self) -> Run:
+        layout = layout_of(self.header)
+        numbers = sorted(self.ticks)
+        ticks = np.frombuffer(b"".join(self.ticks[number] for number in numbers), layout)
+        return Run(
+            self.header,
+            ticks,
+            np.array(numbers, dtype=np.uint64),
+            sorted(self.events.items(), key=lambda event: event[0]),
+            sorted(self.keyframes.items()),
+        )
+
+
+def _add(parts: dict[str, _Part], data: bytes) -> None:
+    """Add a segment to its run; one whose begin is torn has nothing in it yet."""
+    header = header_of(data)
+    if header is None:
+        return
+    part = parts.setdefault(header["run"], _Part(header))
+    for one in chunks.chunks(data):
+        if one.kind == chunks.KEYFRAME:
+            (position,) = POSITION.unpack_from(one.data)
+            part.keyframes[position] = one.data[POSITION.size :]
+        elif one.kind == chunks.LOG:
+            for entry in log.unpacked(one.data):
+                if entry.kind == TICK:
+                    part.ticks[entry.number] = entry.data
+                elif entry.kind == EVENT:
+                    part.events[entry.number] = _event(entry.data)
+
+
+def _event(data: bytes) -> dict[str, Any]:
+    """Raises one of DAMAGED for what is none."""
+    event: dict[str, Any] = json.loads(data)
+    if not isinstance(event["kind"], str) or not isinstance(event.get("order", {}), dict):
+        raise TypeError("an event of an unknown kind")
+    return event | {"now": float(event["now"])}

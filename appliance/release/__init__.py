@@ -1,0 +1,1 @@
+"""Release: which show and which version start."""

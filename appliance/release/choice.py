@@ -1,0 +1,216 @@
+"""Which show dances tonight, on which box file, and what dances instead when it does not."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from appliance.box.durable import write_whole
+
+_SHOWS = Path(__file__).resolve().parents[1] / "show"
+APPLIANCE_BOX, EMBEDDED_SHOW = _SHOWS / "appliance_box.yaml", _SHOWS / "default_show"
+BOOTS = (Path("/boot/firmware/bunraku"), Path("/boot/bunraku"))
+STICK = Path("/media/bunraku/bunraku")
+DATA = Path("/data/bunraku")
+RUN = Path("/run/bunraku")
+CHOSEN = "chosen.json"
+_MOST_REMEMBERED = 2  # the newest and the last good one; what comes with the box is always there
+_AGAIN_S = 0.02
+
+
+class Pair(NamedTuple):
+    """A show and a box file that were checked together.
+
+    id: of their contents, `show+box`, where nothing stands for what comes with the box; source: where they
+    came from, for people; good: the pair has danced on this box.
+    """
+
+    show: Path = EMBEDDED_SHOW
+    box: Path = APPLIANCE_BOX
+    id: str = ""
+    source: str = "comes with the box"
+    good: bool = False
+
+    @property
+    def show_id(self) -> str:
+        """Of the show alone."""
+        return self.id.partition("+")[0]
+
+    @property
+    def box_id(self) -> str:
+        """Of the box file alone."""
+        return self.id.partition("+")[2]
+
+    def here(self, box: Path = APPLIANCE_BOX) -> Pair:
+        """With what comes with the box as it comes with this release, which may be another one now."""
+        return self._replace(
+            show=self.show if self.show_id else EMBEDDED_SHOW, box=self.box if self.box_id else box
+        )
+
+    @property
+    def is_there(self) -> bool:
+        """Whether both can still be found, on a disk that may be gone or belong to somebody else."""
+        try:
+            return (self.show / "show.yaml").is_file() and self.box.is_file()
+        except OSError:
+            return False
+
+
+class Choice(NamedTuple):
+    """pairs: in the order in which they are tried, never empty in a file that a stage reads.
+
+    refused: what was found and is not danced, sentences for people, those about pairs that did not dance at
+    the end; aside: ids of these pairs; data: the folder in which it is kept over power-off.
+    """
+
+    pairs: tuple[Pair, ...] = (Pair(good=True),)
+    refused: tuple[str, ...] = ()
+    aside: tuple[str, ...] = ()
+    data: Path = DATA
+
+    @property
+    def first(self) -> Pair:
+        """What dances."""
+        return self.pairs[0]
+
+    @staticmethod
+    def read(path: Path) -> Choice | None:
+        """As written; None where there is none, no whole one, or an empty one."""
+        try:
+            choice = Choice.of(json.loads(path.read_bytes()))
+        except (OSError, ValueError):
+            return None
+        return choice if choice.pairs else None
+
+    @staticmethod
+    def of(values: dict[str, Any]) -> Choice:
+        """From plain values; raises ValueError."""
+        try:
+            refused, aside = (tuple(map(str, values[name])) for name in ("refused", "aside"))
+            pairs = tuple(_pair(one) for one in values["pairs"])
+            return Choice(pairs, refused, aside, Path(values["data"]))
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"This is no choice of a show ({error}).") from error
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        pairs = [pair._asdict() | {"show": str(pair.show), "box": str(pair.box)} for pair in self.pairs]
+        lists = {"pairs": pairs, "refused": list(self.refused), "aside": list(self.aside)}
+        return lists | {"data": str(self.data)}
+
+    def write(self, path: Path) -> None:
+        """As a whole or not at all, also when the power is cut; what dances stands at the top as well.
+
+        Raises OSError.
+        """
+        values = self.plain()
+        write_whole(path, (json.dumps({**values["pairs"][0], **values}, indent=1) + "\n").encode())
+
+    def with_newest(self, pair: Pair) -> Choice:
+        """To remember: this one first, then the newest of those that have danced."""
+        others = [one for one in self.pairs if one.id and one.id != pair.id]
+        good = [one for one in others if one.good] or others
+        has_danced = pair.good or any(one.good for one in self.pairs if one.id == pair.id)
+        return Choice((pair._replace(good=has_danced), *good[: _MOST_REMEMBERED - 1]))
+
+    def with_good(self, identity: str) -> Choice:
+        """This pair has danced."""
+        return self._replace(
+            pairs=tuple(one._replace(good=True) if one.id == identity else one for one in self.pairs)
+        )
+
+    def without(self, other: Choice) -> Choice:
+        """Without pairs that did not dance, as another choice tells; what comes with the box stays.
+
+        So does what has danced on this box: that it does not tonight may be tonight's fault.
+        """
+        good = {one.id for one in self.pairs if one.good}
+        both = zip(other.aside, other.put_aside, strict=False)
+        told = [(one, words) for one, words in both if one not in good]
+        aside = tuple(one for one, _ in told)
+        pairs = tuple(one for one in self.pairs if not one.id or one.id not in aside)
+        refused = tuple(words for _, words in told)
+        return self._replace(pairs=pairs or (Pair(good=True),), refused=refused, aside=aside)
+
+    @property
+    def put_aside(self) -> tuple[str, ...]:
+        """The sentences about pairs that did not dance."""
+        return self.refused[len(self.refused) - len(self.aside) :]
+
+    def complete(self, box: Path = APPLIANCE_BOX) -> Choice:
+        """With what comes with the box at the end, on the venue's box files first: never nothing on stage.
+
+        `box`: the box file of a box without one.
+        """
+        pairs = {one.id: one.here(box) for one in self.pairs if one.id}
+        pairs = {identity: one for identity, one in pairs.items() if one.is_there}
+        for one in list(pairs.values()):
+            if one.box_id:
+                pairs.setdefault(f"+{one.box_id}", Pair(box=one.box, id=f"+{one.box_id}", good=one.good))
+        return self._replace(pairs=(*pairs.values(), Pair(box=box, good=True)))
+
+
+def box_of(box: Path | None, chosen: Path | None) -> Path | None:
+    """The box file that a command means with `--box` or `--chosen`; raises ConfigError for both."""
+    if chosen is None:
+        return box
+    require_no("--box", box, chosen)
+    choice = Choice.read(chosen)
+    return choice.first.box if choice is not None else APPLIANCE_BOX
+
+
+def require_no(option: str, given: Path | None, chosen: Path) -> None:
+    """Raises ConfigError where a choice is given, and something else besides."""
+    if given is not None:
+        from appliance.show.config_error import ConfigError, Problem
+
+        message = f"This names a show and a box file, and {option} another one."
+        raise ConfigError([Problem(chosen, 0, message, f"Give {option} or --chosen, not both.")])
+
+
+def appliance_box(places: dict[str, str]) -> str:
+    """The box file that comes with the box, with folders other than the usual ones."""
+    text = APPLIANCE_BOX.read_text(encoding="utf-8")
+    for usual, place in places.items():
+        text = text.replace(usual, place)
+    return text
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path, patience_s: float = 0.0) -> Iterator[None]:
+    """One process at a time in a folder, also in a read-only one; without one there is nothing to guard.
+
+    Raises BlockingIOError where another one does not leave within `patience_s`: it may hang on a disk.
+    """
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except OSError:
+        yield
+        return
+    try:
+        _lock(descriptor, time.monotonic() + patience_s)
+        yield
+    finally:
+        fcntl.flock(descriptor, fcntl.LOCK_UN)  # a fork of ours that hangs has it open too
+        os.close(descriptor)
+
+
+def _lock(descriptor: int, until: float) -> None:
+    while True:
+        try:
+            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= until:
+                raise
+            time.sleep(_AGAIN_S)
+
+
+def _pair(values: dict[str, Any]) -> Pair:
+    show, box = Path(values["show"]), Path(values["box"])
+    return Pair(show, box, str(values["id"]), str(values["source"]), bool(values["good"]))

@@ -1,0 +1,232 @@
+"""Choosing the show: what is new is copied and checked; a broken one is refused, the last good goes on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from appliance.box.durable import write_whole
+from appliance.release.arrivals import Arrival
+from appliance.release.choice import APPLIANCE_BOX, CHOSEN, DATA, RUN, Choice, Pair, appliance_box
+
+if TYPE_CHECKING:
+    from appliance.release.shelf import Shelf
+
+Check = Callable[
+    [Path, Path], list[str]
+]  # a show, a box file: why they cannot be danced; nothing when they can
+SEEN = "seen.json"
+_GOES_ON = "It is not danced; what danced before goes on."
+
+
+class Places(NamedTuple):
+    """data: what is kept over power-off; run: in memory, where all processes of the box look."""
+
+    data: Path = DATA
+    run: Path = RUN
+
+    @property
+    def moved(self) -> dict[str, str]:
+        """What stands in the built-in box file, and what is to stand there."""
+        usual = {str(DATA): str(self.data), str(RUN): str(self.run)}
+        return {name: place for name, place in usual.items() if name != place}
+
+
+class Outcome(NamedTuple):
+    """choice: to be kept; taken: something new dances from now on; words: what people should know."""
+
+    choice: Choice
+    taken: bool
+    words: tuple[str, ...]
+
+    def packed(self) -> bytes:
+        """For the process that waits for it."""
+        return json.dumps([self.choice.plain(), self.taken, self.words]).encode()
+
+    @staticmethod
+    def unpacked(answer: bytes) -> Outcome:
+        """As packed; raises ValueError."""
+        choice, taken, words = json.loads(answer)
+        return Outcome(Choice.of(choice), bool(taken), tuple(words))
+
+
+def remembered(data: Path) -> Choice:
+    """What was chosen last, as far as it is still there; nothing (what comes with the box) without it."""
+    choice = Choice.read(data / CHOSEN) or Choice(pairs=())
+    pairs = (one.here() for one in choice.pairs if one.id)
+    return choice._replace(pairs=tuple(one for one in pairs if one.is_there))
+
+
+def choose(places: Places, arrivals: list[Arrival], check: Check, late: bool = False) -> Outcome:
+    """Take what is new and sound. The newest arrival counts; the stick goes before the boot partition.
+
+    late: beside a running show, where a check may fail for want of time or memory: what is refused then is
+    checked once more at the next power-on.
+    """
+    before, seen = remembered(places.data), _read_seen(places.data)
+    lost = _lost(places.data, seen)
+    fresh = [one for one in arrivals if one.listing and _is_new(one, seen, lost)]
+    refused = [
+        words for one in arrivals if one.listing and one not in fresh for words in seen[one.source]["refused"]
+    ]
+    if not fresh:
+        return Outcome(before._replace(refused=(*refused, *before.put_aside)), False, ())
+    choice, taken, said = before, False, []
+    brought: frozenset[str] = frozenset()  # a show from the stick goes with a box file from elsewhere
+    for arrival in fresh:
+        lacking = arrival.without(brought)
+        if not lacking.listing:
+            seen[arrival.source] = _seen(arrival, [], "")
+            continue
+        newest, problems, is_final = _take(places, lacking, choice, check)
+        refused += problems
+        said += problems
+        looked_at = arrival if is_final and (newest or not late) else arrival._replace(listing=[])
+        seen[arrival.source] = _seen(looked_at, problems, newest.id if newest else "")
+        if newest is not None:
+            taken = taken or newest.id != (choice.pairs or (Pair(),))[0].id
+            choice, brought = choice.with_newest(newest), brought | lacking.parts
+            said.append(f"{newest.source[0].upper()}{newest.source[1:]}: its show is checked and dances.")
+    said += _remember(places.data, choice, seen)
+    return Outcome(choice._replace(refused=(*refused, *choice.put_aside)), taken, tuple(said))
+
+
+def _take(
+    places: Places, arrival: Arrival, choice: Choice, check: Check
+) -> tuple[Pair | None, list[str], bool]:
+    """The pair to dance from now on, what is wrong, and whether that is the arrival's fault for good."""
+    from appliance.release.shelf import NoRoomError, Shelf, UnreadableError
+
+    no_room = ""
+    # In memory where the disk takes nothing: a stick that is pulled in mid-show is missed by nobody.
+    for root in (places.data, places.run):
+        shelf = Shelf(root)
+        try:
+            shelf.sweep((choice, Choice.read(places.run / CHOSEN) or Choice()))
+            newest, problems = _on_shelf(shelf, places, arrival, choice, check)
+        except UnreadableError as error:
+            cure = "Was it pulled? Plug it in again, or copy the show again."
+            return None, [_printable(f"{arrival.words.capitalize()}: {error} {_GOES_ON} {cure}")], False
+        except NoRoomError as error:
+            no_room = (
+                f"{arrival.words.capitalize()}: no room for its show ({error}). {_GOES_ON} Free some room."
+            )
+        else:
+            return newest, problems, root == places.data
+    return None, [_printable(no_room)], False
+
+
+def _on_shelf(
+    shelf: Shelf, places: Places, arrival: Arrival, choice: Choice, check: Check
+) -> tuple[Pair | None, list[str]]:
+    before = (choice.pairs or (Pair(),))[0]
+    show_id, show = shelf.take_show(arrival) if arrival.show else (before.show_id, before.show)
+    box_id, original = shelf.take_box(arrival) if arrival.box else (before.box_id, before.box)
+    copies = {str(show): str(arrival.show), str(original): str(arrival.box)}
+    first_problems: list[str] = []
+    for with_show, with_box in _combinations(arrival):
+        danced = (show_id, show) if with_show else (before.show_id, before.show)
+        boxed = (box_id, original) if with_box else (before.box_id, before.box)
+        if problems := check(danced[1], boxed[1]):
+            first_problems = first_problems or [_as_on_the_stick(words, copies) for words in problems]
+            continue
+        if with_box:
+            boxed = (box_id, shelf.furnish(original, places.moved))
+        source = _named(arrival, with_show, with_box)
+        return Pair(danced[1], boxed[1], f"{danced[0]}+{boxed[0]}", source), first_problems
+    return None, [*first_problems, f"{arrival.words.capitalize()} is refused. {_GOES_ON}"]
+
+
+def _combinations(arrival: Arrival) -> Iterator[tuple[bool, bool]]:
+    """Both together; else the show alone, else the box file alone: a broken one does not hold up both."""
+    if arrival.show and arrival.box:
+        yield True, True
+    if arrival.show:
+        yield True, False
+    if arrival.box:
+        yield False, True
+
+
+def _named(arrival: Arrival, with_show: bool, with_box: bool) -> str:
+    what = "show and box file" if with_show and with_box else "show" if with_show else "box file"
+    return f"{what} from {arrival.words}"
+
+
+def _as_on_the_stick(words: str, copies: dict[str, str]) -> str:
+    """What people find on their stick, not the copy that was checked."""
+    for copy, source in copies.items():
+        words = words.replace(copy, source)
+    return _printable(words)
+
+
+def _printable(words: str) -> str:
+    """A file's name may be no text: nobody who tells these words any further should stumble over it."""
+    return words.encode("utf-8", "backslashreplace").decode()
+
+
+def _remember(data: Path, choice: Choice, seen: dict[str, Any]) -> list[str]:
+    try:
+        if choice.pairs:
+            choice._replace(refused=choice.put_aside, data=data).write(data / CHOSEN)
+        write_whole(data / SEEN, json.dumps(seen).encode())
+        _write_refusals(data / "refusals", seen)
+    except OSError as error:
+        return [
+            f"{data}: nothing can be kept there ({error.strerror}). The show dances tonight; after the next "
+            "power-on the last one that could be kept does. Look at the data partition."
+        ]
+    return []
+
+
+def _write_refusals(folder: Path, seen: dict[str, Any]) -> None:
+    folder.mkdir(mode=0o700, exist_ok=True)
+    for source, one in seen.items():
+        path = folder / f"{source}.txt"
+        if one["refused"]:
+            write_whole(path, "".join(f"{words}\n" for words in one["refused"]).encode())
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _is_new(arrival: Arrival, seen: dict[str, Any], lost: set[str]) -> bool:
+    """Another one than at the last look, or what was taken then is lost."""
+    one = seen.get(arrival.source)
+    return one is None or one["listing"] != arrival.listing or one["taken"] in lost
+
+
+def _lost(data: Path, seen: dict[str, Any]) -> set[str]:
+    """What should still be there and is not. What gave way to something newer is not lost: it stays away."""
+    kept = Choice.read(data / CHOSEN)
+    if kept is None:
+        return {one["taken"] for one in seen.values() if one["taken"]}
+    return {one.id for one in kept.pairs if one.id and not one.here().is_there}
+
+
+def _seen(arrival: Arrival, refused: list[str], taken: str) -> dict[str, Any]:
+    return {"listing": arrival.listing, "refused": refused, "taken": taken}
+
+
+def _read_seen(data: Path) -> dict[str, Any]:
+    try:
+        seen = json.loads((data / SEEN).read_bytes())
+        return {
+            str(source): {
+                "listing": one["listing"],
+                "refused": [str(words) for words in one["refused"]],
+                "taken": str(one["taken"]),
+            }
+            for source, one in seen.items()
+        }
+    except (OSError, ValueError, TypeError, AttributeError, KeyError):
+        return {}
+
+
+def built_in_box(places: Places) -> Path:
+    """The box file for a box without one: as it comes, or with its folders elsewhere. Raises OSError."""
+    if not places.moved:
+        return APPLIANCE_BOX
+    path = places.run / "box.yaml"
+    write_whole(path, appliance_box(places.moved).encode())
+    return path

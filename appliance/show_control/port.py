@@ -1,0 +1,105 @@
+"""The control port: datagrams of those who may command the box; strangers are dropped and counted."""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import socket
+import struct
+from collections.abc import Sequence
+
+from appliance.sensor.transports.udp import bind_early
+from appliance.show_control.packet import Message, datagram
+
+LARGEST_DATAGRAM = 4096  # no command comes near; what is larger is none
+_SAY_EVERY_S = 60.0
+_WAITING_BYTES = 4 << 20  # or as much as net.core.rmem_max allows: what comes while this process does not run
+_SO_MEMINFO, _DROPS = 55, 8  # Linux, asm-generic/socket.h and linux/sock_diag.h: nine numbers, the last one
+
+Address = tuple[str, int]
+
+
+def open_port(host: str, port: int) -> socket.socket:
+    """The control port's socket, bound, also to an address that comes later. Raises OSError: it is taken."""
+    one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WAITING_BYTES)
+    try:
+        bind_early(one, (host, port))
+    except OSError:
+        one.close()
+        raise
+    return one
+
+
+class Port:
+    """Takes over a bound socket. `senders`: addresses and networks besides this machine that may command.
+
+    strangers: how many datagrams came from somebody else. too_large: how many were no command by their size.
+    """
+
+    def __init__(self, bound: socket.socket, senders: Sequence[str] = ()) -> None:
+        self._socket = bound
+        self._socket.setblocking(False)
+        host, self.number = self._socket.getsockname()
+        own = ["127.0.0.0/8"] if host == "0.0.0.0" else ["127.0.0.0/8", host]
+        self._networks = [ipaddress.IPv4Network(one, strict=False) for one in (*own, *senders)]
+        self._known: dict[str, bool] = {}
+        self.strangers = 0
+        self.too_large = 0
+        self._newest_stranger = ""
+        self._said_at = float("-inf")
+
+    def fileno(self) -> int:
+        """For whoever sleeps until something comes."""
+        return self._socket.fileno()
+
+    def take(self) -> tuple[bytes, Address] | None:
+        """The oldest datagram, empty when it is not to be taken; None: none waits. Never blocks or raises."""
+        try:
+            received, sender = self._socket.recvfrom(LARGEST_DATAGRAM + 1)
+        except BlockingIOError:
+            return None
+        except OSError:  # an asker who is gone again, told by the kernel
+            return b"", ("", 0)
+        if not self._may_command(sender[0]):
+            self.strangers += 1
+            self._newest_stranger = sender[0]
+            return b"", sender
+        if len(received) > LARGEST_DATAGRAM:
+            self.too_large += 1
+            return b"", sender
+        return received, sender
+
+    def dropped(self) -> int:
+        """How many datagrams the kernel dropped, because too many waited."""
+        told = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * (_DROPS + 1))
+        return int(struct.unpack_from("=I", told, 4 * _DROPS)[0])
+
+    def send(self, to: Address, message: Message) -> None:
+        """Tell somebody; dropped when the network does not take it at once."""
+        with contextlib.suppress(OSError, ValueError):  # ValueError: a text that OSC cannot carry
+            self._socket.sendto(datagram(message), to)
+
+    def news(self, now: float) -> str:
+        """A sentence about strangers, at most once a minute; else empty."""
+        if not self._newest_stranger or now < self._said_at + _SAY_EVERY_S:
+            return ""
+        sender, self._newest_stranger, self._said_at = self._newest_stranger, "", now
+        return (
+            f"Somebody at {sender} sends commands and is not listed ({self.strangers} dropped so far). "
+            "Nothing is changed. To let them: `senders` under control in the box file."
+        )
+
+    def close(self) -> None:
+        """Free the port."""
+        self._socket.close()
+
+    def _may_command(self, host: str) -> bool:
+        may = self._known.get(host)
+        if may is None:
+            address = ipaddress.IPv4Address(host)
+            may = any(address in network for network in self._networks)
+            if len(self._known) > 1000:  # a flood from made-up addresses
+                self._known.clear()
+            self._known[host] = may
+        return may

@@ -1,0 +1,146 @@
+"""Show control as a process: the port, the house, orders and the heartbeat, until it is told to end."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import signal
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from appliance.box.notify import Notifier
+from appliance.box.show_state import House, HouseReader, HouseWriter
+from appliance.box.stop_signals import stop_signals
+from appliance.show_control.command_handler import Desk
+from appliance.show_control.console_messages import News, held_back
+from appliance.show_control.heartbeat import Heartbeat
+from appliance.show_control.intake import Intake
+from appliance.show_control.key_file import KeyFile
+from appliance.show_control.order_dispatch import Errands
+from appliance.show_control.orders import OrderSender
+from appliance.show_control.port import Port
+from appliance.show_control.settings import Settings
+from appliance.show_control.stage_observer import StageSight
+
+_LONGEST_SLEEP_S = 0.25  # a stage that was started anew is found so soon
+_AT_ONCE = 16  # datagrams; then answers, heartbeat and signals have their turn
+_REST_S = 0.002  # after so many at once: a flood leaves the processor to others
+
+
+class ControlProcess:
+    """Everything open. Raises OSError where the folder takes no file, or another one is at work there."""
+
+    def __init__(
+        self, settings: Settings, say: Callable[[str], None], monotonic: Callable[[], float] = time.monotonic
+    ) -> None:
+        folder, now = Path(settings.folder), monotonic()
+        self._say, self._monotonic = say, monotonic
+        with ExitStack() as opened:
+            self.port = Port(socket.socket(fileno=settings.descriptor), settings.senders)
+            opened.callback(self.port.close)
+            self._intake = Intake(self.port)
+            house = _house_left(folder, now)
+            writer = HouseWriter(folder)
+            opened.callback(writer.close)
+            sender = OrderSender(folder)
+            opened.callback(sender.close)
+            self.sight = StageSight(folder)
+            opened.callback(self.sight.close)
+            self._errands = Errands(sender)
+            self._heartbeat = Heartbeat(settings.heartbeat, now)
+            opened.callback(self._heartbeat.close)
+            keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
+            self.desk = Desk(house, self.sight, self._errands, keys, self.port.send, writer.write, monotonic)
+            self._poll = select.poll()
+            for one in (self.port, sender):
+                self._poll.register(one.fileno(), select.POLLIN)
+            self._closing = opened.pop_all()
+        writer.write(house)
+        self._news = News(house)
+        if words := held_back(house):
+            say(f"Still from before: {words}")
+
+    def run(self, ended: Callable[[], bool], wake: int, notifier: Notifier) -> None:
+        """Until `ended` says so; `wake` is a descriptor that can be read when it may."""
+        self._poll.register(wake, select.POLLIN)
+        notifier.ready("Commands are heard.")
+        while not ended():
+            self._poll.poll(1000.0 * self._sleep_s(self._monotonic()))
+            self.turn()
+            notifier.ping(self._monotonic())
+        notifier.stopping()
+
+    def turn(self) -> None:
+        """What waits, urgent commands first and no more than _AT_ONCE, and what is due.
+
+        The clock is read after each datagram has come: this process may have been held up while it took it.
+        """
+        taken = 0
+        while taken < _AT_ONCE and (found := self._intake.take()) is not None:
+            taken += 1
+            self.desk.hear(*found, self._monotonic())
+        self._errands.go_on(self._monotonic())
+        now = self._monotonic()
+        self.sight.note_dropped(self._intake.dropped + self.port.dropped(), now)
+        self.desk.look(now)
+        if now >= self._heartbeat.due:
+            self._heartbeat.beat(self.desk.status(self.port.strangers, now), now)
+        for words in (self.port.news(now), self._news.look(self.desk.house, now)):
+            if words:
+                self._say(words)
+        if taken == _AT_ONCE:
+            time.sleep(_REST_S)
+
+    def conclusion(self) -> str:
+        """What was refused, in a sentence; empty when nothing was."""
+        refused = self.desk.refused + self.port.too_large
+        if not refused:
+            return ""
+        reason = self.desk.reason or "A datagram was too long for a command."
+        return f"Commands: {refused} refused, the last one: {reason}"
+
+    def close(self) -> None:
+        """Free the port and the house; what is in force stays in force."""
+        self._closing.close()
+
+    def _sleep_s(self, now: float) -> float:
+        if not self._intake.is_empty:
+            return 0.0
+        due = min(self._heartbeat.due, self._errands.due(now), now + _LONGEST_SLEEP_S)
+        return max(due - now, 0.0)
+
+
+def control(settings: Settings, say: Callable[[str], None]) -> int:
+    """Show control until SIGTERM, Ctrl-C or a closed terminal; the exit status."""
+    with _waking_stop_signals() as (ended, wake):
+        process = ControlProcess(settings, say)
+        try:
+            process.run(ended, wake, Notifier())
+        finally:
+            process.close()
+        if words := process.conclusion():
+            say(words)
+    return 0
+
+
+def _house_left(folder: Path, now: float) -> House:
+    """What an earlier show control left in force: panic stays panic."""
+    with contextlib.closing(HouseReader(folder)) as reader:
+        return reader.read().settled(now)
+
+
+@contextmanager
+def _waking_stop_signals() -> Iterator[tuple[Callable[[], bool], int]]:
+    """While inside: whether one came, and a descriptor that can be read when one did."""
+    reading, writing = socket.socketpair()
+    for one in (reading, writing):
+        one.setblocking(False)
+    with reading, writing, stop_signals() as came:
+        wake_before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
+        try:
+            yield came, reading.fileno()
+        finally:
+            signal.set_wakeup_fd(wake_before)

@@ -1,0 +1,64 @@
+"""What show control sees of the stage: in the shared frame, without ever asking it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from appliance.box.fallback import Fallbacks, Fallen, fallen
+from appliance.box.process_health import COMMANDS_DROPPED, STAGE_HUNG, Company
+from appliance.outputs.frame_reader import FrameReader
+from appliance.outputs.shared_frame import Facts
+
+StageState = Literal["dancing", "stopped", "hung", "absent"]
+
+
+class StageSight:
+    """The stage of a runtime folder, whether it is there or not."""
+
+    def __init__(self, folder: Path) -> None:
+        self._reader = FrameReader(folder)
+        self._company = Company(folder)
+        self._seen = Fallbacks((STAGE_HUNG, COMMANDS_DROPPED))
+
+    def state(self, now: float) -> StageState:
+        """hung: the process lives, but no frame came for half a second; absent: no process, or none yet."""
+        frames = self._reader.state(now)
+        is_hung = frames == "stale" and self._reader.is_alive(now)
+        self._seen.set(STAGE_HUNG.name, is_hung)
+        if frames == "fresh":
+            return "stopped" if self.health().get("state") == "stopped" else "dancing"
+        return "hung" if is_hung else "absent"
+
+    def lives(self, now: float) -> bool:
+        """Whether there is a stage at all: one that dances, hangs, or is about to begin."""
+        return self._reader.is_alive(now)
+
+    def health(self) -> dict[str, Any]:
+        """What the stage last said about itself; empty before it did."""
+        return self._reader.health() or {}
+
+    def note_dropped(self, total: int, now: float) -> None:
+        """How many datagrams at the control port gave way, since it was opened."""
+        self._seen.follow(COMMANDS_DROPPED.name, total, now)
+
+    def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
+        """Process and fallback, of all processes of the box, as far as they ever happened."""
+        own = [("control", one) for one in self._seen.told(now)]
+        stage = fallen(self.health().get("fallbacks")) if self.state(now) != "absent" else ()
+        return [*(("stage", one) for one in stage), *own, *self._company.fallbacks(now)]
+
+    @property
+    def facts(self) -> Facts | None:
+        """Of the newest stage, also of one that has ended; None before the first."""
+        return self._reader.facts
+
+    @property
+    def generation(self) -> int:
+        """Another number for each new stage."""
+        return self._reader.generation
+
+    def close(self) -> None:
+        """Let go of the shared frame."""
+        self._reader.close()
+        self._company.close()

@@ -1,0 +1,139 @@
+"""What show control tells: answers to questions, and the status that goes out once a second."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from appliance.box.show_state import House
+from appliance.show_control.packet import Message
+from appliance.show_control.stage_observer import StageSight
+
+STATUS, END = "/bunraku/status", "/end"
+QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/hands", "/fallbacks")
+UNKNOWN = -1.0
+_LONGEST_WORDS = 1000  # of a sentence in an answer
+
+
+class Status(NamedTuple):
+    """How the box is, as the arguments of `/bunraku/status` in this order; docs/osc.md explains them."""
+
+    state: str  # dancing, stopped, panic, blackout, hung, absent
+    show: str
+    rate_hz: float
+    late: int
+    skipped: int
+    tick_p50_ms: float
+    tick_p99_ms: float
+    sensor_age_s: float
+    coding: int
+    interaction: int
+    phrase: str
+    position_s: float
+    cue: str
+    look: str
+    lights: str
+    level: float
+    panic: int
+    blackout: int
+    temperature_c: float
+    uptime_s: float
+    refused: int
+    strangers: int
+    fallbacks: int
+
+
+def status(house: House, sight: StageSight, refused: int, strangers: int, now: float) -> Status:
+    """What the stage last said about itself, and what show control sees of one that hangs or is not there."""
+    stage, health, facts = sight.state(now), sight.health(), sight.facts
+    if stage == "absent":
+        health = {}
+    return Status(
+        state=_state(stage, house),
+        show=facts.show_name if facts else "",
+        rate_hz=float(health.get("rate_hz", 0.0)) if stage in ("dancing", "stopped") else 0.0,
+        late=int(health.get("late", 0)),
+        skipped=int(health.get("skipped", 0)),
+        tick_p50_ms=float(health.get("tick_p50_ms", 0.0)),
+        tick_p99_ms=float(health.get("tick_p99_ms", 0.0)),
+        sensor_age_s=_known(health.get("sensor_age_s")),
+        coding=int(health.get("coding", 0)),
+        interaction=int(health.get("interaction", 0)),
+        phrase=str(health.get("phrase", "")),
+        position_s=_known(health.get("position_s")),
+        cue=house.cue,
+        look=house.look or (facts.looks[0] if facts and facts.looks else ""),
+        lights=house.lights or (facts.lights[0] if facts and facts.lights else ""),
+        level=house.level(now),
+        panic=int(house.panic),
+        blackout=int(house.blackout),
+        temperature_c=_known(health.get("temperature_c")),
+        uptime_s=_known(health.get("uptime_s")),
+        refused=refused,
+        strangers=strangers,
+        fallbacks=sum(one.active for _, one in sight.fallbacks(now)),
+    )
+
+
+def told(question: str, house: House, sight: StageSight, now_status: Status, now: float) -> Iterator[Message]:
+    """The answer to one of QUESTIONS: a message for each thing, and one to end with."""
+    if question == "/status":
+        answers: list[Message] = [(STATUS, *now_status)]
+    else:
+        answers = list(_LISTS[question](now_status, sight, now))
+    yield from answers
+    yield END, question, len(answers)
+
+
+def _cues(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+    for cue in sight.facts.cues if sight.facts else ():
+        yield "/cues/cue", str(cue["name"]), int(cue["name"] == status.cue)
+
+
+def _phrases(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+    for name in sight.facts.phrases if sight.facts else ():
+        yield "/phrases/phrase", name, int(name == status.phrase)
+
+
+def _looks(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+    for name in sight.facts.looks if sight.facts else ():
+        yield "/looks/look", name, int(name == status.look)
+
+
+def _hands(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+    facts = sight.facts
+    if facts is None:
+        return
+    let_go = sight.health().get("let_go", ())
+    for joint, who in zip(facts.held, facts.hands, strict=True):
+        name = facts.skeleton.names[joint]
+        yield "/hands/hand", name, who, int(name not in let_go)
+
+
+def _fallbacks(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+    for who, one in sight.fallbacks(now):
+        yield "/fallbacks/fallback", one.name, who, one.times, int(one.active), one.words[:_LONGEST_WORDS]
+
+
+_LISTS = {
+    "/cues": _cues,
+    "/phrases": _phrases,
+    "/looks": _looks,
+    "/hands": _hands,
+    "/fallbacks": _fallbacks,
+}
+
+
+def _state(stage: str, house: House) -> str:
+    """One word: the worst first, as black is what the audience sees of a stage that hangs anyway."""
+    if stage in ("hung", "absent"):
+        return stage
+    if house.panic:
+        return "panic"
+    if house.blackout:
+        return "blackout"
+    return stage if house.going else "stopped"
+
+
+def _known(value: float | None) -> float:
+    return UNKNOWN if value is None else float(value)

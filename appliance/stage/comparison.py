@@ -1,0 +1,115 @@
+"""Compares frames that were danced again with the recorded ones: the first that differs, and the worst."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from appliance.recorder.record import NOT_FINITE, RESENT
+
+if TYPE_CHECKING:
+    from appliance.stage.tick import Tick
+
+METRES_PER_DEGREE = 0.01  # how far the root may be off where joints may be off by a degree
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A tick that came out otherwise than it was recorded: `joint` is off the most, by `degrees`; the root by
+    `metres`. words: what else is another.
+    """
+
+    tick: int
+    at_s: float  # of the run
+    joint: str
+    degrees: float
+    metres: float
+    words: str = ""
+
+    def sentence(self) -> str:
+        """For people."""
+        off = f"{self.joint} is off by {self.degrees:.3g} degrees, the root by {1000 * self.metres:.3g} mm"
+        return f"tick {self.tick}, at {self.at_s:.2f} s: {self.words or off}."
+
+
+class Comparison:
+    """Looks at each tick after it was run. tolerance_degrees 0: every bit must be the same.
+
+    ticks: how many were looked at; first: the first difference beyond the tolerance; worst: the largest one.
+    """
+
+    def __init__(self, begun: float, tolerance_degrees: float) -> None:
+        """begun: frame time of the run's first tick."""
+        self.ticks = 0
+        self.first: Difference | None = None
+        self.worst: Difference | None = None
+        self._begun, self._tolerance = begun, tolerance_degrees
+        self._words = ""
+
+    def look(self, recorded: Any, tick: Tick) -> None:
+        """Compare a record with the frame that the tick has just made of it."""
+        self.ticks += 1
+        words = self._words or _other(recorded, tick)
+        self._words = ""
+        frame = tick.frame
+        is_same = (
+            frame.pose.tobytes() == recorded["pose"].tobytes()
+            and frame.root.tobytes() == recorded["root"].tobytes()
+        )
+        if is_same and not words:
+            return
+        degrees = _degrees_between(recorded["pose"], frame.pose)
+        joint, metres = int(degrees.argmax()), float(np.linalg.norm(recorded["root"] - frame.root))
+        found = Difference(
+            int(recorded["tick"]),
+            float(recorded["frame_time"]) - self._begun,
+            tick.cast.skeleton.names[joint],
+            float(degrees[joint]),
+            metres,
+            words,
+        )
+        if self.worst is None or _size(found) > _size(self.worst):
+            self.worst = replace(found, words="")
+        if self.first is None and (words or self._is_beyond(found)):
+            self.first = found
+
+    def note_order(self, name: str, done_then: bool, done_here: bool) -> None:
+        """An order was carried out again before the next tick."""
+        if done_then != done_here:
+            then, here = ("carried out", "refused") if done_then else ("refused", "carried out")
+            self._words = f"before it the order '{name}' was {then} then, and is {here} here"
+
+    def _is_beyond(self, found: Difference) -> bool:
+        if not self._tolerance:
+            return True
+        return _size(found) > self._tolerance
+
+
+def _size(found: Difference) -> float:
+    return max(found.degrees, found.metres / METRES_PER_DEGREE)
+
+
+def _other(recorded: Any, tick: Tick) -> str:
+    """What beside the pose is another than recorded, in words."""
+    frame, times = tick.frame, tick.iterations
+    was_late, had_failed = (bool(recorded["flags"] & flag) for flag in (RESENT, NOT_FINITE))
+    iterations = int(recorded["coding_iterations"]), int(recorded["interaction_iterations"])
+    if was_late != frame.late:
+        return "it was late then and is in time here" if was_late else "it was in time then and is late here"
+    if had_failed != tick.network_failed:
+        return "the network failed then" if had_failed else "the network gives no sound poses here"
+    if iterations != (times.coding, times.interaction):
+        return f"iterations were {iterations[0]}/{iterations[1]}, and are {times.coding}/{times.interaction}"
+    if int(recorded["sensor_sequence"]) != frame.sensor_sequence:
+        return f"reading {int(recorded['sensor_sequence'])} went into it then, {frame.sensor_sequence} here"
+    return ""
+
+
+def _degrees_between(one: Any, other: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Angles (J,) between orientations (J, 4), exact for small ones."""
+    a, b = np.asarray(one, np.float64), np.asarray(other, np.float64)
+    chord = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    degrees: np.ndarray[Any, np.dtype[np.float64]] = np.degrees(4.0 * np.arcsin(np.clip(chord / 2, 0, 1)))
+    return degrees

@@ -1,0 +1,134 @@
+"""The recorder: the stage's end of the journal, in memory that the keeper reads; it never waits or raises."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from appliance.box.ring_file import RingFileWriter
+from appliance.recorder.keyframe import POSITION, packed
+from appliance.recorder.record import EVENT, TICK, layout_of
+
+if TYPE_CHECKING:
+    from appliance.box.clock import Slot
+    from appliance.stage.tick import Tick
+
+FILE, KIND, FORMAT = "journal", "journal", 1  # in the runtime folder
+FACTS, LOG, KEYFRAMES = range(3)  # the file's rings
+LOG_SLOTS = 4096  # 80 s: so long the disk may hang before a tick is missing in the journal
+KEYFRAME_TICKS = 500  # from one keyframe to the next
+KEYFRAME_SLOTS = 1 + LOG_SLOTS // KEYFRAME_TICKS
+KEYFRAME_BYTES, KEYFRAME_JOINT_BYTES = 1 << 14, 1 << 9  # and so many more for each joint
+EVENT_BYTES = 1024
+ENTRY = struct.Struct("<Q")  # kind of an entry of the log; then the tick's record, or the event as JSON
+
+_NO_ROUND_TRIP = float("nan")
+
+
+class Recorder:
+    """Notes each tick, each event and now and then the whole state of the dance.
+
+    Raises OSError where the runtime folder takes no file of its size. lost: what could not be noted.
+    """
+
+    def __init__(self, folder: Path, facts: dict[str, Any]) -> None:
+        """facts: of this run, as record.facts_of_run gives them."""
+        said, layout = json.dumps(facts).encode(), layout_of(facts)
+        entry_bytes = ENTRY.size + max(layout.itemsize, EVENT_BYTES)
+        keyframe_bytes = KEYFRAME_BYTES + KEYFRAME_JOINT_BYTES * len(facts["joints"])
+        shapes = [(1, len(said)), (LOG_SLOTS, entry_bytes), (KEYFRAME_SLOTS, keyframe_bytes)]
+        self.lost = 0
+        self._file = RingFileWriter.new(folder / FILE, KIND, FORMAT, shapes)
+        self._file.rings[FACTS].write(said)
+        self._log = self._file.rings[LOG]
+        row = np.frombuffer(self._log.payload, layout, 1, ENTRY.size)
+        self._field: dict[str, np.ndarray[Any, Any]] = {name: row[name] for name in layout.names or ()}
+        self._sensors = {name: place for place, name in enumerate(facts["sensors"])}
+        self._entries = 0
+        self._ticks = 0
+        self._file.publish()
+
+    @property
+    def wants_keyframe(self) -> bool:
+        """Whether the last keyframe is so long ago that the next one is due."""
+        return self._ticks >= KEYFRAME_TICKS
+
+    def note_tick(self, slot: Slot, tick: Tick, flags: int) -> None:
+        """The frame of this slot has left: one copy into the memory."""
+        frame, field, cast = tick.frame, self._field, tick.cast
+        ENTRY.pack_into(self._log.payload, 0, TICK)
+        field["tick"][0] = slot.tick
+        field["frame_time"][0] = slot.deadline
+        field["started"][0] = slot.started
+        field["skipped"][0] = slot.skipped
+        field["sensor_sequence"][0] = frame.sensor_sequence
+        field["sensor_arrival"][0] = frame.sensor_arrival
+        field["flags"][0] = flags
+        field["coding_iterations"][0] = tick.iterations.coding
+        field["interaction_iterations"][0] = tick.iterations.interaction
+        field["sections_ms"][0] = tick.sections_ms
+        for hand, place in enumerate(cast.hand_places):
+            field["targets"][0, hand] = cast.hands.targets[0, place]
+            field["weights"][0, hand] = cast.hands.weights[place]
+        field["root"][0] = frame.root
+        field["pose"][0] = frame.pose
+        self._note_readings(tick)
+        self._log.publish()
+        self._entries += 1
+        self._ticks += 1
+
+    def event(self, kind: str, now: float, **facts: Any) -> None:
+        """Something happened between two ticks: `facts` as JSON, 1 KiB at most (long texts lose their end).
+
+        `now`: seconds on the monotonic clock.
+        """
+        try:
+            said = _within({"kind": kind, "now": now} | facts)
+            self._log.write(ENTRY.pack(EVENT) + said)
+            self._entries += 1
+        except (TypeError, ValueError):
+            self.lost += 1
+
+    def keyframe(self, state: dict[str, Any]) -> None:
+        """The whole state of the dance, from which a replay may start: plain values and arrays."""
+        self._ticks = 0
+        try:
+            self._file.rings[KEYFRAMES].write(POSITION.pack(self._entries) + packed(state))
+        except (TypeError, ValueError):
+            self.lost += 1
+
+    def close(self) -> None:
+        """Let go of the file; it stays for the keeper, which may not have read all of it yet."""
+        self._file.close()
+
+    def _note_readings(self, tick: Tick) -> None:
+        field = self._field
+        for name in ("reading_here", "reading_orientation", "reading_times", "reading_numbers"):
+            field[name][0] = 0
+        for one in tick.readings:
+            place = self._sensors.get(one.sensor)
+            if place is None:
+                continue
+            trip_s = _NO_ROUND_TRIP if one.round_trip_s is None else one.round_trip_s
+            field["reading_here"][0, place] = 1
+            field["reading_orientation"][0, place] = one.orientation
+            field["reading_times"][0, place] = one.measured_at, one.arrival, trip_s
+            field["reading_numbers"][0, place] = (
+                *(one.sequence, one.sensor_time_us, one.battery, one.calibration),
+                *(one.boot_nonce, one.taps, one.recoveries, one.flags),
+            )
+
+
+def _within(facts: dict[str, Any]) -> bytes:
+    """As JSON that fits an event; the longest text loses its end until it does. Raises ValueError."""
+    while len(said := json.dumps(facts).encode()) > EVENT_BYTES:
+        texts = [name for name, value in facts.items() if isinstance(value, str) and len(value) > 1]
+        if not texts:
+            raise ValueError(f"{len(said)} bytes do not fit an event")
+        longest = max(texts, key=lambda name: len(facts[name]))
+        facts[longest] = facts[longest][: len(facts[longest]) // 2]
+    return said

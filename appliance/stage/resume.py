@@ -1,0 +1,151 @@
+"""Going on: the place of the dance is noted after each frame, and a stage that starts anew begins there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from appliance.box.checkpoint import FILE, Place, PlaceReader, PlaceWriter, boot_id
+from appliance.box.checkpoint_file import read_place
+from appliance.show.box import Resume
+from appliance.stage.iterations import Iterations
+from appliance.stage.stage_parts import Cast
+
+TRIES = 5  # starts from one place without a frame: then it is the place that is wrong
+
+
+class Resuming:
+    """Knows where the show was, and keeps where it is: some microseconds a tick, and never a disk.
+
+    went_on: whether this start is one of them; restarts, power_cuts: how often this show went on after one;
+    complaint: why no place is kept, else "".
+    """
+
+    def __init__(self, show: str, runtime: Path, state: Path | None, wanted: Resume) -> None:
+        """runtime: the folder where the box's processes meet; state: the one on the disk, if there is one."""
+        self._show, self._boot = show, boot_id()
+        self.complaint = ""
+        self.went_on = False
+        self._found, self._after_power_cut = _found(runtime, state, wanted, self._boot)
+        self.restarts = self._found.restarts if self._found else 0
+        self.power_cuts = self._found.power_cuts if self._found else 0
+        self._now: Place | None = None
+        self._writer: PlaceWriter | None = None
+        try:
+            self._writer = PlaceWriter(runtime)
+        except OSError as error:
+            self.complaint = (
+                f"{runtime}: the place of the dance cannot be kept there ({error.strerror}). The dance goes "
+                "on; after a crash it begins at the beginning. Free memory there, or give another folder as "
+                "`runtime:` in the box file."
+            )
+
+    @property
+    def comes_back(self) -> bool:
+        """Whether a stage danced here since the machine was switched on, and did not end as it should."""
+        return self._found is not None and not self._after_power_cut
+
+    def go_on(self, cast: Cast, iterations: Iterations) -> str:
+        """Before the first tick: put the cast where the show was. Gives what to say about it, or ""."""
+        place = self._found
+        if place is None:
+            return ""
+        if self._after_power_cut:
+            self.power_cuts += 1
+        else:
+            self.restarts += 1
+        why = "After a power cut" if self._after_power_cut else "After a restart of the stage"
+        if place.tries >= TRIES:
+            return (
+                f"{why}: {place.tries} starts at {place.position_s:.1f} s of the phrase '{place.phrase}' "
+                "ended without a frame. The show begins at the beginning. Export its journal for us."
+            )
+        try:
+            words = self._take(place, cast, iterations)
+        except ValueError as error:
+            return f"{why}: the show begins at the beginning. {error}"
+        self.went_on = True
+        where = f" in the cue '{place.cue}'" if cast.cue else ""
+        where += f" at {place.position_s:.1f} s of the phrase '{place.phrase}'"
+        return f"{why} the show goes on{where}. {words}".rstrip()
+
+    def begin(self, cast: Cast, iterations: Iterations) -> None:
+        """Right before the first tick: a start from here is tried."""
+        tries = min(self._found.tries + 1, TRIES) if self._found and self._found.tries < TRIES else 1
+        self._write(replace(self._place(cast, iterations, -1), tries=tries))
+
+    def note(self, cast: Cast, iterations: Iterations, tick: int) -> None:
+        """The frame of this tick has left, and the cast has moved on: here the next one begins."""
+        if self._writer is not None:
+            self._write(self._place(cast, iterations, tick))
+
+    def end(self) -> None:
+        """The show ends as it should: the next one begins at the beginning."""
+        if self._now is not None:
+            self._write(replace(self._now, ended=True))
+
+    def close(self) -> None:
+        """Let go of the file; the place stays in it."""
+        if self._writer is not None:
+            self._writer.close()
+
+    def _take(self, place: Place, cast: Cast, iterations: Iterations) -> str:
+        """Raises ValueError where this show has no such place."""
+        if place.show != self._show:
+            raise ValueError(f"Before, the show was '{place.show}'.")
+        # What has stopped the phrase went with the power, and nobody would order it to start.
+        rate = place.rate or (cast.motion.rate if self._after_power_cut else 0.0)
+        cast.motion.start_at(
+            place.phrase, place.excerpt, place.position_s, rate, (place.x, place.z, place.heading)
+        )
+        cast.grounding.strayed = place.strayed
+        for puppeteer in cast.hands.puppeteers:
+            puppeteer.enabled = puppeteer.joint not in place.let_go
+        cast.cue = place.cue if place.cue in cast.cues else ""
+        return iterations.ask(place.coding, place.interaction)
+
+    def _place(self, cast: Cast, iterations: Iterations, tick: int) -> Place:
+        motion = cast.motion
+        phrase, position_s = motion.going_on
+        coding, interaction = iterations.asked
+        return Place(
+            self._show,
+            phrase,
+            position_s,
+            motion.excerpt_s,
+            motion.rate,
+            *motion.standing,
+            cast.grounding.strayed,
+            coding,
+            interaction,
+            cast.cue,
+            tuple([puppeteer.joint for puppeteer in cast.hands.puppeteers if not puppeteer.enabled]),
+            self._boot,
+            tick,
+            self.restarts,
+            self.power_cuts,
+        )
+
+    def _write(self, place: Place) -> None:
+        self._now = place
+        if self._writer is None:
+            return
+        try:
+            self._writer.write(place)
+        except ValueError as error:  # names of several thousand signs
+            self._writer, self.complaint = None, f"The place of the dance is not kept: {error}"
+
+
+def _found(runtime: Path, state: Path | None, wanted: Resume, boot: str) -> tuple[Place | None, bool]:
+    """Where the show was, None: nowhere; and whether the machine has started anew since."""
+    if wanted == "never":
+        return None, False
+    reader = PlaceReader(runtime)
+    place = reader.read()
+    reader.close()
+    if place is None and state is not None:
+        place = read_place(state / FILE)
+    if place is None or place.ended:
+        return None, False
+    power_cut = place.boot != boot
+    return (None, False) if power_cut and wanted == "after_crash" else (place, power_cut)

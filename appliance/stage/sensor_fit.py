@@ -1,0 +1,217 @@
+"""How the sensors are worn tonight: neutral poses taken in stillness, headings carried over, lamps lit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from appliance.sensor.link import SensorReading
+from appliance.sensor.neutral import (
+    NO_BOOT,
+    STILL_S,
+    NeutralPose,
+    carried,
+    front,
+    with_heading_reset,
+)
+from appliance.show.config_error import did_you_mean
+from appliance.stage.sensor_binding import Wearer, WornHand, upright
+from appliance.stage.sensor_memory import SensorMemory
+from appliance.stage.stage_parts import Cast
+
+ASKED_STILL_S = 0.5  # of stillness are enough for a neutral pose that was asked for
+ASKED_WITHIN_S = 3.0
+CARRIED_WITHIN_S = 60.0  # a sensor that comes back later may have changed hands
+FRESH_S = 0.5  # an older reading does not tell how the dancer stands
+
+
+class Wearing:
+    """Joins what the sensors say with what the joints get; what is to be said leaves with `look`.
+
+    One neutral pose is taken by itself at each power-on, when the dancer stands still; after that only when
+    asked for. A sensor that is back within a minute, or whose IMU restarted, keeps the pose: its heading is
+    lost, and carried over from where the joint was.
+    """
+
+    def __init__(self, cast: Cast, memory: SensorMemory, say: Callable[[str], None]) -> None:
+        self._link = cast.link
+        self._memory = memory
+        self._say = say
+        self._news: list[str] = []
+        self._wearers = {
+            name: Wearer(name, [WornHand(joint, cast.mountings[joint.joint]) for joint in joints])
+            for name, joints in cast.worn.items()
+        }
+        for wearer in self._wearers.values():
+            for hand in wearer.hands:
+                kept = memory.neutral(wearer.name, hand.joint.joint)
+                hand.wear(kept or hand.mounting.assumed_pose)
+
+    def hear(self, reading: SensorReading) -> None:
+        """Take a reading before its joints do; it takes part in the tick, so it says nothing."""
+        wearer = self._wearers.get(reading.sensor)
+        if wearer is None:
+            return
+        before, wearer.reading = wearer.reading, reading
+        if before is None:
+            self._meet(wearer, reading)
+        elif reading.boot_nonce != before.boot_nonce or reading.recoveries != before.recoveries:
+            self._meet_again(wearer, before, reading)
+        elif reading.taps != before.taps:
+            wearer.stillness.restart()
+            self._wait_for(wearer, ASKED_STILL_S, reading.arrival + ASKED_WITHIN_S)
+        wearer.stillness.hear(reading.orientation, reading.arrival)
+
+    def look(self, now: float) -> None:
+        """After the frame: take the neutral poses of those who stand still, and say what happened."""
+        for wearer in self._wearers.values():
+            if wearer.needs_still_s and wearer.stillness.still_s >= wearer.needs_still_s:
+                self._take(wearer)
+            elif now > wearer.waits_until:
+                self._give_up(wearer)
+        for sentence in self._news:
+            self._say(sentence)
+        self._news.clear()
+
+    def named(self, sensor: str | None) -> list[str]:
+        """The sensors that a person means: one that the show knows, or all (None). Raises ValueError."""
+        worn = list(self._wearers)
+        if not worn:
+            raise ValueError("No hand of this show is held by a sensor.")
+        if sensor is not None and sensor not in worn:
+            cure = did_you_mean(sensor, worn)
+            raise ValueError(f"No hand of this show is held by a sensor '{sensor}'. {cure}")
+        return worn if sensor is None else [sensor]
+
+    def take_neutral(self, sensor: str | None, now: float) -> bool:
+        """Asked for by a person: take the neutral pose of a sensor (all: None) at the next stillness.
+
+        Whether anybody was asked; as `named` raises.
+        """
+        asked = self._asked(sensor, now)
+        for wearer, _ in asked:
+            self._wait_for(wearer, ASKED_STILL_S, now + ASKED_WITHIN_S)
+        return bool(asked)
+
+    def reset_heading(self, sensor: str | None, now: float) -> bool:
+        """Asked for by a person: the dancer (all: None) faces the front as in the neutral pose, right now.
+
+        Whether anybody was asked; as `named` raises.
+        """
+        asked = self._asked(sensor, now)
+        for wearer, reading in asked:
+            poses = [with_heading_reset(hand.pose, reading.orientation) for hand in wearer.hands]
+            if any(pose is None for pose in poses):
+                self._news.append(
+                    f"Sensor {wearer.name} is upside down against its neutral pose: no heading can be told. "
+                    "Its joint goes on as before. Stand as in the neutral pose, then ask again."
+                )
+                continue
+            self._wear(wearer, [pose for pose in poses if pose is not None])
+            self._news.append(f"Sensor {wearer.name}: this is the front now. Dance.")
+        return bool(asked)
+
+    def neutral_of(self, sensor: str) -> str:
+        """'taken' (since its power-on), 'wanted', 'kept' (from before), 'assumed', or '' for a stranger."""
+        wearer = self._wearers.get(sensor)
+        if wearer is None:
+            return ""
+        if wearer.needs_still_s:
+            return "wanted"
+        if wearer.reading is not None and wearer.has_pose_of(wearer.reading.boot_nonce):
+            return "taken"
+        return "assumed" if any(hand.pose.boot_nonce == NO_BOOT for hand in wearer.hands) else "kept"
+
+    def state(self) -> dict[str, Any]:
+        """How the sensors are worn, for `restore`: plain values."""
+        return {name: wearer.state() for name, wearer in self._wearers.items()} | {"": self._news[:]}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the one did that gave this state; the matrices of the joints are the hands' to restore."""
+        for name, wearer in self._wearers.items():
+            wearer.restore(state[name])
+            if wearer.needs_still_s:
+                self._link.wants_neutral.add(name)
+            else:
+                self._link.wants_neutral.discard(name)
+        self._news[:] = state[""]
+
+    def _meet(self, wearer: Wearer, reading: SensorReading) -> None:
+        """The first reading of this run: after a restart of the box alone, its pose holds still."""
+        if wearer.has_pose_of(reading.boot_nonce):
+            self._news.append(f"Sensor {wearer.name}: the neutral pose taken before is used on. Dance.")
+        else:
+            self._ask_for_stillness(wearer)
+
+    def _meet_again(self, wearer: Wearer, before: SensorReading, reading: SensorReading) -> None:
+        """The sensor was switched on again, or its IMU restarted: its heading is another one."""
+        wearer.stillness.restart()
+        is_known = wearer.has_pose_of(before.boot_nonce)
+        if not is_known or reading.arrival - before.arrival > CARRIED_WITHIN_S:
+            self._ask_for_stillness(wearer)
+            return
+        poses = (
+            carried(hand.pose, before.orientation, reading.orientation, reading.boot_nonce)
+            for hand in wearer.hands
+        )
+        self._wear(wearer, poses)
+        what = "'s IMU started anew" if reading.boot_nonce == before.boot_nonce else " is on again"
+        self._news.append(
+            f"Sensor {wearer.name}{what}: its joint goes on where it was. "
+            "If it stands askew: a double tap on the sensor, then stand still."
+        )
+
+    def _ask_for_stillness(self, wearer: Wearer) -> None:
+        self._wait_for(wearer, STILL_S)
+        self._news.append(f"Sensor {wearer.name} is on. Its dancer stands still for a breath now.")
+
+    def _take(self, wearer: Wearer) -> None:
+        reading = wearer.reading
+        assert reading is not None
+        self._settle(wearer)
+        pose = NeutralPose(reading.orientation, 0.0, reading.boot_nonce)
+        self._wear(wearer, [pose] * len(wearer.hands))
+        self._news.append(f"Sensor {wearer.name}: neutral pose taken. Dance.")
+        for hand in wearer.hands:
+            _, axis = front(pose.orientation, hand.mounting.facing)
+            if axis != hand.mounting.facing:
+                self._news.append(upright(wearer.name, hand, axis))
+
+    def _give_up(self, wearer: Wearer) -> None:
+        """Who asked did not stand still. A power-on that still waits for its first pose goes on waiting."""
+        self._news.append(
+            f"Sensor {wearer.name} did not keep still within {ASKED_WITHIN_S:g} s: no new neutral pose. "
+            "Its joint goes on as before. Ask again, and stand still at once."
+        )
+        if wearer.reading is not None and wearer.has_pose_of(wearer.reading.boot_nonce):
+            self._settle(wearer)
+        else:
+            self._wait_for(wearer, STILL_S)
+
+    def _wait_for(self, wearer: Wearer, still_s: float, until: float = math.inf) -> None:
+        wearer.needs_still_s, wearer.waits_until = still_s, until
+        self._link.wants_neutral.add(wearer.name)
+
+    def _settle(self, wearer: Wearer) -> None:
+        wearer.needs_still_s, wearer.waits_until = 0.0, math.inf
+        self._link.wants_neutral.discard(wearer.name)
+
+    def _wear(self, wearer: Wearer, poses: Iterable[NeutralPose]) -> None:
+        """Put a pose on each of the sensor's joints, and keep them for the next start, all or none."""
+        taken: dict[str, NeutralPose] = {}
+        for hand, pose in zip(wearer.hands, poses, strict=True):
+            hand.wear(pose)
+            if pose.boot_nonce != NO_BOOT:
+                taken[hand.joint.joint] = pose
+        if taken:
+            self._memory.keep_neutral(wearer.name, taken)
+
+    def _asked(self, sensor: str | None, now: float) -> list[tuple[Wearer, SensorReading]]:
+        """The sensors that a person means, with a fresh reading: who is silent shows nothing to go by."""
+        wearers = (self._wearers[name] for name in self.named(sensor))
+        return [
+            (wearer, wearer.reading)
+            for wearer in wearers
+            if wearer.reading is not None and now - wearer.reading.arrival <= FRESH_S
+        ]

@@ -1,0 +1,224 @@
+"""The cast of a show: every part that a tick joins, made from a show bundle and a box file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from appliance.box.realtime import borrowed_priority
+from appliance.dancer.blending import Blending
+from appliance.dancer.grounding import Floor, Grounding, GroundingError
+from appliance.dancer.hands import Hands
+from appliance.dancer.motion_source import Playback
+from appliance.dancer.phrase import PhraseError
+from appliance.dancer.puppet import Puppet, PuppetError
+from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Remote, TurningAxis, WornSensor
+from appliance.outputs.outputs import Outputs
+from appliance.pose.bvh import BvhError
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+from appliance.sensor.link import SensorLink, SensorReading
+from appliance.sensor.neutral import Mounting, joint_from_reading
+from appliance.sensor.state import restored_reading
+from appliance.show.box import BoxConfig
+from appliance.show.config_error import ConfigError
+from appliance.show.cues import CueConfig
+from appliance.show.posistagenet import misfits
+from appliance.show.show import HandConfig, Show
+from appliance.stage.admission import Admission, admit
+from appliance.stage.open_sensors import open_ears
+from appliance.stage.phrase_cache import Preparations
+from appliance.stage.stage_error import StageError
+
+
+@dataclass(slots=True)
+class Cast:
+    """Everything that dances, hears and speaks.
+
+    `hand_places`: where the hands' joints stand among the moving ones; `worn`: which joints a sensor holds;
+    `mountings`: how it is worn for each of these joints; `complaints`: why sensors are not let in;
+    `cue`: the newest that was carried out, "" for none yet.
+    """
+
+    skeleton: Skeleton
+    puppet: Puppet
+    motion: Playback
+    blending: Blending
+    grounding: Grounding
+    hands: Hands
+    cues: dict[str, CueConfig]
+    hand_places: list[int]
+    worn: dict[str, list[WornSensor]]
+    mountings: dict[str, Mounting]
+    primary: str | None
+    link: SensorLink
+    outputs: Outputs
+    complaints: tuple[str, ...] = ()
+    cue: str = ""
+    newest_primary: SensorReading | None = field(default=None)
+
+    def hear(self, reading: SensorReading) -> None:
+        """Give a reading to the joints that its sensor holds."""
+        for puppeteer in self.worn.get(reading.sensor, ()):
+            puppeteer.hear(reading.orientation, reading.arrival)
+        if reading.sensor == self.primary:
+            self.newest_primary = reading
+
+    def state(self) -> dict[str, Any]:
+        """What the dance to come depends on, for `restore`: plain values and copies of arrays."""
+        return {
+            "motion": self.motion.state(),
+            "blending": self.blending.state(),
+            "grounding": self.grounding.state(),
+            "hands": self.hands.state(),
+            "cue": self.cue,
+            "newest_primary": self.newest_primary,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on as the cast of the same show did that gave this state."""
+        self.motion.restore(state["motion"])
+        self.blending.restore(state["blending"])
+        self.grounding.restore(state["grounding"])
+        self.hands.restore(state["hands"])
+        self.cue = state["cue"]
+        self.newest_primary = restored_reading(state["newest_primary"])
+
+    def close(self) -> None:
+        """Free ports and sockets."""
+        self.link.close()
+        self.outputs.close()
+
+
+def assemble(
+    show: Show,
+    box: BoxConfig,
+    profiles: Mapping[bytes, bytes] = MappingProxyType({}),
+    box_file: Path | None = None,
+    memory: Path | None = None,
+) -> Cast:
+    """Open every port and file of a show; `profiles`: the sensors' calibrations that the box has kept;
+    `memory`: a folder where phrases that were made ready are kept for the next start.
+
+    Raises StageError or ConfigError before anything dances. Keys that are missing are no reason not to dance:
+    see `complaints`.
+    """
+    try:
+        puppet = Puppet(show.network, show.skeleton)
+        show.require_moving(puppet.joints)
+        motion, floor = _playback(show, puppet.window, Preparations(show.directory, memory))
+    except PuppetError as error:
+        raise StageError(str(error)) from error
+    puppeteers = [_puppeteer(hand) for hand in show.config.hands]
+    worn: dict[str, list[WornSensor]] = {}
+    mountings: dict[str, Mounting] = {}
+    for hand, puppeteer in zip(show.config.hands, puppeteers, strict=True):
+        if hand.sensor is not None and isinstance(puppeteer, WornSensor):
+            worn.setdefault(hand.sensor, []).append(puppeteer)
+            mountings[hand.joint] = _mounting(hand)
+    link, complaints = open_ears(box, list(worn), profiles)
+    return Cast(
+        skeleton=show.skeleton,
+        puppet=puppet,
+        motion=motion,
+        blending=Blending(len(puppet.joints), puppet.window, show.config.dancer.hop),
+        grounding=Grounding(show.skeleton, floor),
+        hands=Hands(puppeteers, puppet.joints, puppet.window),
+        cues={cue.name: cue for cue in show.config.cues},
+        hand_places=[puppet.joints.index(hand.joint) for hand in show.config.hands],
+        worn=worn,
+        mountings=mountings,
+        primary=show.config.primary_sensor,
+        link=link,
+        outputs=_outputs(show, box, box_file),
+        complaints=complaints,
+    )
+
+
+def admission(cast: Cast, show: Show, box: BoxConfig) -> Admission:
+    """Measure the show's iterations on this machine with the first window and all hands of the show."""
+    dance = _dance(cast)
+    dancer = show.config.dancer
+    with borrowed_priority(box.realtime.priority if box.realtime.enabled else None):
+        return admit(
+            dance, dancer.coding_iterations, dancer.interaction_iterations, box.limits.tick_budget_ms
+        )
+
+
+def warm_up(cast: Cast, admitted: Admission) -> None:
+    """Let the network run once as the first tick will: its first run takes several times as long."""
+    _dance(cast)(admitted.coding, admitted.interaction)
+
+
+def _dance(cast: Cast) -> Callable[[int, int], object]:
+    """Runs the puppet with the first window and all hands of the show; its poses go nowhere."""
+    window = cast.puppet.select(cast.motion.window()).copy()
+    mask, targets, weights = cast.hands.mask.copy(), cast.hands.targets, cast.hands.weights
+    mask[cast.hand_places] = True
+
+    def dance(coding: int, interaction: int) -> object:
+        return cast.puppet.dance(window, mask, targets, weights, coding, interaction)
+
+    return dance
+
+
+def _puppeteer(hand: HandConfig) -> Puppeteer:
+    if hand.sensor is not None:
+        mounting = _mounting(hand)
+        return WornSensor(hand.joint, hand.weight, joint_from_reading(mounting.assumed_pose, mounting))
+    if hand.turning is not None:
+        return TurningAxis(hand.joint, hand.turning.axis, hand.turning.seconds_per_turn, hand.weight)
+    if hand.fixed is not None:
+        return FixedOrientation(hand.joint, hand.fixed.orientation, hand.weight)
+    if hand.kept:
+        return Kept(hand.joint, hand.weight)
+    return Remote(hand.joint, hand.weight)
+
+
+def _mounting(hand: HandConfig) -> Mounting:
+    return Mounting(hand.facing, hand.at_neutral, hand.neutral)
+
+
+def _playback(show: Show, window: int, preparations: Preparations) -> tuple[Playback, Floor | None]:
+    """All phrases of a show, ready to be switched, and the floor of the one that it starts with."""
+    motion, (path, *others) = show.config.motion, show.phrases.values()
+    try:
+        phrase, floor = _phrase(show, path, preparations)
+        playback = Playback(
+            phrase,
+            start_s=motion.start_s,
+            end_s=motion.end_s,
+            rate=motion.rate,
+            crossfade_s=motion.crossfade_s,
+            window=window,
+            floor=floor,
+        )
+        for name, path in zip(motion.phrases, others, strict=True):
+            playback.add(name, *_phrase(show, path, preparations))
+    except BvhError as error:
+        raise StageError(str(error)) from error
+    except (PhraseError, GroundingError) as error:
+        raise StageError(f"{path}: {error}") from error
+    preparations.forget_others()
+    return playback, floor
+
+
+def _phrase(show: Show, path: Path, preparations: Preparations) -> tuple[Recording, Floor | None]:
+    """A phrase at the tick's rate, and what its survey learnt of the floor."""
+    found = preparations.phrase(path, show.skeleton, show.config.motion.grounded)
+    if found is None:
+        raise StageError(
+            f"{path}: the phrase has other joints than {show.directory / 'skeleton.bvh'}. "
+            "Nothing can be danced. Export the show again."
+        )
+    return found
+
+
+def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:
+    problems = misfits(box.outputs.posistagenet, show.skeleton.names, box_file)
+    if problems:
+        raise ConfigError(problems)
+    return Outputs(box.outputs, show.skeleton)

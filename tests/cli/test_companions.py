@@ -1,0 +1,181 @@
+"""Companions of the stage: started after its first tick, started again when they die, ended with it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from appliance.cli import companions
+from appliance.cli.companions import UNAVAILABLE, Companion, Companions
+from tests.show_control.doubles import until
+
+NOTE = "import os, sys, time; open(sys.argv[1], 'a').write(f'{os.getpid()}\\n'); "
+
+
+class Diary:
+    """A file in which each start of a child leaves its process id."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / "diary.txt"
+        self.path.touch()
+
+    @property
+    def pids(self) -> list[int]:
+        return [int(line) for line in self.path.read_text().splitlines()]
+
+    def child(self, script: str, may_close: bool = False) -> Companion:
+        command = (sys.executable, "-c", NOTE + script, str(self.path))
+        return Companion("The child", command, "Something is missing for a moment.", may_close)
+
+
+@pytest.fixture
+def diary(tmp_path: Path) -> Diary:
+    return Diary(tmp_path)
+
+
+def is_gone(pid: int) -> bool:
+    """Whether a process has ended; one that nobody waits for any more has ended, too."""
+    try:
+        return "State:\tZ" in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return True
+
+
+def test_it_starts_when_it_may_and_ends_with_the_context(diary: Diary) -> None:
+    dances: list[bool] = []
+    said: list[str] = []
+    with Companions([diary.child("time.sleep(60)")], said.append, lambda: bool(dances)):
+        time.sleep(0.2)
+        assert diary.pids == []
+        dances.append(True)
+        until(lambda: len(diary.pids) == 1)
+    assert is_gone(diary.pids[0])
+    assert said == []
+
+
+def test_without_a_first_tick_nobody_is_started(diary: Diary) -> None:
+    with Companions([diary.child("time.sleep(60)")], print, lambda: False):
+        pass
+    assert diary.pids == []
+
+
+def test_one_that_is_killed_is_started_again_and_that_is_said(diary: Diary) -> None:
+    said: list[str] = []
+    with Companions([diary.child("time.sleep(60)")], said.append, lambda: True):
+        until(lambda: len(diary.pids) == 1)
+        os.kill(diary.pids[0], signal.SIGKILL)
+        until(lambda: len(diary.pids) == 2)
+    assert said == [
+        "The child was killed (signal 9). Something is missing for a moment. It is started again."
+    ]
+
+
+def test_one_that_dies_at_once_is_tried_ever_more_slowly_and_not_said_for_ever(
+    diary: Diary, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(companions, "SHORTEST_PAUSE_S", 0.01)
+    monkeypatch.setattr(companions, "LONGEST_PAUSE_S", 0.02)
+    said: list[str] = []
+    with Companions([diary.child("sys.exit(3)")], said.append, lambda: True):
+        until(lambda: len(diary.pids) >= 6)
+    assert len(said) == 4
+    assert said[0].startswith("The child ended by itself (status 3).")
+    assert "4 times in a row" in said[3]
+
+
+def test_pauses_grow_and_one_that_lived_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    child = companions._Running(Companion("The child", ("x",), ""), lambda words: None)
+    pauses = []
+    now = 1000.0
+    for lived_s in (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 11.0, 0.1):
+        child._started_at = now
+        now += lived_s
+        child._note(1, now)
+        pauses.append(round(child._starts_at - now, 3))
+    assert pauses == [0.2, 0.4, 0.8, 1.6, 2.0, 2.0, 0.2, 0.4]
+
+
+def test_one_that_dies_all_evening_takes_nobody_with_it() -> None:
+    child = companions._Running(Companion("The child", ("/nowhere/at/all",), ""), lambda words: None)
+    for second in range(0, 3 * 1100, 3):
+        child.look(float(second))
+    assert child._starts_at - second == companions.LONGEST_PAUSE_S
+
+
+def test_one_that_a_person_has_closed_stays_closed(diary: Diary) -> None:
+    said: list[str] = []
+    with Companions([diary.child("sys.exit(0)", may_close=True)], said.append, lambda: True):
+        until(lambda: bool(said))
+        time.sleep(0.5)
+    assert len(diary.pids) == 1
+    assert said == ["The child was closed. The dance goes on."]
+
+
+def test_what_it_needs_may_come_late(diary: Diary, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(companions, "RETRY_S", 0.1)
+    said: list[str] = []
+    display, told, shows = tmp_path / "display", tmp_path / "told", tmp_path / "shows"
+    waits = "from appliance.box.parent_death import was_told; "
+    waits += f"open({str(told)!r}, 'a').write(f'{{was_told({UNAVAILABLE}):d}}'); "
+    waits += f"os.path.exists({str(display)!r}) or sys.exit({UNAVAILABLE}); "
+    waits += f"open({str(shows)!r}, 'w').close(); time.sleep(60)"
+    with Companions([diary.child(waits)], said.append, lambda: True):
+        until(lambda: len(diary.pids) >= 3)
+        display.touch()
+        until(lambda: shows.exists())
+    assert said == ["The child cannot run now. The dance goes on without, and it is tried again each 0.1 s."]
+    assert told.read_text() == "0" + "1" * (len(diary.pids) - 1)  # it gives its reasons once
+    assert is_gone(diary.pids[-1])
+
+
+def test_what_cannot_be_started_is_said_and_tried_again() -> None:
+    said: list[str] = []
+    missing = Companion("The child", ("/nowhere/at/all",), "Something is missing.")
+    with Companions([missing], said.append, lambda: True):
+        until(lambda: len(said) >= 2)
+    assert said[0].startswith("The child cannot be started (No such file or directory).")
+
+
+def test_one_that_does_not_end_is_killed(diary: Diary, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(companions, "_LAST_WORDS_S", 0.2)
+    stubborn = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True); "
+    stubborn += "open(sys.argv[1], 'a').write('0\\n'); time.sleep(60)"
+    with Companions([diary.child(stubborn)], print, lambda: True):
+        until(lambda: len(diary.pids) == 2)
+    assert is_gone(diary.pids[0])
+
+
+PLAYER = """
+import sys, time
+from appliance.cli.companions import Companion, Companions
+child = "from appliance.box.parent_death import hold_lifeline; hold_lifeline(); "
+child += "import os, sys, time; open(sys.argv[1], 'a').write(f'{os.getpid()}\\\\n'); time.sleep(60)"
+command = (sys.executable, "-c", child, sys.argv[1])
+with Companions([Companion("The child", command, "")], print, lambda: True):
+    time.sleep(60)
+"""
+
+
+def test_a_killed_player_leaves_no_orphan(diary: Diary) -> None:
+    player = subprocess.Popen([sys.executable, "-c", PLAYER, str(diary.path)])
+    until(lambda: len(diary.pids) == 1)
+    player.send_signal(signal.SIGKILL)
+    player.wait()
+    until(lambda: is_gone(diary.pids[0]))
+
+
+def test_a_child_whose_player_is_gone_already_does_not_begin(diary: Diary) -> None:
+    script = "from appliance.box.parent_death import hold_lifeline; hold_lifeline(); " + NOTE
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(diary.path)],
+        env={**os.environ, "BUNRAKU_PARENT": "0"},
+        check=False,
+    )
+    assert done.returncode == 0
+    assert diary.pids == []

@@ -1,0 +1,544 @@
+"""`bunraku sensors` against a control port: tables, values, changes of the key file, clear refusals."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import yaml
+from rich.console import Console
+
+from appliance.cli import sensors
+from appliance.cli.app import main
+from appliance.cli.control_client import Answer, NoBoxError, Roll
+from appliance.cli.control_client import RunningBox as AskedBox
+from appliance.cli.sensor_table import SensorTable
+from appliance.sensor.keys import create_keys, load_keys
+from appliance.sensor.link import SensorState
+from appliance.sensor.wire import HAS_PROFILE, IS_NDOF
+from appliance.show_control.orders import Order
+from appliance.show_control.packet import Message, datagram
+from appliance.show_control.port import Address
+from appliance.show_control.sensor_roster import RosterLine
+from appliance.stage.sensor_lines import roster_lines
+from tests.show_control.doubles import ControlInThread, StageDouble, until
+
+LEFT = SensorState(
+    *("left-wrist", 0x1A2B3C4D, "linked", "192.168.4.7:2390", 49.96, 0.0123, 0.0042, 0.013),
+    *(12, 0b00111011, "1.0.0", "00112233445566778899aabbccddeeff", HAS_PROFILE, 77, ""),
+)
+LOST = LEFT._replace(name="head", state="lost", rate_hz=0.0, round_trip_s=None, age_s=192.0, battery=255)
+SPARE = SensorState(
+    *("spare-1", 5, "absent", "", 0.0, 0.0, None, None, 255, 0, "", "", 0, 0, "Its firmware is older."),
+)
+
+
+class RunningBox:
+    """Show control, and a stage that answers without dancing."""
+
+    def __init__(self, folder: Path, key_file: Path | None = None) -> None:
+        runtime = folder / "runtime"
+        runtime.mkdir(mode=0o700)
+        self.stage = StageDouble(runtime)
+        self.stage.answer = lambda order: (self.done, f"{order.name} it is.")
+        self.done = True
+        self.control = ControlInThread(runtime, key_file or folder / "sensors.keys")
+        self.box_file = folder / "box.yaml"
+        settings = {
+            "runtime": str(runtime),
+            "sensors": {"keys": "sensors.keys"},
+            "control": {"host": "0.0.0.0", "port": self.control.port, "senders": ["10.0.0.1"]},
+        }
+        self.box_file.write_text(yaml.safe_dump(settings))
+        self.stage.__enter__()
+        until(lambda: self.control.process.desk.status(0, time.monotonic()).state == "dancing")
+
+    @property
+    def obeyed(self) -> list[Order]:
+        return self.stage.orders
+
+    def look(self, states: list[SensorState], neutral_of: Callable[[str], str], now: float) -> None:
+        """The stage looks at its sensors."""
+        self.stage.tell(sensors=roster_lines(states, neutral_of), looked_at=now)
+
+    def close(self) -> None:
+        self.control.close()
+        self.stage.__exit__(None, None, None)
+
+
+@pytest.fixture
+def box(tmp_path: Path) -> Iterator[RunningBox]:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist", "head", "spare-1"])
+    box = RunningBox(tmp_path)
+    box.look(
+        [LEFT, LOST, SPARE],
+        lambda name: {"left-wrist": "wanted", "head": "kept"}.get(name, ""),
+        time.monotonic(),
+    )
+    yield box
+    box.close()
+
+
+@contextmanager
+def ends(capsys: pytest.CaptureFixture[str], status: int, *words: str) -> Iterator[list[str]]:
+    said: list[str] = []
+    with pytest.raises(SystemExit) as ended:
+        main(["sensors", *words])
+    captured = capsys.readouterr()
+    assert (ended.value.code or 0) == status, captured
+    said += [captured.out, captured.err]
+    yield said
+
+
+def test_the_table_has_everything_that_the_box_knows(
+    box: RunningBox, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        *first, heading, left, head, spare = out.splitlines()
+    assert re.split(r"  +", heading.strip()) == [
+        *("name", "state", "rate", "loss", "round trip", "age", "battery"),
+        *("calibration", "neutral", "firmware", "id", "way"),
+    ]
+    assert re.split(r"  +", left.strip()) == [
+        *("left-wrist", "linked", "50 Hz", "1.2 %", "4.2 ms", "13 ms", "12 %"),
+        *("gyro 3 accel 2", "wanted", "1.0.0", "1a2b3c4d", "192.168.4.7:2390"),
+    ]
+    assert re.split(r"  +", head.strip())[:7] == ["head", "lost", "-", "-", "-", "3 min", "-"]
+    assert "absent" in spare
+    assert "Its firmware is older." in first
+
+
+def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
+    line = RosterLine(
+        *("a-name-of-24-letters-abc", "1a2b3c4d", "linked", "192.168.100.107:23900", 50.0, 0.5, 0.2, 0.7),
+        *(87, 0b11010110, IS_NDOF, "1.0.0", "00", "taken", ""),
+    )
+    console = Console(width=80, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
+    console.print(SensorTable([line]))
+    shown = console.export_text()
+    assert all(len(row) <= 80 for row in shown.splitlines())
+    assert "…" not in shown
+    words = "a-name-of-24-letters-abc linked 50.0 200.0 700 87 gyro accel mag taken 1.0.0 1a2b3c4d"
+    assert all(word in shown for word in words.split())
+
+
+def test_programs_get_values_and_nulls(box: RunningBox, capsys: pytest.CaptureFixture[str]) -> None:
+    with ends(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
+        told = json.loads(out)
+    assert told["box"] is True
+    left, head, spare = told["sensors"]
+    assert left == {
+        "name": "left-wrist",
+        "id": "1a2b3c4d",
+        "state": "linked",
+        "way": "192.168.4.7:2390",
+        "rate_hz": 49.96,
+        "loss": 0.0123,
+        "round_trip_s": 0.0042,
+        "age_s": 0.013,
+        "battery_percent": 12,
+        "calibration": {"system": 0, "gyro": 3, "accel": 2, "mag": 3},
+        "has_profile": True,
+        "fusion": "imuplus",
+        "firmware": "1.0.0",
+        "imu": "00112233445566778899aabbccddeeff",
+        "neutral": "wanted",
+        "complaint": None,
+    }
+    assert (head["round_trip_s"], head["age_s"], head["battery_percent"]) == (None, 192.0, None)
+    assert (spare["calibration"], spare["neutral"]) == (None, None)
+
+
+def test_a_box_that_is_still_starting_or_hangs_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist"])
+    box = RunningBox(tmp_path)
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "still starting" in out
+    with ends(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
+        assert json.loads(out) == {"box": True, "age_s": None, "sensors": []}
+    box.look([LEFT], lambda name: "", time.monotonic() - 60.0)
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "This is 60 s old: the box hangs" in out
+    box.close()
+
+
+def test_without_a_box_it_lists_the_key_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist", "head"])
+    box_file = tmp_path / "box.yaml"
+    box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
+    with ends(capsys, 0, "--box", str(box_file)) as (out, _):
+        assert "has no control port" in out
+        assert re.search(r"^left-wrist  [0-9a-f]{8}", out, re.MULTILINE)
+        assert load_keys(tmp_path / "sensors.keys")["head"].key.hex() not in out
+    (tmp_path / "sensors.keys").chmod(0o644)
+    with ends(capsys, 0, "--box", str(box_file)) as (out, _):
+        assert "chmod 600" in out
+    with ends(capsys, 0, "--json", "--box", str(box_file)) as (out, _):
+        told = json.loads(out)
+    assert (told["box"], [sensor["state"] for sensor in told["sensors"]]) == (False, [None, None])
+
+
+@pytest.mark.parametrize(
+    ("words", "name", "sensor"),
+    [
+        (["strobe", "left-wrist"], "strobe", "left-wrist"),
+        (["neutral"], "neutral", ""),
+        (["neutral", "head"], "neutral", "head"),
+        (["heading", "head"], "heading", "head"),
+    ],
+)
+def test_commands_reach_the_box_and_its_answer_is_printed(
+    box: RunningBox, capsys: pytest.CaptureFixture[str], words: list[str], name: str, sensor: str
+) -> None:
+    with ends(capsys, 0, *words, "--box", str(box.box_file)) as (out, _):
+        assert out == f"{name} it is.\n"
+    assert box.obeyed == [Order(name, text=sensor)]
+    box.done = False
+    with ends(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
+        assert err == f"bunraku: {name} it is.\n"
+
+
+def test_a_stage_that_was_held_up_in_the_middle_of_a_command_is_believed_in_the_end(box: RunningBox) -> None:
+    desk = box.control.process.desk
+
+    def late(order: Order) -> tuple[bool, str]:
+        until(lambda: desk.refused == 1)  # by then it was said that the stage does not answer
+        return True, "It is."
+
+    box.stage.answer = late
+    asked = AskedBox(("127.0.0.1", box.control.port), patience_s=20.0)
+    assert asked.ask("/sensors/strobe", "left-wrist") == Answer(True, "It is.")
+
+
+def test_a_stage_that_never_answers_is_told_once_patience_is_over(box: RunningBox) -> None:
+    box.stage.obeys = False
+    asked = AskedBox(("127.0.0.1", box.control.port), patience_s=3.0)
+    answer = asked.ask("/sensors/strobe", "left-wrist")
+    assert not answer.done and "does not answer" in answer.words
+
+
+def test_changes_of_the_key_file_reach_the_box(
+    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = load_keys(tmp_path / "sensors.keys")
+    with ends(capsys, 0, "replace", "left-wrist", "spare-1", "--box", str(box.box_file)) as (out, _):
+        assert "left-wrist is now the sensor that was spare-1" in out
+        assert "The running box took it." in out
+    with ends(capsys, 0, "rename", "spare-1", "spare-2", "--box", str(box.box_file)) as (out, _):
+        assert "spare-1 is now spare-2" in out
+    with ends(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert "head is revoked" in out
+    after = load_keys(tmp_path / "sensors.keys")
+    assert {name: key.key for name, key in after.items()} == {
+        "left-wrist": before["spare-1"].key,
+        "spare-2": before["left-wrist"].key,
+    }
+    assert [order.name for order in box.obeyed] == ["reload"] * 3
+    assert box.obeyed[-1].keys == after
+
+
+def test_a_box_that_does_not_take_it_costs_the_exit_status(
+    box: RunningBox, capsys: pytest.CaptureFixture[str]
+) -> None:
+    box.done = False
+    with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert "head is revoked" in out
+        assert "did not take it. reload it is." in out
+
+
+class Clock:
+    """Time that passes only while somebody waits."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.mark.parametrize("silent", [1, 20])
+def test_show_control_that_is_on_its_way_back_is_asked_again(
+    box: RunningBox, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], silent: int
+) -> None:
+    asked, roll = [0], AskedBox.roll
+
+    def silent_first(running: AskedBox) -> Roll:
+        asked[0] += 1
+        if asked[0] <= silent:
+            raise NoBoxError("No box answers.")
+        return roll(running)
+
+    monkeypatch.setattr(AskedBox, "roll", silent_first)
+    monkeypatch.setattr(sensors, "time", Clock())
+    with ends(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert "The running box took it." in out
+    assert [order.name for order in box.obeyed] == ["reload"]
+
+
+def test_a_stage_that_dances_without_show_control_has_not_taken_it(
+    box: RunningBox, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = Clock()
+    monkeypatch.setattr(AskedBox, "_replies", lambda *_: (one for one in ()))
+    monkeypatch.setattr(sensors, "time", clock)
+    with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert "head is revoked" in out
+        assert "A box dances here, but its show control did not answer." in out
+    assert clock.now > 102.0
+    assert box.obeyed == []
+
+
+def test_where_no_stage_lives_nobody_waits_for_show_control(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = Clock()
+    monkeypatch.setattr(sensors, "time", clock)
+    create_keys(tmp_path / "sensors.keys", ["head"])
+    box_file = tmp_path / "box.yaml"
+    settings = {"runtime": str(tmp_path / "none"), "sensors": {"keys": "sensors.keys"}}
+    box_file.write_text(yaml.safe_dump({**settings, "control": {"port": 1}}))
+    with ends(capsys, 0, "revoke", "head", "--box", str(box_file)) as (out, _):
+        assert "No box answers on 127.0.0.1:1. The change counts when it starts." in out
+    assert clock.now == 100.0
+
+
+def test_a_box_with_another_key_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    create_keys(tmp_path / "sensors.keys", ["head"])
+    box = RunningBox(tmp_path, key_file=tmp_path / "others.keys")
+    with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
+        assert f"reads another key file ({tmp_path / 'others.keys'})" in out
+    assert box.obeyed == []
+    box.close()
+
+
+def test_what_is_wrong_with_the_key_file_of_a_running_box_is_said(
+    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keys = tmp_path / "sensors.keys"
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "has other sensors than the running box. Run: bunraku sensors reload" in out
+    keys.write_text(
+        "".join(
+            f"{one.name}: {{device: {one.device_id}, key: {one.device_id:032x}}}\n" for one in (LEFT, SPARE)
+        )
+        + f"head: {{device: {LOST.device_id + 1}, key: {7:032x}}}\n"
+    )
+    states = [LEFT, SPARE, LOST._replace(device_id=LOST.device_id + 1)]
+    box.look(states, lambda _: "", time.monotonic())
+    keys.chmod(0o644)
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "has other sensors" not in out
+        assert "can be read by other users" in out
+    keys.write_text("left-wrist: {devise: 7}\n")
+    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
+        assert "unknown field 'devise'" in out
+        assert "goes on with the keys that it has" in out
+    with ends(capsys, 2, "reload", "--box", str(box.box_file)) as (_, err):
+        assert "unknown field 'devise'" in err
+    assert box.obeyed == []
+
+
+def test_a_key_file_changed_by_hand_reaches_the_box(
+    box: RunningBox, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with ends(capsys, 0, "reload", "--box", str(box.box_file)) as (out, _):
+        assert "The running box took it." in out
+    assert [order.name for order in box.obeyed] == ["reload"]
+
+
+def test_watching_through_a_pipe_is_told_at_once(box: RunningBox) -> None:
+    command = [sys.executable, "-m", "appliance.cli", "sensors", "--watch", "--box", str(box.box_file)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        while not (line := process.stdout.readline()).startswith("left-wrist"):
+            assert line
+        process.stdout.close()  # as `head` does
+        process.wait(60)
+        assert process.stderr.read() == ""
+
+
+def test_a_folder_that_is_not_there_and_a_full_disk_are_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keys = tmp_path / "sensors.keys"
+    create_keys(keys, ["head"])
+    monkeypatch.setattr(os, "fsync", lambda _: (_ for _ in ()).throw(OSError(errno.ENOSPC, "No space left")))
+    with ends(capsys, 2, "revoke", "head", "--keys", str(keys)) as (_, err):
+        assert "No space left. Nothing was changed. Free some space" in err
+    nowhere = str(tmp_path / "nowhere" / "sensors.keys")
+    with pytest.raises(SystemExit) as ended:  # before it asks for a password or opens a port
+        main(["provision", "--name", "head", "--network", "stage", "--keys", nowhere])
+    assert ended.value.code == 2
+    assert "There is no folder" in capsys.readouterr().err
+
+
+def test_without_a_box_a_change_counts_later(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    create_keys(tmp_path / "sensors.keys", ["head"])
+    box_file = tmp_path / "box.yaml"
+    box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
+    with ends(capsys, 0, "revoke", "head", "--box", str(box_file)) as (out, _):
+        assert "the change counts when it starts again" in out
+    assert load_keys(tmp_path / "sensors.keys") == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["revoke", "haed"], "Did you mean 'head'?"),
+        (["rename", "head", "left-wrist"], "already"),
+        (["rename", "head", "two words"], "without spaces"),
+        (["replace", "head", "spare-9"], "no sensor 'spare-9'"),
+        (["replace", "head"], "Name a spare"),
+        (["replace", "head", "spare-1", "--port", "/dev/ttyACM0"], "Name a spare"),
+        (["revoke", "head", "--keys", "other.keys"], "not both"),
+    ],
+)
+def test_what_cannot_be_done_is_one_clear_line(
+    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], complaint: str
+) -> None:
+    before = (tmp_path / "sensors.keys").read_bytes()
+    with ends(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
+        assert complaint in err
+        assert len(err.splitlines()) == 1
+    assert (tmp_path / "sensors.keys").read_bytes() == before
+    assert box.obeyed == []
+
+
+def test_a_missing_key_file_or_box_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    box_file = tmp_path / "box.yaml"
+    box_file.write_text("control: {port: 1}\n")
+    with ends(capsys, 2, "--box", str(box_file)) as (_, err):
+        assert "names no key file" in err
+    with ends(capsys, 2, "revoke", "head", "--keys", "sensors.keys") as (_, err):
+        assert "There is no key file sensors.keys" in err
+    box_file.write_text("sensors: {keys: nowhere/sensors.keys}\ncontrol: {port: 1}\n")
+    with ends(capsys, 2, "revoke", "head", "--box", str(box_file)) as (_, err):
+        assert "There is no folder" in err
+    with ends(capsys, 2, "strobe", "head", "--box", str(box_file)) as (_, err):
+        assert "No box answers on 127.0.0.1:1." in err
+    with ends(capsys, 2, "--watch", "strobe", "head") as (_, err):
+        assert "behind 'strobe'" in err
+
+
+def test_watching_goes_on_until_it_is_ended(box: RunningBox) -> None:
+    command = [sys.executable, "-m", "appliance.cli", "sensors", "--watch", "--box", str(box.box_file)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    seen = 0
+    ends_at = time.monotonic() + 60.0
+    tell = box.control.process.desk._tell
+
+    def counted(asker: Address, message: Message) -> None:
+        nonlocal seen
+        seen += message[0] == "/sensors/end"
+        tell(asker, message)
+
+    box.control.process.desk._tell = counted
+    while seen < 3:
+        assert time.monotonic() < ends_at
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert "left-wrist" in out
+
+
+def test_provision_says_what_is_wrong_before_it_opens_a_port(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.stdin", open("/dev/null"))  # noqa: SIM115, PTH123
+    for words, complaint in (
+        (["--name", "two words"], "without spaces"),
+        (["--name", "head", "--axes", "24"], "two hexadecimal numbers"),
+        (["--name", "head", "--axes", "20,00"], "no axes"),
+        (["--name", "head", "--password-file", "p"], "needs a network"),
+        (["--name", "head", "--network", "n", "--password-file", "p"], "p: the password cannot be read"),
+        (["--name", "head", "--network", "n"], "No password came"),
+        (["--name", "head"], "There is no serial port /dev/nowhere"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(["provision", "--port", "/dev/nowhere", *words])
+        assert ended.value.code == 2
+        assert complaint in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+class Impostor:
+    """Somebody else on the control port while no box runs; replies with whatever he likes."""
+
+    def __init__(self, folder: Path, replies: list[Message]) -> None:
+        self._replies = replies
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", 0))
+        self.box_file = folder / "box.yaml"
+        control = {"host": "127.0.0.1", "port": self._socket.getsockname()[1]}
+        self.box_file.write_text(yaml.safe_dump({"sensors": {"keys": "sensors.keys"}, "control": control}))
+        threading.Thread(target=self._answer, daemon=True).start()
+
+    def _answer(self) -> None:
+        _, asker = self._socket.recvfrom(4096)
+        for reply in self._replies:
+            self._socket.sendto(datagram(reply), asker)
+
+
+OBEYED = "\x1b]0;mine\x07\x1b[2J\x9b31m"
+
+
+def test_what_an_impostor_replies_commands_no_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    create_keys(tmp_path / "sensors.keys", ["left-wrist"])
+    line = ("name", "1", *(OBEYED,) * 2, 50.0, 0.0, 0.0, 0.0, 9, 0, 0, *(OBEYED,) * 4)
+    listed: list[Message] = [("/sensors/sensor", *line), ("/sensors/end", 1, 0.1, OBEYED)]
+    with ends(capsys, 0, "--box", str(Impostor(tmp_path, listed).box_file)) as (out, _):
+        assert "mine" in out
+    told: list[Message] = [("/sensors/reply", "/sensors/strobe", 1, OBEYED)]
+    with ends(capsys, 0, "strobe", "head", "--box", str(Impostor(tmp_path, told).box_file)) as (words, _):
+        assert "mine" in words
+    assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", out + words)
+
+
+@pytest.mark.parametrize(
+    "replies",
+    [
+        [("/sensors/end", 0, "x", 7)],
+        [("/sensors/end", "0", 0.1, "")],
+        [("/sensors/sensor", *range(15)), ("/sensors/end", 1, 0.1, "")],
+        [("/sensors/sensor", *"abcdefghijklmno"), ("/sensors/end", 1, 0.1, "")],
+        [
+            ("/sensors/sensor", *"abcd", float("nan"), float("inf"), 0.0, 0.0, 1, 1, 1, *"lmno"),
+            ("/sensors/end", 1, 0.1, ""),
+        ],
+    ],
+)
+def test_nonsense_from_an_impostor_is_no_box(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    replies: list[Message],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(AskedBox.__init__, "__defaults__", (0.2,))
+    create_keys(tmp_path / "sensors.keys", ["left-wrist"])
+    with ends(capsys, 0, "--box", str(Impostor(tmp_path, replies).box_file)) as (out, _):
+        assert "No box answers" in out

@@ -1,0 +1,97 @@
+"""100,000 messages that nobody should send: nothing raises, nothing grows, and the port goes on answering."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+from appliance.box.show_state import House, HouseReader, HouseWriter
+from appliance.show_control.command_handler import Desk
+from appliance.show_control.key_file import KeyFile
+from appliance.show_control.order_dispatch import WAITING, Errands
+from appliance.show_control.orders import OrderSender
+from appliance.show_control.packet import Message, datagram
+from appliance.show_control.port import LARGEST_DATAGRAM, Address
+from appliance.show_control.stage_observer import StageSight
+from tests.show_control.doubles import Asker, InboxDouble, StageDouble, control_process, until
+from tests.show_control.fuzz import datagrams
+
+COUNT, OVER_THE_SOCKET = 100_000, 10_000
+SOMEBODY = ("127.0.0.1", 5000)
+
+
+def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
+    folder: Path, key_file: Path, stage: StageDouble
+) -> None:
+    writer, sender, projector = HouseWriter(folder), OrderSender(folder), InboxDouble(folder, "projector")
+    told: list[int] = []
+
+    def tell(to: Address, message: Message) -> None:
+        told.append(len(datagram(message)))
+
+    errands = Errands(sender)
+    desk = Desk(House(), StageSight(folder), errands, KeyFile(key_file), tell, writer.write)
+    reader = HouseReader(folder)
+    now = time.monotonic()
+    for number, received in enumerate(datagrams(3, COUNT)):
+        desk.hear(received[:LARGEST_DATAGRAM], SOMEBODY, now + number / 1000)
+        if number % 100 == 0:
+            now = time.monotonic() - number / 1000
+            errands.go_on(now + number / 1000)
+            desk.look(now + number / 1000)
+        assert 0.0 <= desk.house.level(now) <= 1.0
+    assert all(len(way.waiting) <= WAITING for way in errands._ways.values())
+    house = reader.read()
+    assert house == desk.house
+    assert all(math.isfinite(value) for value in (house.master, house.going_since, house.look_since))
+    assert 0.0 <= house.master <= 1.0
+    assert house.look in ("", "plaster", "lines", "ink", "cloud")
+    assert desk.refused > COUNT / 2
+    assert len(told) > COUNT / 2
+    assert max(told) < 1500  # an answer is no weapon
+    assert stage.orders  # some of them were commands
+    assert all(math.isfinite(value) for order in stage.orders for value in order.values)
+    projector.close()
+    sender.close()
+    writer.close()
+
+
+def answers(asker: Asker) -> bool:
+    """Whether a ping is answered; in a flood the kernel may drop one."""
+    asker.tell("/ping")
+    return asker.hear(0.5) == ["/pong"]
+
+
+def own_kb(pid: int) -> int:
+    """Memory of its own; pages of programs and libraries, which come and go, are not counted."""
+    line = next(one for one in Path(f"/proc/{pid}/status").read_text().splitlines() if "RssAnon" in one)
+    return int(line.split()[1])
+
+
+def test_the_process_answers_after_all_that_and_has_not_grown(folder: Path, tmp_path: Path) -> None:
+    words = tmp_path / "words.txt"
+    with control_process(folder, words) as (process, port):
+        flood, asker = Asker(port), Asker(port)
+        assert asker.ask("/ping") == ["/pong"]
+        before = 0
+        for number, sent in enumerate(datagrams(4, OVER_THE_SOCKET)):
+            flood.socket.send(sent[:65_000])
+            if number % 20 == 19:
+                until(lambda: answers(asker))
+                while flood.hear(0.0) is not None:
+                    pass
+            if number == OVER_THE_SOCKET // 5:
+                before = own_kb(process.pid)
+        assert own_kb(process.pid) < before + 2048
+        asker.tell("/panic", 1)
+        until(lambda: (asker.hear() or [])[:3] == ["/reply", "/panic", 1])  # after pongs that were late
+        assert HouseReader(folder).read().panic
+        process.terminate()
+        assert process.wait(20) == 0
+        flood.close()
+        asker.close()
+    *news, said = words.read_text().splitlines()
+    assert said.startswith("Commands: ") and said.isprintable()
+    known = ("Panic is", "The show is stopped", "Blackout is", "Master is", "Picture and lights")
+    assert all(line.startswith(known) for line in news), news  # nothing of what came in was said

@@ -1,0 +1,116 @@
+"""The heartbeat: once a second, whatever the stage does, and it says what the stage does."""
+
+from __future__ import annotations
+
+import re
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import get_type_hints
+
+import pytest
+from pythonosc.osc_message import OscMessage
+
+from appliance.box.show_state import House
+from appliance.show_control.heartbeat import Heartbeat
+from appliance.show_control.stage_observer import StageSight
+from appliance.show_control.status_messages import Status, status
+from tests.show_control.doubles import HOST, Asker, ControlInThread, StageDouble, until
+
+NOW = 1000.0
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "osc.md"
+
+
+@pytest.fixture
+def listener() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind((HOST, 0))
+        listener.settimeout(20.0)
+        yield listener
+
+
+def heard(listener: socket.socket) -> Status:
+    message = OscMessage(listener.recv(4096))
+    assert message.address == "/bunraku/status"
+    return Status(*message.params)
+
+
+def some_status(folder: Path) -> Status:
+    return status(House(), StageSight(folder), 0, 0, NOW)
+
+
+def test_it_beats_on_a_grid_and_after_a_stall_once(folder: Path, listener: socket.socket) -> None:
+    heartbeat = Heartbeat([listener.getsockname()], NOW)
+    assert heartbeat.due == NOW
+    heartbeat.beat(some_status(folder), NOW + 0.3)
+    assert heartbeat.due == NOW + 1.0
+    heartbeat.beat(some_status(folder), NOW + 7.5)
+    assert heartbeat.due == NOW + 8.5
+    heartbeat.close()
+
+
+def test_without_listeners_it_is_never_due() -> None:
+    assert Heartbeat([], NOW).due == float("inf")
+
+
+def test_who_is_not_there_costs_the_others_nothing(folder: Path, listener: socket.socket) -> None:
+    heartbeat = Heartbeat([("240.0.0.1", 9), (HOST, 1), listener.getsockname()], NOW)
+    for beat in range(3):
+        heartbeat.beat(some_status(folder), NOW + beat)
+        assert heard(listener).state == "absent"
+    heartbeat.close()
+
+
+def test_every_state_of_the_stage_and_the_house(folder: Path) -> None:
+    sight = StageSight(folder)
+
+    def state(house: House, later_s: float = 0.0) -> str:
+        now = time.monotonic() + later_s
+        return status(house, sight, 0, 0, now).state
+
+    assert state(House()) == state(House(panic=True)) == "absent"
+    with StageDouble(folder) as stage:
+        until(lambda: state(House()) == "dancing")
+        until(lambda: state(House(panic=True, blackout=True, going=False)) == "panic")
+        until(lambda: state(House(blackout=True, going=False)) == "blackout")
+        until(lambda: state(House(going=False)) == "stopped")
+        stage.tell(state="stopped")
+        until(lambda: state(House()) == "stopped")
+        stage.dances = False
+        until(lambda: state(House(), later_s=0.6) == "hung")
+        assert state(House(panic=True), later_s=0.6) == "hung"
+    assert state(House(), later_s=1.0) == "absent"
+
+
+def test_it_goes_on_while_the_stage_hangs_and_when_it_is_gone(
+    folder: Path, listener: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("appliance.show_control.heartbeat.EVERY_S", 0.1)
+    control = ControlInThread(folder, heartbeat=[listener.getsockname()])
+    with StageDouble(folder) as stage:
+        stage.tell(late=3, temperature_c=61.5, sensor_age_s=None)
+        until(lambda: heard(listener).state == "dancing")
+        asker = Asker(control.port)
+        asker.ask("/nonsense")
+        asker.ask("/panic")
+        first = next(one for one in iter(lambda: heard(listener), None) if one.state == "panic")
+        assert (first.show, first.rate_hz, first.late, first.temperature_c) == ("A test", 50.0, 3, 61.5)
+        assert (first.sensor_age_s, first.panic, first.level, first.look) == (-1.0, 1, 0.0, "plaster")
+        assert (first.refused, first.strangers) == (1, 0)
+        stage.dances = False
+        hung = next(one for one in iter(lambda: heard(listener), None) if one.state == "hung")
+        assert (hung.rate_hz, hung.panic) == (0.0, 1)
+    gone = next(one for one in iter(lambda: heard(listener), None) if one.state == "absent")
+    assert gone.late == 0
+    asker.close()
+    control.close()
+
+
+def test_the_documentation_explains_every_argument_in_its_order() -> None:
+    table = DOCS.read_text().split("### `/bunraku/status`")[1].split("###")[0]
+    names = re.findall(r"^\| \d+ \| `(\w+)` \| `([sif])` \|", table, re.MULTILINE)
+    kinds = {str: "s", int: "i", float: "f"}
+    assert names == [(name, kinds[kind]) for name, kind in get_type_hints(Status).items()]
+    places = [int(number) for number in re.findall(r"^\| (\d+) \|", table, re.MULTILINE)]
+    assert places == list(range(1, len(names) + 1))

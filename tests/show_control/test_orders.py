@@ -1,0 +1,338 @@
+"""Orders over real sockets: nobody waits, nothing raises, what is too old is not done."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from appliance.sensor.keys import SensorKey
+from appliance.show_control.order_dispatch import (
+    ANSWER_S,
+    AT_ONCE,
+    EVERY_S,
+    LATE_S,
+    PATIENCE_S,
+    WAITING,
+    Errands,
+)
+from appliance.show_control.orders import Answer, Order, OrderInbox, OrderSender
+from tests.show_control.doubles import Clock, until
+
+NOW = 1000.0
+KEY = SensorKey("left-wrist", 0x1A2B3C4D, bytes(range(16)))
+
+
+@pytest.fixture
+def sender(folder: Path) -> Iterator[OrderSender]:
+    sender = OrderSender(folder)
+    yield sender
+    sender.close()
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock(NOW)
+
+
+@pytest.fixture
+def inbox(folder: Path, clock: Clock) -> Iterator[OrderInbox]:
+    inbox = OrderInbox(folder, "stage", clock)
+    yield inbox
+    inbox.close()
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        Order("start"),
+        Order("jump", (12.5,), ask=7, until=NOW),
+        Order("hold", (0.0, 1.0, 0.0, 1.5), "lShldr", quiet=True),
+        Order("hold", (0.0, 1.0, 0.0, 1.5), 3),
+        Order("reload", keys={"left-wrist": KEY}),
+        Order("cue", text="Größe 'x' \" \\ 雪"),
+    ],
+)
+def test_an_order_arrives_whole(sender: OrderSender, inbox: OrderInbox, order: Order) -> None:
+    assert inbox.take() is None
+    assert sender.send("stage", order) == "sent"
+    taken = inbox.take()
+    assert taken == order
+    assert taken is not None
+    assert (taken.keys, taken.ask, taken.quiet, taken.until) == (
+        *(dict(order.keys), order.ask, order.quiet, order.until),
+    )
+    assert KEY.key.hex() not in repr(taken)
+
+
+def test_an_answer_comes_back_to_who_asked(sender: OrderSender, inbox: OrderInbox) -> None:
+    inbox.answer(Order("start"), False, "nobody waits")
+    assert sender.take() is None
+    inbox.answer(Order("start", ask=1, quiet=True), True, "done")
+    inbox.answer(Order("start", ask=2, quiet=True), False, "no")
+    inbox.answer(Order("start", ask=3), True, "yes")
+    assert [sender.take() for _ in range(4)] == [
+        Answer(1, True, "done"),
+        Answer(2, False, "no"),
+        Answer(3, True, "yes"),
+        None,
+    ]
+
+
+def test_what_its_asker_no_longer_waits_for_is_not_done(
+    sender: OrderSender, inbox: OrderInbox, clock: Clock
+) -> None:
+    sender.send("stage", Order("stop", until=NOW))
+    sender.send("stage", Order("start", until=NOW + 1.0))
+    clock.now += 0.5
+    assert inbox.take() == Order("start")
+    assert inbox.take() is None
+
+
+@pytest.mark.parametrize(
+    "datagram",
+    [
+        *(b"", b"[]", b"{}", b"null", b"\xff\xfe", b"{", b"[" * 60_000, b'"text"'),
+        json.dumps({"name": 1, "values": ["x"], "text": "", "ask": 0, "quiet": 0, "until": 0}).encode(),
+        json.dumps({"name": "x", "values": 1, "text": "", "ask": 0, "quiet": 0, "until": 0}).encode(),
+        json.dumps(
+            {"name": "x", "values": [], "text": "", "ask": 0, "quiet": 0, "until": 1e9, "keys": {"a": 1}}
+        ).encode(),
+        *(
+            b'{"name": "x", "values": [%b], "text": "", "ask": %b, "quiet": 0, "until": 1e9, "keys": %b}'
+            % parts
+            for parts in ((b"NaN", b"0", b"{}"), (b"", b"Infinity", b"{}"), (b"", b"0", b"[1]"))
+        ),
+    ],
+)
+def test_what_is_no_order_is_passed_over(folder: Path, inbox: OrderInbox, datagram: bytes) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as somebody:
+        somebody.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as _:
+            descriptor = os.open(folder, os.O_PATH)
+            somebody.sendto(datagram, f"/proc/self/fd/{descriptor}/stage.sock")
+            os.close(descriptor)
+    sender = OrderSender(folder)
+    assert sender.send("stage", Order("start")) == "sent"
+    assert inbox.take() == Order("start")
+    sender.close()
+
+
+def test_nobody_there_and_nobody_taking_is_told_apart_and_never_waited_for(
+    folder: Path, sender: OrderSender
+) -> None:
+    assert sender.send("projector", Order("grid", (1.0,))) == "absent"
+    inbox = OrderInbox(folder, "projector")
+    sent = 0
+    while sender.send("projector", Order("grid", (1.0,))) == "sent":
+        sent += 1
+        assert sent < 100_000
+    assert sender.send("projector", Order("grid", (1.0,))) == "full"
+    assert inbox.take() is not None
+    assert sender.send("projector", Order("grid", (1.0,))) == "sent"
+    inbox.close()
+    assert sender.send("projector", Order("grid", (1.0,))) == "absent"
+
+
+def test_who_was_killed_leaves_a_socket_that_the_next_one_takes_over(
+    folder: Path, sender: OrderSender
+) -> None:
+    script = (
+        "import sys, time\nfrom pathlib import Path\nfrom appliance.show_control.orders import OrderInbox\n"
+        "inbox = OrderInbox(Path(sys.argv[1]), 'stage')\nprint('open', flush=True)\ntime.sleep(60)\n"
+    )
+    killed = subprocess.Popen([sys.executable, "-c", script, str(folder)], stdout=subprocess.PIPE)
+    assert killed.stdout is not None
+    assert killed.stdout.readline() == b"open\n"
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    assert (folder / "stage.sock").exists()
+    assert sender.send("stage", Order("start")) == "absent"
+    inbox = OrderInbox(folder, "stage")
+    assert sender.send("stage", Order("start")) == "sent"
+    successor = OrderInbox(folder, "stage")
+    inbox.close()  # the first one leaves its successor's socket alone
+    assert sender.send("stage", Order("stop")) == "sent"
+    assert successor.take() == Order("stop")
+    successor.close()
+    assert not (folder / "stage.sock").exists()
+
+
+def test_a_folder_with_a_long_name_will_do(tmp_path: Path) -> None:
+    deep = tmp_path / ("a" * 100) / ("b" * 100)
+    deep.mkdir(parents=True)
+    inbox, sender = OrderInbox(deep, "stage"), OrderSender(deep)
+    assert sender.send("stage", Order("start")) == "sent"
+    assert inbox.take() == Order("start")
+    inbox.close()
+    sender.close()
+
+
+def test_without_a_place_for_the_socket_it_says_so(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No such file"):
+        OrderInbox(tmp_path / "nowhere", "stage")
+
+
+class Heard:
+    """What came of errands: whether it was done, in words."""
+
+    def __init__(self) -> None:
+        self.all: list[tuple[bool, str]] = []
+
+    def __call__(self, done: bool, words: str) -> None:
+        self.all.append((done, words))
+
+
+def test_a_flood_reaches_the_stage_at_four_a_tick_and_the_oldest_gives_way(
+    sender: OrderSender, inbox: OrderInbox
+) -> None:
+    errands, heard = Errands(sender), Heard()
+    for number in range(500):
+        errands.begin("stage", Order("jump", (float(number),), quiet=True), NOW, heard)
+    taken = []
+    for turn in range(1, 30):
+        got = []
+        while (order := inbox.take()) is not None:
+            got.append(order.values[0])
+        assert len(got) <= AT_ONCE
+        taken += got
+        errands.go_on(NOW + turn * EVERY_S)
+    assert taken[:AT_ONCE] == [0.0, 1.0, 2.0, 3.0]
+    assert taken[AT_ONCE:] == [float(number) for number in range(500 - WAITING, 500)]
+    assert len(heard.all) == 500 - WAITING - AT_ONCE
+    assert all(not done and "Too many commands" in words for done, words in heard.all)
+
+
+def test_a_stage_that_does_not_answer_is_told_after_half_a_second_and_once(
+    sender: OrderSender, inbox: OrderInbox, clock: Clock
+) -> None:
+    errands, heard = Errands(sender), Heard()
+    errands.begin("stage", Order("cue", text="storm"), NOW, heard)
+    errands.go_on(NOW + PATIENCE_S + ANSWER_S)
+    assert heard.all == []
+    assert errands.due(NOW) == pytest.approx(NOW + PATIENCE_S + ANSWER_S)
+    errands.go_on(NOW + PATIENCE_S + ANSWER_S + 0.01)
+    [(done, words)] = heard.all
+    assert not done
+    assert "The stage does not answer, and nothing is changed" in words
+    assert errands.due(NOW) == math.inf
+    clock.now += PATIENCE_S + 0.02
+    assert inbox.take() is None  # as it was told
+    errands.go_on(NOW + 1.0)
+    assert len(heard.all) == 1
+
+
+def test_what_is_carried_out_at_the_last_moment_is_told_as_done(
+    sender: OrderSender, inbox: OrderInbox, clock: Clock
+) -> None:
+    errands, heard = Errands(sender), Heard()
+    errands.begin("stage", Order("cue", text="storm"), NOW, heard)
+    clock.now += PATIENCE_S
+    order = inbox.take()
+    assert order is not None
+    errands.go_on(clock.now + 0.02)  # before the answer
+    inbox.answer(order, True, "Cue storm.")
+    errands.go_on(clock.now + 0.03)
+    assert heard.all == [(True, "Cue storm.")]
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+@pytest.mark.parametrize(
+    ("late_s", "done", "corrected"),
+    [
+        (0.2, True, [(True, "Cue storm.")]),
+        (LATE_S, True, [(True, "Cue storm.")]),
+        (LATE_S + 1.0, True, []),
+        (0.2, False, []),
+    ],
+)
+def test_what_was_told_as_not_done_is_corrected_when_it_was_done_after_all(
+    sender: OrderSender,
+    inbox: OrderInbox,
+    quiet: bool,
+    late_s: float,
+    done: bool,
+    corrected: list[tuple[bool, str]],
+) -> None:
+    """The stage was held up in the middle of the order, which it had taken in time."""
+    errands, heard = Errands(sender), Heard()
+    errands.begin("stage", Order("cue", text="storm", quiet=quiet), NOW, heard)
+    order = inbox.take()
+    assert order is not None
+    for now in (order.until + ANSWER_S + 0.01, order.until + late_s - 0.01):
+        errands.go_on(now)
+    [(told, words)] = heard.all
+    assert not told and "does not answer" in words
+    for _ in range(2):
+        inbox.answer(order, done, "Cue storm.")
+        errands.go_on(order.until + late_s)
+    assert heard.all[1:] == corrected
+
+
+def test_an_answer_to_a_show_control_that_died_is_not_taken_for_one_to_the_next(
+    folder: Path, inbox: OrderInbox
+) -> None:
+    orders, heard = [], Heard()
+    for _ in range(2):
+        sender = OrderSender(folder)
+        errands = Errands(sender)
+        errands.begin("stage", Order("cue", text="storm"), NOW, heard)
+        orders.append(inbox.take())
+        if len(orders) == 1:
+            sender.close()
+    before, now = orders
+    assert before is not None and now is not None
+    inbox.answer(before, True, "what the first one asked for")
+    errands.go_on(NOW)
+    assert heard.all == []
+    inbox.answer(now, True, "Cue storm.")
+    errands.go_on(NOW)
+    assert heard.all == [(True, "Cue storm.")]
+    sender.close()
+
+
+def test_what_waits_for_a_full_socket_is_told_too(sender: OrderSender, inbox: OrderInbox) -> None:
+    while sender.send("stage", Order("start", until=NOW)) == "sent":
+        pass
+    errands, heard = Errands(sender), Heard()
+    errands.begin("stage", Order("start"), NOW, heard)
+    errands.go_on(NOW + PATIENCE_S + 0.1)
+    assert [done for done, _ in heard.all] == [False]
+    assert "does not answer" in heard.all[0][1]
+
+
+def test_of_quiet_orders_refusals_and_silence_are_told_alone(sender: OrderSender, inbox: OrderInbox) -> None:
+    errands, heard, quiet = Errands(sender), Heard(), Heard()
+    errands.begin("stage", Order("cue", text="storm"), NOW, heard)
+    errands.begin("stage", Order("rate", (1.0,), quiet=True), NOW, quiet)
+    errands.begin("stage", Order("rate", (9.0,), quiet=True), NOW, quiet)
+    errands.begin("stage", Order("jump", (1.0,), quiet=True), NOW, quiet)
+    for done in (True, True, False):
+        order = inbox.take()
+        assert order is not None
+        inbox.answer(order, done, f"{order.name} {done}")
+    until(lambda: (errands.go_on(NOW), bool(quiet.all))[1])
+    errands.go_on(NOW + 1.0)
+    assert heard.all == [(True, "cue True")]
+    refused, silent = quiet.all
+    assert refused == (False, "rate False")
+    assert not silent[0] and "does not answer" in silent[1]
+
+
+def test_without_anybody_there_it_is_told_at_once(sender: OrderSender) -> None:
+    errands, heard = Errands(sender), Heard()
+    for place in ("stage", "projector", "lights"):
+        errands.begin(place, Order("x"), NOW, heard)
+    assert [done for done, _ in heard.all] == [False] * 3
+    for (_, words), cure in zip(
+        heard.all, ("bunraku play", "bunraku project", "bunraku lights"), strict=True
+    ):
+        assert cure in words
