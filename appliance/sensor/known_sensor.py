@@ -18,6 +18,7 @@ class KnownSensor:
 
     def __init__(self, key: SensorKey, pairing: Pairing) -> None:
         self.key = key
+        self.wearable = key.wearable
         self.pairing = pairing
         self.reception = Reception()
         self.believed_arrival: float | None = None
@@ -66,6 +67,7 @@ class KnownSensor:
                 packet.recoveries,
                 packet.flags,
                 _round_trip_s(packet),
+                self.wearable,
             ),
             fate,
         )
