@@ -93,7 +93,9 @@ class Reading(Packet):
     """One orientation of the sensor, 50 times a second."""
 
     sensor_time_us: Annotated[int, U32, "device clock at the measurement; wraps after 71.6 minutes"]
-    orientation: Annotated[tuple[float, float, float, float], QUATERNION, "w, x, y, z; 16384 stands for 1"]
+    orientation: Annotated[
+        tuple[float, float, float, float], QUATERNION, "w, x, y, z; 16384 stands for 1; from the case to the room"
+    ]
     calibration: Annotated[
         int, U8, "BNO055 register 0x35: system, gyro, accelerometer, magnetometer, 2 bits each"
     ]

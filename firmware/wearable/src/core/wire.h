@@ -152,7 +152,7 @@ struct Reading {
   uint32_t session;  // random, drawn by the box at each assignment; 0 before one
   uint32_t sequence;  // counts this kind of packet from this sender since power-on
   uint32_t sensor_time_us;  // device clock at the measurement; wraps after 71.6 minutes
-  int16_t orientation[4];  // w, x, y, z; 16384 stands for 1
+  int16_t orientation[4];  // w, x, y, z; 16384 stands for 1; from the case to the room
   uint8_t calibration;  // BNO055 register 0x35: system, gyro, accelerometer, magnetometer, 2 bits each
   uint8_t battery;  // percent; 255 unknown
   uint16_t round_trip;  // newest round trip by a heartbeat's echo, 0.1 ms; 65535 unknown
