@@ -29,7 +29,8 @@ class Playback:
     The motion that it plays is one continuous stream; the window is its next 8 poses, the first of them being
     the pose of this tick. Every change (phrase, jump, excerpt, rate) enters at the far end of the window,
     7 ticks before it is seen. The root's position and heading are carried on through loops and changes.
-    Times are seconds of the phrase that plays. Control methods may be called from any thread, but for add().
+    Times are seconds of the phrase that plays. Control methods are called between ticks, by the thread that
+    advances it: a change is several fields, which a tick in the midst of them would take for another one.
     """
 
     def __init__(

@@ -47,8 +47,8 @@ def record(joints: int, hands: int, sensors: int) -> np.dtype[np.void]:
             ("reading_here", "u1", (sensors,)),
             ("reading_orientation", "<f8", (sensors, 4)),
             ("reading_times", "<f8", (sensors, 3)),  # measured_at, arrival, round_trip_s (not a number: none)
-            # sequence, sensor_time_us, battery, calibration, boot_nonce, taps, recoveries, flags
-            ("reading_numbers", "<i8", (sensors, 8)),
+            # sequence, sensor_time_us, battery, calibration, boot_nonce, taps, recoveries, flags, wearable
+            ("reading_numbers", "<i8", (sensors, 9)),
         ]
     )
 

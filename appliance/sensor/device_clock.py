@@ -37,9 +37,7 @@ class DeviceClock:
     def reset(self) -> None:
         """Forget the mapping and the wraps: the sensor was switched on again."""
         self._raw_us = None
-        self._points.clear()
-        self._bucket_start = None
-        self._slope = 0.0
+        self._forget_line()
 
     @property
     def drift_ppm(self) -> float:
@@ -52,8 +50,8 @@ class DeviceClock:
             self._unwrapped_us = sensor_time_us
         else:
             step_us = (sensor_time_us - self._raw_us) % WRAP_US
-            missed_wraps = round(((arrival - self._arrival) * 1e6 - step_us) / WRAP_US)
-            self._unwrapped_us += step_us + max(0, missed_wraps) * WRAP_US
+            missed_wraps = round(((arrival - self._arrival) * 1e6 - step_us) / WRAP_US)  # -1: it stepped back
+            self._unwrapped_us += step_us + missed_wraps * WRAP_US
         self._raw_us = sensor_time_us
         self._arrival = arrival
         return self._unwrapped_us
@@ -62,6 +60,8 @@ class DeviceClock:
         """One reading's times; gives when it was measured, on the box's clock, never after arrival."""
         sensor_s = unwrapped_us * 1e-6
         offset = arrival - sensor_s
+        if self._bucket_start is not None and sensor_s < self._bucket_start - BUCKET_S:  # it was set back
+            self._forget_line()
         if self._bucket_start is None:
             self._bucket_start = self._anchor_s = sensor_s
             self._least = (sensor_s, offset)
@@ -79,6 +79,11 @@ class DeviceClock:
             self._height += offset - expected
             return arrival
         return min(arrival, sensor_s + expected)
+
+    def _forget_line(self) -> None:
+        self._points.clear()
+        self._bucket_start = None
+        self._slope = 0.0
 
     def _close_bucket(self) -> None:
         at, least = self._least

@@ -9,6 +9,7 @@ import stat
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from hashlib import blake2s
 from pathlib import Path
 
 import yaml
@@ -38,6 +39,12 @@ class SensorKey:
     name: str
     device_id: int
     key: bytes = field(repr=False)
+
+    @property
+    def wearable(self) -> int:
+        """Which wearable this entry lets in, 32 bits. Each provisioning makes another one of it."""
+        tag = blake2s(self.device_id.to_bytes(4, "little"), key=self.key, digest_size=4, person=b"wearable")
+        return int.from_bytes(tag.digest(), "little")
 
 
 def load_keys(path: Path) -> dict[str, SensorKey]:

@@ -12,12 +12,15 @@ from appliance.sensor.plausibility import Orientation, PlausibilityGate
 from appliance.sensor.state import Reception, SensorReading, SensorState
 from appliance.sensor.transports.transport import Way
 
+CONTESTED_S = 30.0  # two wearables with one key change places each 3 s
+
 
 class KnownSensor:
     """Turns authentic, new readings into believed ones."""
 
     def __init__(self, key: SensorKey, pairing: Pairing) -> None:
         self.key = key
+        self.wearable = key.wearable
         self.pairing = pairing
         self.reception = Reception()
         self.believed_arrival: float | None = None
@@ -66,13 +69,14 @@ class KnownSensor:
                 packet.recoveries,
                 packet.flags,
                 _round_trip_s(packet),
+                self.wearable,
             ),
             fate,
         )
 
     def state(self, now: float) -> SensorState:
         """How it is, for people."""
-        pairing, session, hello = self.pairing, self.pairing.session, self.pairing.hello
+        session, hello = self.pairing.session, self.pairing.hello
         newest = session.newest if session is not None else None
         told = newest or hello
         age_s = None if self.believed_arrival is None else max(0.0, now - self.believed_arrival)
@@ -91,7 +95,7 @@ class KnownSensor:
             imu_id="" if hello is None else hello.imu_id.hex(),
             flags=0 if told is None else told.flags,
             boot_nonce=0 if told is None else told.boot_nonce,
-            complaint="" if pairing.way(now) else self._complaint(),
+            complaint=self._complaint(now),
         )
 
     def _word(self, now: float) -> str:
@@ -102,7 +106,16 @@ class KnownSensor:
             return "greeted"
         return "absent" if pairing.newest_hello is None else "lost"
 
-    def _complaint(self) -> str:
+    def _complaint(self, now: float) -> str:
+        if now - self.pairing.contested_at < CONTESTED_S:
+            name = self.key.name
+            return (
+                f"Two wearables are on with the key of {name}, and take its place from each other: its joint "
+                "jumps between them. Switch one of them off, and provision it under a name of its own. "
+                f"Is there only one? Its key was copied: bunraku provision --name {name} gives it another."
+            )
+        if self.pairing.way(now) is not None:
+            return ""
         hello = self.pairing.newest_hello
         if hello is None or hello.wire_hash == wire.WIRE_HASH:
             return ""

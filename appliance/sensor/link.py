@@ -27,7 +27,7 @@ REASONS = (
     "relocated",  # accepted: refused at first, then several readings agreed
     *("hello", "profile"),  # authentic, new, of use
     *("length", "magic", "version", "kind", "device", "tag", "other_wire"),
-    *("duplicate", "reordered", "old", "old_session", "old_hello"),
+    *("duplicate", "reordered", "old", "ahead", "old_session", "old_hello"),
     *("zero", "norm", "torn", "rate"),
     "lost",  # never came, by the gaps in the sequence
     "reboot",
@@ -178,7 +178,7 @@ class SensorLink:
             return "device"
         pairing = sensor.pairing
         if layout is wire.READING:
-            stale = pairing.reading_staleness(boot_nonce, session, sequence)
+            stale = pairing.reading_staleness(boot_nonce, session, sequence, arrival)
         elif layout.name == "Hello":
             stale = pairing.hello_staleness(boot_nonce, sequence)
         else:

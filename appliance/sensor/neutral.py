@@ -136,7 +136,7 @@ def joint_from_reading(pose: NeutralPose, mounting: Mounting) -> NDArray[np.floa
     back = quaternion.multiply(back, np.array(mounting.at_neutral, dtype=np.float64))
     units = np.eye(4)[:, _STAGE_FROM_SENSOR]  # row k: what a 1 in place k of a reading is in stage axes
     images = quaternion.multiply(quaternion.multiply(to_front, units), back)
-    return images.T.astype(np.float32)
+    return np.ascontiguousarray(images.T, np.float32)  # as a keyframe gives it back: products to the last bit
 
 
 def turned(before: Quaternion, after: Quaternion) -> float | None:

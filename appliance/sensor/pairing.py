@@ -15,9 +15,9 @@ from hashlib import blake2s
 from math import inf
 
 from appliance.sensor import wire
-from appliance.sensor.answering import Answering
+from appliance.sensor.answering import REMEMBERED_BOOTS, Answering
 from appliance.sensor.keys import SensorKey
-from appliance.sensor.sequence import SequenceWindow
+from appliance.sensor.sequence import REMEMBERED, SequenceWindow
 from appliance.sensor.transports.transport import Way
 
 RATE_HZ = 50
@@ -27,7 +27,7 @@ SILENT_S = 0.5  # a linked sensor heard within this is there: nobody else with a
 ASSIGNMENT_INTERVAL_S = 0.1
 CALL_INTERVAL_S = 0.2
 RESTORES = 5
-REMEMBERED_BOOTS = 256
+MOST_AHEAD_HZ = 2 * RATE_HZ  # faster than this no sensor counts its readings, whatever was lost
 NO_HAND = 255
 
 
@@ -53,10 +53,12 @@ class Pairing:
         self.hand = hand
         self.session: Session | None = None
         self.greeted_at = -inf
+        self.contested_at = -inf  # a power-on that another one had ended came back: no sensor does that alone
         self._device_id = key.device_id
         self._secret = secret
         self._phase_s = phase_s
         self._sessions_before = 0
+        self._ended: dict[int, None] = {}  # boot nonces that were in force; the newest is the last
         self._hellos: dict[int, wire.Hello] = {}  # boot nonce -> its newest; the newest boot is the last
         self._unanswered: Answering[tuple[wire.Hello, Way]] = Answering(ASSIGNMENT_INTERVAL_S)
         self._uncalled: Answering[Way] = Answering(CALL_INTERVAL_S)
@@ -70,10 +72,14 @@ class Pairing:
         before = self._hellos.get(boot_nonce)
         return "old_hello" if before is not None and sequence <= before.sequence else None
 
-    def reading_staleness(self, boot_nonce: int, number: int, sequence: int) -> str | None:
+    def reading_staleness(self, boot_nonce: int, number: int, sequence: int, arrival: float) -> str | None:
         session = self.session
         if session is not None and boot_nonce == session.boot_nonce:
-            return session.readings.staleness(sequence) if number == session.number else "old_session"
+            if number != session.number:
+                return "old_session"
+            most = REMEMBERED + MOST_AHEAD_HZ * max(0.0, arrival - session.heard)
+            is_ahead = sequence - session.readings.newest > most
+            return "ahead" if is_ahead else session.readings.staleness(sequence)
         return None if number == self._number_for(boot_nonce) else "old_session"
 
     def profile_staleness(self, boot_nonce: int, number: int, sequence: int) -> str | None:
@@ -110,6 +116,12 @@ class Pairing:
         """A reading: where it came from is where its sensor is. Gives how many before it never came."""
         session = self.session
         if session is None or reading.boot_nonce != session.boot_nonce:
+            if reading.boot_nonce in self._ended:
+                self.contested_at = arrival
+            if session is not None:
+                self._ended[session.boot_nonce] = None
+            if len(self._ended) > REMEMBERED_BOOTS:
+                del self._ended[next(iter(self._ended))]
             session = self.session = Session(
                 reading.boot_nonce, reading.session, way, reading, arrival, SequenceWindow()
             )

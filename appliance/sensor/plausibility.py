@@ -87,7 +87,7 @@ class PlausibilityGate:
 
 
 def _within_reach(a: Orientation, b: Orientation, elapsed_s: float) -> bool:
-    reach = radians(SLACK_DEGREES + FASTEST_DEGREES_S * elapsed_s)
+    reach = radians(SLACK_DEGREES + FASTEST_DEGREES_S * max(0.0, elapsed_s))  # a clock may step back
     if reach >= 3.1415:
         return True
     return _alignment(a, b) >= cos(reach / 2)

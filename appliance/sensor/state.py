@@ -27,6 +27,7 @@ class SensorReading(NamedTuple):
     recoveries: int = 0  # restarts of the IMU since power-on; wraps at 256; its heading is lost
     flags: int = 0  # wire.HAS_PROFILE, wire.IS_NDOF
     round_trip_s: float | None = None  # by the newest heartbeat's echo
+    wearable: int = 0  # SensorKey.wearable; another one: the name has gone to another wearable
 
 
 def restored_reading(fields: Sequence[Any] | None) -> SensorReading | None:

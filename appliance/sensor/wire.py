@@ -1,7 +1,8 @@
 """The packets between a wearable and the box: the one declaration from which everything else is made.
 
 Little-endian, fixed size, one packet a datagram, an 8-byte keyed BLAKE2s tag at the end of each. The tables
-of docs/wire.md and the golden vectors are made from here by `python -m appliance.sensor.generate_wire`.
+of docs/wire.md, the firmware's wire.h and the golden vectors are made from here by
+`python -m appliance.sensor.generate_wire`.
 """
 
 from __future__ import annotations
@@ -61,13 +62,15 @@ class Packet:
 
     device_id: Annotated[int, U32, "which sensor, as in the key file"]
     boot_nonce: Annotated[int, U32, "random, drawn by the sensor at each power-on"]
-    session: Annotated[int, U32, "random, drawn by the box at each assignment; 0 before one"]
-    sequence: Annotated[int, U32, "counts this kind of packet from this sender since power-on"]
+    session: Annotated[int, U32, "given by the box to this power-on, by a hash with its secret; 0 before one"]
+    sequence: Annotated[
+        int, U32, "counts this kind of packet from this sender to this receiver, since its start"
+    ]
 
 
 @dataclass(slots=True)
 class Hello(Packet):
-    """The sensor is on and looks for its box: broadcast every 500 ms until assigned."""
+    """The sensor is on and looks for its box: each 500 ms on every way that is up, broadcast on Wi-Fi."""
 
     wire_hash: Annotated[int, U32, "hash of this declaration; a mismatch says which side to update"]
     firmware_major: Annotated[int, U8, "firmware version"]
@@ -83,17 +86,21 @@ class Assignment(Packet):
     """The box takes the sensor: stream to the sender of this packet. Bound to the hello that it answers."""
 
     hello_sequence: Annotated[int, U32, "sequence of the hello that is answered"]
-    hand: Annotated[int, U8, "which hand of the show, from 0"]
+    hand: Annotated[int, U8, "which hand of the show, from 0; 255 none"]
     rate_hz: Annotated[int, U8, "readings a second"]
     led: Annotated[int, U8, LEDS]
 
 
 @dataclass(slots=True)
 class Reading(Packet):
-    """One orientation of the sensor, 50 times a second."""
+    """One orientation of the sensor, as often a second as the assignment says: 50 times."""
 
     sensor_time_us: Annotated[int, U32, "device clock at the measurement; wraps after 71.6 minutes"]
-    orientation: Annotated[tuple[float, float, float, float], QUATERNION, "w, x, y, z; 16384 stands for 1"]
+    orientation: Annotated[
+        tuple[float, float, float, float],
+        QUATERNION,
+        "w, x, y, z; 16384 stands for 1; from the case to the room",
+    ]
     calibration: Annotated[
         int, U8, "BNO055 register 0x35: system, gyro, accelerometer, magnetometer, 2 bits each"
     ]
@@ -106,7 +113,9 @@ class Reading(Packet):
 
 @dataclass(slots=True)
 class Heartbeat(Packet):
-    """The box is there: once a second. Three seconds without it and the sensor says hello again."""
+    """The box is there: each second, and at once when the light changes. Three seconds without it and the
+    sensor says hello again.
+    """
 
     echo_sequence: Annotated[int, U32, "sequence of the newest reading that arrived"]
     echo_held_us: Annotated[int, U32, "how long the box held that reading before this packet left"]
@@ -120,7 +129,7 @@ class Call(Packet):
 
 @dataclass(slots=True)
 class Profile(Packet):
-    """A calibration that the sensor has saved, for the box to keep: an update erases the sensor's own."""
+    """A calibration that the sensor has learned, for the box to keep: an update erases the sensor's own."""
 
     imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055"]
     offsets: Annotated[bytes, OFFSETS22, "BNO055 registers 0x55 to 0x6A"]
@@ -128,7 +137,7 @@ class Profile(Packet):
 
 @dataclass(slots=True)
 class Restore(Packet):
-    """A calibration that the box has kept, for a sensor that has none. Right after the assignment only."""
+    """A calibration that the box has kept, for a sensor that has none. With the first five heartbeats."""
 
     imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055; another one ignores it"]
     offsets: Annotated[bytes, OFFSETS22, "BNO055 registers 0x55 to 0x6A"]

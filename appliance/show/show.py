@@ -21,6 +21,7 @@ from appliance.show.validation import validated
 from appliance.show.yaml_file import YamlFile, read_yaml
 
 MAX_HANDS = 8
+LONGEST_SENSOR_NAME = 24  # as in the key file (appliance/sensor/keys.py) and the wearable's flash
 KINDS = ("sensor", "turning", "fixed", "kept", "osc")
 SENSOR_KEYS = ("facing", "at_neutral", "neutral", "primary")  # of a hand, for a worn sensor alone
 
@@ -46,7 +47,10 @@ class HandConfig(Section):
     """A puppeteer's hold on one joint. Exactly one of sensor, turning, fixed, kept, osc says who holds it."""
 
     sensor: str | None = Field(
-        default=None, min_length=1, max_length=32, description="Name of the worn sensor that holds it."
+        default=None,
+        min_length=1,
+        max_length=LONGEST_SENSOR_NAME,
+        description="Name of the worn sensor that holds it, as in the key file.",
     )
     turning: TurningConfig | None = Field(default=None, description="The joint turns at a constant rate.")
     fixed: FixedConfig | None = Field(default=None, description="The joint is held still.")

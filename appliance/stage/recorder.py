@@ -119,7 +119,7 @@ class Recorder:
             field["reading_times"][0, place] = one.measured_at, one.arrival, trip_s
             field["reading_numbers"][0, place] = (
                 *(one.sequence, one.sensor_time_us, one.battery, one.calibration),
-                *(one.boot_nonce, one.taps, one.recoveries, one.flags),
+                *(one.boot_nonce, one.taps, one.recoveries, one.flags, one.wearable),
             )
 
 

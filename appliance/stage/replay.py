@@ -183,10 +183,10 @@ class _RecordedLink(SensorLink):
         w, x, y, z = self._ticks["reading_orientation"][self.row, place].tolist()
         measured_at, arrival, trip_s = self._ticks["reading_times"][self.row, place].tolist()
         numbers = self._ticks["reading_numbers"][self.row, place].tolist()
-        sequence, time_us, battery, calibration, boot_nonce, taps, recoveries, flags = numbers
+        sequence, time_us, battery, calibration, boot_nonce, taps, recoveries, flags, wearable = numbers
         return SensorReading(
             *(name, (w, x, y, z), sequence, time_us, measured_at, arrival, battery, calibration),
-            *(boot_nonce, taps, recoveries, flags, None if trip_s != trip_s else trip_s),
+            *(boot_nonce, taps, recoveries, flags, None if trip_s != trip_s else trip_s, wearable),
         )
 
 

@@ -30,8 +30,8 @@ class Wearing:
     """Joins what the sensors say with what the joints get; what is to be said leaves with `look`.
 
     One neutral pose is taken by itself at each power-on, when the dancer stands still; after that only when
-    asked for. A sensor that is back within a minute, or whose IMU restarted, keeps the pose: its heading is
-    lost, and carried over from where the joint was.
+    asked for. A wearable that is back within a minute, or whose IMU restarted, keeps the pose: its heading is
+    lost, and carried over from where the joint was. Another wearable under the same name does not.
     """
 
     def __init__(self, cast: Cast, memory: SensorMemory, say: Callable[[str], None]) -> None:
@@ -56,6 +56,9 @@ class Wearing:
         before, wearer.reading = wearer.reading, reading
         if before is None:
             self._meet(wearer, reading)
+        elif reading.wearable != before.wearable:  # it hangs otherwise
+            wearer.stillness.restart()
+            self._ask_for_stillness(wearer)
         elif reading.boot_nonce != before.boot_nonce or reading.recoveries != before.recoveries:
             self._meet_again(wearer, before, reading)
         elif reading.taps != before.taps:

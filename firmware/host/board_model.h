@@ -84,10 +84,12 @@ class BoardModel : public Board {
     fed_at_us_ = clock_.now_us();
   }
   void restart() override { wants_restart_ = true; }
+  bool was_reset_by_watchdog() override { return was_bitten_; }
 
   // The world's side.
   void power_on() {
     fed_at_us_ = clock_.now_us();
+    was_bitten_ = has_bitten_;
     wants_restart_ = has_bitten_ = false;
   }
   void notice() {  // how long the watchdog was not fed; too long and it bites
@@ -107,6 +109,7 @@ class BoardModel : public Board {
   uint64_t fed_at_us_ = 0;
   bool wants_restart_ = false;
   bool has_bitten_ = false;
+  bool was_bitten_ = false;  // that began this start
 };
 
 }  // namespace bunraku

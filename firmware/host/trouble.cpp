@@ -19,6 +19,7 @@ constexpr Trouble kTroubles[] = {
     {"loss", [](World& world, double share) { world.wifi.conditions.loss = share; }},
     {"send failures", [](World& world, double share) { world.wifi.conditions.send_failures = share; }},
     {"join failures", [](World& world, double share) { world.wifi.conditions.join_failures = share; }},
+    {"dead radio", [](World& world, double is_so) { world.wifi.conditions.is_dead = is_so > 0; }},
     {"flash fails", [](World& world, double is_so) { world.flash.fails = is_so > 0; }},
     {"flash tears", [](World& world, double is_so) { world.flash.tears_next = is_so > 0; }},
     {"heading drift", [](World& world, double a_minute) { world.imu.drift_degrees_minute = a_minute; }},

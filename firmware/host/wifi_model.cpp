@@ -9,6 +9,7 @@ namespace {
 
 constexpr size_t kRadioBuffer = 16;     // datagrams that the radio keeps for the board
 constexpr size_t kMostUntaken = 4096;   // sent and not fetched by the world: the oldest go
+constexpr uint64_t kForEverUs = 16'100'000;  // longer than the watchdog waits
 constexpr uint64_t kNever = std::numeric_limits<uint64_t>::max();
 
 }  // namespace
@@ -24,6 +25,10 @@ bool WifiModel::is_up() {
 bool WifiModel::join(const char* network, const char* password) {
   leave();
   const uint64_t start_us = clock_.now_us();
+  if (conditions.is_dead) {
+    clock_.advance(kForEverUs);
+    return false;
+  }
   const uint64_t deadline_us = start_us + conditions.join_timeout_us;
   const uint64_t heard_us = is_on_air(start_us) ? start_us : next_change(true, start_us);
   const uint64_t took_us = chosen(conditions.join_us);

@@ -26,6 +26,7 @@ struct WifiConditions {
   uint32_t stale_us[2] = {2'000'000, 8'000'000};  // how long is_up() goes on after the access point went
   uint32_t send_us = 250;                        // one datagram over SPI to the radio
   uint32_t receive_us = 150;
+  bool is_dead = false;      // the radio: whoever starts it waits for ever, which the watchdog ends
   double join_failures = 0;  // share of joins that block to the end and fail
   double send_failures = 0;  // share of datagrams that the driver refuses
   double loss = 0;           // share lost on the air, either way

@@ -48,6 +48,9 @@ struct Gclk {
   Register16 CLKCTRL;
   Register32 GENCTRL, GENDIV;
 };
+struct PowerManager {
+  const Register8 RCAUSE;
+};
 struct SysTick_Type {
   volatile uint32_t CTRL, LOAD, VAL;
 };
@@ -57,6 +60,7 @@ extern Usb* const USB;
 extern Nvmctrl* const NVMCTRL;
 extern Wdt* const WDT;
 extern Gclk* const GCLK;
+extern PowerManager* const PM;
 extern SysTick_Type* const SysTick;
 
 extern "C" void NVIC_SystemReset();
@@ -74,6 +78,7 @@ constexpr uint32_t NVMCTRL_CTRLB_MANW = 1ul << 7, NVMCTRL_INTFLAG_READY = 1;
 
 constexpr uint32_t WDT_CTRL_ENABLE = 1ul << 1, WDT_CONFIG_PER_16K = 0xB, WDT_STATUS_SYNCBUSY = 1ul << 7;
 constexpr uint32_t WDT_CLEAR_CLEAR_KEY = 0xA5;
+constexpr uint32_t PM_RCAUSE_WDT = 1ul << 5;
 
 constexpr uint32_t GCLK_STATUS_SYNCBUSY = 1ul << 7, GCLK_CLKCTRL_CLKEN = 1ul << 14;
 constexpr uint32_t GCLK_CLKCTRL_ID_SERCOMX_SLOW = 0x13, GCLK_CLKCTRL_GEN_GCLK1 = 1ul << 8;

@@ -188,10 +188,12 @@ class FakeBoard : public Board {
   }
   void feed_watchdog() override { ++feedings; }
   void restart() override { ++restarts; }
+  bool was_reset_by_watchdog() override { return has_hung; }
   uint32_t serial_number() override { return 0xB0A2D001; }
 
   uint16_t millivolts = 4000;
   bool is_noisy = true;
+  bool has_hung = false;
   int feedings = 0, restarts = 0;
 
  private:

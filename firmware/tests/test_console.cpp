@@ -156,15 +156,15 @@ TEST_CASE("status fits one line with everything at its largest") {
   Status& status = session.status;
   status.state = State::kLinked;
   status.lane = Lane::kCable;
-  status.has_imu = status.has_profile = true;
+  status.has_imu = status.has_profile = status.is_profile_unsaved = true;
   status.battery_millivolts = status.joins = 65535;
   status.calibration = 0x1B;
   status.recoveries = status.taps = status.rate_hz = 255;
   status.readings = status.skipped = status.unsent = status.damaged_frames = 4294967295;
   status.dropped.malformed = status.dropped.foreign = status.dropped.forged = status.dropped.replayed = 65535;
   const std::string answer = session.ask("status");
-  CHECK(answer.rfind("ok state linked way cable imu running battery 65535 mV calibration", 0) == 0);
-  CHECK(answer.find("calibration 0 1 2 3 ") != std::string::npos);
+  CHECK(answer.rfind("ok state linked way cable imu ok battery 65535 mV calibration", 0) == 0);
+  CHECK(answer.find("calibration 0 1 2 3 profile unsaved ") != std::string::npos);
   CHECK(answer.substr(answer.size() - 14) == "replayed 65535");
 }
 

@@ -99,6 +99,31 @@ TEST_CASE("while joining blocks the status says so, and the watchdog lives throu
   CHECK(world.board.longest_unfed_us < BoardModel::kWatchdogUs);
 }
 
+TEST_CASE("a dead radio hangs each join, and the console is reached all the same") {
+  Provisioned wearable;
+  World& world = wearable.world;
+  REQUIRE(set_trouble(world, "dead radio", 1));
+  world.power(true);
+  world.step_until(wearable.now() + 3 * kSecond);
+  REQUIRE(world.counts.watchdog_bites == 1);  // USB is enumerated by now, and nobody had opened the port
+  world.step_until(world.booted_at_us() + 5 * kSecond);
+  world.serial.connect(true);
+  CHECK(ask(world, "id").find("ok bunraku-wearable") == 0);
+  world.step_until(wearable.now() + 120 * kSecond);
+  uint8_t stale[512];
+  while (world.serial.take(stale, sizeof stale) > 0) continue;
+  ask(world, "id");  // no hellos from now on
+  CHECK(ask(world, "status").find("ok state ") == 0);
+  CHECK(world.counts.watchdog_bites == 1);
+  world.serial.connect(false);
+  world.step_until(wearable.now() + 30 * kSecond);  // without a cable it tries the radio again, and again
+  CHECK(world.counts.watchdog_bites >= 2);
+  REQUIRE(set_trouble(world, "dead radio", 0));
+  world.wifi.set_access_point(true, wearable.now());
+  world.step_until(wearable.now() + 30 * kSecond);
+  CHECK(world.wifi.counts.joins >= 1);
+}
+
 TEST_CASE("power that goes while a call blocks goes then, and not at its end") {
   Provisioned wearable;
   World& world = wearable.world;

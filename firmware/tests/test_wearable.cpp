@@ -518,6 +518,55 @@ TEST_CASE("a calibration that the box kept is restored and saved") {
   CHECK(load_profile(stage.flash, stage.wearable->status().imu_id, offsets));
 }
 
+TEST_CASE("a calibration that the flash did not take is in use, told to the box, and said") {
+  Stage stage;
+  stage.is_box_on = false;
+  stage.serial.is_open = true;
+  stage.provision_and_switch_on();
+  stage.imu.calibrate(0x3C);
+  stage.run(5 * kSecond);
+  REQUIRE(stage.wearable->status().has_profile);  // saved by itself
+  stage.flash.is_broken = true;
+  CHECK(stage.ask("calibration save").substr(0, 9) == "ok saving");
+  stage.run(2 * kSecond);
+  REQUIRE(stage.lines.size() == 2);
+  CHECK(stage.lines[1] == "note: the flash did not take the calibration, it counts until power-off; try again");
+  CHECK(stage.wearable->status().has_profile);
+  CHECK(stage.wearable->status().is_profile_unsaved);
+  stage.flash.is_broken = false;
+  CHECK(stage.ask("calibration save").substr(0, 9) == "ok saving");
+  stage.run(2 * kSecond);
+  CHECK(stage.lines.size() == 1);
+  CHECK_FALSE(stage.wearable->status().is_profile_unsaved);
+}
+
+TEST_CASE("a kept calibration that the flash did not take is in use, and status says so") {
+  Stage stage;
+  stage.link();
+  stage.flash.is_broken = true;
+  stage.say(signed_packet(stage.box.restore(stage.wearable->status().imu_id)));
+  stage.run(kSecond);
+  CHECK(stage.wearable->status().has_profile);
+  CHECK(stage.wearable->status().is_profile_unsaved);
+}
+
+TEST_CASE("after a hang the port has ten seconds before the next join, and all the time once it is open") {
+  for (const bool is_opened : {false, true}) {
+    Stage stage;
+    stage.is_box_on = false;
+    stage.board.has_hung = true;
+    stage.provision_and_switch_on();
+    stage.run(9 * kSecond);
+    CHECK(stage.wifi.joins == 0);
+    stage.serial.is_open = is_opened;
+    stage.run(20 * kSecond);
+    CHECK((stage.wifi.joins == 0) == is_opened);
+    stage.serial.is_open = false;
+    stage.run(3 * kSecond);
+    CHECK(stage.wifi.joins >= 1);
+  }
+}
+
 TEST_CASE("strobe from the console, for ten seconds") {
   Stage stage;
   stage.serial.is_open = true;

@@ -6,6 +6,7 @@ import os
 import pty
 import select
 import socket
+import threading
 import time
 import tty
 from collections import Counter
@@ -285,6 +286,27 @@ class TimedOut(serial.Serial):
 
     def write(self, data: bytes) -> int:
         raise serial.SerialTimeoutException("Write timeout")
+
+
+def test_a_device_that_never_opens_does_not_keep_the_box_from_ending(
+    cable: Cable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a driver does whose device has died: the call does not come back."""
+    is_opening, gives_way = threading.Event(), threading.Event()
+
+    def dead(*_: object, **__: object) -> None:
+        is_opening.set()
+        gives_way.wait(PATIENCE_S)
+        raise serial.SerialException("dead")
+
+    monkeypatch.setattr(serial, "Serial", dead)
+    intake = SerialIntake(str(cable.name))
+    assert is_opening.wait(PATIENCE_S)
+    closing = threading.Thread(target=intake.close, daemon=True)
+    closing.start()
+    closing.join(PATIENCE_S / 2)
+    assert not closing.is_alive()
+    gives_way.set()
 
 
 def test_what_came_since_the_tick_read_its_time_came_when_it_did(cable: Cable) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from appliance.sensor.keys import KeyFileError, load_keys
 from appliance.show.config_error import ConfigError
 from appliance.show.dance import DancerConfig
 from appliance.show.show import HandConfig, ShowConfig, load_show
@@ -48,6 +49,23 @@ def test_all_five_kinds_of_hand_are_read(show_yaml: ShowYaml) -> None:
     assert hands[0].neutral == (1.0, 0.0, 0.0, 0.0)
     assert hands[1].turning is not None and hands[1].turning.axis == (0.0, 1.0, 0.0)
     assert hands[2].fixed is not None and hands[2].fixed.orientation == pytest.approx((0.6, 0.8, 0, 0))
+
+
+def test_a_sensors_name_is_as_long_as_a_key_file_and_a_wearable_take_it(
+    show_yaml: ShowYaml, tmp_path: Path
+) -> None:
+    hands = "name: x\nhands:\n  - {{sensor: {}, joint: lShldr}}\n"
+    longest, longer = "w" * 24, "w" * 25
+    assert load_show(show_yaml(hands.format(longest))).config.hands[0].sensor == longest
+    assert "1 to 24" in str(refusal(show_yaml(hands.format(longer))))
+    entry = "{}: {{device: 1, key: 000102030405060708090a0b0c0d0e0f}}\n"
+    (keys := tmp_path / "sensors.keys").write_text(entry.format(longest))
+    assert list(load_keys(keys)) == [longest]
+    keys.write_text(entry.format(longer))
+    with pytest.raises(KeyFileError, match="at most 24 letters"):
+        load_keys(keys)
+    header = Path(__file__).resolve().parents[2] / "firmware/wearable/src/core/settings.h"
+    assert "kLongestName = 24," in header.read_text()
 
 
 @pytest.mark.parametrize(("coding", "interaction"), [(10, 9), (2, 1), (1, 1), (64, 63)])

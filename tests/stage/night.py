@@ -77,10 +77,16 @@ class Night:
         return flags | self.cast.motion.jumped * JUMPED
 
 
-def reading(orientation: Sequence[float], boot_nonce: int = 1, taps: int = 0) -> SensorReading:
+def reading(
+    orientation: Sequence[float], boot_nonce: int = 1, taps: int = 0, wearable: int = 1
+) -> SensorReading:
     """Of the left wrist."""
     w, x, y, z = orientation
-    return SensorReading("left-wrist", (w, x, y, z), 0, 0, 0.0, 0.0, 90, 255, boot_nonce, taps)
+    return SensorReading(
+        *("left-wrist", (w, x, y, z), 0, 0, 0.0, 0.0, 90, 255),
+        *(boot_nonce, taps),
+        wearable=wearable,
+    )
 
 
 class _Heard(SensorLink):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from appliance.pose import quaternion
+from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorReading
 from appliance.sensor.neutral import NeutralPose
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
@@ -17,6 +18,7 @@ from appliance.show.show import load_show
 from appliance.stage.sensor_fit import Wearing
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import Cast, assemble
+from tests.sensor.peers import Box, Wearable
 from tests.stage.bundles import write_show
 
 SENSOR = "left-wrist"
@@ -61,6 +63,7 @@ class Stage:
         boot: int = BOOT,
         taps: int = 0,
         restarts: int = 0,
+        wearable: int = 1,
     ) -> None:
         """One tick with one reading."""
         self.now += TICK_S
@@ -68,7 +71,11 @@ class Stage:
         reading = SensorReading(
             *(sensor, orientation, self.sequence, 0, self.now, self.now, 90, 255),
             *(boot, taps, restarts),
+            wearable=wearable,
         )
+        self.take(reading)
+
+    def take(self, reading: SensorReading) -> None:
         self.wearing.hear(reading)
         self.cast.hear(reading)
         self.cast.hands.pull(self.now, self.cast.puppet.select(self.cast.motion.window()))
@@ -226,6 +233,44 @@ def test_after_more_than_a_minute_the_dancer_stands_still_again(evening: Evening
     stage.stand(0.1, about_up(90.0), boot=NEXT_BOOT)
     assert stage.wants
     stage.stand(2.5, about_up(90.0), boot=NEXT_BOOT)
+    assert stage.taken() == 2 and holds(stage.target(), HANGING)
+
+
+@pytest.mark.parametrize("was_on", [True, False])
+def test_a_spare_that_takes_over_the_name_is_another_wearable(evening: Evening, was_on: bool) -> None:
+    """It hangs otherwise than the broken one: nothing of that one's pose is its own."""
+    stage = evening()
+    stage.stand(2.0, about_up(40.0))
+    stage.silence(2.0)
+    hung_otherwise = multiply(about_up(40.0), about_front(80.0))
+    spare = {"wearable": 2, "boot": BOOT if was_on else NEXT_BOOT}
+    stage.stand(0.1, hung_otherwise, **spare)
+    assert stage.wants and stage.wearing.neutral_of(SENSOR) == "wanted"
+    assert stage.said[-1] == f"Sensor {SENSOR} is on. Its dancer stands still for a breath now."
+    stage.stand(2.5, hung_otherwise, **spare)
+    assert stage.taken() == 2 and holds(stage.target(), HANGING)
+
+
+@pytest.mark.parametrize("has_same_device_id", [True, False])
+def test_a_replaced_sensor_asks_for_stillness_on_the_boxs_own_link(
+    evening: Evening, has_same_device_id: bool
+) -> None:
+    """By its real packets: a spare under the broken one's name, or a new one provisioned in its place."""
+    stage, box = evening(), Box()
+    key = box.link_keys[SENSOR]
+
+    def stand(wearable: Wearable, degrees: float) -> None:
+        for _ in range(150):
+            box.now = stage.now = box.now + TICK_S
+            for reading in box.hear(wearable.reading(degrees)):
+                stage.take(reading)
+
+    stand(box.pair(), 0.0)
+    assert stage.taken() == 1
+    device_id = key.device_id if has_same_device_id else 0x5BA2E
+    spare = SensorKey(SENSOR, device_id, bytes(range(100, 116)))
+    box.link.admit({SENSOR: spare})
+    stand(box.pair(boot=2), 80.0)
     assert stage.taken() == 2 and holds(stage.target(), HANGING)
 
 

@@ -21,6 +21,7 @@ LONGEST_RETRY_S = 2.0
 WAITING_PACKETS = 128
 UNSENT_PACKETS = 16
 WRITE_TIMEOUT_S = 0.1
+CLOSE_S = 1.0  # a driver may keep the thread for good, in the call that opens, sets or closes a dead device
 
 
 class SerialIntake:
@@ -66,9 +67,12 @@ class SerialIntake:
         return str(origin[0])
 
     def close(self) -> None:
+        """End the thread; one that a dead device keeps for longer than CLOSE_S is left behind."""
         self._stop.set()
         self._wake()
-        self._thread.join()
+        self._thread.join(CLOSE_S)
+        if self._thread.is_alive():
+            return
         self._waker.close()
         self._woken.close()
 

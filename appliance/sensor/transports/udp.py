@@ -22,7 +22,7 @@ OLDEST_S = 1.0
 # The kernel counts about 768 bytes for a datagram of ours and doubles what is asked for.
 COMMON_BUFFER_BYTES = 192 * 1024  # room for some 500 of strangers: two ticks' worth of a heavy flood
 OWN_BUFFER_BYTES = 96 * 1024  # room for some 250 of one sensor: the burst after a stall of 5 s
-# A drain takes at most so many: in a flood 1.5 ms of a tick.
+# A drain takes at most so many: in a flood 0.7 to 2.5 ms of a tick, by the machine.
 COMMON_PER_DRAIN = 256
 OWN_PER_DRAIN = 32
 OWN_PER_SECOND = 64  # of a stop, in which the box did not drain: what a sensor sends, and some more

@@ -59,6 +59,8 @@ void MkrBoard::feed_watchdog() {
 
 void MkrBoard::restart() { NVIC_SystemReset(); }
 
+bool MkrBoard::was_reset_by_watchdog() { return (PM->RCAUSE.reg & PM_RCAUSE_WDT) != 0; }
+
 // SAM D21 data sheet, "Serial Number": 128 bits in four words, folded into one.
 uint32_t MkrBoard::serial_number() {
   uint32_t folded = 0;

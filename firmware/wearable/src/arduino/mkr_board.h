@@ -18,6 +18,7 @@ class MkrBoard final : public Board {
   void noise(uint8_t* data, uint8_t count) override;
   void feed_watchdog() override;
   void restart() override;
+  bool was_reset_by_watchdog() override;
   uint32_t serial_number() override;
 
  private:

@@ -45,11 +45,12 @@ void identify(const Status& status, uint32_t board_number, Answer& answer) {
 
 void tell(const Status& status, Answer& answer) {
   answer.add("ok state ").add(state_name(status.state)).add(" way ").add(lane_name(status.lane));
-  answer.add(" imu ").add(status.has_imu ? "running" : "none");
+  answer.add(" imu ").add(status.has_imu ? "ok" : "none");
   answer.add(" battery ").add_number(status.battery_millivolts).add(" mV calibration");
   for (int8_t shift = 6; shift >= 0; shift = static_cast<int8_t>(shift - 2))
     answer.add(" ").add_number(status.calibration >> shift & 3u);
-  answer.add(" profile ").add(set_or_none(status.has_profile));
+  const bool is_unsaved = status.has_profile && status.is_profile_unsaved;
+  answer.add(" profile ").add(is_unsaved ? "unsaved" : set_or_none(status.has_profile));
   answer.add(" recoveries ").add_number(status.recoveries).add(" taps ").add_number(status.taps);
   answer.add(" sent ").add_number(status.readings);
   answer.add(" skipped ").add_number(status.skipped).add(" unsent ").add_number(status.unsent);

@@ -82,6 +82,7 @@ class Board {
   virtual void noise(uint8_t* data, uint8_t count) = 0;  // unpredictable bytes, as good as the board has them
   virtual void feed_watchdog() = 0;
   virtual void restart() = 0;  // does not return on the real board
+  virtual bool was_reset_by_watchdog() { return false; }  // the start before this one hung
   virtual uint32_t serial_number() { return 0; }  // of the board's processor, folded; 0: it has none
 
  protected:

@@ -20,6 +20,7 @@ struct Status {
   bool has_imu = false;     // fusion runs and gives data
   bool has_imu_id = false;
   bool has_profile = false;
+  bool is_profile_unsaved = false;  // in use, but the flash did not take it
   bool is_light_on = false;
   uint8_t imu_id[16] = {};
   uint32_t boot_nonce = 0;

@@ -13,6 +13,7 @@ namespace {
 constexpr uint32_t kSecondUs = 1'000'000;
 constexpr uint32_t kImuStartsUs = 10'000;  // its wait for the chip begins, and passes during the first join
 constexpr uint32_t kImuFirstMs = 2'000;
+constexpr uint32_t kConsoleFirstUs = 10'000'000;  // after a hang: time to open the port, before the next one
 constexpr uint32_t kUnlinkedForSavingUs = 30'000'000;  // then nobody dances: the heading may be lost
 
 }  // namespace
@@ -23,7 +24,8 @@ void Wearable::begin() {
   status_.boot_nonce = draw_boot_nonce(settings_.key, ports_.flash, ports_.board);
   imu_.start(settings_.imu, now_us);
   start_pairing();
-  join_pause_.start(now_us, kImuStartsUs);
+  is_radio_in_doubt_ = ports_.board.was_reset_by_watchdog();  // nothing else blocks for so long
+  join_pause_.start(now_us, is_radio_in_doubt_ ? kConsoleFirstUs : kImuStartsUs);
   schedule_.start(now_us, kSecondUs / pairing_.rate_hz());
   measure_battery(now_us);
   refresh_status();
@@ -78,7 +80,8 @@ void Wearable::keep_calibration(uint32_t now_us) {
   if (may_save_calibration(now_us)) save_calibration(now_us);
   if (!imu_.profile_ready(offsets)) return;
   set_lamp(true);
-  save_profile(ports_.flash, imu_.unique_id(), offsets);  // (blocks some 10 ms)
+  if (!store_profile(imu_.unique_id(), offsets) && conversation_.is_running(now_us))
+    say_line("note: the flash did not take the calibration, it counts until power-off; try again");
   saving_.stop();
   pairing_.announce_profile(offsets);
 }
@@ -99,8 +102,12 @@ void Wearable::receive(const uint8_t* data, uint16_t count, const Way& from, uin
   wire::Restore restore;
   restore.read(data);
   imu_.use_profile(restore.offsets, now_us);
-  if (sound_profile_bytes(restore.offsets) > 0)  // (blocks some 10 ms, in the first 10 s of a link)
-    save_profile(ports_.flash, restore.imu_id, restore.offsets);
+  if (sound_profile_bytes(restore.offsets) > 0) store_profile(restore.imu_id, restore.offsets);
+}
+
+bool Wearable::store_profile(const uint8_t* imu_id, const uint8_t* offsets) {  // (blocks some 10 ms)
+  status_.is_profile_unsaved = !save_profile(ports_.flash, imu_id, offsets);
+  return !status_.is_profile_unsaved;
 }
 
 // What is due to be said: hellos, and a calibration that was saved.

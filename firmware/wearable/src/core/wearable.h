@@ -43,6 +43,8 @@ class Wearable {
   const char* keep_settings(uint32_t now_us);
   const char* forget(uint32_t now_us);
   void save_calibration(uint32_t now_us);
+  bool store_profile(const uint8_t* imu_id, const uint8_t* offsets);  // false: the flash did not take it
+  void say_line(const char* line);
 
   void serve_wifi(uint32_t now_us);
   void look_for_network(uint32_t now_us);
@@ -86,6 +88,7 @@ class Wearable {
 
   bool is_socket_open_ = false;
   Timer join_pause_;
+  bool is_radio_in_doubt_ = false;  // it may have hung the last start, and nothing has shown that it works
   Timer network_trial_;         // how long a network without a box is kept
   uint32_t trial_us_ = 0;
 

@@ -61,7 +61,11 @@ void Wearable::answer_line(const char* line, bool is_overlong, uint32_t now_us) 
       answer.add("error: ").add(fault);
     }
   }
-  cable_output_.put(reinterpret_cast<const uint8_t*>(answer.text()), answer.count());
+  say_line(answer.text());
+}
+
+void Wearable::say_line(const char* line) {
+  cable_output_.put(reinterpret_cast<const uint8_t*>(line), static_cast<uint16_t>(strlen(line)));
   cable_output_.put(reinterpret_cast<const uint8_t*>(kLineEnd), kLineEndBytes);
 }
 
@@ -156,6 +160,7 @@ void Wearable::look_for_network(uint32_t now_us) {
   if (!settings_.is_provisioned() || settings_.network[0] == '\0') return;
   if (is_socket_open_ && network_trial_.is_running(now_us)) return;
   if (is_cable_first || is_pausing || conversation_.is_running(now_us)) return;
+  if (is_radio_in_doubt_ && is_cable_connected_) return;  // it could hang again, and the console with it
   if (is_socket_open_) {
     leave_network();  // joined by the driver's word, but no box: it may be wrong
     trial_us_ = trial_us_ < kLongestTrialUs ? 2 * trial_us_ : kLongestTrialUs;
@@ -168,6 +173,7 @@ void Wearable::join() {
   set_lamp(true);  // nothing can make it blink meanwhile
   const bool is_joined = ports_.wifi.join(settings_.network, settings_.password);  // (blocks, up to 10 s)
   ports_.board.feed_watchdog();
+  is_radio_in_doubt_ = false;
   is_socket_open_ = is_joined && ports_.wifi.open(kOwnPort);  // (blocks, up to 2 s)
   if (is_joined && !is_socket_open_) ports_.wifi.leave();
   const uint32_t now_us = ports_.clock.micros();

@@ -54,7 +54,7 @@ void get(const uint8_t*& at, Value (&values)[count]) {
   for (Value& value : values) get(at, value);
 }
 
-// The sensor is on and looks for its box: broadcast every 500 ms until assigned.
+// The sensor is on and looks for its box: each 500 ms on every way that is up, broadcast on Wi-Fi.
 // Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Hello {
   static constexpr uint8_t kKind = 1;
@@ -62,8 +62,8 @@ struct Hello {
   static constexpr uint8_t kSize = 53;
   uint32_t device_id;  // which sensor, as in the key file
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
-  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
-  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
   uint32_t wire_hash;  // hash of this declaration; a mismatch says which side to update
   uint8_t firmware_major;  // firmware version
   uint8_t firmware_minor;
@@ -110,10 +110,10 @@ struct Assignment {
   static constexpr uint8_t kSize = 35;
   uint32_t device_id;  // which sensor, as in the key file
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
-  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
-  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
   uint32_t hello_sequence;  // sequence of the hello that is answered
-  uint8_t hand;  // which hand of the show, from 0
+  uint8_t hand;  // which hand of the show, from 0; 255 none
   uint8_t rate_hz;  // readings a second
   uint8_t led;  // 0 off, 1 on, 2 slow, 3 fast, 4 strobe
 
@@ -141,7 +141,7 @@ struct Assignment {
   }
 };
 
-// One orientation of the sensor, 50 times a second.
+// One orientation of the sensor, as often a second as the assignment says: 50 times.
 // Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Reading {
   static constexpr uint8_t kKind = 3;
@@ -149,10 +149,10 @@ struct Reading {
   static constexpr uint8_t kSize = 47;
   uint32_t device_id;  // which sensor, as in the key file
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
-  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
-  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
   uint32_t sensor_time_us;  // device clock at the measurement; wraps after 71.6 minutes
-  int16_t orientation[4];  // w, x, y, z; 16384 stands for 1
+  int16_t orientation[4];  // w, x, y, z; 16384 stands for 1; from the case to the room
   uint8_t calibration;  // BNO055 register 0x35: system, gyro, accelerometer, magnetometer, 2 bits each
   uint8_t battery;  // percent; 255 unknown
   uint16_t round_trip;  // newest round trip by a heartbeat's echo, 0.1 ms; 65535 unknown
@@ -192,7 +192,7 @@ struct Reading {
   }
 };
 
-// The box is there: once a second. Three seconds without it and the sensor says hello again.
+// The box is there: each second, and at once when the light changes. Three seconds without it and the sensor says hello again.
 // Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Heartbeat {
   static constexpr uint8_t kKind = 4;
@@ -200,8 +200,8 @@ struct Heartbeat {
   static constexpr uint8_t kSize = 37;
   uint32_t device_id;  // which sensor, as in the key file
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
-  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
-  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
   uint32_t echo_sequence;  // sequence of the newest reading that arrived
   uint32_t echo_held_us;  // how long the box held that reading before this packet left
   uint8_t led;  // 0 off, 1 on, 2 slow, 3 fast, 4 strobe
@@ -236,8 +236,8 @@ struct Call {
   static constexpr uint8_t kSize = 28;
   uint32_t device_id;  // which sensor, as in the key file
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
-  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
-  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
@@ -255,7 +255,7 @@ struct Call {
   }
 };
 
-// A calibration that the sensor has saved, for the box to keep: an update erases the sensor's own.
+// A calibration that the sensor has learned, for the box to keep: an update erases the sensor's own.
 // Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Profile {
   static constexpr uint8_t kKind = 6;
@@ -263,8 +263,8 @@ struct Profile {
   static constexpr uint8_t kSize = 66;
   uint32_t device_id;  // which sensor, as in the key file
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
-  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
-  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
   uint8_t imu_id[16];  // unique id of the BNO055
   uint8_t offsets[22];  // BNO055 registers 0x55 to 0x6A
 
@@ -288,7 +288,7 @@ struct Profile {
   }
 };
 
-// A calibration that the box has kept, for a sensor that has none. Right after the assignment only.
+// A calibration that the box has kept, for a sensor that has none. With the first five heartbeats.
 // Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Restore {
   static constexpr uint8_t kKind = 7;
@@ -296,8 +296,8 @@ struct Restore {
   static constexpr uint8_t kSize = 66;
   uint32_t device_id;  // which sensor, as in the key file
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
-  uint32_t session;  // random, drawn by the box at each assignment; 0 before one
-  uint32_t sequence;  // counts this kind of packet from this sender since power-on
+  uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
+  uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
   uint8_t imu_id[16];  // unique id of the BNO055; another one ignores it
   uint8_t offsets[22];  // BNO055 registers 0x55 to 0x6A
 
