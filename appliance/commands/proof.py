@@ -25,7 +25,7 @@ class Proof:
     def turn(self, now: float) -> None:
         """Look whether the stage has danced for long enough; monotonic seconds."""
         newest, facts = self._frames.newest(now), self._frames.facts
-        if newest is None or facts is None or now < self._again_at:
+        if newest is None or facts is None or facts.rehearsal or now < self._again_at:
             return
         if newest.left - facts.started < PROVEN_S:
             return
