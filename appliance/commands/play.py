@@ -84,7 +84,7 @@ def play_show(
             with _accompanied(company + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:
-                from appliance.stage.keeper import keep_rest
+                from appliance.stage.kept import keep_rest
 
                 keep_rest(stage.box, stage.sharing.noted, journal, minutes, speaker.say)
         if not alone:

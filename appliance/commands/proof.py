@@ -8,12 +8,15 @@ from pathlib import Path
 from appliance.commands.trying import PROVEN_S
 from appliance.outputs.frame_reader import FrameReader
 from appliance.show.choice import CHOSEN, Choice, alone_in
+from appliance.stage.keeper_health import CHOICE_NOT_KEPT
 
 _AGAIN_S = 10.0  # a disk that took nothing is tried again
 
 
 class Proof:
     """A carrier of the keeper: notes once in a stage's life, after PROVEN_S of dancing, what became of it."""
+
+    fallback = CHOICE_NOT_KEPT.name
 
     def __init__(self, runtime: Path, chosen: Path) -> None:
         self.complaint = ""

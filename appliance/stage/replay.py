@@ -19,8 +19,8 @@ from appliance.stage.iterations import Iterations
 from appliance.stage.journal.comparison import Comparison
 from appliance.stage.journal.journal_error import JournalError
 from appliance.stage.journal.keyframe import unpacked
-from appliance.stage.journal.reading import DAMAGED, Run
-from appliance.stage.journal.record import NOT_FINITE, ORDER
+from appliance.stage.journal.reading import Run
+from appliance.stage.journal.record import DAMAGED, NOT_FINITE, ORDER
 from appliance.stage.obey import carry_out
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.tick import Tick

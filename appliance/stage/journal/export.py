@@ -14,7 +14,8 @@ from pathlib import Path
 
 from appliance.show.durable import sync_folder
 from appliance.stage.journal.journal_error import JournalError
-from appliance.stage.journal.reading import DAMAGED, EXPORTED, header_of, segments_of
+from appliance.stage.journal.reading import EXPORTED, header_of, segments_of
+from appliance.stage.journal.record import DAMAGED
 from appliance.stage.journal.segments import SUFFIX
 
 CHECKSUMS = "SHA256SUMS"
