@@ -98,6 +98,8 @@ class PlaceCarrier:
     failed: how often the disk did not take it; complaint: why it does not take it now, a sentence, else "".
     """
 
+    fallback = "place-not-kept"
+
     def __init__(self, runtime: Path, state: Path, say: Callable[[str], None]) -> None:
         """runtime: the folder where the box's processes meet; state: the one on the disk."""
         self._reader = PlaceReader(runtime)

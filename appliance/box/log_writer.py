@@ -2,38 +2,51 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import threading
-from queue import Full, Queue
+from queue import SimpleQueue
 
-_WAITING_LINES = 200
+WAITING_LINES = 200
 _LAST_WORDS_S = 0.5
 
 
 class Speaker:
-    """Writes lines to a file descriptor (standard output by default); what cannot be written is dropped."""
+    """Writes lines to a file descriptor (standard output by default).
+
+    dropped: how many lines found no room, because nothing took those before; the reader is told.
+    """
 
     def __init__(self, descriptor: int = 1) -> None:
         self._descriptor = descriptor
-        self._lines: Queue[str | None] = Queue(_WAITING_LINES)
+        # Its put() takes no lock: the real-time thread would wait for one that another thread holds.
+        self._lines: SimpleQueue[str | None] = SimpleQueue()
+        self.dropped = self._told = 0
         self._thread = threading.Thread(target=self._speak, name="speaker", daemon=True)
         self._thread.start()
 
     def say(self, line: str) -> None:
-        """Hand over one line; never waits."""
-        with contextlib.suppress(Full):
-            self._lines.put_nowait(line)
+        """Hand over one line; never waits, not even for a lock."""
+        if self._lines.qsize() < WAITING_LINES:
+            self._lines.put(line)
+        else:
+            self.dropped += 1
 
     def close(self) -> None:
         """Let the last lines out, for as long as half a second."""
-        with contextlib.suppress(Full):
-            self._lines.put_nowait(None)
+        self._lines.put(None)
         self._thread.join(_LAST_WORDS_S)
 
     def _speak(self) -> None:
-        while (line := self._lines.get()) is not None:
-            try:
-                os.write(self._descriptor, f"{line}\n".encode(errors="backslashreplace"))
-            except OSError:
-                return  # nobody listens any more: the show goes on
+        try:
+            while (line := self._lines.get()) is not None:
+                self._write(line)
+                if (dropped := self.dropped) != self._told and self._lines.empty():
+                    self._write(
+                        f"{dropped - self._told} lines before this one are missing: nothing took them."
+                    )
+                    self._told = dropped
+        except OSError:
+            return  # nobody listens any more: the show goes on
+
+    def _write(self, line: str) -> None:
+        os.write(self._descriptor, f"{line}\n".encode(errors="backslashreplace"))

@@ -20,7 +20,7 @@ _LIVED_S = 10.0  # whoever lived so long begins with the shortest pause again
 _SAID = 3  # deaths in a row that are told one by one
 _MOST_DOUBLINGS = 10  # of the pause: beyond it is the longest one anyway
 _LOOK_S = 0.1
-_LAST_WORDS_S = 3.0
+_LAST_WORDS_S, _KILLED_WITHIN_S = 3.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -106,13 +106,14 @@ class _Running:
             self._process.terminate()
 
     def end(self, within_s: float) -> None:
-        """Wait for its end; kill what does not end."""
+        """Wait for its end; kill what does not end, and leave behind what hangs in the kernel."""
         if self._process is None:
             return
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(within_s)
         self._process.kill()
-        self._process.wait()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_KILLED_WITHIN_S)
 
     def _start(self, now: float) -> None:
         self._started_at = now

@@ -20,7 +20,7 @@ class Emulation:
     """A context: starts `python -m hw_sim emulate` for the show's sensors and ends it.
 
     `box` is the given box with the key file of these sensors: the venue's own are not let in meanwhile, and
-    what is learnt of these is forgotten with them.
+    what is learnt of these is forgotten with them. It has no journal: the venue's is not for rehearsals.
     """
 
     def __init__(self, show: Show, box: BoxConfig, scratch: Path) -> None:
@@ -35,7 +35,8 @@ class Emulation:
             *("--host", udp.host, "--port", str(udp.port)),
         ]
         sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
-        self.box = box.model_copy(update={"sensors": sensors, "state": None})
+        journal = box.journal.model_copy(update={"folder": None})
+        self.box = box.model_copy(update={"sensors": sensors, "state": None, "journal": journal})
         self._words = scratch / "emulator.txt"
         self._process: subprocess.Popen[bytes] | None = None
 

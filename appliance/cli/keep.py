@@ -6,13 +6,14 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from appliance.box.checkpoint import PlaceReader
 from appliance.box.log_writer import Speaker
 from appliance.box.notify import Notifier
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.stop_signals import stop_signals
-from appliance.keeper.keeper import END_BESIDE_S, END_S, carriers, keep_on
+from appliance.keeper.carrier_process import CarrierProcess, Kept
+from appliance.keeper.keeper import END_BESIDE_S, END_S
 from appliance.keeper.keeper_health import KeeperHealth
+from appliance.keeper.kept import keep_all, kept_by
 from appliance.release.promote_show import Proof
 from appliance.show.box import load_box
 
@@ -36,27 +37,20 @@ def keep_box(
         closing(Speaker()) as speaker,
         closing(Claim(runtime, "keeper")),
         closing(Notifier()) as notifier,
-        closing(PlaceReader(runtime)) as place,
     ):
-        kept = carriers(
-            box, runtime, journal or box.journal.folder, minutes or box.journal.minutes, speaker.say
-        )
+        kept = kept_by(box, runtime, journal or box.journal.folder, minutes or box.journal.minutes)
         if chosen is not None:
-            kept.append(Proof(runtime, chosen))
+            kept.append(Kept("That a show has danced", Proof.fallback, lambda say: Proof(runtime, chosen)))
+        end_s = END_BESIDE_S if chosen is None else END_S
+        processes = [CarrierProcess(one, runtime, end_s, speaker.say) for one in kept]
         health = KeeperHealth(runtime)
         notifier.ready("The journal and the place of the dance are kept.")
 
-        def after_turn(now: float) -> None:
+        def after_look(now: float) -> None:
             notifier.ping(now)
-            health.tell(kept, now)
+            health.tell(processes, now)
 
-        keep_on(
-            kept,
-            stopped,
-            after_turn,
-            goes_on=place.goes_on,
-            end_s=END_BESIDE_S if chosen is None else END_S,
-        )
+        keep_all(processes, stopped, after_look, end_s)
         notifier.stopping()
         health.end(time.monotonic())
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import sys
 from collections.abc import Iterator
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from appliance.cli.companions import Companion
 
 PICTURED_MINUTES = 0.5  # a journal that only serves the picture at the end keeps little more than is drawn
+_REHEARSAL = (
+    "A rehearsal with emulated sensors: the box's own place, journal and sensor memory stay as they are."
+)
 _NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
 # In a technician's words; what is not here goes by its name in docs/wire.md.
 _REFUSALS = {
@@ -60,28 +64,29 @@ def play_show(
         scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
         if emulate and scratch:
             box = _emulated(show, box, scratch, opened)
-        keeper = None if journal is None else _keeper(box_file, _new_folder(journal), box.journal.minutes)
-        journal = journal or box.journal.folder
+        keeps, minutes = journal is not None, box.journal.minutes
+        journal = _new_folder(journal) if journal is not None else box.journal.folder
         if (filmstrip or rehearse) is not None and scratch and (alone or journal is None):
-            journal = scratch / "dance.journal"
-            keeper = _keeper(box_file, journal, PICTURED_MINUTES)
-        elif keeper is None and not alone and (journal or (box.state_folder and not emulate)):
-            keeper = _keeper(box_file, journal, box.journal.minutes)
+            keeps, journal, minutes = True, scratch / "dance.journal", PICTURED_MINUTES
+        elif not alone:
+            keeps = journal is not None or (box.state_folder is not None and not emulate)
         speaker = Speaker()
         opened.callback(speaker.close)
         shown = rehearse is not None and _has_display()
         control = None if alone or box.control is None else _opened(box.control, opened)
-        stage = Stage(show, box, speaker.say, box_file)
+        stage = Stage(show, box, speaker.say, box_file, rehearsal=emulate)
         with closing(stage):
+            keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box_file
+            keeper = _keeper(keepers_box, journal, minutes) if keeps else None
             for line in _introduction(stage, emulate, control):
                 speaker.say(line)
             company = () if alone else tuple(_company(show, box, box_file, control, window or shown))
             with _accompanied(company + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:
-                from appliance.keeper.keeper import keep_rest
+                from appliance.keeper.kept import keep_rest
 
-                keep_rest(stage.box, stage.sharing.folder, journal, box.journal.minutes, speaker.say)
+                keep_rest(stage.box, stage.sharing.noted, journal, minutes, speaker.say)
         if not alone:
             _forget(stage)
         for line in _conclusion(stage):
@@ -115,6 +120,13 @@ def _emulated(show: Show, box: BoxConfig, scratch: Path, opened: ExitStack) -> B
     from appliance.cli.emulation import Emulation
 
     return opened.enter_context(Emulation(show, box, scratch)).box
+
+
+def _rehearsal_box(stage: Stage, scratch: Path) -> Path:
+    """The box file of a rehearsal's keeper, which finds there what the rehearsal notes, and no venue."""
+    path = scratch / "keeper.yaml"
+    path.write_text(f"runtime: {json.dumps(str(stage.sharing.noted))}\n")
+    return path
 
 
 def _has_display() -> bool:
@@ -177,7 +189,7 @@ def _forget(stage: Stage) -> None:
     """All have ended as they should: the next show begins anew."""
     forget_house(stage.sharing.folder)
     if stage.box.state_folder is not None:
-        forget_memory(stage.sharing.folder, stage.box.state_folder)
+        forget_memory(stage.sharing.noted, stage.box.state_folder)
 
 
 def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Companion:
@@ -215,7 +227,9 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
     ]
     lines += stage.cast.complaints
     lines += map(str, show.idle_hands())
-    if not emulate:
+    if emulate:
+        lines.append(_REHEARSAL)
+    else:
         lines += reach(list(stage.cast.worn), stage.box)
     return lines
 

@@ -11,6 +11,7 @@ from appliance.box.clock import TICK_S
 from appliance.keeper.run_memory import Piece, RunMemory
 from appliance.recorder import chunks, log
 from appliance.recorder.environment import environment, fingerprints
+from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import POSITION
 from appliance.recorder.reading import last_kept
 from appliance.recorder.segments import Segments
@@ -26,6 +27,8 @@ class JournalCarrier:
     While the disk takes nothing, the stage's memory holds the last 80 s; they follow when it takes something
     again. complaint: why nothing is kept, or "". errors: how often the disk refused.
     """
+
+    fallback = "journal-stopped"
 
     def __init__(
         self,
@@ -64,19 +67,21 @@ class JournalCarrier:
         except OSError as error:
             self.errors += 1
             self._segments.forget()
-            self._complain(error)
+            self._complain(
+                f"{self._folder}: the journal stops growing ({error.strerror}). The dance goes on, and what "
+                f"was recorded before stays. It is tried again each {RETRY_S:g} s. Free the disk, or look "
+                "whether it is there and can be written to."
+            )
+            return RETRY_S
+        except JournalError as error:
+            self._complain(str(error))
             return RETRY_S
         if self.complaint:
             self.complaint = ""
             self._say(f"{self._folder}: the journal grows again.")
         return 0.0
 
-    def _complain(self, error: OSError) -> None:
-        complaint = (
-            f"{self._folder}: the journal stops growing ({error.strerror}). The dance goes on, and what was "
-            f"recorded before stays. It is tried again each {RETRY_S:g} s. Free the disk, or look whether it "
-            "is there and can be written to."
-        )
+    def _complain(self, complaint: str) -> None:
         if complaint != self.complaint:
             self._say(complaint)
         self.complaint = complaint

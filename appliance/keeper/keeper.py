@@ -1,70 +1,35 @@
-"""The keeper: a process of its own that carries from memory to the disk what must survive a power cut.
+"""The keeper: processes of its own that carry from memory to the disk what must survive a power cut.
 
-The stage touches no disk while it dances: a disk that is full, read-only, gone or hangs stops this alone.
+The stage touches no disk while it dances: a disk that is full, read-only, gone or hangs stops these alone.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import closing
-from pathlib import Path
 from typing import Protocol
-
-from appliance.box.checkpoint_file import PlaceCarrier
-from appliance.box.runtime_folder import Claim, RuntimeFolderError
-from appliance.keeper.journal_carrier import JournalCarrier
-from appliance.keeper.sensor_memory_carrier import MemoryCarrier
-from appliance.show.box import BoxConfig
 
 TURN_S = 0.5
 # The machine goes down: whoever starts after the stage ends before it (the lights may take 4 s), then the
 # stage says that its show has ended (it may take 3 s). Beside a stage of one's own it says so at once.
 END_S, END_BESIDE_S = 8.0, 1.0
-_LOOK_S = 0.05  # how often it looks whether it is to end
+LOOK_S = 0.05  # how often it looks whether it is to end
 
 
 class Carrier(Protocol):
     """Carries one thing (the journal, the place, the sensors' memory) from the runtime folder to the disk.
 
-    complaint: what cannot be kept, in words for people, or "".
+    complaint: what cannot be kept, in words for people, or ""; fallback: the name under which it is told.
     """
 
     complaint: str
+    fallback: str
 
     def turn(self, now: float) -> None:
         """Bring the disk up to date; monotonic seconds. Waits as long as the disk does. Never raises."""
 
     def last_turn(self) -> None:
         """Before the process ends: the rest. Never raises."""
-
-
-def carriers(
-    box: BoxConfig, runtime: Path, journal: Path | None, minutes: float, say: Callable[[str], None]
-) -> list[Carrier]:
-    """What this box keeps: its journal, where one is wanted; its place and what it learns of its sensors, in
-    the state folder, where there is one.
-    """
-    kept: list[Carrier] = []
-    if box.state_folder is not None:
-        kept.append(PlaceCarrier(runtime, box.state_folder, say))
-        kept.append(MemoryCarrier(runtime, box.state_folder, say))
-    if journal is not None:
-        kept.append(JournalCarrier(runtime, journal, minutes, say))
-    return kept
-
-
-def keep_rest(
-    box: BoxConfig, runtime: Path, journal: Path | None, minutes: float, say: Callable[[str], None]
-) -> None:
-    """After the dance: what a keeper did not live to carry, for it was ended while it started."""
-    try:
-        claim = Claim(runtime, "keeper")
-    except RuntimeFolderError:  # one that is still at work
-        return
-    with closing(claim):
-        for carrier in carriers(box, runtime, journal, minutes, say):
-            carrier.last_turn()
 
 
 def keep_on(
@@ -96,6 +61,6 @@ def keep_on(
             carrier.turn(monotonic())
         after_turn(monotonic())
         while not is_over() and (rest_s := until - monotonic()) > 0.0:
-            sleep(min(rest_s, _LOOK_S))
+            sleep(min(rest_s, LOOK_S))
     for carrier in carriers:
         carrier.last_turn()

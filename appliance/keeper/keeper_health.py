@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Protocol
 
 from appliance.box.checkpoint_file import PlaceCarrier
 from appliance.box.fallback import Fallback, Fallbacks
 from appliance.box.process_health import CompanyWriter
 from appliance.keeper.journal_carrier import JournalCarrier
-from appliance.keeper.keeper import Carrier
 from appliance.keeper.sensor_memory_carrier import MemoryCarrier
 
 JOURNAL_STOPPED = Fallback(
-    "journal-stopped",
+    JournalCarrier.fallback,
     "The journal does not grow: the disk is full, read-only or gone. The audience sees nothing of it; the "
     "newest minute stays in memory, and it is tried again each 10 s. Free some room, or look at the disk.",
 )
 PLACE_NOT_KEPT = Fallback(
-    "place-not-kept",
+    PlaceCarrier.fallback,
     "The place of the dance is not kept on the disk. The audience sees nothing of it, but after a power cut "
     "the dance begins where it was kept last. Free some room, or look at the disk.",
 )
 SENSORS_NOT_KEPT = Fallback(
-    "sensors-not-kept",
+    MemoryCarrier.fallback,
     "Neutral poses and calibrations are not kept on the disk. The audience sees nothing of it, but after a "
     "power cut sensors need a moment of stillness. Free some room, or look at the disk.",
 )
@@ -33,11 +33,16 @@ CHOICE_NOT_KEPT = Fallback(
     "power-on it is tried anew. Free some room, or look at the disk.",
 )
 OF_THE_KEEPER = (JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT, CHOICE_NOT_KEPT)
-_ROWS: Mapping[type, Fallback] = {
-    JournalCarrier: JOURNAL_STOPPED,
-    PlaceCarrier: PLACE_NOT_KEPT,
-    MemoryCarrier: SENSORS_NOT_KEPT,
-}
+
+
+class Complaining(Protocol):
+    """What is told of: a carrier, or its process."""
+
+    @property
+    def complaint(self) -> str: ...
+
+    @property
+    def fallback(self) -> str: ...
 
 
 class KeeperHealth:
@@ -47,11 +52,10 @@ class KeeperHealth:
         self._fallbacks = Fallbacks(OF_THE_KEEPER)
         self._block = CompanyWriter(runtime, "keeper", self._fallbacks)
 
-    def tell(self, kept: list[Carrier], now: float) -> None:
-        """After each turn; monotonic seconds."""
-        for carrier in kept:
-            row = _ROWS.get(type(carrier), CHOICE_NOT_KEPT)
-            self._fallbacks.set(row.name, bool(carrier.complaint), carrier.complaint)
+    def tell(self, kept: Iterable[Complaining], now: float) -> None:
+        """Call it often; monotonic seconds."""
+        for one in kept:
+            self._fallbacks.set(one.fallback, bool(one.complaint), one.complaint)
         self._block.tell(now)
 
     def end(self, now: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from appliance.box.ring_file import RingFileReader
+from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import POSITION
 from appliance.recorder.log import Entry
-from appliance.recorder.record import TICK, layout_of
+from appliance.recorder.record import DAMAGED, TICK, layout_of, require_sound
 from appliance.stage.recorder import (
     ENTRY,
     FACTS,
@@ -21,6 +23,7 @@ from appliance.stage.recorder import (
     KIND,
     LOG,
     LOG_SLOTS,
+    RINGS,
 )
 
 
@@ -59,18 +62,32 @@ class RunMemory:
 
     @classmethod
     def at(cls, path: Path) -> RunMemory | None:
-        """The memory of the stage that has this file; None where there is none, or none that can be read."""
+        """The memory of the stage that has this file, None where there is none.
+
+        Raises JournalError for one that cannot be read, or was noted by another release.
+        """
         try:
             found = path.stat()
         except OSError:
             return None
         reader = RingFileReader(path, KIND, FORMAT, "the stage (bunraku play)")
         reader.look()
-        said = reader.rings[FACTS].newest() if reader.rings else None
-        if said is None:
-            reader.close()
-            return None
-        return cls(reader, json.loads(said[1]), (found.st_dev, found.st_ino))
+        with contextlib.ExitStack() as leaving:
+            leaving.callback(reader.close)
+            said = reader.rings[FACTS].newest() if reader.rings else None
+            if said is None and not reader.complaint:
+                return None
+            if said is None or len(reader.rings) != RINGS:
+                raise JournalError(reader.complaint or _foreign(path, "other rings"))
+            try:
+                facts = json.loads(said[1])
+                require_sound(
+                    facts | {"show_files": dict.fromkeys(facts["show_files"], ""), "written_at": 0.0}
+                )
+            except DAMAGED as error:
+                raise JournalError(_foreign(path, str(error))) from error
+            leaving.pop_all()
+        return cls(reader, facts, (found.st_dev, found.st_ino))
 
     def is_at(self, path: Path) -> bool:
         """Whether this path still leads to it; if not, another stage has taken its place."""
@@ -118,3 +135,10 @@ class RunMemory:
                 (kind,) = ENTRY.unpack_from(found)
                 body = found[ENTRY.size :]
                 yield Entry(number, kind, body[: self._tick_bytes] if kind == TICK else body)
+
+
+def _foreign(path: Path, why: str) -> str:
+    return (
+        f"{path}: the journal stops growing: what the stage has noted is not of this release ({why}). "
+        "The dance goes on. Start a stage and a keeper of one release."
+    )

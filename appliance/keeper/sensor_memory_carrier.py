@@ -17,6 +17,8 @@ class MemoryCarrier:
     complaint: why it cannot be kept now, a sentence, else "".
     """
 
+    fallback = "sensors-not-kept"
+
     def __init__(self, runtime: Path, state: Path, say: Callable[[str], None]) -> None:
         """runtime: the folder where the box's processes meet; state: the one on the disk."""
         self._reader = MemoryReader(runtime, state)

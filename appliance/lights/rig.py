@@ -66,20 +66,21 @@ class Rig:
         self._secure(house, now, seconds)
         wishes = self._wishes(house, now, seconds)
         safety = self.safety
-        dark = 0.0 if house.blackout and not house.panic else 1.0
         danced = self.patch.dimmed(wishes.values, house.level(now)) if safety < 1.0 else wishes.values
-        safe = self.patch.dimmed(self._safe, dark)
+        safe = self.patch.dimmed(self._safe, _safe_level(house))
         self.values = danced + (safe - danced) * np.where(self.patch.snaps, float(safety >= 0.5), safety)
         self._turn_heads(wishes, seconds)
         return self.patch.encode(self.values)
 
-    def last_levels(self) -> dict[int, bytes]:
+    def last_levels(self, house: House) -> dict[int, bytes]:
         """What is left on the wires at the end: the safe look where it has light in it, else zeros.
 
-        Heads stay where they point: at zero they would swing to the end of their range.
+        Blackout takes the light out of it, as in each pass. Heads stay where they point: at zero they would
+        swing to the end of their range.
         """
         heads = self.patch.heads
-        values = self.patch.dimmed(self._safe, 1.0) if not self._is_dark else self.patch.rest()
+        is_dark = self._is_dark or not _safe_level(house)
+        values = self.patch.rest() if is_dark else self.patch.dimmed(self._safe, 1.0)
         values[heads.axes.slots] = heads.axes.shares(heads.angles)
         return self.patch.encode(values)
 
@@ -148,6 +149,11 @@ class _Layer:
         if self._fade_s <= 0.0:
             return 1.0
         return min(max((now - self._since) / self._fade_s, 0.0), 1.0)
+
+
+def _safe_level(house: House) -> float:
+    """0 or 1: what the safe look is multiplied with. Blackout darkens it; panic shows it all the same."""
+    return 0.0 if house.blackout and not house.panic else 1.0
 
 
 def _safe_look(config: SafeConfig, patch: Patch) -> Values:

@@ -31,7 +31,7 @@ from appliance.show.venue_rig import at_venue, misplaced, unwired
 
 _REPORT_S = 1.0
 _LOOK_S = 0.1  # how often the stage is looked for
-_GIVE_UP_S = 1.2  # at the end: a machine too busy to fade within this time goes dark at once
+_GIVE_UP_S = 1.2  # at the end: a machine too busy to fade within this time goes to its last levels at once
 
 
 class Lights:
@@ -88,7 +88,7 @@ class Lights:
 
     def close(self) -> None:
         """Leave the safe look, or zeros, on all wires, and say goodbye on them."""
-        levels, now = self.rig.last_levels(), time.monotonic()
+        levels, now = self.rig.last_levels(self._house.read()), time.monotonic()
         for universe in self.universes:
             universe.offer(levels[universe.number], now)
             universe.close(now)

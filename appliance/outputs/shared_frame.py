@@ -44,6 +44,7 @@ class Facts:
     most_iterations: int
     pid: int
     started: float  # seconds on the monotonic clock
+    rehearsal: bool = False  # its sensors are emulated: nothing of it is kept
 
     def packed(self) -> bytes:
         """As JSON."""

@@ -21,6 +21,7 @@ _HEADER = (
     "# How the picture lies on the wall; written by bunraku project, corners clockwise from the top left.\n"
 )
 _LARGEST_FILE = 4096
+LAST_WRITE_S = 1.0  # of the 3 s that systemd and `bunraku play` give the projector
 MOST_BRIGHT = 2.0
 
 
@@ -94,10 +95,15 @@ class AlignmentFile:
         self._is_wanted.set()
 
     def close(self) -> None:
-        """Write what is not written yet, and end the thread."""
+        """Write what is not written yet, for as long as LAST_WRITE_S: a dead disk holds up no end."""
         self._closing = True
         self._is_wanted.set()
-        self._thread.join()
+        self._thread.join(LAST_WRITE_S)
+        if self._thread.is_alive():
+            self._say(
+                f"{self.path}: the disk does not answer, and the newest alignment is perhaps not kept: after "
+                "the next start the picture may lie as before. Look at the disk: bunraku doctor."
+            )
 
     def _write_on(self) -> None:
         while True:

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from appliance.box.durable import sync_folder
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import DAMAGED, EXPORTED, header_of, segments_of
+from appliance.recorder.reading import EXPORTED, header_of, segments_of
+from appliance.recorder.record import DAMAGED
 from appliance.recorder.segments import SUFFIX
 
 CHECKSUMS = "SHA256SUMS"

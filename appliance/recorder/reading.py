@@ -6,7 +6,6 @@ import contextlib
 import errno
 import json
 import os
-import struct
 import tarfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -19,15 +18,13 @@ from appliance.pose.skeleton import Skeleton
 from appliance.recorder import chunks, log
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import POSITION
-from appliance.recorder.record import EVENT, TICK, layout_of, require_sound, skeleton_of
+from appliance.recorder.record import DAMAGED, EVENT, TICK, layout_of, require_sound, skeleton_of
 from appliance.recorder.segments import SUFFIX, segment_paths
 
 EXPORTED = ".bunraku"
 _OLD_MAGIC = b"bunraku journal 1\n"
 _NAME_ONE = "Name the folder of `bunraku play --journal`, a segment in it, or an exported file."
 _LARGEST = 1 << 28  # bytes of a segment: one that the keeper wrote has a hundredth of it
-# What facts, events and ticks raise that no box wrote.
-DAMAGED = (ValueError, KeyError, TypeError, AttributeError, RecursionError, struct.error)
 
 Ticks = np.ndarray[Any, np.dtype[np.void]]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import struct
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,6 +19,8 @@ LATE, NOT_FINITE, JUMPED, RESENT = 1, 2, 4, 8  # flags of a tick; RESENT: it sen
 SECTIONS = ("drain", "motion", "puppeteers", "puppet", "blend", "figure", "send")
 TICK, EVENT = 1, 2  # kinds of entries
 ORDER = "order"  # kind of the event that show control asked for something, and what came of it
+# What facts, events and ticks raise that no box wrote.
+DAMAGED = (ValueError, KeyError, TypeError, AttributeError, RecursionError, struct.error)
 _LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970: the year 5138
 SAID = "said"  # kind of the event that people were told something
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from appliance.keeper.keeper_health import CHOICE_NOT_KEPT
 from appliance.outputs.frame_reader import FrameReader
 from appliance.release.choice import CHOSEN, Choice, alone_in
 from appliance.release.start_attempts import PROVEN_S
@@ -14,6 +15,8 @@ _AGAIN_S = 10.0  # a disk that took nothing is tried again
 
 class Proof:
     """A carrier of the keeper: notes once in a stage's life, after PROVEN_S of dancing, what became of it."""
+
+    fallback = CHOICE_NOT_KEPT.name
 
     def __init__(self, runtime: Path, chosen: Path) -> None:
         self.complaint = ""
@@ -25,7 +28,7 @@ class Proof:
     def turn(self, now: float) -> None:
         """Look whether the stage has danced for long enough; monotonic seconds."""
         newest, facts = self._frames.newest(now), self._frames.facts
-        if newest is None or facts is None or now < self._again_at:
+        if newest is None or facts is None or facts.rehearsal or now < self._again_at:
             return
         if newest.left - facts.started < PROVEN_S:
             return

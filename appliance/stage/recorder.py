@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from appliance.stage.tick import Tick
 
 FILE, KIND, FORMAT = "journal", "journal", 1  # in the runtime folder
-FACTS, LOG, KEYFRAMES = range(3)  # the file's rings
+RINGS = 3
+FACTS, LOG, KEYFRAMES = range(RINGS)  # of the file
 LOG_SLOTS = 4096  # 80 s: so long the disk may hang before a tick is missing in the journal
 KEYFRAME_TICKS = 500  # from one keyframe to the next
 KEYFRAME_SLOTS = 1 + LOG_SLOTS // KEYFRAME_TICKS

@@ -12,8 +12,8 @@ from appliance.dancer.puppet import Puppet
 from appliance.dancer.slerp import FloatArray
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import unpacked
-from appliance.recorder.reading import DAMAGED, Run
-from appliance.recorder.record import NOT_FINITE, ORDER
+from appliance.recorder.reading import Run
+from appliance.recorder.record import DAMAGED, NOT_FINITE, ORDER
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show

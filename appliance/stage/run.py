@@ -44,7 +44,10 @@ _FORGET_PHASE_S = 5.0  # a sensor silent for longer may come back anywhere: the 
 
 
 class Stage:
-    """A show ready to dance, all ports open. Raises StageError or ConfigError before anything dances."""
+    """A show ready to dance, all ports open. Raises StageError or ConfigError before anything dances.
+
+    rehearsal: what is noted of it is not for the venue's keeper, and goes with it.
+    """
 
     def __init__(
         self,
@@ -52,19 +55,20 @@ class Stage:
         box: BoxConfig,
         say: Callable[[str], None],
         box_file: Path | None = None,
+        rehearsal: bool = False,
     ) -> None:
-        self.show, self.box, self.box_file = show, box, box_file
+        self.show, self.box, self.box_file, self.rehearsal = show, box, box_file, rehearsal
         self.say, self._now = say, 0.0
         self._comes_from_stop = self._held_up = False
         self.health = Health()
         with ExitStack() as opened:
-            self.sharing = Sharing(box)
+            self.sharing = Sharing(box, rehearsal)
             opened.callback(self.sharing.close)
             self.notifier = Notifier()
             opened.callback(self.notifier.close)
-            self.resuming = Resuming(show.config.name, self.sharing.folder, box.state_folder, box.resume)
+            self.resuming = Resuming(show.config.name, self.sharing.noted, box.state_folder, box.resume)
             opened.callback(self.resuming.close)
-            self.memory = SensorMemory(box.state_folder, say, self.sharing.folder)
+            self.memory = SensorMemory(box.state_folder, say, self.sharing.noted)
             opened.callback(self.memory.close)
             self.cast: Cast = assemble(
                 show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY
@@ -117,7 +121,7 @@ class Stage:
         shift_s = 0.0
         begun = clock.now()
         self.health.begin(begun)
-        facts = facts_of(self.show, self.box_file, self.iterations, begun)
+        facts = facts_of(self.show, self.box_file, self.iterations, begun, self.rehearsal)
         self.sharing.begin(self.cast, facts, self.say)
         self.fallbacks.begin(begun, self.resuming, self.sharing.complaint, self.recorder is not None)
         self._tell(begun)
@@ -251,10 +255,10 @@ class Stage:
     def _open_recorder(self) -> Recorder | None:
         """The flight recorder, unless there is no memory for it: that does not stop the show."""
         try:
-            return Recorder(self.sharing.folder, facts_of_run(self.show, list(self.cast.worn)))
+            return Recorder(self.sharing.noted, facts_of_run(self.show, list(self.cast.worn)))
         except OSError as error:
             self.say(
-                f"{self.sharing.folder}: no journal can be noted there ({error.strerror}). The dance goes on "
+                f"{self.sharing.noted}: no journal can be noted there ({error.strerror}). The dance goes on "
                 "without one. Free memory there, or give another folder as `runtime:` in the box file."
             )
             return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,9 @@ from appliance.stage.stage_parts import Cast
 from appliance.stage.thermometer import Thermometer
 
 
-def facts_of(show: Show, box_file: Path | None, iterations: Iterations, now: float) -> Facts:
+def facts_of(
+    show: Show, box_file: Path | None, iterations: Iterations, now: float, rehearsal: bool = False
+) -> Facts:
     """What readers need to know about this stage; `now`: it is about to dance."""
     config, names = show.config, show.config.names
     return Facts(
@@ -37,18 +40,28 @@ def facts_of(show: Show, box_file: Path | None, iterations: Iterations, now: flo
         most_iterations=iterations.most,
         pid=os.getpid(),
         started=now,
+        rehearsal=rehearsal,
     )
 
 
 class Sharing:
-    """The stage's place in the runtime folder: one stage a folder. Raises StageError where it has none."""
+    """The stage's place in the runtime folder: one stage a folder. Raises StageError where it has none.
 
-    def __init__(self, box: BoxConfig) -> None:
+    folder: where the box's processes meet. noted: where the stage notes what a keeper carries to the disk
+    (place, journal, sensors' memory): the same folder, but in a rehearsal one within it, removed at its end.
+    """
+
+    def __init__(self, box: BoxConfig, rehearsal: bool = False) -> None:
         try:
-            self.folder = runtime_folder(box)
+            self.folder = self.noted = runtime_folder(box)
             self._claim = Claim(self.folder, "stage")
         except RuntimeFolderError as error:
             raise StageError(str(error)) from error
+        self._rehearsed = self.folder / "rehearsal" if rehearsal else None
+        if self._rehearsed is not None:
+            self.noted = self._rehearsed
+            self._forget_rehearsal()  # one that was killed
+            self._rehearsed.mkdir(mode=0o700)
         self._thermometer = Thermometer()
         self.complaint = ""
 
@@ -105,5 +118,10 @@ class Sharing:
 
     def close(self) -> None:
         """Give the place back, after the outputs were closed."""
+        self._forget_rehearsal()
         self._thermometer.close()
         self._claim.close()
+
+    def _forget_rehearsal(self) -> None:
+        if self._rehearsed is not None:
+            shutil.rmtree(self._rehearsed, ignore_errors=True)

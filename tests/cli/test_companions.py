@@ -14,6 +14,7 @@ import pytest
 from appliance.cli import companions
 from appliance.cli.companions import UNAVAILABLE, Companion, Companions
 from tests.show_control.doubles import until
+from tests.stage import disks
 
 NOTE = "import os, sys, time; open(sys.argv[1], 'a').write(f'{os.getpid()}\\n'); "
 
@@ -179,3 +180,16 @@ def test_a_child_whose_player_is_gone_already_does_not_begin(diary: Diary) -> No
     )
     assert done.returncode == 0
     assert diary.pids == []
+
+
+def test_one_that_hangs_on_a_dead_disk_is_left_behind(diary: Diary, tmp_path: Path) -> None:
+    """No signal ends what waits in the kernel: the box ends without it."""
+    if reason := disks.why_not():
+        pytest.skip(reason)
+    (tmp_path / "disk").mkdir()
+    with disks.disk(disks.made_image(tmp_path / "image"), tmp_path / "disk") as disk, disks.frozen(disk):
+        with Companions([diary.child(f"open({str(disk / 'file')!r}, 'w')")], print, lambda: True):
+            until(lambda: len(diary.pids) == 1)
+            until(lambda: "State:\tD" in Path(f"/proc/{diary.pids[0]}/status").read_text())
+        assert not is_gone(diary.pids[0])
+    until(lambda: is_gone(diary.pids[0]))

@@ -174,10 +174,27 @@ def test_at_the_end_it_fades_and_leaves_zeros_or_the_safe_look(safe: dict[str, A
     assert shown[0] > 200 and shown == sorted(shown, reverse=True)
     assert shown[-1] == left
     assert night.rig.safety == 1.0
-    last = night.rig.last_levels()[1]
+    last = night.rig.last_levels(night.house)[1]
     assert last[0] == left
     heads = set(range(20, 24))  # pan and tilt, coarse and fine
     assert any(level for channel, level in enumerate(last) if channel not in heads) == bool(left)
+
+
+@pytest.mark.parametrize(
+    ("house", "left"),
+    [(House(blackout=True), 0), (House(panic=True), 51), (House(panic=True, blackout=True), 51)],
+)
+def test_the_end_is_as_dark_as_blackout_and_as_lit_as_panic(house: House, left: int) -> None:
+    night = evening(FULL, AIM, safe={"dimmer": 0.2})
+    night.dance(1.0)
+    night.house = house
+    night.dance(0.5)
+    night.rig.leave()
+    shown = {dimmers(levels)[0] for levels in night.dance(2 * LEAVING_FADE_S)}
+    last = night.rig.last_levels(house)[1]
+    assert shown | {last[0]} == {left}
+    assert any(last[20:24])  # where the head points
+    assert bool(left) == any(level for channel, level in enumerate(last) if not 20 <= channel < 24)
 
 
 def test_at_the_end_heads_stay_where_they_point() -> None:
@@ -185,7 +202,7 @@ def test_at_the_end_heads_stay_where_they_point() -> None:
     shown = night.dance(2.0)[-1]
     night.rig.leave()
     night.dance(LEAVING_FADE_S + PERIOD_S, hand=(-2.0, 1.0, 1.0))
-    before, last = night.dance()[0], night.rig.last_levels()[1]
+    before, last = night.dance()[0], night.rig.last_levels(night.house)[1]
     assert last[20:24] == before[20:24] != shown[20:24]
     assert any(last[20:24]) and not any(last[:20]) and not any(last[24:])
 

@@ -10,6 +10,7 @@ import yaml
 from appliance.projector.alignment import Alignment, AlignmentFile, alignment_folder, file_name
 from appliance.show.box import BoxConfig
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
+from tests.stage import disks
 
 FILE_NAME = "projector.alignment"
 PINNED = Alignment(((0.1, 0.05), (0.9, 0.1), (1.0, 1.0), (1 / 3, 0.9)), True, 0.8)
@@ -118,3 +119,17 @@ def test_two_projectors_of_one_box_have_a_file_each() -> None:
         "projector-left.alignment",
         "projector-right.alignment",
     }
+
+
+def test_a_disk_that_hangs_holds_up_neither_the_picture_nor_the_end(tmp_path: Path, said: list[str]) -> None:
+    if reason := disks.why_not():
+        pytest.skip(reason)
+    with disks.disk(disks.made_image(tmp_path / "image"), tmp_path / "disk") as disk:
+        keep(disk, said, Alignment(brightness=0.5))
+        file = opened(disk, said)
+        with disks.frozen(disk):
+            file.keep(PINNED)
+            file.close()
+            assert "the disk does not answer" in said[-1]
+        file.close()
+        assert opened(disk, said).alignment == PINNED

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import sys
+import threading
+from types import FrameType
+from typing import Any
 
-from appliance.box.log_writer import Speaker
+from appliance.box.log_writer import WAITING_LINES, Speaker
 
 
 def test_a_name_that_is_no_text_does_not_silence_what_follows() -> None:
@@ -26,3 +30,45 @@ def test_who_does_not_read_holds_nobody_up() -> None:
     speaker.close()
     os.close(reading)
     os.close(writing)
+
+
+def test_what_was_dropped_is_counted_and_told_once_lines_are_taken_again() -> None:
+    reading, writing = os.pipe()
+    speaker = Speaker(writing)
+    for number in range(3 * WAITING_LINES):
+        speaker.say(f"{number:05d}" + "x" * 4000)
+    dropped, heard = speaker.dropped, b""
+    assert dropped > WAITING_LINES
+    while b"missing" not in heard:
+        heard += os.read(reading, 1 << 16)
+    assert f"{dropped} lines before this one are missing".encode() in heard
+    speaker.say("The show goes on.")
+    speaker.close()
+    os.close(writing)
+    while more := os.read(reading, 1 << 16):
+        heard += more
+    assert heard.endswith(b"The show goes on.\n") and heard.count(b"missing") == 1
+    os.close(reading)
+
+
+def test_the_tick_hands_a_line_over_without_a_lock() -> None:
+    """It would wait for a thread that may not run for long: one that is not real-time, and holds the lock."""
+    reading, writing = os.pipe()
+    speaker = Speaker(writing)
+    locks: list[str] = []
+    kinds = (type(threading.Lock()), type(threading.RLock()))
+
+    def note(frame: FrameType, event: str, called: Any) -> None:
+        if event == "c_call" and isinstance(getattr(called, "__self__", None), kinds):
+            locks.append(called.__name__)
+
+    sys.setprofile(note)
+    try:
+        speaker.say("A line.")
+    finally:
+        sys.setprofile(None)
+    assert locks == []
+    speaker.close()
+    assert os.read(reading, 100) == b"A line.\n"
+    os.close(writing)
+    os.close(reading)

@@ -67,3 +67,13 @@ def disk(image: Path, folder: Path, how: str = "rw") -> Iterator[Path]:
     finally:
         shutil.copyfile(plugged, image)
         plugged.unlink()
+
+
+@contextlib.contextmanager
+def frozen(folder: Path) -> Iterator[None]:
+    """A file system that does not answer: writes wait in the kernel, where no signal ends them."""
+    subprocess.run(["fsfreeze", "--freeze", str(folder)], check=True)
+    try:
+        yield
+    finally:
+        subprocess.run(["fsfreeze", "--unfreeze", str(folder)], check=False)

@@ -13,12 +13,15 @@ import pytest
 
 from appliance.box.checkpoint import Place, PlaceReader, PlaceWriter
 from appliance.box.clock import TICK_S
+from appliance.box.ring_file import RingFileWriter
 from appliance.box.runtime_folder import Claim
 from appliance.keeper.journal_carrier import RETRY_S
-from appliance.keeper.keeper import END_S, TURN_S, keep_on, keep_rest
+from appliance.keeper.keeper import END_S, TURN_S, keep_on
+from appliance.keeper.kept import keep_rest
 from appliance.recorder.reading import read_journal
 from appliance.recorder.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
 from appliance.show.box import BoxConfig
+from appliance.stage.recorder import FILE, FORMAT, KIND
 from tests.stage.bundles import write_show
 from tests.stage.fakes import FakeTime
 from tests.stage.night import Night
@@ -116,6 +119,41 @@ def test_a_disk_that_is_not_there_is_waited_for(night: Night, tmp_path: Path) ->
     assert len(read_journal(tmp_path / "data" / "journal").ticks) == 50
 
 
+FOREIGN = {
+    "no text": b"\xff\xfe",
+    "no object": b"[1]",
+    "nothing in it": b"{}",
+    "another layout": b'{"record": 3, "run": "x"}',
+    "of half a run": b'{"record": [], "run": "x", "joints": []}',
+}
+
+
+@pytest.mark.parametrize("facts", FOREIGN.values(), ids=FOREIGN.keys())
+def test_what_another_release_has_noted_is_said_and_the_next_stage_is_kept(
+    night: Night, tmp_path: Path, facts: bytes
+) -> None:
+    with closing(RingFileWriter.new(night.runtime / FILE, KIND, FORMAT, [(1, 500)] * 3)) as other:
+        other.rings[0].write(facts)
+        other.publish()
+        carrier = night.carrier(tmp_path / "journal")
+        carrier.turn(0.0)
+        assert "not of this release" in carrier.complaint and night.said == [carrier.complaint]
+        carrier.turn(RETRY_S)
+    stage = Night(night.show.directory, night.runtime)
+    stage.dance(30)
+    carrier.turn(2 * RETRY_S)
+    assert carrier.complaint == ""
+    assert len(read_journal(tmp_path / "journal").ticks) == 30
+
+
+def test_a_memory_of_another_format_is_said_too(night: Night, tmp_path: Path) -> None:
+    with closing(RingFileWriter.new(night.runtime / FILE, KIND, FORMAT + 1, [(1, 500)] * 3)) as other:
+        other.publish()
+        carrier = night.carrier(tmp_path / "journal")
+        carrier.turn(0.0)
+        assert "Update this program" in carrier.complaint
+
+
 def test_the_oldest_go_where_room_is_short_but_never_the_newest_minute(night: Night, disk: Path) -> None:
     carrier, folder = night.carrier(disk / "journal"), disk / "journal"
     for second in range(170):
@@ -137,7 +175,7 @@ def test_the_keeper_turns_until_it_is_stopped_and_then_once_more() -> None:
     time, happened = FakeTime(), list[str]()
 
     class Carried:
-        complaint = ""
+        complaint, fallback = "", "not-kept"
 
         def turn(self, now: float) -> None:
             happened.append(f"turn at {now - 1000.0:.1f}")
@@ -154,7 +192,7 @@ def end_of(place: PlaceWriter, runtime: Path, ends_at: float, end_s: float = END
     time, turned = FakeTime(), list[float]()
 
     class Carried:
-        complaint = ""
+        complaint, fallback = "", "not-kept"
 
         def turn(self, now: float) -> None:
             turned.append(round(now - 1000.0, 2))
@@ -197,7 +235,7 @@ def test_whatever_the_disk_takes_each_is_given_the_time_at_which_it_begins() -> 
     time, begun, beats = FakeTime(), list[float](), list[float]()
 
     class Slow:
-        complaint = ""
+        complaint, fallback = "", "not-kept"
 
         def turn(self, now: float) -> None:
             begun.append(now)

@@ -227,3 +227,21 @@ def test_another_show_in_the_same_box_lights_its_own_rig(tmp_path: Path) -> None
         box.kill_and_restart()
         lamp.await_levels(lambda levels: levels[511] == 255 and not any(levels[:511]))
         assert lights.end() == 0
+
+
+def test_blackout_outlasts_the_lights_and_the_box(tmp_path: Path) -> None:
+    show = show_with(tmp_path, RIG)
+    with node() as (lamp, port), playing(show, tmp_path, settings=artnet(port, 1, 2)) as box:
+        lamp.await_dance()
+        SimpleUDPClient(HOST, box.control).send_message("/blackout", [1])
+        lamp.await_levels(lambda levels: levels[PAR] == 0)
+        lamp.arrivals.clear()
+        [lights] = children_that_say(box.process.pid, "lights")
+        os.kill(lights, signal.SIGTERM)
+        box.await_words("Lights: 3 fixtures", count=2)
+        box.frames(50)
+        assert box.end() == 0
+        lamp.look()
+        assert all(levels[DIMMER] == levels[PAR] == 0 for _, one, levels in lamp.arrivals if one == 1)
+        assert is_dark(lamp.levels[1])
+        assert lamp.levels[2] == bytes(512)

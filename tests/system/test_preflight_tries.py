@@ -53,22 +53,21 @@ class Evening:
 
         return within(60.0, begin).decode()
 
-    def dance(self, seconds: float) -> None:
+    def dance(self, seconds: float, rehearsal: bool = False) -> None:
         """A stage dances what was chosen for so long, and dies."""
 
         def dance() -> bytes:
-            self._leave_frames(seconds)
+            self._leave_frames(seconds, rehearsal)
             return b""
 
         within(60.0, dance)
 
-    def _leave_frames(self, seconds: float) -> None:
+    def _leave_frames(self, seconds: float, rehearsal: bool = False) -> None:
         """In the shared frame, as a stage that is killed does."""
         now = time.monotonic()
         directory = self.choice.first.show.resolve()
-        writer = FrameWriter(
-            self.run, facts(pid=os.getpid(), started=now - seconds, show_directory=directory)
-        )
+        started = {"pid": os.getpid(), "started": now - seconds, "rehearsal": rehearsal}
+        writer = FrameWriter(self.run, facts(show_directory=directory, **started))
         frame = JointFrame(len(FIGURE))
         frame.frame_time = now
         writer.write(frame)
@@ -160,6 +159,14 @@ def test_who_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(evening:
     assert evening.kept.first.good
     assert evening.choice.first.good
     assert proof.complaint == ""
+    proof.last_turn()
+
+
+def test_a_rehearsal_proves_nothing(evening: Evening) -> None:
+    proof = Proof(evening.run, evening.run / CHOSEN)
+    evening.dance(seconds=10.5, rehearsal=True)
+    proof.turn(time.monotonic())
+    assert not evening.kept.first.good
     proof.last_turn()
 
 

@@ -1,0 +1,215 @@
+"""The real keeper and a disk that hangs: what lies on other disks is kept meanwhile, and the keeper ends."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from appliance.box.checkpoint import FILE, Place, PlaceWriter
+from appliance.box.checkpoint_file import read_place
+from appliance.box.process_health import Company
+from appliance.box.ring_file import RingFileWriter
+from appliance.keeper.keeper_health import JOURNAL_STOPPED, SENSORS_NOT_KEPT
+from appliance.keeper.kept import keep_rest
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.reading import read_journal
+from appliance.sensor.memory_block import FILE_NAME, MemoryWriter
+from appliance.show.box import load_box
+from appliance.stage.recorder import FILE as JOURNAL_FILE
+from appliance.stage.recorder import FORMAT, KIND
+from tests.stage import disks
+from tests.stage.bundles import write_show
+from tests.stage.night import Night
+from tests.system.box import PATIENCE_S, started
+from tests.system.processes import children
+
+KEEP = (sys.executable, "-m", "appliance.cli", "keep")
+MEMORY = '{"neutral": [], "profiles": {}}'
+
+
+def await_that(happened: Callable[[], Any], what: str) -> None:
+    until = time.monotonic() + PATIENCE_S
+    while not happened():
+        assert time.monotonic() < until, what
+        time.sleep(0.05)
+
+
+class Keeper:
+    """`bunraku keep`, and the stage's memory that it carries: a night as a test dances it, a place."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.runtime = folder, folder / "runtime"
+        self.night = Night(write_show(folder / "show"), self.runtime)
+        self.place = PlaceWriter(self.runtime)
+        self.position_s = 0.0
+        self.box_file = folder / "box.yaml"
+        self.box_file.write_text(
+            yaml.safe_dump({"runtime": "runtime", "state": "state", "journal": {"folder": "disk/journal"}})
+        )
+        self.words_file = folder / "words.txt"
+        self.start()
+
+    def start(self) -> None:
+        with self.words_file.open("ab") as words:
+            self.process = started((*KEEP, "--box", str(self.box_file)), words)
+
+    @property
+    def words(self) -> str:
+        return self.words_file.read_text()
+
+    @property
+    def journal(self) -> Path:
+        return self.folder / "disk" / "journal"
+
+    def kept_ticks(self) -> int:
+        with contextlib.suppress(JournalError):
+            return len(read_journal(self.journal).ticks)
+        return 0
+
+    def goes_on(self, ended: bool = False) -> None:
+        """The place moves, and is on the disk soon after."""
+        self.position_s += 0.02
+        place = Place("A show", "main", self.position_s, (0.0, 30.0))
+        self.place.write(replace(place, ended=ended))
+        await_that(lambda: self.kept_place() == self.position_s, f"the place stays behind: {self.words}")
+
+    def kept_place(self) -> float | None:
+        place = read_place(self.folder / "state" / FILE)
+        return None if place is None else place.position_s
+
+    def fallbacks(self) -> set[str]:
+        """Those in force, as desks hear them."""
+        with closing(Company(self.runtime)) as company:
+            found = company.fallbacks(time.monotonic())
+        return {one.name for process, one in found if process == "keeper" and one.active}
+
+    def end(self) -> int:
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(PATIENCE_S)
+
+
+@pytest.fixture
+def keeper(tmp_path: Path) -> Iterator[Keeper]:
+    (tmp_path / "disk").mkdir(exist_ok=True)
+    keeper = Keeper(tmp_path)
+    try:
+        yield keeper
+    finally:
+        keeper.process.kill()
+        keeper.process.wait()
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of its own for the journal, which can be made to hang."""
+    if reason := disks.why_not():
+        pytest.skip(reason)
+    with disks.disk(disks.made_image(tmp_path / "image", megabytes=16), tmp_path / "disk") as folder:
+        yield folder
+
+
+def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Path, keeper: Keeper) -> None:
+    keeper.night.dance(50)
+    await_that(lambda: keeper.kept_ticks() == 50, keeper.words)
+    keeper.goes_on()
+    with disks.frozen(disk):
+        keeper.night.dance(50)
+        for _ in range(3):
+            keeper.goes_on()
+        await_that(lambda: keeper.fallbacks() == {JOURNAL_STOPPED.name}, "nobody is told")
+        assert "The journal: the disk has not answered for 5 s" in keeper.words
+        keeper.goes_on()
+        assert keeper.end() == 0
+        assert "The journal: the disk does not answer" in keeper.words
+        keeper.start()  # what hangs still holds nothing that this one needs
+        keeper.goes_on()
+        keeper.goes_on(ended=True)
+    await_that(lambda: keeper.kept_ticks() == 100, keeper.words)
+    await_that(lambda: not keeper.fallbacks(), keeper.words)
+    assert keeper.end() == 0
+    (run,) = read_journal(keeper.journal).runs
+    numbers = run.tick_numbers.tolist()
+    assert numbers == list(range(1, 101))
+
+
+def test_what_a_keeper_left_is_not_waited_for_on_a_disk_that_hangs(disk: Path, keeper: Keeper) -> None:
+    keeper.end()
+    keeper.night.dance(10)
+    keeper.place.write(Place("A show", "main", 7.5, (0.0, 30.0), ended=True))
+    said: list[str] = []
+    with disks.frozen(disk):
+        keep_rest(load_box(keeper.box_file), keeper.runtime, keeper.journal, 1.0, said.append)
+        assert keeper.kept_place() == 7.5
+    assert any("The journal: the disk does not answer" in words for words in said)
+
+
+def test_a_file_that_does_not_answer_holds_up_its_own_carrier_alone(tmp_path: Path) -> None:
+    """Without a disk to freeze: a pipe without a writer, which waits for one when it is opened."""
+    (tmp_path / "state").mkdir()
+    os.mkfifo(tmp_path / "state" / FILE_NAME)
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "runtime").mkdir(mode=0o700)
+    with closing(MemoryWriter(tmp_path / "runtime", tmp_path / "state")) as memory:
+        memory.write(MEMORY)
+        keeper = Keeper(tmp_path)
+        try:
+            keeper.goes_on()
+            keeper.night.dance(20)
+            await_that(lambda: keeper.kept_ticks() == 20, keeper.words)
+            await_that(lambda: keeper.fallbacks() == {SENSORS_NOT_KEPT.name}, "nobody is told")
+            keeper.goes_on(ended=True)
+            assert keeper.end() == 0
+        finally:
+            keeper.process.kill()
+            keeper.process.wait()
+
+
+def test_a_journal_of_another_release_costs_neither_place_nor_keeper(keeper: Keeper) -> None:
+    with closing(RingFileWriter.new(keeper.runtime / JOURNAL_FILE, KIND, FORMAT, [(1, 500)] * 3)) as other:
+        other.rings[0].write(b"\xff\xfe")
+        other.publish()
+        keeper.goes_on()
+        await_that(lambda: JOURNAL_STOPPED.name in keeper.fallbacks(), keeper.words)
+        keeper.goes_on()
+    assert keeper.process.poll() is None
+    assert "Traceback" not in keeper.words
+
+
+def test_a_carrier_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper) -> None:
+    keeper.goes_on()
+    keeper.night.dance(20)
+    await_that(lambda: keeper.kept_ticks() == 20, keeper.words)
+    for process in children(keeper.process.pid):
+        os.kill(process, signal.SIGKILL)
+    keeper.goes_on()
+    keeper.night.dance(20)
+    await_that(lambda: keeper.kept_ticks() == 40, keeper.words)
+    assert "has died" in keeper.words and "carried to the disk again" in keeper.words
+    assert keeper.end() == 0
+
+
+def test_carriers_end_with_a_keeper_that_is_killed(keeper: Keeper) -> None:
+    keeper.goes_on()
+    processes = children(keeper.process.pid)
+    assert len(processes) == 3
+    keeper.process.kill()
+    keeper.process.wait()
+    await_that(lambda: not any(map(lives, processes)), "they outlive their keeper")
+
+
+def lives(process: int) -> bool:
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

@@ -1,0 +1,98 @@
+"""A rehearsal with emulated sensors in a real venue: what the venue's box keeps stays as it was."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import time
+from contextlib import closing
+from pathlib import Path
+
+from appliance.box.checkpoint import FILE
+from appliance.box.checkpoint_file import read_place
+from appliance.outputs.frame_reader import FrameReader
+from appliance.recorder.reading import read_journal
+from appliance.sensor.memory_block import FILE_NAME, MemoryWriter
+from appliance.sensor.memory_text import memory_text, remembered
+from tests.stage.bundles import write_show
+from tests.system.box import Box, await_end_of_keeper, playing
+
+VENUE = {"realtime": {"enabled": False}, "state": "state", "journal": {"folder": "journal", "minutes": 5}}
+PROFILES = {bytes(16): bytes(22)}
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def rehearse(box: Box, *arguments: str) -> None:
+    """The venue's own command with emulated sensors, from its first frames to its end."""
+    venue, box.command = box.command, [*box.command, "--emulate", *arguments]
+    box.kill_and_restart()
+    box.frame_that(lambda frame: frame[2] > 5)
+    assert box.end() == 0, box.words
+    box.command = venue
+
+
+def test_a_rehearsal_leaves_what_the_venue_keeps_and_the_show_goes_on_behind_it(tmp_path: Path) -> None:
+    show = write_show(tmp_path / "show")
+    runtime = tmp_path / "runtime"
+    with playing(show, tmp_path, settings=VENUE) as box:
+        box.frame_that(lambda frame: read_place(tmp_path / "state" / FILE) is not None)
+        box.frames(60)
+        box.end(signal.SIGKILL)
+        await_end_of_keeper(runtime)
+        memory = MemoryWriter(runtime, tmp_path / "state")  # learnt, and not carried to the disk yet
+        memory.write(memory_text({}, PROFILES))
+        memory.close()
+        kept = {name: files_of(tmp_path / name) for name in ("state", "journal")}
+        noted = {name: (runtime / name).read_bytes() for name in (FILE, FILE_NAME, "journal")}
+
+        rehearse(box, "--journal", str(tmp_path / "rehearsed"))
+        assert {name: files_of(tmp_path / name) for name in kept} == kept
+        assert {name: (runtime / name).read_bytes() for name in noted} == noted
+        assert "A rehearsal" in box.words
+        assert "the show goes on" not in box.words
+        assert len(read_journal(tmp_path / "rehearsed").ticks)
+        assert {path.name for path in runtime.iterdir() if path.is_dir()} <= {"prepared"}
+
+        shutil.rmtree(tmp_path / "rehearsed")
+        rehearse(box)
+        assert {name: files_of(tmp_path / name) for name in kept} == kept
+        box.kill_and_restart()
+        box.await_words("After a restart of the stage the show goes on")
+        assert box.end() == 0
+        assert "Traceback" not in box.words
+    assert remembered((tmp_path / "state" / FILE_NAME).read_text())[1] == PROFILES
+
+
+def test_a_rehearsal_that_is_killed_is_not_gone_on_with(tmp_path: Path) -> None:
+    show = write_show(tmp_path / "show")
+    with playing(show, tmp_path, "--emulate", settings=VENUE) as box:
+        box.frames(20)
+        box.kill_and_restart()
+        box.frames(5)
+        box.command.remove("--emulate")
+        box.kill_and_restart()
+        box.frames(5)
+        assert box.end() == 0
+        assert "the show goes on" not in box.words
+
+
+def test_a_rehearsal_is_called_one_in_the_shared_frame(tmp_path: Path) -> None:
+    """So the keeper of an installed box does not take its show for one that has proven itself."""
+    show = write_show(tmp_path / "show")
+    with (
+        playing(show, tmp_path, "--emulate", settings=VENUE) as box,
+        closing(FrameReader(tmp_path / "runtime")) as reader,
+    ):
+        box.frames(1)
+        reader.newest(time.monotonic())
+        assert reader.facts is not None and reader.facts.rehearsal
+        assert box.end() == 0
+        box.command.remove("--emulate")
+        box.kill_and_restart()
+        box.frames(1)
+        reader.newest(time.monotonic())
+        assert not reader.facts.rehearsal
+        assert box.end() == 0
