@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from appliance.box.parent_death import hold_lifeline
+from appliance.box.parent_death import end_with_parent
 from appliance.box.realtime import prepare_environment, spare_the_collector
 
 _PATHS = ("--show", "--box", "--journal", "--chosen")
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
         any_command(given)
         return
-    hold_lifeline()
+    end_with_parent()
     prepare_environment()
     spare_the_collector()
     try:

@@ -19,7 +19,7 @@ _MOST = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Checkpoint:
     """Where a show is, right before its next tick.
 
     phrase, position_s: which pose comes next; excerpt: first and last second of the part that plays;
@@ -50,7 +50,7 @@ class Place:
     tries: int = 0
 
 
-def packed(place: Place) -> bytes:
+def packed(place: Checkpoint) -> bytes:
     """A place as bytes, at most LARGEST; raises ValueError for names that are longer than that."""
     numbers = _NUMBERS.pack(
         place.tick,
@@ -74,14 +74,14 @@ def packed(place: Place) -> bytes:
     return payload
 
 
-def unpacked(payload: bytes) -> Place | None:
+def unpacked(payload: bytes) -> Checkpoint | None:
     """The place in these bytes; None when they are none that this program knows."""
     try:
         tick, position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, *small = (
             _NUMBERS.unpack_from(payload)
         )
         show, phrase, cue, let_go, boot = json.loads(payload[_NUMBERS.size :])
-        place = Place(
+        place = Checkpoint(
             str(show),
             str(phrase),
             position_s,
@@ -108,7 +108,7 @@ def unpacked(payload: bytes) -> Place | None:
     return place if all(math.isfinite(number) for number in sound) else None
 
 
-class PlaceWriter:
+class CheckpointWriter:
     """The stage's end: the place in memory, renewed after each frame. Raises OSError without room for it.
 
     It costs some microseconds, waits for nothing, and outlives the process.
@@ -117,7 +117,7 @@ class PlaceWriter:
     def __init__(self, folder: Path) -> None:
         self._block = BlockWriter(folder / FILE, KIND, LARGEST)
 
-    def write(self, place: Place) -> None:
+    def write(self, place: Checkpoint) -> None:
         """Readers see this one from now on; raises ValueError as `packed` does."""
         self._block.write(packed(place))
 
@@ -126,13 +126,13 @@ class PlaceWriter:
         self._block.close()
 
 
-class PlaceReader:
+class CheckpointReader:
     """Reads the place in memory; the stage may be there or not."""
 
     def __init__(self, folder: Path) -> None:
         self._block = BlockReader(folder / FILE, KIND)
 
-    def read(self) -> Place | None:
+    def read(self) -> Checkpoint | None:
         """The newest place; None where none was written. Never waits, never raises."""
         payload = self._block.read()
         return None if payload is None else unpacked(payload)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from appliance.box.checkpoint import FILE, LARGEST, Place, PlaceReader, packed, unpacked
+from appliance.box.checkpoint import FILE, LARGEST, Checkpoint, CheckpointReader, packed, unpacked
 from appliance.box.durable import sync_folder
 
 # A page: never shares a sector, nor the cell of a card that is being written, with the other.
@@ -24,7 +24,7 @@ _MAGIC = b"bkplace1"
 _HEAD = struct.Struct("<8sQII")  # magic, number, payload's bytes, CRC-32 of everything in the slot but itself
 
 
-class PlaceFile:
+class CheckpointFile:
     """One file, made in full when it is missing; a write changes the older slot alone and is then synced.
 
     A power cut in the middle of a write tears that slot; the other one still holds the place before.
@@ -35,7 +35,7 @@ class PlaceFile:
         self._descriptor = -1
         self._newest = 0
 
-    def write(self, place: Place) -> None:
+    def write(self, place: Checkpoint) -> None:
         """Put it on the disk, and wait until it is there. Raises OSError when it is not; then call again.
 
         The folder is made when it is missing. A file that was replaced (a disk mounted over it) is left.
@@ -76,7 +76,7 @@ class PlaceFile:
         self._descriptor, self._newest = os.open(self._path, flags), 0
 
 
-def read_place(path: Path) -> Place | None:
+def read_checkpoint(path: Path) -> Checkpoint | None:
     """The newest whole place of a file; None where there is none. Never raises."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
@@ -92,7 +92,7 @@ def read_place(path: Path) -> Place | None:
     return next((place for place in places if place is not None), None)
 
 
-class PlaceCarrier:
+class CheckpointCarrier:
     """Carries the place from memory to the disk twice a second, in a process that may wait for a disk.
 
     failed: how often the disk did not take it; complaint: why it does not take it now, a sentence, else "".
@@ -102,10 +102,10 @@ class PlaceCarrier:
 
     def __init__(self, runtime: Path, state: Path, say: Callable[[str], None]) -> None:
         """runtime: the folder where the box's processes meet; state: the one on the disk."""
-        self._reader = PlaceReader(runtime)
-        self._file = PlaceFile(state / FILE)
+        self._reader = CheckpointReader(runtime)
+        self._file = CheckpointFile(state / FILE)
         self._state, self._say = state, say
-        self._written: Place | None = None
+        self._written: Checkpoint | None = None
         self._due = 0.0
         self.failed = 0
         self.complaint = ""

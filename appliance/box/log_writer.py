@@ -10,7 +10,7 @@ WAITING_LINES = 200
 _LAST_WORDS_S = 0.5
 
 
-class Speaker:
+class LogWriter:
     """Writes lines to a file descriptor (standard output by default).
 
     dropped: how many lines found no room, because nothing took those before; the reader is told.

@@ -12,7 +12,7 @@ TOLD = "BUNRAKU_TOLD"  # in the environment: the exit status before this try, wh
 _PR_SET_PDEATHSIG = 1
 
 
-def hold_lifeline() -> None:
+def end_with_parent() -> None:
     """Call it first thing; does nothing in a process that a person or systemd started."""
     parent = os.environ.pop(PARENT, "")
     if not parent:

@@ -53,7 +53,7 @@ SHOW_PUT_ASIDE = Fallback(
 OF_THE_COMPANY = (*DIED.values(), STAGE_HUNG, COMMANDS_DROPPED, SHOW_REFUSED, SHOW_PUT_ASIDE)
 
 
-class CompanyWriter:
+class ProcessHealthWriter:
     """A process says once a second how it is; without a place for it, it says nothing and works on."""
 
     def __init__(self, folder: Path, who: str, fallbacks: Fallbacks) -> None:
@@ -102,7 +102,7 @@ class Member(NamedTuple):
     fallbacks: tuple[Fallen, ...]
 
 
-class Company:
+class ProcessHealth:
     """What all of them said; never waits, never raises."""
 
     def __init__(self, folder: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, NoReturn
 
 from appliance.box.notify import Notifier
-from appliance.box.parent_death import hold_lifeline
+from appliance.box.parent_death import end_with_parent
 from appliance.box.realtime import prepare_environment
 
 prepare_environment()
@@ -250,7 +250,7 @@ def version() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command; errors that people can mend are one clear line and exit status 2."""
-    hold_lifeline()
+    end_with_parent()
     given = list(sys.argv[1:] if arguments is None else arguments)
     if not given or given[0] not in _own_commands():
         plug_in(app, entry_points(group=PLUG_INS), lambda words: print(words, file=sys.stderr))

@@ -15,7 +15,7 @@ from appliance.show.venue_rig import misplaced, unwired
 from appliance.stage.admission import Admission
 from appliance.stage.open_sensors import reach
 from appliance.stage.stage_error import StageError
-from appliance.stage.stage_parts import Cast, admission, assemble
+from appliance.stage.stage_parts import StageParts, admission, assemble
 
 
 def check_show(directory: Path | None, box_file: Path | None) -> None:
@@ -34,7 +34,7 @@ def check_show(directory: Path | None, box_file: Path | None) -> None:
         print(warning)
 
 
-def verified(directory: Path, box_file: Path | None) -> tuple[Cast, Admission]:
+def verified(directory: Path, box_file: Path | None) -> tuple[StageParts, Admission]:
     """A show that can dance on this box, all ports closed, and what its iterations cost here.
 
     Raises StageError or ConfigError with all that is wrong.

@@ -70,7 +70,7 @@ def _danced(pair: Pair) -> tuple[float, float]:
     from appliance.show.box import load_box
     from appliance.show.show import load_show
     from appliance.stage.iterations import Iterations
-    from appliance.stage.sensor_fit import Wearing
+    from appliance.stage.sensor_fit import SensorFit
     from appliance.stage.sensor_memory import SensorMemory
     from appliance.stage.stage_parts import assemble
     from appliance.stage.tick import Tick
@@ -79,7 +79,7 @@ def _danced(pair: Pair) -> tuple[float, float]:
     box = load_box(pair.box)
     cast, memory = assemble(load_show(pair.show), without_ports(box)), SensorMemory(None, print)
     iterations = Iterations(verdict.coding, verdict.interaction, verdict.most_coding)
-    tick = Tick(cast, Wearing(cast, memory, print), iterations, latest_start_s=TICK_S)
+    tick = Tick(cast, SensorFit(cast, memory, print), iterations, latest_start_s=TICK_S)
     costs_ms: list[float] = []
     for number in range(_TICKS):
         begun = time.monotonic()

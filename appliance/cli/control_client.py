@@ -45,7 +45,7 @@ class Roll:
     key_file: Path | None
 
 
-class RunningBox:
+class ControlClient:
     """The box behind a control port; each question opens a socket of its own."""
 
     def __init__(self, control: Address | None, patience_s: float = PATIENCE_S) -> None:
@@ -53,7 +53,7 @@ class RunningBox:
         self._patience_s = patience_s
 
     @classmethod
-    def of(cls, box: BoxConfig) -> RunningBox:
+    def of(cls, box: BoxConfig) -> ControlClient:
         """The box that plays with this box file on this machine."""
         control = box.control
         if control is None or control.port == 0:

@@ -6,7 +6,7 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from appliance.box.log_writer import Speaker
+from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.stop_signals import stop_signals
@@ -34,7 +34,7 @@ def keep_box(
     runtime = runtime_folder(box)
     with (
         stop_signals() as stopped,
-        closing(Speaker()) as speaker,
+        closing(LogWriter()) as speaker,
         closing(Claim(runtime, "keeper")),
         closing(Notifier()) as notifier,
     ):

@@ -10,8 +10,8 @@ from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from appliance.box.log_writer import Speaker
-from appliance.box.show_state import forget_house
+from appliance.box.log_writer import LogWriter
+from appliance.box.show_state import forget_show_state
 from appliance.box.stop_signals import stop_signals
 from appliance.sensor.memory_block import forget_memory
 from appliance.show.box import BoxConfig, load_box
@@ -70,7 +70,7 @@ def play_show(
             keeps, journal, minutes = True, scratch / "dance.journal", PICTURED_MINUTES
         elif not alone:
             keeps = journal is not None or (box.state_folder is not None and not emulate)
-        speaker = Speaker()
+        speaker = LogWriter()
         opened.callback(speaker.close)
         shown = rehearse is not None and _has_display()
         control = None if alone or box.control is None else _opened(box.control, opened)
@@ -144,7 +144,7 @@ def _opened(control: ControlConfig, opened: ExitStack) -> socket.socket:
 
 
 def _accompanied(
-    company: tuple[Companion, ...], speaker: Speaker, stage: Stage
+    company: tuple[Companion, ...], speaker: LogWriter, stage: Stage
 ) -> AbstractContextManager[object]:
     """While inside, they run; without any, nothing is loaded for them: a stage that is back is in a hurry."""
     if not company:
@@ -187,7 +187,7 @@ def _company(
 
 def _forget(stage: Stage) -> None:
     """All have ended as they should: the next show begins anew."""
-    forget_house(stage.sharing.folder)
+    forget_show_state(stage.sharing.folder)
     if stage.box.state_folder is not None:
         forget_memory(stage.sharing.noted, stage.box.state_folder)
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from appliance.cli.run_with_timeout import GivenUpError, within
+from appliance.cli.run_with_timeout import TimedOutError, within
 from appliance.release.arrivals import look
 from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice, alone_in
 from appliance.release.choosing import Outcome, Places, built_in_box, choose, remembered
@@ -70,7 +70,7 @@ def _found(options: Options, places: Places) -> Outcome:
         if _is_folder(options.stick):
             return Outcome.unpacked(within(_PATIENCE_S, lambda: chosen().packed()))
         return chosen()
-    except GivenUpError as error:
+    except TimedOutError as error:
         words = f"The stick could not be read ({error}). What danced before goes on. Try another stick."
     except Exception as error:
         words = f"What is new cannot be looked at ({error!r}). What danced before goes on. Copy it again."

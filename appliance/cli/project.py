@@ -10,7 +10,7 @@ from pathlib import Path
 
 import typer
 
-from appliance.box.log_writer import Speaker
+from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
 from appliance.box.parent_death import was_told
 from appliance.box.stop_signals import stop_signals
@@ -46,7 +46,7 @@ def project_show(box_file: Path | None, wish: Wish, waits: bool = False) -> int:
 
     waits: without a display it is tried again each 10 s, in this process, until there is one.
     """
-    with stop_signals() as stopped, closing(Speaker()) as speaker, closing(Notifier()) as notifier:
+    with stop_signals() as stopped, closing(LogWriter()) as speaker, closing(Notifier()) as notifier:
         said = ""
         while not stopped():
             try:

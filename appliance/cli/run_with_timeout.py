@@ -10,12 +10,12 @@ import time
 from collections.abc import Callable
 
 
-class GivenUpError(Exception):
+class TimedOutError(Exception):
     """It gave nothing; the message says why."""
 
 
 def within(seconds: float, do: Callable[[], bytes]) -> bytes:
-    """What `do` gives, from a fork of this process; raises GivenUpError when it is late or has crashed.
+    """What `do` gives, from a fork of this process; raises TimedOutError when it is late or has crashed.
 
     Whoever hangs in the kernel, on a stick that does not answer, cannot be ended: nobody waits for it.
     """
@@ -67,5 +67,5 @@ def _answered(reading: int, until: float, seconds: float) -> bytes:
         if not part:
             if answer.startswith(b"!"):
                 return answer[1:]
-            raise GivenUpError("what read it has crashed")
-    raise GivenUpError(f"not within {seconds:g} s")
+            raise TimedOutError("what read it has crashed")
+    raise TimedOutError(f"not within {seconds:g} s")

@@ -14,8 +14,8 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from appliance.cli.control_client import NoBoxError, Roll, RunningBox
-from appliance.cli.doctor.host_view import living_stage
+from appliance.cli.control_client import ControlClient, NoBoxError, Roll
+from appliance.cli.doctor.host_view import running_stage
 from appliance.cli.sensor_table import SensorTable, known_table, plain_values, unheard
 from appliance.release.installed_box import box_here
 from appliance.sensor.key_editing import KeyEditing, editing
@@ -40,8 +40,8 @@ class Venue:
     keys: Path
 
     @property
-    def running(self) -> RunningBox:
-        return RunningBox.of(self.box)
+    def running(self) -> ControlClient:
+        return ControlClient.of(self.box)
 
 
 def venue(box_file: Path | None, keys: Path | None) -> Venue:
@@ -153,7 +153,7 @@ def reload(place: Venue) -> tuple[bool, str]:
             if not place.running.has_port:
                 words = "The box has no control port to be told by: the change counts when it starts again."
                 return True, words
-            if living_stage(place.box) is None:
+            if running_stage(place.box) is None:
                 return True, f"{error} The change counts when it starts."
         if time.monotonic() >= until:
             return (

@@ -18,7 +18,7 @@ from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
-from appliance.box.checkpoint import PlaceReader
+from appliance.box.checkpoint import CheckpointReader
 from appliance.box.pace import Pace
 from appliance.keeper.keeper import LOOK_S, TURN_S, Carrier, keep_on
 
@@ -170,7 +170,7 @@ class CarrierProcess:
         try:
             _cut_loose(channel, parent)
             carrier = self._kept.carrier(lambda words: _tell(channel, _SAID, words))
-            with closing(PlaceReader(self._runtime)) as place:
+            with closing(CheckpointReader(self._runtime)) as place:
                 keep_on(
                     [carrier],
                     lambda: _is_closed(channel),

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Protocol
 
-from appliance.box.checkpoint_file import PlaceCarrier
+from appliance.box.checkpoint_file import CheckpointCarrier
 from appliance.box.fallback import Fallback, Fallbacks
-from appliance.box.process_health import CompanyWriter
+from appliance.box.process_health import ProcessHealthWriter
 from appliance.keeper.journal_carrier import JournalCarrier
 from appliance.keeper.sensor_memory_carrier import MemoryCarrier
 
@@ -18,7 +18,7 @@ JOURNAL_STOPPED = Fallback(
     "newest minute stays in memory, and it is tried again each 10 s. Free some room, or look at the disk.",
 )
 PLACE_NOT_KEPT = Fallback(
-    PlaceCarrier.fallback,
+    CheckpointCarrier.fallback,
     "The place of the dance is not kept on the disk. The audience sees nothing of it, but after a power cut "
     "the dance begins where it was kept last. Free some room, or look at the disk.",
 )
@@ -50,7 +50,7 @@ class KeeperHealth:
 
     def __init__(self, runtime: Path) -> None:
         self._fallbacks = Fallbacks(OF_THE_KEEPER)
-        self._block = CompanyWriter(runtime, "keeper", self._fallbacks)
+        self._block = ProcessHealthWriter(runtime, "keeper", self._fallbacks)
 
     def tell(self, kept: Iterable[Complaining], now: float) -> None:
         """Call it often; monotonic seconds."""

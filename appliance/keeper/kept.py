@@ -8,7 +8,7 @@ from contextlib import closing
 from functools import partial
 from pathlib import Path
 
-from appliance.box.checkpoint_file import PlaceCarrier
+from appliance.box.checkpoint_file import CheckpointCarrier
 from appliance.box.runtime_folder import Claim, RuntimeFolderError
 from appliance.keeper.carrier_process import CarrierProcess, Kept
 from appliance.keeper.journal_carrier import JournalCarrier
@@ -27,8 +27,8 @@ def kept_by(box: BoxConfig, runtime: Path, journal: Path | None, minutes: float)
     """
     kept: list[Kept] = []
     if (state := box.state_folder) is not None:
-        place, memory = partial(PlaceCarrier, runtime, state), partial(MemoryCarrier, runtime, state)
-        kept.append(Kept("The place of the dance", PlaceCarrier.fallback, place))
+        place, memory = partial(CheckpointCarrier, runtime, state), partial(MemoryCarrier, runtime, state)
+        kept.append(Kept("The place of the dance", CheckpointCarrier.fallback, place))
         kept.append(Kept("What sensors taught the box", MemoryCarrier.fallback, memory))
     if journal is not None:
         carrier = partial(JournalCarrier, runtime, journal, minutes)

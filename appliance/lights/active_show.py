@@ -6,7 +6,7 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.show.show import Show, load_show
 
 
-class Bill:
+class ActiveShow:
     """Follows the stage from show to show."""
 
     def __init__(self, stage: FrameReader) -> None:

@@ -1,11 +1,11 @@
-"""The rig: one pass from the newest frame and the house to the levels of all universes."""
+"""The rig: one pass from the newest frame and the show state to the levels of all universes."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from appliance.box.pace import Pace
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 from appliance.lights.colour import mixed
 from appliance.lights.dance import Dance
 from appliance.lights.head import LONGEST_STEP_S
@@ -56,41 +56,43 @@ class Rig:
         """Whether the stage has shown nothing for LOST_S."""
         return self._unseen_s > LOST_S
 
-    def pass_(self, frame: SeenFrame | None, generation: int, house: House, now: float) -> dict[int, bytes]:
+    def pass_(
+        self, frame: SeenFrame | None, generation: int, show_state: ShowState, now: float
+    ) -> dict[int, bytes]:
         """512 levels for each universe at `now`, monotonic seconds; `generation` is that of the stage."""
         seconds = self._pace.step_s(now)
         self._unseen_s += seconds
         if frame is not None:
             self.dance.see(frame, generation, now)
             self._unseen_s = min(self._unseen_s, now - frame.frame_time)
-        self._secure(house, now, seconds)
-        wishes = self._wishes(house, now, seconds)
+        self._secure(show_state, now, seconds)
+        wishes = self._wishes(show_state, now, seconds)
         safety = self.safety
-        danced = self.patch.dimmed(wishes.values, house.level(now)) if safety < 1.0 else wishes.values
-        safe = self.patch.dimmed(self._safe, _safe_level(house))
+        danced = self.patch.dimmed(wishes.values, show_state.level(now)) if safety < 1.0 else wishes.values
+        safe = self.patch.dimmed(self._safe, _safe_level(show_state))
         self.values = danced + (safe - danced) * np.where(self.patch.snaps, float(safety >= 0.5), safety)
         self._turn_heads(wishes, seconds)
         return self.patch.encode(self.values)
 
-    def last_levels(self, house: House) -> dict[int, bytes]:
+    def last_levels(self, show_state: ShowState) -> dict[int, bytes]:
         """What is left on the wires at the end: the safe look where it has light in it, else zeros.
 
         Blackout takes the light out of it, as in each pass. Heads stay where they point: at zero they would
         swing to the end of their range.
         """
         heads = self.patch.heads
-        is_dark = self._is_dark or not _safe_level(house)
+        is_dark = self._is_dark or not _safe_level(show_state)
         values = self.patch.rest() if is_dark else self.patch.dimmed(self._safe, 1.0)
         values[heads.axes.slots] = heads.axes.shares(heads.angles)
         return self.patch.encode(values)
 
-    def _secure(self, house: House, now: float, seconds: float) -> None:
+    def _secure(self, show_state: ShowState, now: float, seconds: float) -> None:
         """How much of the safe look is there: at once on panic, faded else."""
-        if house.panic:
+        if show_state.panic:
             self.safety = 1.0
         elif self._leaving:
             self.safety = min(self.safety + seconds / LEAVING_FADE_S, 1.0)
-        elif self.is_lost or house.is_safe(now):
+        elif self.is_lost or show_state.is_safe(now):
             self.safety = min(self.safety + seconds / SAFE_FADE_S, 1.0)
         else:
             self.safety = max(self.safety - seconds / SAFE_FADE_S, 0.0)
@@ -107,9 +109,9 @@ class Rig:
         heads.follow(wanted, wishes.aims, aimed, seconds)
         self.values[heads.axes.slots] = heads.axes.shares(heads.angles)
 
-    def _wishes(self, house: House, now: float, seconds: float) -> Wishes:
+    def _wishes(self, show_state: ShowState, now: float, seconds: float) -> Wishes:
         """What the mapping in force wants, faded in from those before it."""
-        self._call(house)
+        self._call(show_state)
         mappings = {layer.mapping for layer in self._layers}  # each once, though it may fade out and in again
         wanted = {mapping: mapping.wishes(self.dance, seconds) for mapping in mappings}
         wishes = wanted[self._layers[0].mapping]
@@ -119,19 +121,19 @@ class Rig:
         self._layers = self._layers[done[-1] :]
         return wishes
 
-    def _call(self, house: House) -> None:
+    def _call(self, show_state: ShowState) -> None:
         """Lay the mapping that show control has called over those that are still fading."""
-        called = (house.lights, house.lights_since)
+        called = (show_state.lights, show_state.lights_since)
         if called == self._called:
             return
         before, self._called = self._called, called
         if before is None:
-            self._layers = [_Layer(self._mapping(house.lights_before), -np.inf, 0.0)]
-        mapping = self._mapping(house.lights)
+            self._layers = [_Layer(self._mapping(show_state.lights_before), -np.inf, 0.0)]
+        mapping = self._mapping(show_state.lights)
         if mapping is self._layers[-1].mapping:
             return
         mapping.begin()
-        self._layers.append(_Layer(mapping, house.lights_since, house.lights_fade_s))
+        self._layers.append(_Layer(mapping, show_state.lights_since, show_state.lights_fade_s))
         self._layers = self._layers[-MOST_LAYERS:]
 
     def _mapping(self, name: str) -> Mapping:
@@ -151,9 +153,9 @@ class _Layer:
         return min(max((now - self._since) / self._fade_s, 0.0), 1.0)
 
 
-def _safe_level(house: House) -> float:
+def _safe_level(show_state: ShowState) -> float:
     """0 or 1: what the safe look is multiplied with. Blackout darkens it; panic shows it all the same."""
-    return 0.0 if house.blackout and not house.panic else 1.0
+    return 0.0 if show_state.blackout and not show_state.panic else 1.0
 
 
 def _safe_look(config: SafeConfig, patch: Patch) -> Values:

@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 from appliance.lights.patch import Patch
 from appliance.lights.plan import draw_plan
 from appliance.lights.rig import Rig
@@ -88,7 +88,7 @@ def _draw(config: LightsConfig, show: Show, out: Path, mapping: str, at_s: float
     rig = Rig(config, patch, show.skeleton)
     rig.safety = 0.0
     for number in range(_SETTLING_PASSES):
-        rig.pass_(frame, 1, House(lights=mapping, lights_before=mapping), number * _PASS_S)
+        rig.pass_(frame, 1, ShowState(lights=mapping, lights_before=mapping), number * _PASS_S)
     named = mapping or next((one.name for one in config.mappings), "none")
     scene = f"{place / phrase.fps:.1f} s into the phrase, mapping {named}"
     dancer = frame.positions.astype(float)

@@ -1,4 +1,4 @@
-"""The lights' process: the shared frame and the house in, levels of all universes out, 40 times a second."""
+"""The lights' process: shared frame and show state in, levels of all universes out, 40 times a second."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from appliance.box.fallback import Fallbacks
-from appliance.box.log_writer import Speaker
+from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
-from appliance.box.process_health import CompanyWriter
+from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import Claim, runtime_folder
-from appliance.box.show_state import HouseReader
+from appliance.box.show_state import ShowStateReader
 from appliance.box.stop_signals import stop_signals
-from appliance.lights.active_show import Bill
+from appliance.lights.active_show import ActiveShow
 from appliance.lights.fallback import DMX_AWAY, OF_THE_LIGHTS, STAGE_UNSEEN
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
@@ -43,7 +43,7 @@ class Lights:
         box: BoxConfig,
         box_file: Path | None,
         stage: FrameReader,
-        house: HouseReader,
+        show_state: ShowStateReader,
         say: Callable[[str], None],
         fallbacks: Fallbacks,
     ) -> None:
@@ -52,7 +52,7 @@ class Lights:
         self.show, self.box = show, box
         self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz)
         self.universes = wired(patch, box)
-        self._stage, self._house, self._say, self._fallbacks = stage, house, say, fallbacks
+        self._stage, self._house, self._say, self._fallbacks = stage, show_state, say, fallbacks
         self._stranger: int | None = None
         self._was_lost = True
         self._troubles: dict[str, str] = {}
@@ -175,34 +175,34 @@ def light_up(directory: Path | None, box_file: Path | None) -> None:
     box = load_box(box_file)
     require_wires(box, box_file)
     with stop_signals() as stopped, ExitStack() as opened:
-        speaker = Speaker()  # a terminal that stands still must not hold up the lights
+        speaker = LogWriter()  # a terminal that stands still must not hold up the lights
         opened.callback(speaker.close)
         folder = runtime_folder(box)
         opened.callback(Claim(folder, "lights").close)
-        notifier, stage, house = Notifier(), FrameReader(folder), HouseReader(folder)
+        notifier, stage, show_state = Notifier(), FrameReader(folder), ShowStateReader(folder)
         opened.callback(notifier.close)
         fallbacks = Fallbacks(OF_THE_LIGHTS)
-        company = CompanyWriter(folder, "lights", fallbacks)
+        company = ProcessHealthWriter(folder, "lights", fallbacks)
         opened.callback(company.close)
         opened.callback(stage.close)
-        opened.callback(house.close)
+        opened.callback(show_state.close)
 
         def pulse(now: float) -> None:
             notifier.ping(now)
             company.tell(now)
 
         if directory is not None:
-            lights = Lights(load_show(directory), box, box_file, stage, house, speaker.say, fallbacks)
+            lights = Lights(load_show(directory), box, box_file, stage, show_state, speaker.say, fallbacks)
             notifier.ready("The lights dance.")
             _light(lights, stopped, pulse)
             company.end(time.monotonic())
             return
         notifier.ready("The lights follow the stage.")
-        bill = Bill(stage)
+        bill = ActiveShow(stage)
         while not stopped():
             if bill.is_new(time.monotonic()):
                 try:
-                    lights = Lights(bill.take(), box, box_file, stage, house, speaker.say, fallbacks)
+                    lights = Lights(bill.take(), box, box_file, stage, show_state, speaker.say, fallbacks)
                 except ConfigError as error:
                     speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
                 else:

@@ -1,4 +1,4 @@
-"""One picture: follow the stage, read the house, draw the dance, lay it onto the wall."""
+"""One picture: follow the stage, read the show state, draw the dance, lay it onto the wall."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 import moderngl
 import numpy as np
 
-from appliance.box.show_state import HouseReader
+from appliance.box.show_state import ShowStateReader
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
 from appliance.pose.skeleton import Skeleton
@@ -51,13 +51,13 @@ class Projector:
         gl: moderngl.Context,
         config: ProjectorConfig,
         reader: FrameReader,
-        house: HouseReader,
+        show_state: ShowStateReader,
         controls: Controls,
         say: Callable[[str], None],
         make_painter: MakePainter = Renderer,
     ) -> None:
         self._gl, self._config, self._make_painter = gl, config, make_painter
-        self._reader, self._house, self._controls, self._say = reader, house, controls, say
+        self._reader, self._house, self._controls, self._say = reader, show_state, controls, say
         self._final = FinalPass(gl, config)
         self._presence = Presence(config.rate or USUAL_RATE)
         self._generation = 0
@@ -94,22 +94,22 @@ class Projector:
             self._prepare(self._to_draw, moment, screen, display, share)
         newest = self._poses.newest if self._poses is not None and self._drawn is not None else None
         presence = self._presence.step(newest, now)
-        house = self._house.read()
-        level = house.level(now) * presence
+        show_state = self._house.read()
+        level = show_state.level(now) * presence
         is_drawn = self._painter is not None and moment is not None and level > 0.0
         size = picture_size(self._config, display, share)
         wall = self._final.wall(screen, display, self._controls, level, size, lines)
         if self._painter is not None and moment is not None and is_drawn:
-            mix = house.look_mix(now)
-            self._painter.draw(moment, house.look, house.look_before, mix, wall)
-            self.shown = house.look if mix in (0.0, 1.0) else None
-        house = self._house.read()  # again: a panic that came meanwhile is in this picture already
-        if house.panic or house.blackout:
+            mix = show_state.look_mix(now)
+            self._painter.draw(moment, show_state.look, show_state.look_before, mix, wall)
+            self.shown = show_state.look if mix in (0.0, 1.0) else None
+        show_state = self._house.read()  # again: a panic that came meanwhile is in this picture already
+        if show_state.panic or show_state.blackout:
             self._final.black(screen, display)
             self.shown = None
             return None
         if wall.framebuffer is not screen or not is_drawn:
-            seen = min(level, house.level(now)) if is_drawn else 0.0
+            seen = min(level, show_state.level(now)) if is_drawn else 0.0
             self._final.draw(screen, display, self._controls, seen, lines)
         is_fresh = newest is not None and now - newest < STALE_S
         return self._poses.left_stage(moment) if self._poses and moment and is_drawn and is_fresh else None

@@ -12,9 +12,9 @@ import moderngl
 
 from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
-from appliance.box.process_health import CompanyWriter
+from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import AlreadyHereError, Claim, runtime_folder
-from appliance.box.show_state import HouseReader
+from appliance.box.show_state import ShowStateReader
 from appliance.outputs.frame_reader import FrameReader
 from appliance.projector.advice import about_resolution, about_software
 from appliance.projector.alignment import AlignmentFile, alignment_folder
@@ -68,11 +68,11 @@ class Run:
             self._controls = Controls(self._file.alignment, self._file.keep, wish.shows_info)
             self._inbox = _inbox(folder, opened, say)
             self._fallbacks = Fallbacks(OF_THE_PROJECTOR)
-            self._company = CompanyWriter(folder, "projector", self._fallbacks)
+            self._company = ProcessHealthWriter(folder, "projector", self._fallbacks)
             opened.callback(self._company.close)
             self._reader = FrameReader(folder)
             opened.callback(self._reader.close)
-            self._house = HouseReader(folder)
+            self._house = ShowStateReader(folder)
             opened.callback(self._house.close)
             self._projector = Projector(
                 self._context.gl, config, self._reader, self._house, self._controls, say

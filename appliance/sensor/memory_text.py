@@ -15,7 +15,7 @@ HEADER = "# What this box remembers of its sensors: neutral poses, and calibrati
 IMU_ID_BYTES = 16
 OFFSETS_BYTES = 22
 LARGEST = 256 * 1024  # bytes
-MOST_PROFILES = 64  # so many IMUs no house has: more would only fill the file
+MOST_PROFILES = 64  # more IMUs than any installation has: more would only fill the file
 
 Worn = tuple[str, str]  # sensor, joint
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import sys
 
-from appliance.box.parent_death import hold_lifeline
+from appliance.box.parent_death import end_with_parent
 
 
 def main() -> int:
     """Run with the settings that `bunraku control` or `bunraku play` hands over; the exit status."""
-    hold_lifeline()
-    from appliance.box.log_writer import Speaker
+    end_with_parent()
+    from appliance.box.log_writer import LogWriter
     from appliance.show_control.run import control
     from appliance.show_control.settings import Settings
 
-    speaker, settings = Speaker(), Settings.unpacked(sys.argv[1])
+    speaker, settings = LogWriter(), Settings.unpacked(sys.argv[1])
     try:
         return control(settings, speaker.say)
     except BlockingIOError:

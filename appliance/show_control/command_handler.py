@@ -1,4 +1,4 @@
-"""The desk: every command that came in, carried out here, in the house, or by stage and projector."""
+"""The desk: every command that came in, carried out here, in the show state, or by stage and projector."""
 
 from __future__ import annotations
 
@@ -7,9 +7,16 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 from appliance.show_control.command import Command, command
-from appliance.show_control.house_commands import (
+from appliance.show_control.key_file import KeyFile
+from appliance.show_control.order_dispatch import OrderDispatch, Then
+from appliance.show_control.orders import Order, Place
+from appliance.show_control.packet import Message, messages_in, readable
+from appliance.show_control.port import Address
+from appliance.show_control.sensor_roster import END as ROSTER_END
+from appliance.show_control.sensor_roster import SENSOR, roster_messages
+from appliance.show_control.show_state_commands import (
     CHANGES,
     PARTS,
     in_cue,
@@ -18,14 +25,7 @@ from appliance.show_control.house_commands import (
     next_cue,
     of_this_show,
 )
-from appliance.show_control.key_file import KeyFile
-from appliance.show_control.order_dispatch import Errands, Then
-from appliance.show_control.orders import Order, Place
-from appliance.show_control.packet import Message, messages_in, readable
-from appliance.show_control.port import Address
-from appliance.show_control.sensor_roster import END as ROSTER_END
-from appliance.show_control.sensor_roster import SENSOR, roster_messages
-from appliance.show_control.stage_observer import StageSight
+from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.standstill import Standstill
 from appliance.show_control.status_messages import END, QUESTIONS, STATUS, Status, status, told
 
@@ -77,23 +77,23 @@ class _Undone(NamedTuple):
     then: Then
 
 
-class Desk:
-    """`tell` sends a message to who asked; `publish` shows the house to all who read it.
+class CommandHandler:
+    """`tell` sends a message to who asked; `publish` shows the show state to all who read it.
 
     refused: commands that were not carried out; reason: why the last one was not.
     """
 
     def __init__(
         self,
-        house: House,
-        sight: StageSight,
-        errands: Errands,
+        show_state: ShowState,
+        sight: StageObserver,
+        errands: OrderDispatch,
         keys: KeyFile,
         tell: Callable[[Address, Message], None],
-        publish: Callable[[House], None],
+        publish: Callable[[ShowState], None],
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.house = house
+        self.show_state = show_state
         self.refused = 0
         self.reason = ""
         self._sight, self._errands, self._keys = sight, errands, keys
@@ -133,17 +133,17 @@ class Desk:
         facts = self._sight.facts
         if facts is not None and self._sight.generation != self._generation:
             self._generation = self._sight.generation
-            self._set(of_this_show(self.house, facts))
+            self._set(of_this_show(self.show_state, facts))
             self._is_new_stage, self._began_in = True, ""
         if self._is_new_stage and facts is not None and (health := self._sight.health()):
             self._is_new_stage, self._began_in = False, str(health.get("cue", ""))
             self._come_back(facts, self._began_in, now)
         self._catch_up()
-        self._standstill.look(self.house, now)
+        self._standstill.look(self.show_state, now)
 
     def status(self, strangers: int, now: float) -> Status:
         """How the box is."""
-        return status(self.house, self._sight, self.refused, strangers, now)
+        return status(self.show_state, self._sight, self.refused, strangers, now)
 
     def _come_back(self, facts: Facts, name: str, now: float) -> None:
         """After a power cut the stage goes on in its cue: so do picture and lights, if nobody said another.
@@ -151,16 +151,16 @@ class Desk:
         Its master stays aside: whoever switches the box on wants to see something.
         """
         cue = next((cue for cue in facts.cues if cue["name"] == name), None)
-        if cue is not None and not self.house.cue:
+        if cue is not None and not self.show_state.cue:
             parts = [part for part in ("look", "lights") if not self._set_by[part]]
-            self._set(in_cue(self.house, {**cue, "fade_s": 0.0}, parts, now))
+            self._set(in_cue(self.show_state, {**cue, "fade_s": 0.0}, parts, now))
 
     def _catch_up(self) -> None:
         """A stage that died before it answered had done its cue if the next one goes on in it."""
         undone = self._undone
         if undone is None or undone.generation == self._generation:
             return
-        if undone.cue == self._began_in != self.house.cue:
+        if undone.cue == self._began_in != self.show_state.cue:
             undone.then(True, "The stage was started anew in it.")
 
     def _carry_out(self, order: Command, asker: Address, now: float) -> None:
@@ -174,7 +174,7 @@ class Desk:
         elif address in CHANGES:
             self._change(order, asker, now)
         elif address in QUESTIONS:
-            for message in told(address, self.house, self._sight, self.status(0, now), now):
+            for message in told(address, self.show_state, self._sight, self.status(0, now), now):
                 self._tell(asker, message)
         elif address == "/sensors/list":
             self._tell_roster(asker, now)
@@ -184,10 +184,10 @@ class Desk:
             self._pass_on(order, asker, now)
 
     def _change(self, order: Command, asker: Address, now: float) -> None:
-        house, words = CHANGES[order.address](self.house, order, self._sight.facts, now)
+        show_state, words = CHANGES[order.address](self.show_state, order, self._sight.facts, now)
         if order.address == "/go":
-            self._standstill.go(self.house, now)
-        self._set(house)
+            self._standstill.go(self.show_state, now)
+        self._set(show_state)
         self._set_by |= {part: self._heard for part in PARTS if order.address == f"/{part}"}
         self._end(asker, order.address, True, words)
 
@@ -195,7 +195,7 @@ class Desk:
         """The stage first; then picture and lights follow, where nothing newer was said about them."""
         facts = self._sight.facts
         names = None if facts is None else [cue["name"] for cue in facts.cues]
-        name = known("cue", order.text, names) if order.text else next_cue(self.house, facts)
+        name = known("cue", order.text, names) if order.text else next_cue(self.show_state, facts)
         cue = next(cue for cue in facts.cues if cue["name"] == name) if facts else {}
         heard, generation = self._heard, self._generation
 
@@ -204,7 +204,7 @@ class Desk:
             if done:
                 parts = [part for part in PARTS if self._set_by[part] <= heard]
                 self._set_by |= dict.fromkeys(parts, heard)
-                self._set(in_cue(self.house, cue, parts, self._monotonic()))
+                self._set(in_cue(self.show_state, cue, parts, self._monotonic()))
             self._end(asker, "/cue", done, f"Cue {name}. {words}".rstrip() if done else words)
 
         self._errands.begin("stage", Order("cue", text=name), now, then)
@@ -229,10 +229,10 @@ class Desk:
         for message in roster_messages(self._sight.health(), key_file, now):
             self._tell(asker, message)
 
-    def _set(self, house: House) -> None:
-        if house != self.house:
-            self.house = house
-            self._publish(house)
+    def _set(self, show_state: ShowState) -> None:
+        if show_state != self.show_state:
+            self.show_state = show_state
+            self._publish(show_state)
 
     def _end(self, asker: Address, address: str, done: bool, words: str) -> None:
         """Tell who asked what came of it."""

@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 
 _PAUSE_S = 0.5  # a fader or a button that somebody plays with never floods the terminal
 
 
-def held_back(house: House) -> str:
+def held_back(show_state: ShowState) -> str:
     """Why the audience sees nothing, and what lifts it; empty where nothing is held back."""
-    if house.panic:
+    if show_state.panic:
         return "Panic is in force: black, lights safe. /go lifts it."
-    if not house.going:
+    if not show_state.going:
         return "The show is stopped: dark. /go lets it go on."
-    if house.blackout:
+    if show_state.blackout:
         return "Blackout is in force. /blackout 0 lifts it."
-    return "" if house.master > 0.0 else "Master is at 0 %: dark. /master 1 brings picture and lights back."
+    return (
+        "" if show_state.master > 0.0 else "Master is at 0 %: dark. /master 1 brings picture and lights back."
+    )
 
 
-class News:
+class ConsoleMessages:
     """Tells each change once; of several within half a second the last."""
 
-    def __init__(self, house: House) -> None:
+    def __init__(self, show_state: ShowState) -> None:
         self._said_at = float("-inf")
-        self._held_back, self._cue = held_back(house), house.cue
+        self._held_back, self._cue = held_back(show_state), show_state.cue
 
-    def look(self, house: House, now: float) -> str:
+    def look(self, show_state: ShowState, now: float) -> str:
         """A sentence when something is new; call it often."""
-        held, cue = held_back(house), house.cue
+        held, cue = held_back(show_state), show_state.cue
         if (held, cue) == (self._held_back, self._cue) or now - self._said_at < _PAUSE_S:
             return ""
         words = [f"Cue {cue}."] if cue and cue != self._cue else []

@@ -1,4 +1,4 @@
-"""Errands: orders on their way to stage, projector and lights, and who waits for what came of them."""
+"""OrderDispatch: orders on their way to stage, projector and lights, and who waits for what came of them."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class _Way:
         return late
 
 
-class Errands:
+class OrderDispatch:
     """Sends orders at a bounded pace, and tells what came of each once; of quiet ones, refusals alone.
 
     Who was held up in the middle of an order answers too late: that it was done then corrects what was told.

@@ -1,4 +1,4 @@
-"""Show control as a process: the port, the house, orders and the heartbeat, until it is told to end."""
+"""Show control as a process: the port, the show state, orders and the heartbeat, until it is told to end."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from appliance.box.notify import Notifier
-from appliance.box.show_state import House, HouseReader, HouseWriter
+from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.box.stop_signals import stop_signals
-from appliance.show_control.command_handler import Desk
-from appliance.show_control.console_messages import News, held_back
+from appliance.show_control.command_handler import CommandHandler
+from appliance.show_control.console_messages import ConsoleMessages, held_back
 from appliance.show_control.heartbeat import Heartbeat
 from appliance.show_control.intake import Intake
 from appliance.show_control.key_file import KeyFile
-from appliance.show_control.order_dispatch import Errands
+from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.orders import OrderSender
 from appliance.show_control.port import Port
 from appliance.show_control.settings import Settings
-from appliance.show_control.stage_observer import StageSight
+from appliance.show_control.stage_observer import StageObserver
 
 _LONGEST_SLEEP_S = 0.25  # a stage that was started anew is found so soon
 _AT_ONCE = 16  # datagrams; then answers, heartbeat and signals have their turn
@@ -42,25 +42,27 @@ class ControlProcess:
             self.port = Port(socket.socket(fileno=settings.descriptor), settings.senders)
             opened.callback(self.port.close)
             self._intake = Intake(self.port)
-            house = _house_left(folder, now)
-            writer = HouseWriter(folder)
+            show_state = _house_left(folder, now)
+            writer = ShowStateWriter(folder)
             opened.callback(writer.close)
             sender = OrderSender(folder)
             opened.callback(sender.close)
-            self.sight = StageSight(folder)
+            self.sight = StageObserver(folder)
             opened.callback(self.sight.close)
-            self._errands = Errands(sender)
+            self._errands = OrderDispatch(sender)
             self._heartbeat = Heartbeat(settings.heartbeat, now)
             opened.callback(self._heartbeat.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
-            self.desk = Desk(house, self.sight, self._errands, keys, self.port.send, writer.write, monotonic)
+            self.desk = CommandHandler(
+                show_state, self.sight, self._errands, keys, self.port.send, writer.write, monotonic
+            )
             self._poll = select.poll()
             for one in (self.port, sender):
                 self._poll.register(one.fileno(), select.POLLIN)
             self._closing = opened.pop_all()
-        writer.write(house)
-        self._news = News(house)
-        if words := held_back(house):
+        writer.write(show_state)
+        self._news = ConsoleMessages(show_state)
+        if words := held_back(show_state):
             say(f"Still from before: {words}")
 
     def run(self, ended: Callable[[], bool], wake: int, notifier: Notifier) -> None:
@@ -88,7 +90,7 @@ class ControlProcess:
         self.desk.look(now)
         if now >= self._heartbeat.due:
             self._heartbeat.beat(self.desk.status(self.port.strangers, now), now)
-        for words in (self.port.news(now), self._news.look(self.desk.house, now)):
+        for words in (self.port.news(now), self._news.look(self.desk.show_state, now)):
             if words:
                 self._say(words)
         if taken == _AT_ONCE:
@@ -103,7 +105,7 @@ class ControlProcess:
         return f"Commands: {refused} refused, the last one: {reason}"
 
     def close(self) -> None:
-        """Free the port and the house; what is in force stays in force."""
+        """Free the port and the show state; what is in force stays in force."""
         self._closing.close()
 
     def _sleep_s(self, now: float) -> float:
@@ -126,9 +128,9 @@ def control(settings: Settings, say: Callable[[str], None]) -> int:
     return 0
 
 
-def _house_left(folder: Path, now: float) -> House:
+def _house_left(folder: Path, now: float) -> ShowState:
     """What an earlier show control left in force: panic stays panic."""
-    with contextlib.closing(HouseReader(folder)) as reader:
+    with contextlib.closing(ShowStateReader(folder)) as reader:
         return reader.read().settled(now)
 
 

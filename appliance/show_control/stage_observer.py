@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import Any, Literal
 
 from appliance.box.fallback import Fallbacks, Fallen, fallen
-from appliance.box.process_health import COMMANDS_DROPPED, STAGE_HUNG, Company
+from appliance.box.process_health import COMMANDS_DROPPED, STAGE_HUNG, ProcessHealth
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
 
 StageState = Literal["dancing", "stopped", "hung", "absent"]
 
 
-class StageSight:
+class StageObserver:
     """The stage of a runtime folder, whether it is there or not."""
 
     def __init__(self, folder: Path) -> None:
         self._reader = FrameReader(folder)
-        self._company = Company(folder)
+        self._company = ProcessHealth(folder)
         self._seen = Fallbacks((STAGE_HUNG, COMMANDS_DROPPED))
 
     def state(self, now: float) -> StageState:

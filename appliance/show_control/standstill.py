@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from appliance.box.show_state import House
-from appliance.show_control.order_dispatch import Errands
+from appliance.box.show_state import ShowState
+from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.orders import Order
-from appliance.show_control.stage_observer import StageSight
+from appliance.show_control.stage_observer import StageObserver
 
 _AGAIN_S = 1.0  # when the stage did not answer
 
@@ -13,18 +13,18 @@ _AGAIN_S = 1.0  # when the stage did not answer
 class Standstill:
     """Orders the stage to stop and to start, until it has done so."""
 
-    def __init__(self, sight: StageSight, errands: Errands) -> None:
+    def __init__(self, sight: StageObserver, errands: OrderDispatch) -> None:
         self._sight, self._errands = sight, errands
         self._generation = -1
         self._stands: bool | None = False  # by our order; None: one was given, and nobody has answered yet
         self._next_try = 0.0
 
-    def go(self, house: House, now: float) -> None:
+    def go(self, show_state: ShowState, now: float) -> None:
         """The show is about to go on: the stage is asked first, if it may stand."""
-        if self._stands is not False or not house.going or self._sight.state(now) == "stopped":
+        if self._stands is not False or not show_state.going or self._sight.state(now) == "stopped":
             self._order("start", now)
 
-    def look(self, house: House, now: float) -> None:
+    def look(self, show_state: ShowState, now: float) -> None:
         """See to it; call it often."""
         if self._sight.generation != self._generation and (told := self._sight.health()):
             self._generation, self._next_try = self._sight.generation, now
@@ -32,9 +32,9 @@ class Standstill:
                 self._stands = False
         if now < self._next_try:
             return
-        if house.going and self._stands is not False:
+        if show_state.going and self._stands is not False:
             self._order("start", now)
-        elif not house.going and not self._stands and house.going_level(now) <= 0.0:
+        elif not show_state.going and not self._stands and show_state.going_level(now) <= 0.0:
             self._order("stop", now)
 
     def leave(self) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 from appliance.show_control.packet import Message
-from appliance.show_control.stage_observer import StageSight
+from appliance.show_control.stage_observer import StageObserver
 
 STATUS, END = "/bunraku/status", "/end"
 QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/hands", "/fallbacks")
@@ -43,13 +43,13 @@ class Status(NamedTuple):
     fallbacks: int
 
 
-def status(house: House, sight: StageSight, refused: int, strangers: int, now: float) -> Status:
+def status(show_state: ShowState, sight: StageObserver, refused: int, strangers: int, now: float) -> Status:
     """What the stage last said about itself, and what show control sees of one that hangs or is not there."""
     stage, health, facts = sight.state(now), sight.health(), sight.facts
     if stage == "absent":
         health = {}
     return Status(
-        state=_state(stage, house),
+        state=_state(stage, show_state),
         show=facts.show_name if facts else "",
         rate_hz=float(health.get("rate_hz", 0.0)) if stage in ("dancing", "stopped") else 0.0,
         late=int(health.get("late", 0)),
@@ -61,12 +61,12 @@ def status(house: House, sight: StageSight, refused: int, strangers: int, now: f
         interaction=int(health.get("interaction", 0)),
         phrase=str(health.get("phrase", "")),
         position_s=_known(health.get("position_s")),
-        cue=house.cue,
-        look=house.look or (facts.looks[0] if facts and facts.looks else ""),
-        lights=house.lights or (facts.lights[0] if facts and facts.lights else ""),
-        level=house.level(now),
-        panic=int(house.panic),
-        blackout=int(house.blackout),
+        cue=show_state.cue,
+        look=show_state.look or (facts.looks[0] if facts and facts.looks else ""),
+        lights=show_state.lights or (facts.lights[0] if facts and facts.lights else ""),
+        level=show_state.level(now),
+        panic=int(show_state.panic),
+        blackout=int(show_state.blackout),
         temperature_c=_known(health.get("temperature_c")),
         uptime_s=_known(health.get("uptime_s")),
         refused=refused,
@@ -75,7 +75,9 @@ def status(house: House, sight: StageSight, refused: int, strangers: int, now: f
     )
 
 
-def told(question: str, house: House, sight: StageSight, now_status: Status, now: float) -> Iterator[Message]:
+def told(
+    question: str, show_state: ShowState, sight: StageObserver, now_status: Status, now: float
+) -> Iterator[Message]:
     """The answer to one of QUESTIONS: a message for each thing, and one to end with."""
     if question == "/status":
         answers: list[Message] = [(STATUS, *now_status)]
@@ -85,22 +87,22 @@ def told(question: str, house: House, sight: StageSight, now_status: Status, now
     yield END, question, len(answers)
 
 
-def _cues(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+def _cues(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
     for cue in sight.facts.cues if sight.facts else ():
         yield "/cues/cue", str(cue["name"]), int(cue["name"] == status.cue)
 
 
-def _phrases(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+def _phrases(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
     for name in sight.facts.phrases if sight.facts else ():
         yield "/phrases/phrase", name, int(name == status.phrase)
 
 
-def _looks(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+def _looks(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
     for name in sight.facts.looks if sight.facts else ():
         yield "/looks/look", name, int(name == status.look)
 
 
-def _hands(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+def _hands(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
     facts = sight.facts
     if facts is None:
         return
@@ -110,7 +112,7 @@ def _hands(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
         yield "/hands/hand", name, who, int(name not in let_go)
 
 
-def _fallbacks(status: Status, sight: StageSight, now: float) -> Iterator[Message]:
+def _fallbacks(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
     for who, one in sight.fallbacks(now):
         yield "/fallbacks/fallback", one.name, who, one.times, int(one.active), one.words[:_LONGEST_WORDS]
 
@@ -124,15 +126,15 @@ _LISTS = {
 }
 
 
-def _state(stage: str, house: House) -> str:
+def _state(stage: str, show_state: ShowState) -> str:
     """One word: the worst first, as black is what the audience sees of a stage that hangs anyway."""
     if stage in ("hung", "absent"):
         return stage
-    if house.panic:
+    if show_state.panic:
         return "panic"
-    if house.blackout:
+    if show_state.blackout:
         return "blackout"
-    return stage if house.going else "stopped"
+    return stage if show_state.going else "stopped"
 
 
 def _known(value: float | None) -> float:

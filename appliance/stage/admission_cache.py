@@ -12,12 +12,12 @@ from typing import Any
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.admission import Admission
-from appliance.stage.stage_parts import Cast, admission, warm_up
+from appliance.stage.stage_parts import StageParts, admission, warm_up
 
 FILE = "admission.json"
 
 
-def admitted(folder: Path, cast: Cast, show: Show, box: BoxConfig, comes_back: bool) -> Admission:
+def admitted(folder: Path, cast: StageParts, show: Show, box: BoxConfig, comes_back: bool) -> Admission:
     """Measure what fits the tick's budget; a stage that `comes_back` takes what was measured before it.
 
     It is what was measured with the same network, iterations, hands, budget and priority, since the machine

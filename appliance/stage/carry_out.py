@@ -9,8 +9,8 @@ from appliance.show.config_error import did_you_mean
 from appliance.show.cues import CueConfig
 from appliance.show_control.orders import Order
 from appliance.stage.iterations import Iterations
-from appliance.stage.sensor_fit import Wearing
-from appliance.stage.stage_parts import Cast
+from appliance.stage.sensor_fit import SensorFit
+from appliance.stage.stage_parts import StageParts
 
 SENSOR_ORDERS = frozenset(("neutral", "heading", "strobe", "reload"))
 STROBE_S = 10.0
@@ -19,7 +19,7 @@ Outcome = tuple[bool, str]
 
 
 def carry_out(
-    order: Order, cast: Cast, iterations: Iterations, wearing: Wearing, usual_rate: float, now: float
+    order: Order, cast: StageParts, iterations: Iterations, wearing: SensorFit, usual_rate: float, now: float
 ) -> Outcome:
     """Carry out any order: whether it was done, and a sentence where there is something to say about it."""
     if order.name in SENSOR_ORDERS:
@@ -27,7 +27,7 @@ def carry_out(
     return obey(order, cast, iterations, usual_rate)
 
 
-def obey(order: Order, cast: Cast, iterations: Iterations, usual_rate: float) -> Outcome:
+def obey(order: Order, cast: StageParts, iterations: Iterations, usual_rate: float) -> Outcome:
     """Carry out one order: whether it was done, and a sentence where there is something to say about it."""
     try:
         if order.name in ("hold", "release"):
@@ -54,7 +54,7 @@ def obey(order: Order, cast: Cast, iterations: Iterations, usual_rate: float) ->
     return True, ""
 
 
-def resume(name: str, cast: Cast, iterations: Iterations) -> str:
+def resume(name: str, cast: StageParts, iterations: Iterations) -> str:
     """Before the first tick: begin in the cue that was in force; a sentence about it, "" for no such cue."""
     cue = cast.cues.get(name)
     if cue is None:
@@ -64,7 +64,7 @@ def resume(name: str, cast: Cast, iterations: Iterations) -> str:
     return f"The show goes on in the cue '{name}'. {_fire(cue, cast, iterations, 0.0)}".rstrip()
 
 
-def obey_for_sensors(order: Order, cast: Cast, wearing: Wearing, now: float) -> Outcome:
+def obey_for_sensors(order: Order, cast: StageParts, wearing: SensorFit, now: float) -> Outcome:
     """Carry out one of SENSOR_ORDERS: whether it was done, and a sentence for who asked."""
     sensor = str(order.text)
     try:
@@ -91,7 +91,7 @@ def obey_for_sensors(order: Order, cast: Cast, wearing: Wearing, now: float) -> 
     )
 
 
-def _admit(order: Order, cast: Cast) -> str:
+def _admit(order: Order, cast: StageParts) -> str:
     cast.link.admit(order.keys)
     known = f"The box knows {len(order.keys)} sensor{'' if len(order.keys) == 1 else 's'} now"
     missing = [name for name in cast.worn if name not in order.keys]
@@ -110,7 +110,7 @@ def _require_heard(names: list[str], link: SensorLink, now: float) -> None:
         raise ValueError(f"Sensor {', '.join(names)} is silent. Switch it on, and look at its battery.")
 
 
-def _play(order: Order, cast: Cast, usual_rate: float) -> None:
+def _play(order: Order, cast: StageParts, usual_rate: float) -> None:
     motion = cast.motion
     if order.name == "start":
         motion.rate = usual_rate or 1.0
@@ -126,7 +126,7 @@ def _play(order: Order, cast: Cast, usual_rate: float) -> None:
         raise ValueError(f"The stage knows no order '{order.name}'.")
 
 
-def _cue(name: str, cast: Cast) -> CueConfig:
+def _cue(name: str, cast: StageParts) -> CueConfig:
     if name not in cast.cues:
         if not cast.cues:
             raise ValueError("This show has no cues. Write some under `cues` in its show.yaml.")
@@ -134,7 +134,7 @@ def _cue(name: str, cast: Cast) -> CueConfig:
     return cast.cues[name]
 
 
-def _fire(cue: CueConfig, cast: Cast, iterations: Iterations, fade_s: float) -> str:
+def _fire(cue: CueConfig, cast: StageParts, iterations: Iterations, fade_s: float) -> str:
     """What of a cue concerns the dance; its names were checked when the show was read."""
     words = ""
     if cue.phrase is not None:
@@ -148,7 +148,7 @@ def _fire(cue: CueConfig, cast: Cast, iterations: Iterations, fade_s: float) -> 
     return words
 
 
-def _hold(order: Order, cast: Cast) -> str:
+def _hold(order: Order, cast: StageParts) -> str:
     """Let the hand of a joint hold or let go; says which joint, where it was asked for by its number."""
     name, holds = _joint(order.text, cast), bool(order.values[0])
     for puppeteer in cast.hands.puppeteers:
@@ -160,13 +160,13 @@ def _hold(order: Order, cast: Cast) -> str:
     raise ValueError(f"No hand of this show holds '{name}'. {cure}")
 
 
-def _enable(puppeteer: Puppeteer, holds: bool, cast: Cast) -> None:
+def _enable(puppeteer: Puppeteer, holds: bool, cast: StageParts) -> None:
     puppeteer.enabled = holds
     if holds and isinstance(puppeteer, Remote):
         puppeteer.hold_here(_orientation(puppeteer.joint, cast).tolist())
 
 
-def _orientation(joint: str, cast: Cast) -> quaternion.Array:
+def _orientation(joint: str, cast: StageParts) -> quaternion.Array:
     """Where a joint is now, local to its parent; before the first tick where the phrase has it."""
     place = cast.skeleton.index(joint)
     parent, world = cast.skeleton.parents[place], cast.grounding.figure.world
@@ -178,7 +178,7 @@ def _orientation(joint: str, cast: Cast) -> quaternion.Array:
     return here
 
 
-def _turn(order: Order, cast: Cast) -> None:
+def _turn(order: Order, cast: StageParts) -> None:
     """Give a joint that is held by OSC its orientation, or back to the puppet."""
     name = _joint(order.text, cast)
     for puppeteer in cast.hands.puppeteers:
@@ -194,7 +194,7 @@ def _turn(order: Order, cast: Cast) -> None:
     )
 
 
-def _joint(joint: str | int, cast: Cast) -> str:
+def _joint(joint: str | int, cast: StageParts) -> str:
     """A joint's name; it may be asked for by its number in the skeleton."""
     if isinstance(joint, str):
         return joint

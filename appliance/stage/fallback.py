@@ -8,8 +8,8 @@ from appliance.box.fallback import Fallback, Fallbacks, Fallen
 from appliance.dancer.puppeteers import HOLD_S
 from appliance.stage.admission import Admission
 from appliance.stage.health import Health
-from appliance.stage.resume import Resuming
-from appliance.stage.stage_parts import Cast
+from appliance.stage.resume import Resumption
+from appliance.stage.stage_parts import StageParts
 
 SENSOR_SILENT = Fallback(
     "sensor-silent",
@@ -106,7 +106,7 @@ _FOREIGN = ("length", "magic", "version", "kind", "device", "tag", "old_session"
 class StageFallbacks:
     """Sensors are watched at each tick, all else is looked at once a second, after the frame has left."""
 
-    def __init__(self, cast: Cast, admission: Admission) -> None:
+    def __init__(self, cast: StageParts, admission: Admission) -> None:
         self._cast = cast
         self.all = Fallbacks(OF_THE_STAGE)
         self._worn = [joints[0] for joints in cast.worn.values()]
@@ -124,7 +124,7 @@ class StageFallbacks:
                 if silent:
                     self.all.count(SENSOR_SILENT.name, now)
 
-    def begin(self, now: float, resuming: Resuming, not_shared: str, is_recorded: bool) -> None:
+    def begin(self, now: float, resuming: Resumption, not_shared: str, is_recorded: bool) -> None:
         """Right before the first tick: how it came to this start, and what the stage could not get.
 
         `not_shared`: why no frames can be shared, else "".

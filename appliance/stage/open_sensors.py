@@ -14,7 +14,7 @@ from appliance.stage.stage_error import StageError
 _MOVES_FREELY = "No sensor is let in, and the dancer moves freely."
 
 
-def open_ears(
+def open_sensors(
     box: BoxConfig, sensors: Sequence[str], profiles: Mapping[bytes, bytes]
 ) -> tuple[SensorLink, tuple[str, ...]]:
     """The link to a show's sensors, and why some are not let in. Raises StageError where a port is taken.

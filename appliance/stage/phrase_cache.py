@@ -31,7 +31,7 @@ _HEAD = struct.Struct("<17sII3x")  # magic, bytes of the facts, CRC-32 of all th
 _ALIGNED = 64
 
 
-class Preparations:
+class PhraseCache:
     """Where prepared phrases lie: in the show's bundle, and in memory for as long as the machine runs."""
 
     def __init__(self, bundle: Path, memory: Path | None) -> None:
@@ -77,7 +77,7 @@ def prepare(phrases: Iterable[Path], bundle: Path, skeleton: Skeleton, grounded:
 
     Does nothing where the folder takes no file. Raises as read_bvh and survey do.
     """
-    preparations = Preparations(bundle, bundle / FOLDER)
+    preparations = PhraseCache(bundle, bundle / FOLDER)
     for path in phrases:
         preparations.phrase(path, skeleton, grounded)
     preparations.forget_others()

@@ -21,7 +21,7 @@ from appliance.show_control.orders import Order
 from appliance.stage.carry_out import carry_out
 from appliance.stage.comparison import Comparison
 from appliance.stage.iterations import Iterations
-from appliance.stage.sensor_fit import Wearing
+from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import assemble
 from appliance.stage.tick import Tick
@@ -49,7 +49,7 @@ class Replay:
             )
         cast.link = self._link = _RecordedLink(run)
         cast.puppet = self._puppet = _RecordedPuppet(show)
-        self._wearing = Wearing(cast, SensorMemory(None, _nobody), _nobody)
+        self._wearing = SensorFit(cast, SensorMemory(None, _nobody), _nobody)
         self.tick = Tick(cast, self._wearing, Iterations(1, 0, 1), 0.0)
 
     @property

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from appliance.box.checkpoint import FILE, Place, PlaceReader, PlaceWriter, boot_id
-from appliance.box.checkpoint_file import read_place
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, CheckpointWriter, boot_id
+from appliance.box.checkpoint_file import read_checkpoint
 from appliance.show.box import Resume
 from appliance.stage.iterations import Iterations
-from appliance.stage.stage_parts import Cast
+from appliance.stage.stage_parts import StageParts
 
 TRIES = 5  # starts from one place without a frame: then it is the place that is wrong
 
 
-class Resuming:
+class Resumption:
     """Knows where the show was, and keeps where it is: some microseconds a tick, and never a disk.
 
     went_on: whether this start is one of them; restarts, power_cuts: how often this show went on after one;
@@ -29,10 +29,10 @@ class Resuming:
         self._found, self._after_power_cut = _found(runtime, state, wanted, self._boot)
         self.restarts = self._found.restarts if self._found else 0
         self.power_cuts = self._found.power_cuts if self._found else 0
-        self._now: Place | None = None
-        self._writer: PlaceWriter | None = None
+        self._now: Checkpoint | None = None
+        self._writer: CheckpointWriter | None = None
         try:
-            self._writer = PlaceWriter(runtime)
+            self._writer = CheckpointWriter(runtime)
         except OSError as error:
             self.complaint = (
                 f"{runtime}: the place of the dance cannot be kept there ({error.strerror}). The dance goes "
@@ -45,7 +45,7 @@ class Resuming:
         """Whether a stage danced here since the machine was switched on, and did not end as it should."""
         return self._found is not None and not self._after_power_cut
 
-    def go_on(self, cast: Cast, iterations: Iterations) -> str:
+    def go_on(self, cast: StageParts, iterations: Iterations) -> str:
         """Before the first tick: put the cast where the show was. Gives what to say about it, or ""."""
         place = self._found
         if place is None:
@@ -69,12 +69,12 @@ class Resuming:
         where += f" at {place.position_s:.1f} s of the phrase '{place.phrase}'"
         return f"{why} the show goes on{where}. {words}".rstrip()
 
-    def begin(self, cast: Cast, iterations: Iterations) -> None:
+    def begin(self, cast: StageParts, iterations: Iterations) -> None:
         """Right before the first tick: a start from here is tried."""
         tries = min(self._found.tries + 1, TRIES) if self._found and self._found.tries < TRIES else 1
         self._write(replace(self._place(cast, iterations, -1), tries=tries))
 
-    def note(self, cast: Cast, iterations: Iterations, tick: int) -> None:
+    def note(self, cast: StageParts, iterations: Iterations, tick: int) -> None:
         """The frame of this tick has left, and the cast has moved on: here the next one begins."""
         if self._writer is not None:
             self._write(self._place(cast, iterations, tick))
@@ -89,7 +89,7 @@ class Resuming:
         if self._writer is not None:
             self._writer.close()
 
-    def _take(self, place: Place, cast: Cast, iterations: Iterations) -> str:
+    def _take(self, place: Checkpoint, cast: StageParts, iterations: Iterations) -> str:
         """Raises ValueError where this show has no such place."""
         if place.show != self._show:
             raise ValueError(f"Before, the show was '{place.show}'.")
@@ -104,11 +104,11 @@ class Resuming:
         cast.cue = place.cue if place.cue in cast.cues else ""
         return iterations.ask(place.coding, place.interaction)
 
-    def _place(self, cast: Cast, iterations: Iterations, tick: int) -> Place:
+    def _place(self, cast: StageParts, iterations: Iterations, tick: int) -> Checkpoint:
         motion = cast.motion
         phrase, position_s = motion.going_on
         coding, interaction = iterations.asked
-        return Place(
+        return Checkpoint(
             self._show,
             phrase,
             position_s,
@@ -126,7 +126,7 @@ class Resuming:
             self.power_cuts,
         )
 
-    def _write(self, place: Place) -> None:
+    def _write(self, place: Checkpoint) -> None:
         self._now = place
         if self._writer is None:
             return
@@ -136,15 +136,15 @@ class Resuming:
             self._writer, self.complaint = None, f"The place of the dance is not kept: {error}"
 
 
-def _found(runtime: Path, state: Path | None, wanted: Resume, boot: str) -> tuple[Place | None, bool]:
+def _found(runtime: Path, state: Path | None, wanted: Resume, boot: str) -> tuple[Checkpoint | None, bool]:
     """Where the show was, None: nowhere; and whether the machine has started anew since."""
     if wanted == "never":
         return None, False
-    reader = PlaceReader(runtime)
+    reader = CheckpointReader(runtime)
     place = reader.read()
     reader.close()
     if place is None and state is not None:
-        place = read_place(state / FILE)
+        place = read_checkpoint(state / FILE)
     if place is None or place.ended:
         return None, False
     power_cut = place.boot != boot

@@ -9,7 +9,7 @@ from pathlib import Path
 from appliance.box.clock import Slot, TickClock
 from appliance.box.notify import Notifier
 from appliance.box.realtime import enter_realtime, leave_realtime
-from appliance.box.show_state import HouseReader
+from appliance.box.show_state import ShowStateReader
 from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
 from appliance.sensor.link import SensorState
 from appliance.show.box import BoxConfig
@@ -24,13 +24,13 @@ from appliance.stage.iterations import Iterations
 from appliance.stage.phase_lock import PhaseLock
 from appliance.stage.phrase_cache import MEMORY
 from appliance.stage.recorder import Recorder
-from appliance.stage.resume import Resuming
-from appliance.stage.sensor_fit import Wearing
+from appliance.stage.resume import Resumption
+from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_lines import roster_lines
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.sharing import Sharing, facts_of
 from appliance.stage.stage_error import StageError
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from appliance.stage.watch import Watch
 
@@ -66,11 +66,11 @@ class Stage:
             opened.callback(self.sharing.close)
             self.notifier = Notifier()
             opened.callback(self.notifier.close)
-            self.resuming = Resuming(show.config.name, self.sharing.noted, box.state_folder, box.resume)
+            self.resuming = Resumption(show.config.name, self.sharing.noted, box.state_folder, box.resume)
             opened.callback(self.resuming.close)
             self.memory = SensorMemory(box.state_folder, say, self.sharing.noted)
             opened.callback(self.memory.close)
-            self.cast: Cast = assemble(
+            self.cast: StageParts = assemble(
                 show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY
             )
             opened.callback(self.cast.close)
@@ -88,7 +88,7 @@ class Stage:
         )
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
-        self.wearing = Wearing(self.cast, self.memory, self._tell_people)
+        self.wearing = SensorFit(self.cast, self.memory, self._tell_people)
         self._resume()
         self.tick = Tick(self.cast, self.wearing, self.iterations, latest_start_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
@@ -209,8 +209,8 @@ class Stage:
         """After a crash or a power cut: go on where the show was, or else in the cue that is in force."""
         words = [self.resuming.complaint, self.resuming.go_on(self.cast, self.iterations)]
         if not self.resuming.went_on:
-            with closing(HouseReader(self.sharing.folder)) as house:
-                words.append(resume(house.read().cue, self.cast, self.iterations))
+            with closing(ShowStateReader(self.sharing.folder)) as show_state:
+                words.append(resume(show_state.read().cue, self.cast, self.iterations))
         for sentence in filter(None, words):
             self.say(sentence)
 

@@ -1,4 +1,4 @@
-"""Wearer: one sensor on a dancer, the joints that it holds, and how it is worn there."""
+"""SensorBinding: one sensor on a dancer, the joints that it holds, and how it is worn there."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class WornHand:
 
 
 @dataclass(slots=True)
-class Wearer:
+class SensorBinding:
     """One sensor on a dancer: its joints, its newest reading, the stillness that it needs yet (0: none)."""
 
     name: str

@@ -16,9 +16,9 @@ from appliance.sensor.neutral import (
     with_heading_reset,
 )
 from appliance.show.config_error import did_you_mean
-from appliance.stage.sensor_binding import Wearer, WornHand, upright
+from appliance.stage.sensor_binding import SensorBinding, WornHand, upright
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.stage_parts import Cast
+from appliance.stage.stage_parts import StageParts
 
 ASKED_STILL_S = 0.5  # of stillness are enough for a neutral pose that was asked for
 ASKED_WITHIN_S = 3.0
@@ -26,7 +26,7 @@ CARRIED_WITHIN_S = 60.0  # a sensor that comes back later may have changed hands
 FRESH_S = 0.5  # an older reading does not tell how the dancer stands
 
 
-class Wearing:
+class SensorFit:
     """Joins what the sensors say with what the joints get; what is to be said leaves with `look`.
 
     One neutral pose is taken by itself at each power-on, when the dancer stands still; after that only when
@@ -34,13 +34,13 @@ class Wearing:
     lost, and carried over from where the joint was. Another wearable under the same name does not.
     """
 
-    def __init__(self, cast: Cast, memory: SensorMemory, say: Callable[[str], None]) -> None:
+    def __init__(self, cast: StageParts, memory: SensorMemory, say: Callable[[str], None]) -> None:
         self._link = cast.link
         self._memory = memory
         self._say = say
         self._news: list[str] = []
         self._wearers = {
-            name: Wearer(name, [WornHand(joint, cast.mountings[joint.joint]) for joint in joints])
+            name: SensorBinding(name, [WornHand(joint, cast.mountings[joint.joint]) for joint in joints])
             for name, joints in cast.worn.items()
         }
         for wearer in self._wearers.values():
@@ -140,14 +140,14 @@ class Wearing:
                 self._link.wants_neutral.discard(name)
         self._news[:] = state[""]
 
-    def _meet(self, wearer: Wearer, reading: SensorReading) -> None:
+    def _meet(self, wearer: SensorBinding, reading: SensorReading) -> None:
         """The first reading of this run: after a restart of the box alone, its pose holds still."""
         if wearer.has_pose_of(reading.boot_nonce):
             self._news.append(f"Sensor {wearer.name}: the neutral pose taken before is used on. Dance.")
         else:
             self._ask_for_stillness(wearer)
 
-    def _meet_again(self, wearer: Wearer, before: SensorReading, reading: SensorReading) -> None:
+    def _meet_again(self, wearer: SensorBinding, before: SensorReading, reading: SensorReading) -> None:
         """The sensor was switched on again, or its IMU restarted: its heading is another one."""
         wearer.stillness.restart()
         is_known = wearer.has_pose_of(before.boot_nonce)
@@ -165,11 +165,11 @@ class Wearing:
             "If it stands askew: a double tap on the sensor, then stand still."
         )
 
-    def _ask_for_stillness(self, wearer: Wearer) -> None:
+    def _ask_for_stillness(self, wearer: SensorBinding) -> None:
         self._wait_for(wearer, STILL_S)
         self._news.append(f"Sensor {wearer.name} is on. Its dancer stands still for a breath now.")
 
-    def _take(self, wearer: Wearer) -> None:
+    def _take(self, wearer: SensorBinding) -> None:
         reading = wearer.reading
         assert reading is not None
         self._settle(wearer)
@@ -181,7 +181,7 @@ class Wearing:
             if axis != hand.mounting.facing:
                 self._news.append(upright(wearer.name, hand, axis))
 
-    def _give_up(self, wearer: Wearer) -> None:
+    def _give_up(self, wearer: SensorBinding) -> None:
         """Who asked did not stand still. A power-on that still waits for its first pose goes on waiting."""
         self._news.append(
             f"Sensor {wearer.name} did not keep still within {ASKED_WITHIN_S:g} s: no new neutral pose. "
@@ -192,15 +192,15 @@ class Wearing:
         else:
             self._wait_for(wearer, STILL_S)
 
-    def _wait_for(self, wearer: Wearer, still_s: float, until: float = math.inf) -> None:
+    def _wait_for(self, wearer: SensorBinding, still_s: float, until: float = math.inf) -> None:
         wearer.needs_still_s, wearer.waits_until = still_s, until
         self._link.wants_neutral.add(wearer.name)
 
-    def _settle(self, wearer: Wearer) -> None:
+    def _settle(self, wearer: SensorBinding) -> None:
         wearer.needs_still_s, wearer.waits_until = 0.0, math.inf
         self._link.wants_neutral.discard(wearer.name)
 
-    def _wear(self, wearer: Wearer, poses: Iterable[NeutralPose]) -> None:
+    def _wear(self, wearer: SensorBinding, poses: Iterable[NeutralPose]) -> None:
         """Put a pose on each of the sensor's joints, and keep them for the next start, all or none."""
         taken: dict[str, NeutralPose] = {}
         for hand, pose in zip(wearer.hands, poses, strict=True):
@@ -210,7 +210,7 @@ class Wearing:
         if taken:
             self._memory.keep_neutral(wearer.name, taken)
 
-    def _asked(self, sensor: str | None, now: float) -> list[tuple[Wearer, SensorReading]]:
+    def _asked(self, sensor: str | None, now: float) -> list[tuple[SensorBinding, SensorReading]]:
         """The sensors that a person means, with a fresh reading: who is silent shows nothing to go by."""
         wearers = (self._wearers[name] for name in self.named(sensor))
         return [

@@ -15,7 +15,7 @@ from appliance.show.show import Show
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.stage_error import StageError
-from appliance.stage.stage_parts import Cast
+from appliance.stage.stage_parts import StageParts
 from appliance.stage.thermometer import Thermometer
 
 
@@ -65,7 +65,7 @@ class Sharing:
         self._thermometer = Thermometer()
         self.complaint = ""
 
-    def begin(self, cast: Cast, facts: Facts, say: Callable[[str], None]) -> None:
+    def begin(self, cast: StageParts, facts: Facts, say: Callable[[str], None]) -> None:
         """From now on frames are shared, if the folder has room for them; without it, the dance goes on."""
         try:
             cast.outputs.share(FrameWriter(self.folder, facts))
@@ -81,7 +81,7 @@ class Sharing:
         self,
         now: float,
         health: Health,
-        cast: Cast,
+        cast: StageParts,
         iterations: Iterations,
         sensor_age_s: float | None,
         locked: bool,

@@ -29,13 +29,13 @@ from appliance.show.cues import CueConfig
 from appliance.show.posistagenet import misfits
 from appliance.show.show import HandConfig, Show
 from appliance.stage.admission import Admission, admit
-from appliance.stage.open_sensors import open_ears
-from appliance.stage.phrase_cache import Preparations
+from appliance.stage.open_sensors import open_sensors
+from appliance.stage.phrase_cache import PhraseCache
 from appliance.stage.stage_error import StageError
 
 
 @dataclass(slots=True)
-class Cast:
+class StageParts:
     """Everything that dances, hears and speaks.
 
     `hand_places`: where the hands' joints stand among the moving ones; `worn`: which joints a sensor holds;
@@ -99,7 +99,7 @@ def assemble(
     profiles: Mapping[bytes, bytes] = MappingProxyType({}),
     box_file: Path | None = None,
     memory: Path | None = None,
-) -> Cast:
+) -> StageParts:
     """Open every port and file of a show; `profiles`: the sensors' calibrations that the box has kept;
     `memory`: a folder where phrases that were made ready are kept for the next start.
 
@@ -109,7 +109,7 @@ def assemble(
     try:
         puppet = Puppet(show.network, show.skeleton)
         show.require_moving(puppet.joints)
-        motion, floor = _playback(show, puppet.window, Preparations(show.directory, memory))
+        motion, floor = _playback(show, puppet.window, PhraseCache(show.directory, memory))
     except PuppetError as error:
         raise StageError(str(error)) from error
     puppeteers = [_puppeteer(hand) for hand in show.config.hands]
@@ -119,8 +119,8 @@ def assemble(
         if hand.sensor is not None and isinstance(puppeteer, WornSensor):
             worn.setdefault(hand.sensor, []).append(puppeteer)
             mountings[hand.joint] = _mounting(hand)
-    link, complaints = open_ears(box, list(worn), profiles)
-    return Cast(
+    link, complaints = open_sensors(box, list(worn), profiles)
+    return StageParts(
         skeleton=show.skeleton,
         puppet=puppet,
         motion=motion,
@@ -138,7 +138,7 @@ def assemble(
     )
 
 
-def admission(cast: Cast, show: Show, box: BoxConfig) -> Admission:
+def admission(cast: StageParts, show: Show, box: BoxConfig) -> Admission:
     """Measure the show's iterations on this machine with the first window and all hands of the show."""
     dance = _dance(cast)
     dancer = show.config.dancer
@@ -148,12 +148,12 @@ def admission(cast: Cast, show: Show, box: BoxConfig) -> Admission:
         )
 
 
-def warm_up(cast: Cast, admitted: Admission) -> None:
+def warm_up(cast: StageParts, admitted: Admission) -> None:
     """Let the network run once as the first tick will: its first run takes several times as long."""
     _dance(cast)(admitted.coding, admitted.interaction)
 
 
-def _dance(cast: Cast) -> Callable[[int, int], object]:
+def _dance(cast: StageParts) -> Callable[[int, int], object]:
     """Runs the puppet with the first window and all hands of the show; its poses go nowhere."""
     window = cast.puppet.select(cast.motion.window()).copy()
     mask, targets, weights = cast.hands.mask.copy(), cast.hands.targets, cast.hands.weights
@@ -182,7 +182,7 @@ def _mounting(hand: HandConfig) -> Mounting:
     return Mounting(hand.facing, hand.at_neutral, hand.neutral)
 
 
-def _playback(show: Show, window: int, preparations: Preparations) -> tuple[Playback, Floor | None]:
+def _playback(show: Show, window: int, preparations: PhraseCache) -> tuple[Playback, Floor | None]:
     """All phrases of a show, ready to be switched, and the floor of the one that it starts with."""
     motion, (path, *others) = show.config.motion, show.phrases.values()
     try:
@@ -206,7 +206,7 @@ def _playback(show: Show, window: int, preparations: Preparations) -> tuple[Play
     return playback, floor
 
 
-def _phrase(show: Show, path: Path, preparations: Preparations) -> tuple[Recording, Floor | None]:
+def _phrase(show: Show, path: Path, preparations: PhraseCache) -> tuple[Recording, Floor | None]:
     """A phrase at the tick's rate, and what its survey learnt of the floor."""
     found = preparations.phrase(path, show.skeleton, show.config.motion.grounded)
     if found is None:

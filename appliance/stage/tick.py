@@ -14,8 +14,8 @@ from appliance.outputs.joint_frame import JointFrame
 from appliance.recorder.record import SECTIONS
 from appliance.sensor.link import SensorReading
 from appliance.stage.iterations import Iterations
-from appliance.stage.sensor_fit import Wearing
-from appliance.stage.stage_parts import Cast
+from appliance.stage.sensor_fit import SensorFit
+from appliance.stage.stage_parts import StageParts
 
 _STANDING = ("pose", "world", "positions", "root")  # arrays of a frame
 DRAIN, MOTION, HANDS, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
@@ -31,8 +31,8 @@ class Tick:
 
     def __init__(
         self,
-        cast: Cast,
-        wearing: Wearing,
+        cast: StageParts,
+        wearing: SensorFit,
         iterations: Iterations,
         latest_start_s: float,
         monotonic: Callable[[], float] = time.monotonic,

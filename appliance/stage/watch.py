@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence, Set
 
 from appliance.sensor import wire
 from appliance.sensor.state import LOW_BATTERY, SensorState
-from appliance.stage.stage_parts import Cast
+from appliance.stage.stage_parts import StageParts
 
 SILENT_S = 0.5
 CHARGED = 25  # percent: above it a low battery may be said again
@@ -16,7 +16,7 @@ CHARGED = 25  # percent: above it a low battery may be said again
 class Watch:
     """Remembers what was said about sensors, receivers and the network, so that only changes are said."""
 
-    def __init__(self, cast: Cast) -> None:
+    def __init__(self, cast: StageParts) -> None:
         self._cast = cast
         self._silent: set[str] = set()
         self._ways: dict[str, str] = {}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 from appliance.lights.patch import Patch
 from appliance.lights.rig import Rig
 from appliance.outputs.frame_reader import SeenFrame
@@ -52,13 +52,13 @@ def test_pass(measured: Callable[..., Any], fading: bool, request: pytest.Fixtur
     config = LightsConfig.model_validate(values)
     rig = Rig(config, Patch(config.fixtures, None), skeleton)
     rig.safety = 0.0
-    house = House(lights="other", lights_before="one", lights_fade_s=1e9) if fading else House()
+    show_state = ShowState(lights="other", lights_before="one", lights_fade_s=1e9) if fading else ShowState()
     frames = itertools.cycle(range(200))
     dance = [_frame(skeleton, number) for number in range(200)]
     clock = itertools.count()
 
     def one_pass() -> dict[int, bytes]:
-        return rig.pass_(dance[next(frames)], 1, house, next(clock) * 0.025)
+        return rig.pass_(dance[next(frames)], 1, show_state, next(clock) * 0.025)
 
     levels = measured(request.node.callspec.id, GROUP)(one_pass)
     assert set(levels) == {1, 2}

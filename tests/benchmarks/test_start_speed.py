@@ -16,7 +16,7 @@ from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
 from appliance.stage.iterations import Iterations
-from appliance.stage.resume import Resuming
+from appliance.stage.resume import Resumption
 from appliance.stage.stage_parts import assemble
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST
@@ -101,7 +101,7 @@ def test_the_return_by_the_whole_parser(starts: Callable[..., Starts], measured:
 def test_noting_the_place(tmp_path: Path, measured: Callable[..., Any]) -> None:
     box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
     cast = assemble(load_show(default_show_path()), box)
-    resuming, iterations = Resuming("A show", tmp_path, None, "always"), Iterations(10, 9, 20)
+    resuming, iterations = Resumption("A show", tmp_path, None, "always"), Iterations(10, 9, 20)
     measured("noting it", NOTE_GROUP, reference=True)(lambda: resuming.note(cast, iterations, 1))
     resuming.close()
     cast.close()

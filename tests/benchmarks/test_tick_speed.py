@@ -16,9 +16,9 @@ from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfi
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
 from appliance.stage.iterations import Iterations
-from appliance.stage.sensor_fit import Wearing
+from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from hw_sim.motions import turning
 from tests.hw_sim.paired import PairedSensor
@@ -46,7 +46,7 @@ def key(tmp_path: Path) -> SensorKey:
 
 
 @pytest.fixture
-def cast(tmp_path: Path, key: SensorKey, show: Path, receiver: socket.socket) -> Iterator[Cast]:
+def cast(tmp_path: Path, key: SensorKey, show: Path, receiver: socket.socket) -> Iterator[StageParts]:
     out = OscConfig(port=receiver.getsockname()[1], dialect="ai-toolbox")
     box = BoxConfig(
         sensors=SensorsConfig(udp=UdpConfig(port=0), keys=tmp_path / "sensors.keys"),
@@ -57,13 +57,13 @@ def cast(tmp_path: Path, key: SensorKey, show: Path, receiver: socket.socket) ->
     made.close()
 
 
-def test_the_whole_tick(measured: Callable[..., Any], cast: Cast, key: SensorKey) -> None:
+def test_the_whole_tick(measured: Callable[..., Any], cast: StageParts, key: SensorKey) -> None:
     intake = cast.link.intakes[0]
     assert isinstance(intake, UdpIntake)
     sensor = PairedSensor(key, intake.address[1], turning(seconds_per_turn=7.2), 100.0)
     now = sensor.pair(cast.link, 100.0)
     paired = cast.link.counts["accepted"]
-    wearing = Wearing(cast, SensorMemory(None, print), print)
+    wearing = SensorFit(cast, SensorMemory(None, print), print)
     tick = Tick(cast, wearing, Iterations(10, 9, 10), latest_start_s=TICK_S)
     slot, ran = Slot(), 0
 

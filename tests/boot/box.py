@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from appliance.box.checkpoint import Place, PlaceReader
+from appliance.box.checkpoint import Checkpoint, CheckpointReader
 from tests.boot.disk import DataDisk
 from tests.boot.hall import Hall, box_file
 from tests.boot.machine import PATIENCE_S, Machine, PowerOn
@@ -80,9 +80,9 @@ class Box:
             sum(not frame.late for frame in audience.frames if frame.at >= since and frame.tick <= tick) / FPS
         )
 
-    def place(self) -> Place:
+    def place(self) -> Checkpoint:
         """Where the dance is, as the stage has it in memory."""
-        reader = PlaceReader(self.machine.path("/run/bunraku"))
+        reader = CheckpointReader(self.machine.path("/run/bunraku"))
         with contextlib.closing(reader):
             return self.machine.await_that(reader.read, "there is no place in memory")
 

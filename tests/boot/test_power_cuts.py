@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from appliance.box.checkpoint import Place
+from appliance.box.checkpoint import Checkpoint
 from tests.boot.box import KEYS, Box
 from tests.boot.figures import Figures
 
@@ -39,7 +39,7 @@ def test_it_dances_again_after_twenty_power_cuts(box: Box, figures: Figures) -> 
     assert box.disk.sound()
 
 
-def _cut_somewhere(box: Box, chance: random.Random, in_the_start: bool) -> Place | None:
+def _cut_somewhere(box: Box, chance: random.Random, in_the_start: bool) -> Checkpoint | None:
     """Cut while it dances, with writes on the way; or while it starts, before or after its first frame.
 
     Where the dance was; None in a start.
@@ -57,7 +57,7 @@ def _cut_somewhere(box: Box, chance: random.Random, in_the_start: bool) -> Place
     return left
 
 
-def _age_s(left: Place, now: Place) -> float:
+def _age_s(left: Checkpoint, now: Checkpoint) -> float:
     """How long before the cut the place was noted at which the dance went on."""
     began_s = now.position_s - (now.tick + 1) / 50.0
     start_s, end_s = now.excerpt

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from appliance.box.checkpoint import Place
+from appliance.box.checkpoint import Checkpoint
 from tests.boot.box import STAGE, Box
 from tests.boot.figures import Figures
 from tests.boot.pauses import Seen, lives, missing_ticks, step_m
@@ -68,7 +68,7 @@ def test_twelve_kills_in_a_row_do_not_make_it_give_up(dancing: Box, figures: Fig
     assert now.phrase == left.phrase and now.position_s - left.position_s < after[-1].at - ended
 
 
-def _same_phrase(box: Box, left: Place, first: Seen) -> None:
+def _same_phrase(box: Box, left: Checkpoint, first: Seen) -> None:
     """No tick of the phrase was lost or danced twice, however long the pause was. first: frame after it."""
     now = box.place()
     assert now.phrase == left.phrase

@@ -9,7 +9,7 @@ import signal
 
 import pytest
 
-from appliance.cli.run_with_timeout import GivenUpError, within
+from appliance.cli.run_with_timeout import TimedOutError, within
 
 PATIENCE_S = 20.0
 
@@ -35,7 +35,7 @@ def test_a_child_that_has_not_left_its_parent_s_group_is_ended_too(monkeypatch: 
     monkeypatch.setattr(os, "fork", noted)
     reading, writing = os.pipe()
     try:
-        with pytest.raises(GivenUpError):
+        with pytest.raises(TimedOutError):
             within(0.05, lambda: b"never")
         os.close(writing)
         assert select.select([reading], [], [], PATIENCE_S)[0], "it lives on"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from appliance.cli.doctor.host_view import Patient
+from appliance.cli.doctor.host_view import HostView
 from appliance.cli.doctor.venue import ports
 from appliance.show.box import BoxConfig
 
@@ -22,5 +22,5 @@ def test_a_file_that_is_closed_meanwhile_hides_no_process(tmp_path: Path) -> Non
     (process / "fd/3").symlink_to("socket:[77]")
     for number in (2, 4):
         (process / f"fd/{number}").touch()  # no link, so that it cannot be read as one
-    (finding, *_) = ports(Patient(tmp_path, box))
+    (finding, *_) = ports(HostView(tmp_path, box))
     assert finding.words.endswith("the box listens."), finding

@@ -23,7 +23,7 @@ from rich.console import Console
 from appliance.cli import sensors
 from appliance.cli.app import main
 from appliance.cli.control_client import Answer, NoBoxError, Roll
-from appliance.cli.control_client import RunningBox as AskedBox
+from appliance.cli.control_client import ControlClient as AskedBox
 from appliance.cli.sensor_table import SensorTable
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorState
@@ -45,7 +45,7 @@ SPARE = SensorState(
 )
 
 
-class RunningBox:
+class ControlClient:
     """Show control, and a stage that answers without dancing."""
 
     def __init__(self, folder: Path, key_file: Path | None = None) -> None:
@@ -79,9 +79,9 @@ class RunningBox:
 
 
 @pytest.fixture
-def box(tmp_path: Path) -> Iterator[RunningBox]:
+def box(tmp_path: Path) -> Iterator[ControlClient]:
     create_keys(tmp_path / "sensors.keys", ["left-wrist", "head", "spare-1"])
-    box = RunningBox(tmp_path)
+    box = ControlClient(tmp_path)
     box.look(
         [LEFT, LOST, SPARE],
         lambda name: {"left-wrist": "wanted", "head": "kept"}.get(name, ""),
@@ -103,7 +103,7 @@ def ends(capsys: pytest.CaptureFixture[str], status: int, *words: str) -> Iterat
 
 
 def test_the_table_has_everything_that_the_box_knows(
-    box: RunningBox, capsys: pytest.CaptureFixture[str]
+    box: ControlClient, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
         *first, heading, left, head, spare = out.splitlines()
@@ -134,7 +134,7 @@ def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
     assert all(word in shown for word in words.split())
 
 
-def test_programs_get_values_and_nulls(box: RunningBox, capsys: pytest.CaptureFixture[str]) -> None:
+def test_programs_get_values_and_nulls(box: ControlClient, capsys: pytest.CaptureFixture[str]) -> None:
     with ends(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
         told = json.loads(out)
     assert told["box"] is True
@@ -165,7 +165,7 @@ def test_a_box_that_is_still_starting_or_hangs_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
-    box = RunningBox(tmp_path)
+    box = ControlClient(tmp_path)
     with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
         assert "still starting" in out
     with ends(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
@@ -202,7 +202,7 @@ def test_without_a_box_it_lists_the_key_file(tmp_path: Path, capsys: pytest.Capt
     ],
 )
 def test_commands_reach_the_box_and_its_answer_is_printed(
-    box: RunningBox, capsys: pytest.CaptureFixture[str], words: list[str], name: str, sensor: str
+    box: ControlClient, capsys: pytest.CaptureFixture[str], words: list[str], name: str, sensor: str
 ) -> None:
     with ends(capsys, 0, *words, "--box", str(box.box_file)) as (out, _):
         assert out == f"{name} it is.\n"
@@ -212,7 +212,9 @@ def test_commands_reach_the_box_and_its_answer_is_printed(
         assert err == f"bunraku: {name} it is.\n"
 
 
-def test_a_stage_that_was_held_up_in_the_middle_of_a_command_is_believed_in_the_end(box: RunningBox) -> None:
+def test_a_stage_that_was_held_up_in_the_middle_of_a_command_is_believed_in_the_end(
+    box: ControlClient,
+) -> None:
     desk = box.control.process.desk
 
     def late(order: Order) -> tuple[bool, str]:
@@ -224,7 +226,7 @@ def test_a_stage_that_was_held_up_in_the_middle_of_a_command_is_believed_in_the_
     assert asked.ask("/sensors/strobe", "left-wrist") == Answer(True, "It is.")
 
 
-def test_a_stage_that_never_answers_is_told_once_patience_is_over(box: RunningBox) -> None:
+def test_a_stage_that_never_answers_is_told_once_patience_is_over(box: ControlClient) -> None:
     box.stage.obeys = False
     asked = AskedBox(("127.0.0.1", box.control.port), patience_s=3.0)
     answer = asked.ask("/sensors/strobe", "left-wrist")
@@ -232,7 +234,7 @@ def test_a_stage_that_never_answers_is_told_once_patience_is_over(box: RunningBo
 
 
 def test_changes_of_the_key_file_reach_the_box(
-    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    box: ControlClient, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = load_keys(tmp_path / "sensors.keys")
     with ends(capsys, 0, "replace", "left-wrist", "spare-1", "--box", str(box.box_file)) as (out, _):
@@ -252,7 +254,7 @@ def test_changes_of_the_key_file_reach_the_box(
 
 
 def test_a_box_that_does_not_take_it_costs_the_exit_status(
-    box: RunningBox, capsys: pytest.CaptureFixture[str]
+    box: ControlClient, capsys: pytest.CaptureFixture[str]
 ) -> None:
     box.done = False
     with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
@@ -275,7 +277,7 @@ class Clock:
 
 @pytest.mark.parametrize("silent", [1, 20])
 def test_show_control_that_is_on_its_way_back_is_asked_again(
-    box: RunningBox, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], silent: int
+    box: ControlClient, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], silent: int
 ) -> None:
     asked, roll = [0], AskedBox.roll
 
@@ -293,7 +295,7 @@ def test_show_control_that_is_on_its_way_back_is_asked_again(
 
 
 def test_a_stage_that_dances_without_show_control_has_not_taken_it(
-    box: RunningBox, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    box: ControlClient, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clock = Clock()
     monkeypatch.setattr(AskedBox, "_replies", lambda *_: (one for one in ()))
@@ -321,7 +323,7 @@ def test_where_no_stage_lives_nobody_waits_for_show_control(
 
 def test_a_box_with_another_key_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     create_keys(tmp_path / "sensors.keys", ["head"])
-    box = RunningBox(tmp_path, key_file=tmp_path / "others.keys")
+    box = ControlClient(tmp_path, key_file=tmp_path / "others.keys")
     with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
         assert f"reads another key file ({tmp_path / 'others.keys'})" in out
     assert box.obeyed == []
@@ -329,7 +331,7 @@ def test_a_box_with_another_key_file_is_named(tmp_path: Path, capsys: pytest.Cap
 
 
 def test_what_is_wrong_with_the_key_file_of_a_running_box_is_said(
-    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    box: ControlClient, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     keys = tmp_path / "sensors.keys"
     with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
@@ -356,14 +358,14 @@ def test_what_is_wrong_with_the_key_file_of_a_running_box_is_said(
 
 
 def test_a_key_file_changed_by_hand_reaches_the_box(
-    box: RunningBox, capsys: pytest.CaptureFixture[str]
+    box: ControlClient, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with ends(capsys, 0, "reload", "--box", str(box.box_file)) as (out, _):
         assert "The running box took it." in out
     assert [order.name for order in box.obeyed] == ["reload"]
 
 
-def test_watching_through_a_pipe_is_told_at_once(box: RunningBox) -> None:
+def test_watching_through_a_pipe_is_told_at_once(box: ControlClient) -> None:
     command = [sys.executable, "-m", "appliance.cli", "sensors", "--watch", "--box", str(box.box_file)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -412,7 +414,7 @@ def test_without_a_box_a_change_counts_later(tmp_path: Path, capsys: pytest.Capt
     ],
 )
 def test_what_cannot_be_done_is_one_clear_line(
-    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], complaint: str
+    box: ControlClient, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], complaint: str
 ) -> None:
     before = (tmp_path / "sensors.keys").read_bytes()
     with ends(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
@@ -441,7 +443,7 @@ def test_a_missing_key_file_or_box_is_said(
         assert "behind 'strobe'" in err
 
 
-def test_watching_goes_on_until_it_is_ended(box: RunningBox) -> None:
+def test_watching_goes_on_until_it_is_ended(box: ControlClient) -> None:
     command = [sys.executable, "-m", "appliance.cli", "sensors", "--watch", "--box", str(box.box_file)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     seen = 0

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 from appliance.lights.curve import bent, eased, share
 from appliance.lights.dance import lean, turn
 from appliance.lights.rig import Rig
@@ -24,12 +24,14 @@ HEAD = {"name": "head", "profile": "moving-wash", "address": 21, "place": [0, 4,
 DIMMER, RED, GREEN, BLUE = 0, 1, 2, 3  # channels of PAR, from 0
 
 
-def levels(made: Rig, *hands: Any, house: House | None = None, first: int = 1, **changes: Any) -> list[bytes]:
+def levels(
+    made: Rig, *hands: Any, show_state: ShowState | None = None, first: int = 1, **changes: Any
+) -> list[bytes]:
     """Universe 1 after each frame, the hand being at each of these places, 20 ms apart."""
     shown = []
     for tick, hand in enumerate(hands, first):
         seen = frame(tick, hand, **changes)
-        shown.append(made.pass_(seen, 1, house or House(), seen.frame_time)[1])
+        shown.append(made.pass_(seen, 1, show_state or ShowState(), seen.frame_time)[1])
     return shown
 
 
@@ -64,9 +66,9 @@ def test_speed_drives_the_dimmer_and_one_late_frame_is_no_step() -> None:
     path = [(0.5 * PERIOD_S * step, 1.0, 0.0) for step in range(60)]
     assert levels(made, *path)[-1][DIMMER] == pytest.approx(128, abs=2)
     late = frame(61, path[-1], late=True)
-    assert made.pass_(late, 1, House(), late.frame_time)[1][DIMMER] == pytest.approx(128, abs=2)
+    assert made.pass_(late, 1, ShowState(), late.frame_time)[1][DIMMER] == pytest.approx(128, abs=2)
     after = frame(62, (0.5 * PERIOD_S * 61, 1.0, 0.0))
-    assert made.pass_(after, 1, House(), after.frame_time)[1][DIMMER] == pytest.approx(128, abs=6)
+    assert made.pass_(after, 1, ShowState(), after.frame_time)[1][DIMMER] == pytest.approx(128, abs=6)
 
 
 def test_a_jump_of_the_phrase_is_no_speed_that_a_dancer_could_have() -> None:
@@ -81,7 +83,7 @@ def test_a_stage_that_hangs_moves_no_more() -> None:
     assert levels(made, *path)[-1][DIMMER] > 250
     last = frame(60, path[-1])
     for step in range(30):
-        shown = made.pass_(last, 1, House(), last.frame_time + 0.025 * step)
+        shown = made.pass_(last, 1, ShowState(), last.frame_time + 0.025 * step)
     assert shown[1][DIMMER] < 5
 
 
@@ -207,7 +209,7 @@ def test_heads_that_no_rule_moves_stay_where_they_are() -> None:
     made = rig(config)
     levels(made, *[(2.0, 1.0, 0.0)] * 200)
     before = made.patch.heads.angles.copy()
-    levels(made, *[(-2.0, 1.0, 0.0)] * 100, house=House(lights="second"), first=201)
+    levels(made, *[(-2.0, 1.0, 0.0)] * 100, show_state=ShowState(lights="second"), first=201)
     np.testing.assert_allclose(made.patch.heads.angles, before)
 
 
@@ -225,8 +227,8 @@ def dark_then_bright() -> Rig:
 
 def test_one_mapping_fades_into_the_next() -> None:
     made = dark_then_bright()
-    house = House(lights="second", lights_before="first", lights_since=0.02, lights_fade_s=1.0)
-    shown = [level[DIMMER] / 255 for level in levels(made, *[(0, 1, 0)] * 60, house=house, first=2)]
+    show_state = ShowState(lights="second", lights_before="first", lights_since=0.02, lights_fade_s=1.0)
+    shown = [level[DIMMER] / 255 for level in levels(made, *[(0, 1, 0)] * 60, show_state=show_state, first=2)]
     assert shown[24] == pytest.approx(0.5, abs=0.02)
     assert shown[-1] == 1.0
     assert np.diff(shown).max() < 0.03
@@ -234,10 +236,10 @@ def test_one_mapping_fades_into_the_next() -> None:
 
 def test_a_mapping_called_in_the_middle_of_a_fade_starts_from_what_is_seen() -> None:
     made = dark_then_bright()
-    to_second = House().with_lights("second", 0.02, 1.0)
-    shown = levels(made, *[(0, 1, 0)] * 20, house=to_second, first=2)
+    to_second = ShowState().with_lights("second", 0.02, 1.0)
+    shown = levels(made, *[(0, 1, 0)] * 20, show_state=to_second, first=2)
     back = to_second.with_lights("first", 0.42, 1.0)
-    shown += levels(made, *[(0, 1, 0)] * 60, house=back, first=22)
+    shown += levels(made, *[(0, 1, 0)] * 60, show_state=back, first=22)
     dimmer = [level[DIMMER] / 255 for level in shown]
     assert np.abs(np.diff(dimmer)).max() < 0.03
     assert dimmer[-1] == 0.0
@@ -251,8 +253,8 @@ def test_points_to_aim_at_slide_across_the_stage() -> None:
     )
     made = rig(config)
     levels(made, *[(0, 1, 0)] * 200)
-    house = House(lights="second", lights_before="first", lights_since=4.0, lights_fade_s=2.0)
-    levels(made, *[(0, 1, 0)] * 50, house=house, first=201)  # half of it
+    show_state = ShowState(lights="second", lights_before="first", lights_since=4.0, lights_fade_s=2.0)
+    levels(made, *[(0, 1, 0)] * 50, show_state=show_state, first=201)  # half of it
     beam = made.patch.heads.beams()[0]
     on_floor = np.array([0, 4, 0]) + beam * (-4 / beam[1])
     np.testing.assert_allclose(on_floor, [0, 0, 1], atol=0.1)
@@ -281,8 +283,8 @@ def test_gobos_jump_in_the_middle_of_a_fade(tmp_path: Any) -> None:
     made = Rig(config, Patch(config.fixtures, tmp_path), SKELETON)
     made.safety = 0.0
     still(made)
-    house = House(lights="second", lights_before="first", lights_since=0.02, lights_fade_s=1.0)
-    shown = {level[0] for level in levels(made, *[(0, 1, 0)] * 60, house=house, first=2)}
+    show_state = ShowState(lights="second", lights_before="first", lights_since=0.02, lights_fade_s=1.0)
+    shown = {level[0] for level in levels(made, *[(0, 1, 0)] * 60, show_state=show_state, first=2)}
     assert shown == {51, 204}
 
 

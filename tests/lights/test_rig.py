@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LEAVING_FADE_S, LOST_S, SAFE_FADE_S, Rig
 from tests.lights.rigs import SKELETON, frame, lights, rig
@@ -26,7 +26,7 @@ class Evening:
     """A rig and its clock: passes 40 times a second, with frames or without."""
 
     def __init__(self, made: Rig) -> None:
-        self.rig, self.now, self.house = made, 0.0, House()
+        self.rig, self.now, self.show_state = made, 0.0, ShowState()
         self.frame = frame(1)
         self.generation = 1
 
@@ -43,7 +43,7 @@ class Evening:
         for _ in range(max(1, round(seconds / PERIOD_S))):
             self.now += PERIOD_S
             self.frame = newest()
-            shown.append(self.rig.pass_(self.frame, self.generation, self.house, self.now)[1])
+            shown.append(self.rig.pass_(self.frame, self.generation, self.show_state, self.now)[1])
         return shown
 
 
@@ -59,7 +59,7 @@ def test_panic_is_dark_in_the_very_next_pass_and_heads_stand_still() -> None:
     night = evening(FULL, AIM)
     night.dance(2.0)
     assert dimmers(night.dance()[0]) == (255, 255, 255)
-    night.house = House(panic=True)
+    night.show_state = ShowState(panic=True)
     before = night.rig.patch.heads.angles.copy()
     for levels in night.dance(0.5, hand=(-2, 1, 1)):
         assert dimmers(levels) == (0, 0, 0)
@@ -69,7 +69,7 @@ def test_panic_is_dark_in_the_very_next_pass_and_heads_stand_still() -> None:
 def test_the_safe_look_shines_on_panic_where_the_show_says_so() -> None:
     night = evening(FULL, RED, safe={"dimmer": 0.4, "colour": [1, 1, 1], "fixtures": ["par"]})
     assert night.dance(1.0)[-1][:4] == bytes([255, 255, 0, 0])
-    night.house = House(panic=True)
+    night.show_state = ShowState(panic=True)
     levels = night.dance()[0]
     assert levels[:4] == bytes([102, 255, 255, 255])
     assert dimmers(levels)[1:] == (0, 0)
@@ -79,16 +79,16 @@ def test_heads_go_home_in_the_safe_look_where_the_show_says_so() -> None:
     night = evening(FULL, AIM, safe={"heads": "home"})
     night.dance(3.0)
     assert abs(night.rig.patch.heads.angles).max() > 5
-    night.house = House(panic=True)
+    night.show_state = ShowState(panic=True)
     night.dance(3.0)
     np.testing.assert_allclose(night.rig.patch.heads.angles, 0, atol=1e-6)
 
 
 def test_after_panic_the_dance_fades_in() -> None:
     night = evening()
-    night.house = House(panic=True)
+    night.show_state = ShowState(panic=True)
     night.dance(1.0)
-    night.house = House()
+    night.show_state = ShowState()
     shown = [dimmers(levels)[0] / 255 for levels in night.dance(1.5 * SAFE_FADE_S)]
     assert np.diff(shown).max() < 0.05
     assert shown[-1] == 1.0
@@ -97,7 +97,7 @@ def test_after_panic_the_dance_fades_in() -> None:
 def test_stop_fades_as_show_control_says_and_then_comes_the_safe_look() -> None:
     night = evening(safe={"dimmer": 0.2})
     night.dance(1.0)
-    night.house = House().with_going(False, night.now, 2.0)
+    night.show_state = ShowState().with_going(False, night.now, 2.0)
     shown = [dimmers(levels)[0] / 255 for levels in night.dance(4.0)]
     assert shown[39] == pytest.approx(0.5, abs=0.03)
     assert shown[79] < 0.05
@@ -106,23 +106,23 @@ def test_stop_fades_as_show_control_says_and_then_comes_the_safe_look() -> None:
 
 def test_master_and_blackout_reach_dimmers_alone() -> None:
     night = evening(FULL, RED)
-    night.house = House().with_master(0.5, night.now, 0.0)
+    night.show_state = ShowState().with_master(0.5, night.now, 0.0)
     assert night.dance(1.0)[-1][:3] == bytes([128, 255, 0])
-    night.house = House(blackout=True)
+    night.show_state = ShowState(blackout=True)
     assert night.dance()[0][:3] == bytes([0, 255, 0])
 
 
-@pytest.mark.parametrize(("house", "shines"), [(House(), 51), (House(blackout=True), 0)])
-def test_blackout_also_darkens_the_safe_look_of_a_lost_stage(house: House, shines: int) -> None:
+@pytest.mark.parametrize(("show_state", "shines"), [(ShowState(), 51), (ShowState(blackout=True), 0)])
+def test_blackout_also_darkens_the_safe_look_of_a_lost_stage(show_state: ShowState, shines: int) -> None:
     night = evening(safe={"dimmer": 0.2})
     night.dance(0.5)
-    night.house = house
+    night.show_state = show_state
     assert dimmers(night.hang(LOST_S + 2 * SAFE_FADE_S)[-1])[0] == shines
 
 
 def test_but_on_panic_the_safe_look_is_seen_whatever_else_is_in_force() -> None:
     night = evening(safe={"dimmer": 0.2})
-    night.house = House(panic=True, blackout=True, master=0.0)
+    night.show_state = ShowState(panic=True, blackout=True, master=0.0)
     assert dimmers(night.dance()[0])[0] == 51
 
 
@@ -153,7 +153,7 @@ def test_a_rig_begins_safe_and_stays_so_without_a_stage() -> None:
     made = rig(config)
     made.safety = 1.0
     for number in range(50):
-        levels = made.pass_(None, 0, House(), 100.0 + number * PERIOD_S)[1]
+        levels = made.pass_(None, 0, ShowState(), 100.0 + number * PERIOD_S)[1]
         assert dimmers(levels)[0] == 51
 
 
@@ -162,7 +162,7 @@ def test_the_old_frame_of_a_dead_stage_lights_nothing() -> None:
     made.safety = 1.0
     old = frame(50)
     for number in range(50):
-        assert dimmers(made.pass_(old, 1, House(), 100.0 + number * PERIOD_S)[1]) == (0, 0, 0)
+        assert dimmers(made.pass_(old, 1, ShowState(), 100.0 + number * PERIOD_S)[1]) == (0, 0, 0)
 
 
 @pytest.mark.parametrize(("safe", "left"), [({}, 0), ({"dimmer": 0.5}, 128)])
@@ -174,24 +174,24 @@ def test_at_the_end_it_fades_and_leaves_zeros_or_the_safe_look(safe: dict[str, A
     assert shown[0] > 200 and shown == sorted(shown, reverse=True)
     assert shown[-1] == left
     assert night.rig.safety == 1.0
-    last = night.rig.last_levels(night.house)[1]
+    last = night.rig.last_levels(night.show_state)[1]
     assert last[0] == left
     heads = set(range(20, 24))  # pan and tilt, coarse and fine
     assert any(level for channel, level in enumerate(last) if channel not in heads) == bool(left)
 
 
 @pytest.mark.parametrize(
-    ("house", "left"),
-    [(House(blackout=True), 0), (House(panic=True), 51), (House(panic=True, blackout=True), 51)],
+    ("show_state", "left"),
+    [(ShowState(blackout=True), 0), (ShowState(panic=True), 51), (ShowState(panic=True, blackout=True), 51)],
 )
-def test_the_end_is_as_dark_as_blackout_and_as_lit_as_panic(house: House, left: int) -> None:
+def test_the_end_is_as_dark_as_blackout_and_as_lit_as_panic(show_state: ShowState, left: int) -> None:
     night = evening(FULL, AIM, safe={"dimmer": 0.2})
     night.dance(1.0)
-    night.house = house
+    night.show_state = show_state
     night.dance(0.5)
     night.rig.leave()
     shown = {dimmers(levels)[0] for levels in night.dance(2 * LEAVING_FADE_S)}
-    last = night.rig.last_levels(house)[1]
+    last = night.rig.last_levels(show_state)[1]
     assert shown | {last[0]} == {left}
     assert any(last[20:24])  # where the head points
     assert bool(left) == any(level for channel, level in enumerate(last) if not 20 <= channel < 24)
@@ -202,7 +202,7 @@ def test_at_the_end_heads_stay_where_they_point() -> None:
     shown = night.dance(2.0)[-1]
     night.rig.leave()
     night.dance(LEAVING_FADE_S + PERIOD_S, hand=(-2.0, 1.0, 1.0))
-    before, last = night.dance()[0], night.rig.last_levels(night.house)[1]
+    before, last = night.dance()[0], night.rig.last_levels(night.show_state)[1]
     assert last[20:24] == before[20:24] != shown[20:24]
     assert any(last[20:24]) and not any(last[:20]) and not any(last[24:])
 
@@ -258,7 +258,7 @@ def test_at_a_slow_rate_a_lost_stage_is_seen_and_faded_from_in_the_same_time(rat
     made, period_s, safe_at = slow(rate_hz), 1.0 / rate_hz, np.inf
     for number in range(round(4.0 * rate_hz)):
         now = 1.0 + number * period_s
-        made.pass_(frame(50), 1, House(), now)
+        made.pass_(frame(50), 1, ShowState(), now)
         safe_at = min(safe_at, now if made.safety >= 1.0 else np.inf)
     assert LOST_S + SAFE_FADE_S - 1e-6 <= safe_at - 1.0 <= LOST_S + SAFE_FADE_S + 1.1 * period_s
 
@@ -267,16 +267,16 @@ def test_passes_that_do_not_keep_up_see_a_lost_stage_and_fade_in_the_same_time()
     made, period_s, safe_at, now = slow(40.0), 0.3, np.inf, 1.0
     for _ in range(10):
         now += period_s
-        made.pass_(frame(round(now / 0.02)), 1, House(), now)
+        made.pass_(frame(round(now / 0.02)), 1, ShowState(), now)
     last_frame, died_at = frame(round(now / 0.02)), now
     while now < died_at + 4.0:
         now += period_s
-        made.pass_(last_frame, 1, House(), now)
+        made.pass_(last_frame, 1, ShowState(), now)
         safe_at = min(safe_at, now if made.safety >= 1.0 else np.inf)
     assert LOST_S + SAFE_FADE_S - 0.02 <= safe_at - died_at <= LOST_S + SAFE_FADE_S + 1.1 * period_s
 
 
 def test_unknown_mappings_leave_the_first_in_force() -> None:
     night = evening()
-    night.house = House(lights="of another show", lights_before="nor this")
+    night.show_state = ShowState(lights="of another show", lights_before="nor this")
     assert dimmers(night.dance(0.5)[-1])[0] == 255

@@ -164,7 +164,7 @@ def test_a_foreign_file_is_named_and_replaced_by_the_next_writer(
 
 def test_another_kind_is_foreign(path: Path) -> None:
     written(path, b"a test").close()
-    assert BlockReader(path, "house").read() is None
+    assert BlockReader(path, "show_state").read() is None
 
 
 def test_a_damaged_header_is_refused(path: Path, reader: BlockReader) -> None:

@@ -1,4 +1,4 @@
-"""The projector beside a stage: before it, with it, after it, with another one; and what the house says."""
+"""The projector beside a stage: before it, with it, after it, with another one; and the show state."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from appliance.box.show_state import House, HouseReader, HouseWriter
+from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.outputs.frame_reader import FrameReader
 from appliance.projector.alignment import Alignment
 from appliance.projector.context import offscreen
@@ -39,9 +39,9 @@ class Evening:
         self._gl, self.folder, self.show = gl, folder, show
         self.said: list[str] = []
         self.controls = Controls(Alignment(), lambda _: None)
-        self.house = House()
-        self._house = HouseWriter(folder)
-        self._reader, self._seen_house = FrameReader(folder), HouseReader(folder)
+        self.show_state = ShowState()
+        self._house = ShowStateWriter(folder)
+        self._reader, self._seen_house = FrameReader(folder), ShowStateReader(folder)
         self.projector = Projector(
             *(gl, ProjectorConfig(), self._reader, self._seen_house, self.controls, self.said.append),
             TellingPainter,
@@ -71,9 +71,9 @@ class Evening:
         red, green, blue = found.reshape(-1, 3).max(axis=0)
         return int(red), int(green), int(blue)
 
-    def set_house(self, house: House) -> None:
-        self.house = house
-        self._house.write(house)
+    def set_house(self, show_state: ShowState) -> None:
+        self.show_state = show_state
+        self._house.write(show_state)
 
     def close(self) -> None:
         if self.stage is not None:
@@ -187,10 +187,10 @@ def test_panic_is_black_in_the_very_next_picture(evening: Evening) -> None:
     evening.controls.set_grid(True)
     for _ in range(60):
         assert evening.picture().any() or evening.now < 1000.5
-    evening.set_house(replace(evening.house, panic=True))
+    evening.set_house(replace(evening.show_state, panic=True))
     assert not evening.picture(lines=("60 pictures/s",)).any()
     assert evening.left_stage is None
-    evening.set_house(replace(evening.house, panic=False))
+    evening.set_house(replace(evening.show_state, panic=False))
     assert evening.picture().any()
 
 
@@ -203,7 +203,7 @@ def test_panic_that_comes_while_a_picture_is_drawn_is_in_that_picture(
 
     def panics(*arguments: object) -> None:
         draw(*arguments)  # type: ignore[arg-type]
-        evening.set_house(replace(evening.house, panic=True))
+        evening.set_house(replace(evening.show_state, panic=True))
 
     monkeypatch.setattr(TellingPainter, "draw", panics)
     assert evening.colour() == (0, 0, 0)
@@ -212,12 +212,12 @@ def test_panic_that_comes_while_a_picture_is_drawn_is_in_that_picture(
 def test_blackout_and_master_and_stop(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    evening.set_house(replace(evening.house, blackout=True))
+    evening.set_house(replace(evening.show_state, blackout=True))
     assert evening.colour() == (0, 0, 0)
-    evening.set_house(House().with_master(0.5, evening.now, 1.0))
+    evening.set_house(ShowState().with_master(0.5, evening.now, 1.0))
     assert 180 < evening.colour(0.5)[0] < 200
     assert abs(evening.colour(0.7)[0] - 128) <= 1
-    evening.set_house(House().with_going(False, evening.now, 2.0))
+    evening.set_house(ShowState().with_going(False, evening.now, 2.0))
     assert 120 < evening.colour(1.0)[0] < 135
     assert evening.colour(1.1) == (0, 0, 0)
 
@@ -225,7 +225,7 @@ def test_blackout_and_master_and_stop(evening: Evening) -> None:
 def test_looks_fade_as_the_house_says(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    evening.set_house(House().with_look("lines", evening.now, 1.0))
+    evening.set_house(ShowState().with_look("lines", evening.now, 1.0))
     assert 120 < evening.colour(0.5)[2] < 135
     assert evening.colour(0.6)[2] == 255
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from appliance.box.checkpoint_file import PlaceCarrier
+from appliance.box.checkpoint_file import CheckpointCarrier
 from appliance.box.fallback import Fallback, Fallbacks
-from appliance.box.process_health import LATE_S, Company, CompanyWriter
+from appliance.box.process_health import LATE_S, ProcessHealth, ProcessHealthWriter
 from appliance.keeper.journal_carrier import JournalCarrier
 from appliance.keeper.keeper_health import (
     CHOICE_NOT_KEPT,
@@ -22,7 +22,7 @@ from appliance.outputs.shared_frame import FrameWriter
 from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
 from appliance.release.choice import CHOSEN, Choice, Pair
 from appliance.release.promote_show import Proof
-from appliance.show_control.stage_observer import StageSight
+from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import Status
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, facts, until
 from tests.stage.bundles import FIGURE
@@ -30,13 +30,13 @@ from tests.stage.bundles import FIGURE
 DMX = Fallback("dmx-away", "A wire is away.")
 
 
-def told(company: Company, now: float) -> dict[str, tuple[str, int, bool]]:
+def told(company: ProcessHealth, now: float) -> dict[str, tuple[str, int, bool]]:
     return {one.name: (who, one.times, one.active) for who, one in company.fallbacks(now)}
 
 
 def test_a_process_tells_its_fallbacks(folder: Path) -> None:
-    fallbacks, company = Fallbacks([DMX]), Company(folder)
-    lights = CompanyWriter(folder, "lights", fallbacks)
+    fallbacks, company = Fallbacks([DMX]), ProcessHealth(folder)
+    lights = ProcessHealthWriter(folder, "lights", fallbacks)
     lights.tell(10.0)
     assert told(company, 10.0) == {}
     fallbacks.set("dmx-away", True, "The adapter is unplugged.")
@@ -50,37 +50,37 @@ def test_a_process_tells_its_fallbacks(folder: Path) -> None:
 
 
 def test_lights_projector_and_keeper_that_die_are_counted(folder: Path) -> None:
-    company = Company(folder)
+    company = ProcessHealth(folder)
     for who in ("lights", "projector", "keeper"):
-        first = CompanyWriter(folder, who, Fallbacks(()))
+        first = ProcessHealthWriter(folder, who, Fallbacks(()))
         first.tell(10.0)
         first.close()  # and never says that it ends
         assert told(company, 10.0 + LATE_S) == {}
         late = told(company, 10.1 + LATE_S)
         assert late == {f"{who}-died": (who, 1, True)}
-        second = CompanyWriter(folder, who, Fallbacks(()))
+        second = ProcessHealthWriter(folder, who, Fallbacks(()))
         second.tell(20.0)
         assert told(company, 20.0) == {f"{who}-died": (who, 1, False)}
         second.end(21.0)
         second.close()
         assert told(company, 90.0) == {f"{who}-died": (who, 1, False)}, "who has ended is not late"
-        third = CompanyWriter(folder, who, Fallbacks(()))
+        third = ProcessHealthWriter(folder, who, Fallbacks(()))
         third.tell(100.0)
         assert told(company, 100.0) == {}
         third.close()
         (folder / f"{who}.health").unlink()
-        company = Company(folder)
+        company = ProcessHealth(folder)
 
 
 def test_a_second_projector_says_nothing(folder: Path) -> None:
-    first = CompanyWriter(folder, "projector", Fallbacks(OF_THE_PROJECTOR))
+    first = ProcessHealthWriter(folder, "projector", Fallbacks(OF_THE_PROJECTOR))
     second_fallbacks = Fallbacks(OF_THE_PROJECTOR)
-    second = CompanyWriter(folder, "projector", second_fallbacks)
+    second = ProcessHealthWriter(folder, "projector", second_fallbacks)
     for row in (STAGE_UNSEEN, PICTURES_SMALLER):
         second_fallbacks.set(row.name, True)
     first.tell(10.0)
     second.tell(10.0)
-    assert told(Company(folder), 10.0) == {}
+    assert told(ProcessHealth(folder), 10.0) == {}
     second.close()
     first.close()
 
@@ -90,26 +90,26 @@ def test_the_keeper_tells_that_the_journal_has_stopped(folder: Path) -> None:
     carrier.complaint = "The disk is full."
     keeper = KeeperHealth(folder)
     keeper.tell([carrier], 10.0)
-    assert told(Company(folder), 10.0) == {JOURNAL_STOPPED.name: ("keeper", 1, True)}
+    assert told(ProcessHealth(folder), 10.0) == {JOURNAL_STOPPED.name: ("keeper", 1, True)}
     keeper.end(11.0)
 
 
 def test_the_keeper_tells_all_that_it_cannot_keep(folder: Path) -> None:
-    chosen, place = Proof(folder, folder / CHOSEN), PlaceCarrier(folder, folder, lambda words: None)
+    chosen, place = Proof(folder, folder / CHOSEN), CheckpointCarrier(folder, folder, lambda words: None)
     sensors = MemoryCarrier(folder, folder, lambda words: None)
     chosen.complaint = place.complaint = sensors.complaint = "The disk is read-only."
     keeper = KeeperHealth(folder)
     keeper.tell([chosen, place, sensors], 10.0)
     rows = {PLACE_NOT_KEPT.name, SENSORS_NOT_KEPT.name, CHOICE_NOT_KEPT.name}
-    assert set(told(Company(folder), 10.0)) == rows
+    assert set(told(ProcessHealth(folder), 10.0)) == rows
     chosen.complaint = place.complaint = sensors.complaint = ""
     keeper.tell([chosen, place, sensors], 12.0)
-    assert not any(active for _, _, active in told(Company(folder), 12.0).values())
+    assert not any(active for _, _, active in told(ProcessHealth(folder), 12.0).values())
     keeper.end(13.0)
 
 
 def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
-    company = Company(folder)
+    company = ProcessHealth(folder)
     assert told(company, 1.0) == {}
     Choice((Pair(),), ("Broken one.", "Broken two.", "Did not dance."), ("a+",)).write(folder / CHOSEN)
     assert told(company, 1.0) == {
@@ -125,7 +125,7 @@ def test_a_stage_that_hangs_is_counted_once(folder: Path) -> None:
     frame = JointFrame(len(FIGURE))
     frame.frame_time = time.monotonic()
     writer.write(frame)
-    sight = StageSight(folder)
+    sight = StageObserver(folder)
     now = frame.frame_time
     assert sight.fallbacks(now) == []
     for later in (0.6, 0.7, 0.8):
@@ -140,7 +140,7 @@ def test_a_stage_is_not_absent_for_who_was_held_up_between_its_clock_and_its_loo
     writer, frame = FrameWriter(folder, facts()), JointFrame(len(FIGURE))
     frame.frame_time = time.monotonic()
     writer.write(frame)
-    sight = StageSight(folder)
+    sight = StageObserver(folder)
     assert sight.state(frame.frame_time - 5.0) == "dancing"
     frame.frame_time += 3600.0  # left from before this machine was started anew
     writer.write(frame)

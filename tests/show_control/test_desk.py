@@ -13,19 +13,19 @@ import pytest
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from appliance.box.show_state import House, HouseReader, HouseWriter
+from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.show_control import order_dispatch as errands
 from appliance.show_control.command import FORMS
 from appliance.show_control.command_handler import _ORDERS
-from appliance.show_control.house_commands import CHANGES
 from appliance.show_control.orders import Order
+from appliance.show_control.show_state_commands import CHANGES
 from appliance.show_control.status_messages import QUESTIONS
 from tests.show_control.doubles import Asker, ControlInThread, InboxDouble, StageDouble, facts, until
 
 
-def house(folder: Path) -> House:
-    return HouseReader(folder).read()
+def show_state(folder: Path) -> ShowState:
+    return ShowStateReader(folder).read()
 
 
 def names(stage: StageDouble) -> list[str]:
@@ -44,26 +44,26 @@ def test_panic_is_in_force_when_the_reply_comes_and_go_lifts_it(
         address, about, done, words = asker.ask(*command)
         assert (address, about, done) == ("/reply", "/panic", 1)
         assert "/go lifts it" in words
-        assert house(folder).panic
-        assert house(folder).level(time.monotonic()) == 0.0
+        assert show_state(folder).panic
+        assert show_state(folder).level(time.monotonic()) == 0.0
         assert asker.ask(*lifting)[2] == 1
-        assert not house(folder).panic
-    assert house(folder).going
+        assert not show_state(folder).panic
+    assert show_state(folder).going
 
 
 def test_a_button_let_go_changes_nothing_and_is_not_refused(
     control: ControlInThread, folder: Path, stage: StageDouble, asker: Asker
 ) -> None:
     asker.ask("/stop", 60.0)
-    since = house(folder).going_since
+    since = show_state(folder).going_since
     assert "runs on" in asker.ask("/stop", 0.0)[3]
-    assert (house(folder).going_since, house(folder).going_fade_s) == (since, 60.0)
+    assert (show_state(folder).going_since, show_state(folder).going_fade_s) == (since, 60.0)
     asker.ask("/panic", 1.0)
     address, about, done, words = asker.ask("/panic", 0.0)
     assert (address, about, done) == ("/reply", "/panic", 0)
     assert "let go" in words and "/go lifts a panic" in words
     assert "let go" in asker.ask("/go", 0.0)[3]
-    assert house(folder).panic and not house(folder).going
+    assert show_state(folder).panic and not show_state(folder).going
     assert [order.name for order in stage.orders if order.name == "start"] == []
     assert control.process.desk.refused == 0
 
@@ -71,33 +71,33 @@ def test_a_button_let_go_changes_nothing_and_is_not_refused(
 def test_after_go_picture_and_lights_come_back_slowly(folder: Path, stage: StageDouble, asker: Asker) -> None:
     asker.ask("/panic")
     asker.ask("/go")
-    since = house(folder).going_since
-    assert [house(folder).level(since + t) for t in (0.0, 0.5, 1.0)] == [0.0, 0.5, 1.0]
+    since = show_state(folder).going_since
+    assert [show_state(folder).level(since + t) for t in (0.0, 0.5, 1.0)] == [0.0, 0.5, 1.0]
 
 
 def test_panic_needs_no_stage(folder: Path, asker: Asker) -> None:
     assert asker.ask("/panic")[2] == 1
-    assert house(folder).panic
+    assert show_state(folder).panic
 
 
 def test_a_slow_stop_can_be_made_a_quick_one(folder: Path, stage: StageDouble, asker: Asker) -> None:
     assert asker.ask("/stop", 60.0)[2] == 1
-    assert not house(folder).is_safe(time.monotonic() + 1.0)
+    assert not show_state(folder).is_safe(time.monotonic() + 1.0)
     assert asker.ask("/stop", 0.1)[2] == 1
-    assert house(folder).is_safe(time.monotonic() + 0.1)
+    assert show_state(folder).is_safe(time.monotonic() + 0.1)
 
 
 def test_stop_fades_then_the_phrase_stands_until_go(folder: Path, stage: StageDouble, asker: Asker) -> None:
     assert asker.ask("/stop", 0.3)[2] == 1
-    assert not house(folder).going
-    assert not house(folder).is_safe(house(folder).going_since + 0.2)
+    assert not show_state(folder).going
+    assert not show_state(folder).is_safe(show_state(folder).going_since + 0.2)
     until(lambda: names(stage) == ["stop"])
     ordered_at = stage.orders[0].until - errands.PATIENCE_S
-    assert house(folder).is_safe(ordered_at + 0.001)  # while the light fades, the dance goes on
+    assert show_state(folder).is_safe(ordered_at + 0.001)  # while the light fades, the dance goes on
     assert asker.ask("/stop")[3].startswith("The show stands still already")
     assert asker.ask("/go")[2] == 1
     until(lambda: names(stage) == ["stop", "start"])
-    assert house(folder).going
+    assert show_state(folder).going
 
 
 def test_a_stage_started_anew_while_the_show_is_stopped_is_stopped_too(folder: Path, asker: Asker) -> None:
@@ -147,19 +147,19 @@ def test_go_starts_a_phrase_that_was_stopped_by_the_player(stage: StageDouble, a
 
 def test_blackout_is_dark_without_panic_and_go_does_not_lift_it(folder: Path, asker: Asker) -> None:
     assert asker.ask("/blackout", 1)[2] == 1
-    assert house(folder).level(time.monotonic()) == 0.0
-    assert not house(folder).is_safe(time.monotonic())
+    assert show_state(folder).level(time.monotonic()) == 0.0
+    assert not show_state(folder).is_safe(time.monotonic())
     assert "/blackout 0" in asker.ask("/go")[3]
-    assert house(folder).blackout
+    assert show_state(folder).blackout
     asker.ask("/blackout", 0)
-    assert not house(folder).blackout
+    assert not show_state(folder).blackout
 
 
 def test_master_look_and_lights_fade(folder: Path, stage: StageDouble, asker: Asker) -> None:
     asker.ask("/master", 0.25, 5)
     asker.ask("/look", "ink", 4)
     asker.ask("/lights", "cold")
-    now = house(folder)
+    now = show_state(folder)
     assert (now.master, now.master_before, now.master_fade_s) == (0.25, 1.0, 5.0)
     assert (now.look, now.look_before, now.look_fade_s) == ("ink", "", 4.0)
     assert (now.lights, now.lights_before, now.lights_fade_s) == ("cold", "", 2.0)
@@ -183,7 +183,7 @@ def test_what_is_misspelt_changes_nothing_and_the_nearest_is_named(
     address, about, done, words = asker.ask(*message)
     assert (address, about, done) == ("/reply", message[0], 0)
     assert cure in words
-    assert house(folder) == House()
+    assert show_state(folder) == ShowState()
     assert stage.orders == []
 
 
@@ -196,20 +196,20 @@ def test_names_without_a_stage_are_refused_in_words(asker: Asker) -> None:
 def test_a_cue_is_the_stages_first_and_then_picture_and_lights_follow(
     folder: Path, stage: StageDouble, asker: Asker
 ) -> None:
-    before: list[House] = []
+    before: list[ShowState] = []
 
     def answer(order: Order) -> tuple[bool, str]:
-        before.append(house(folder))
+        before.append(show_state(folder))
         return True, "At most 8 iterations fit."
 
     stage.answer = answer
     assert asker.ask("/cue", "storm") == ["/reply", "/cue", 1, "Cue storm. At most 8 iterations fit."]
-    assert before == [House()]
-    now = house(folder)
+    assert before == [ShowState()]
+    now = show_state(folder)
     assert (now.cue, now.look, now.lights, now.master) == ("storm", "ink", "cold", 0.5)
     assert (now.look_fade_s, now.lights_fade_s, now.master_fade_s) == (4.0, 4.0, 4.0)
     asker.ask("/cue", 1)
-    now = house(folder)
+    now = show_state(folder)
     assert (now.cue, now.look, now.lights, now.master) == ("1", "lines", "cold", 0.5)
 
 
@@ -218,16 +218,18 @@ def test_after_a_power_cut_picture_and_lights_are_those_of_the_stages_cue(folder
     with StageDouble(folder) as stage:
         stage.tell(cue="storm")
         control = ControlInThread(folder)
-        until(lambda: house(folder).cue == "storm")
-        now = house(folder)
+        until(lambda: show_state(folder).cue == "storm")
+        now = show_state(folder)
         assert (now.look, now.lights, now.master) == ("ink", "cold", 1.0)
         assert now.look_mix(time.monotonic()) == 1.0
         control.close()
 
 
-@pytest.mark.parametrize(("left", "cue"), [(House(cue="1", look="lines"), "storm"), (House(), "of another")])
-def test_what_is_in_force_stays_whatever_the_stages_cue(folder: Path, left: House, cue: str) -> None:
-    with closing(HouseWriter(folder)) as writer:
+@pytest.mark.parametrize(
+    ("left", "cue"), [(ShowState(cue="1", look="lines"), "storm"), (ShowState(), "of another")]
+)
+def test_what_is_in_force_stays_whatever_the_stages_cue(folder: Path, left: ShowState, cue: str) -> None:
+    with closing(ShowStateWriter(folder)) as writer:
         writer.write(left)
     with StageDouble(folder) as stage:
         stage.tell(cue=cue)
@@ -235,7 +237,7 @@ def test_what_is_in_force_stays_whatever_the_stages_cue(folder: Path, left: Hous
         asker = Asker(control.port)
         until(lambda: control.process.desk.status(0, time.monotonic()).state == "dancing")
         asker.ask("/ping")
-        assert (house(folder).cue, house(folder).look) == (left.cue, left.look)
+        assert (show_state(folder).cue, show_state(folder).look) == (left.cue, left.look)
         asker.close()
         control.close()
 
@@ -248,7 +250,7 @@ def test_a_cue_that_the_stage_refuses_or_does_not_hear_changes_nothing(
     monkeypatch.setattr(errands, "PATIENCE_S", 0.5)
     stage.obeys = False
     assert "does not answer" in asker.ask("/cue", "storm")[3]
-    assert house(folder) == House()
+    assert show_state(folder) == ShowState()
 
 
 def test_what_is_said_after_a_cue_wins_over_it_however_long_the_stage_takes(
@@ -262,7 +264,7 @@ def test_what_is_said_after_a_cue_wins_over_it_however_long_the_stage_takes(
     assert [asker.hear()[1] for _ in range(2)] == ["/look", "/master"]  # type: ignore[index]
     stage.obeys = True
     assert [asker.hear()[3] for _ in range(2)] == ["Cue storm. cue it is.", "Cue 1. cue it is."]  # type: ignore[index]
-    now = house(folder)
+    now = show_state(folder)
     assert (now.cue, now.look, now.lights, now.master) == ("1", "lines", "cold", 0.25)
 
 
@@ -271,7 +273,7 @@ def test_cues_follow_each_other(folder: Path, stage: StageDouble, asker: Asker) 
     _, _, done, words = asker.ask("/cue")
     assert not done
     assert "storm was the last cue" in words
-    assert house(folder).cue == "storm"
+    assert show_state(folder).cue == "storm"
 
 
 @pytest.mark.parametrize(
@@ -491,18 +493,18 @@ def test_what_was_in_force_stays_in_force_over_a_restart_and_is_said(folder: Pat
     first.close()
     second = ControlInThread(folder)
     assert second.said == ["Still from before: Panic is in force: black, lights safe. /go lifts it."]
-    assert house(folder).panic
-    assert house(folder).master == 0.5
+    assert show_state(folder).panic
+    assert show_state(folder).master == 0.5
     second.close()
 
 
 def test_names_that_another_show_has_left_are_forgotten(folder: Path) -> None:
-    writer = HouseWriter(folder)
-    writer.write(House(panic=True, cue="storm", look="ink", lights="cold", look_before="lines"))
+    writer = ShowStateWriter(folder)
+    writer.write(ShowState(panic=True, cue="storm", look="ink", lights="cold", look_before="lines"))
     writer.close()
     control = ControlInThread(folder)
     with StageDouble(folder, facts(looks=("ink", "glass"), cues=(), lights=())):
-        until(lambda: house(folder) == replace(House(panic=True), look="ink"))
+        until(lambda: show_state(folder) == replace(ShowState(panic=True), look="ink"))
     control.close()
 
 

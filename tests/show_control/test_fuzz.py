@@ -6,14 +6,14 @@ import math
 import time
 from pathlib import Path
 
-from appliance.box.show_state import House, HouseReader, HouseWriter
-from appliance.show_control.command_handler import Desk
+from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
+from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.key_file import KeyFile
-from appliance.show_control.order_dispatch import WAITING, Errands
+from appliance.show_control.order_dispatch import WAITING, OrderDispatch
 from appliance.show_control.orders import OrderSender
 from appliance.show_control.packet import Message, datagram
 from appliance.show_control.port import LARGEST_DATAGRAM, Address
-from appliance.show_control.stage_observer import StageSight
+from appliance.show_control.stage_observer import StageObserver
 from tests.show_control.doubles import Asker, InboxDouble, StageDouble, control_process, until
 from tests.show_control.fuzz import datagrams
 
@@ -24,15 +24,15 @@ SOMEBODY = ("127.0.0.1", 5000)
 def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
     folder: Path, key_file: Path, stage: StageDouble
 ) -> None:
-    writer, sender, projector = HouseWriter(folder), OrderSender(folder), InboxDouble(folder, "projector")
+    writer, sender, projector = ShowStateWriter(folder), OrderSender(folder), InboxDouble(folder, "projector")
     told: list[int] = []
 
     def tell(to: Address, message: Message) -> None:
         told.append(len(datagram(message)))
 
-    errands = Errands(sender)
-    desk = Desk(House(), StageSight(folder), errands, KeyFile(key_file), tell, writer.write)
-    reader = HouseReader(folder)
+    errands = OrderDispatch(sender)
+    desk = CommandHandler(ShowState(), StageObserver(folder), errands, KeyFile(key_file), tell, writer.write)
+    reader = ShowStateReader(folder)
     now = time.monotonic()
     for number, received in enumerate(datagrams(3, COUNT)):
         desk.hear(received[:LARGEST_DATAGRAM], SOMEBODY, now + number / 1000)
@@ -40,13 +40,15 @@ def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
             now = time.monotonic() - number / 1000
             errands.go_on(now + number / 1000)
             desk.look(now + number / 1000)
-        assert 0.0 <= desk.house.level(now) <= 1.0
+        assert 0.0 <= desk.show_state.level(now) <= 1.0
     assert all(len(way.waiting) <= WAITING for way in errands._ways.values())
-    house = reader.read()
-    assert house == desk.house
-    assert all(math.isfinite(value) for value in (house.master, house.going_since, house.look_since))
-    assert 0.0 <= house.master <= 1.0
-    assert house.look in ("", "plaster", "lines", "ink", "cloud")
+    show_state = reader.read()
+    assert show_state == desk.show_state
+    assert all(
+        math.isfinite(value) for value in (show_state.master, show_state.going_since, show_state.look_since)
+    )
+    assert 0.0 <= show_state.master <= 1.0
+    assert show_state.look in ("", "plaster", "lines", "ink", "cloud")
     assert desk.refused > COUNT / 2
     assert len(told) > COUNT / 2
     assert max(told) < 1500  # an answer is no weapon
@@ -86,7 +88,7 @@ def test_the_process_answers_after_all_that_and_has_not_grown(folder: Path, tmp_
         assert own_kb(process.pid) < before + 2048
         asker.tell("/panic", 1)
         until(lambda: (asker.hear() or [])[:3] == ["/reply", "/panic", 1])  # after pongs that were late
-        assert HouseReader(folder).read().panic
+        assert ShowStateReader(folder).read().panic
         process.terminate()
         assert process.wait(20) == 0
         flood.close()

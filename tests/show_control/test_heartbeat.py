@@ -12,9 +12,9 @@ from typing import get_type_hints
 import pytest
 from pythonosc.osc_message import OscMessage
 
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 from appliance.show_control.heartbeat import Heartbeat
-from appliance.show_control.stage_observer import StageSight
+from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import Status, status
 from tests.show_control.doubles import HOST, Asker, ControlInThread, StageDouble, until
 
@@ -37,7 +37,7 @@ def heard(listener: socket.socket) -> Status:
 
 
 def some_status(folder: Path) -> Status:
-    return status(House(), StageSight(folder), 0, 0, NOW)
+    return status(ShowState(), StageObserver(folder), 0, 0, NOW)
 
 
 def test_it_beats_on_a_grid_and_after_a_stall_once(folder: Path, listener: socket.socket) -> None:
@@ -63,24 +63,24 @@ def test_who_is_not_there_costs_the_others_nothing(folder: Path, listener: socke
 
 
 def test_every_state_of_the_stage_and_the_house(folder: Path) -> None:
-    sight = StageSight(folder)
+    sight = StageObserver(folder)
 
-    def state(house: House, later_s: float = 0.0) -> str:
+    def state(show_state: ShowState, later_s: float = 0.0) -> str:
         now = time.monotonic() + later_s
-        return status(house, sight, 0, 0, now).state
+        return status(show_state, sight, 0, 0, now).state
 
-    assert state(House()) == state(House(panic=True)) == "absent"
+    assert state(ShowState()) == state(ShowState(panic=True)) == "absent"
     with StageDouble(folder) as stage:
-        until(lambda: state(House()) == "dancing")
-        until(lambda: state(House(panic=True, blackout=True, going=False)) == "panic")
-        until(lambda: state(House(blackout=True, going=False)) == "blackout")
-        until(lambda: state(House(going=False)) == "stopped")
+        until(lambda: state(ShowState()) == "dancing")
+        until(lambda: state(ShowState(panic=True, blackout=True, going=False)) == "panic")
+        until(lambda: state(ShowState(blackout=True, going=False)) == "blackout")
+        until(lambda: state(ShowState(going=False)) == "stopped")
         stage.tell(state="stopped")
-        until(lambda: state(House()) == "stopped")
+        until(lambda: state(ShowState()) == "stopped")
         stage.dances = False
-        until(lambda: state(House(), later_s=0.6) == "hung")
-        assert state(House(panic=True), later_s=0.6) == "hung"
-    assert state(House(), later_s=1.0) == "absent"
+        until(lambda: state(ShowState(), later_s=0.6) == "hung")
+        assert state(ShowState(panic=True), later_s=0.6) == "hung"
+    assert state(ShowState(), later_s=1.0) == "absent"
 
 
 def test_it_goes_on_while_the_stage_hangs_and_when_it_is_gone(

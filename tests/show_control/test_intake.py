@@ -81,8 +81,8 @@ def test_what_is_urgent_is_answered_first_however_much_has_come_before_it(
     desk.tell("/stop", 1.0)
     desk.tell("/blackout", 1)
     process.turn()
-    house = process.desk.house
-    assert (house.panic, house.going, house.blackout) == (False, False, True)
+    show_state = process.desk.show_state
+    assert (show_state.panic, show_state.going, show_state.blackout) == (False, False, True)
     assert heard(desk)[:4] == ["/panic", "/go", "/stop", "/blackout"]
 
 

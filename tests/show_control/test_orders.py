@@ -22,7 +22,7 @@ from appliance.show_control.order_dispatch import (
     LATE_S,
     PATIENCE_S,
     WAITING,
-    Errands,
+    OrderDispatch,
 )
 from appliance.show_control.orders import Answer, Order, OrderInbox, OrderSender
 from tests.show_control.doubles import Clock, until
@@ -194,7 +194,7 @@ class Heard:
 def test_a_flood_reaches_the_stage_at_four_a_tick_and_the_oldest_gives_way(
     sender: OrderSender, inbox: OrderInbox
 ) -> None:
-    errands, heard = Errands(sender), Heard()
+    errands, heard = OrderDispatch(sender), Heard()
     for number in range(500):
         errands.begin("stage", Order("jump", (float(number),), quiet=True), NOW, heard)
     taken = []
@@ -214,7 +214,7 @@ def test_a_flood_reaches_the_stage_at_four_a_tick_and_the_oldest_gives_way(
 def test_a_stage_that_does_not_answer_is_told_after_half_a_second_and_once(
     sender: OrderSender, inbox: OrderInbox, clock: Clock
 ) -> None:
-    errands, heard = Errands(sender), Heard()
+    errands, heard = OrderDispatch(sender), Heard()
     errands.begin("stage", Order("cue", text="storm"), NOW, heard)
     errands.go_on(NOW + PATIENCE_S + ANSWER_S)
     assert heard.all == []
@@ -233,7 +233,7 @@ def test_a_stage_that_does_not_answer_is_told_after_half_a_second_and_once(
 def test_what_is_carried_out_at_the_last_moment_is_told_as_done(
     sender: OrderSender, inbox: OrderInbox, clock: Clock
 ) -> None:
-    errands, heard = Errands(sender), Heard()
+    errands, heard = OrderDispatch(sender), Heard()
     errands.begin("stage", Order("cue", text="storm"), NOW, heard)
     clock.now += PATIENCE_S
     order = inbox.take()
@@ -263,7 +263,7 @@ def test_what_was_told_as_not_done_is_corrected_when_it_was_done_after_all(
     corrected: list[tuple[bool, str]],
 ) -> None:
     """The stage was held up in the middle of the order, which it had taken in time."""
-    errands, heard = Errands(sender), Heard()
+    errands, heard = OrderDispatch(sender), Heard()
     errands.begin("stage", Order("cue", text="storm", quiet=quiet), NOW, heard)
     order = inbox.take()
     assert order is not None
@@ -283,7 +283,7 @@ def test_an_answer_to_a_show_control_that_died_is_not_taken_for_one_to_the_next(
     orders, heard = [], Heard()
     for _ in range(2):
         sender = OrderSender(folder)
-        errands = Errands(sender)
+        errands = OrderDispatch(sender)
         errands.begin("stage", Order("cue", text="storm"), NOW, heard)
         orders.append(inbox.take())
         if len(orders) == 1:
@@ -302,7 +302,7 @@ def test_an_answer_to_a_show_control_that_died_is_not_taken_for_one_to_the_next(
 def test_what_waits_for_a_full_socket_is_told_too(sender: OrderSender, inbox: OrderInbox) -> None:
     while sender.send("stage", Order("start", until=NOW)) == "sent":
         pass
-    errands, heard = Errands(sender), Heard()
+    errands, heard = OrderDispatch(sender), Heard()
     errands.begin("stage", Order("start"), NOW, heard)
     errands.go_on(NOW + PATIENCE_S + 0.1)
     assert [done for done, _ in heard.all] == [False]
@@ -310,7 +310,7 @@ def test_what_waits_for_a_full_socket_is_told_too(sender: OrderSender, inbox: Or
 
 
 def test_of_quiet_orders_refusals_and_silence_are_told_alone(sender: OrderSender, inbox: OrderInbox) -> None:
-    errands, heard, quiet = Errands(sender), Heard(), Heard()
+    errands, heard, quiet = OrderDispatch(sender), Heard(), Heard()
     errands.begin("stage", Order("cue", text="storm"), NOW, heard)
     errands.begin("stage", Order("rate", (1.0,), quiet=True), NOW, quiet)
     errands.begin("stage", Order("rate", (9.0,), quiet=True), NOW, quiet)
@@ -328,7 +328,7 @@ def test_of_quiet_orders_refusals_and_silence_are_told_alone(sender: OrderSender
 
 
 def test_without_anybody_there_it_is_told_at_once(sender: OrderSender) -> None:
-    errands, heard = Errands(sender), Heard()
+    errands, heard = OrderDispatch(sender), Heard()
     for place in ("stage", "projector", "lights"):
         errands.begin(place, Order("x"), NOW, heard)
     assert [done for done, _ in heard.all] == [False] * 3

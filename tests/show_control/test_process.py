@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.show_state import House, HouseReader
+from appliance.box.show_state import ShowState, ShowStateReader
 from tests.show_control.doubles import PATIENCE_S, Asker, control_process
 
 HEAVY = ("onnxruntime", "pydantic", "typer", "rich", "yaml", "moderngl", "sdl2")
@@ -25,7 +25,7 @@ def test_a_signal_ends_it_and_what_is_in_force_stays(
         process.send_signal(number)
         assert process.wait(PATIENCE_S) == 0
         asker.close()
-    assert HouseReader(folder).read() == House(blackout=True)
+    assert ShowStateReader(folder).read() == ShowState(blackout=True)
     assert (tmp_path / "words.txt").read_text() in ("", "Blackout is in force. /blackout 0 lifts it.\n")
     assert not (folder / "control.sock").exists()
 

@@ -123,7 +123,7 @@ def test_a_fade_begins_when_its_command_has_come(
     asker.tell(*command)
     began = clock.now
     process.turn()
-    assert getattr(process.desk.house, since) == began + 5.0
+    assert getattr(process.desk.show_state, since) == began + 5.0
 
 
 def test_the_fades_of_a_cue_begin_when_the_stage_has_answered(
@@ -133,8 +133,8 @@ def test_the_fades_of_a_cue_begin_when_the_stage_has_answered(
     clock.now += PATIENCE_S
     inbox.answer(order, True, "")
     process.turn()
-    house = process.desk.house
-    assert (house.look_since, house.lights_since, house.master_since) == (clock.now,) * 3
+    show_state = process.desk.show_state
+    assert (show_state.look_since, show_state.lights_since, show_state.master_since) == (clock.now,) * 3
 
 
 def test_a_cue_that_is_answered_too_late_is_followed_and_told_but_for_what_was_set_meanwhile(
@@ -146,12 +146,17 @@ def test_a_cue_that_is_answered_too_late_is_followed_and_told_but_for_what_was_s
     process.turn()
     assert asker.hear()[:3] == ["/reply", "/look", 1]  # type: ignore[index]
     assert asker.hear()[:3] == ["/reply", "/cue", 0]  # type: ignore[index]
-    assert process.desk.house.cue == ""
+    assert process.desk.show_state.cue == ""
     inbox.answer(order, True, "")
     process.turn()
     assert asker.hear() == ["/reply", "/cue", 1, "Cue storm."]
-    house = process.desk.house
-    assert (house.cue, house.look, house.lights, house.master) == ("storm", "lines", "cold", 0.5)
+    show_state = process.desk.show_state
+    assert (show_state.cue, show_state.look, show_state.lights, show_state.master) == (
+        "storm",
+        "lines",
+        "cold",
+        0.5,
+    )
 
 
 @pytest.mark.parametrize("away_s", [0.2, 3.0])
@@ -179,10 +184,10 @@ def test_a_cue_is_followed_if_the_stage_died_before_it_answered_and_the_next_one
             clock.now += GIVEN_UP_S
             process.turn()
     assert asker.hear()[:3] == ["/reply", "/cue", 0]  # type: ignore[index]
-    assert process.desk.house.cue == followed
+    assert process.desk.show_state.cue == followed
     if followed == "storm":
         assert asker.hear()[:3] == ["/reply", "/cue", 1]  # type: ignore[index]
-        assert (process.desk.house.look, process.desk.house.master) == ("ink", 0.5)
+        assert (process.desk.show_state.look, process.desk.show_state.master) == ("ink", 0.5)
 
 
 def test_a_cue_that_nobody_has_done_is_not_followed_though_a_stage_once_began_in_it(
@@ -200,5 +205,5 @@ def test_a_cue_that_nobody_has_done_is_not_followed_though_a_stage_once_began_in
         for _ in range(2):
             clock.now += GIVEN_UP_S
             process.turn()
-            assert process.desk.house.cue == "1"
+            assert process.desk.show_state.cue == "1"
             next_one.write_health({"state": "dancing", "cue": "1"})

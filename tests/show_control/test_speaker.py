@@ -8,12 +8,12 @@ import threading
 from types import FrameType
 from typing import Any
 
-from appliance.box.log_writer import WAITING_LINES, Speaker
+from appliance.box.log_writer import WAITING_LINES, LogWriter
 
 
 def test_a_name_that_is_no_text_does_not_silence_what_follows() -> None:
     reading, writing = os.pipe()
-    speaker = Speaker(writing)
+    speaker = LogWriter(writing)
     speaker.say(os.fsdecode(b"caf\xe9.bvh"))
     speaker.say("The show goes on.")
     speaker.close()
@@ -24,7 +24,7 @@ def test_a_name_that_is_no_text_does_not_silence_what_follows() -> None:
 
 def test_who_does_not_read_holds_nobody_up() -> None:
     reading, writing = os.pipe()
-    speaker = Speaker(writing)
+    speaker = LogWriter(writing)
     for _ in range(1000):
         speaker.say("x" * 1000)
     speaker.close()
@@ -34,7 +34,7 @@ def test_who_does_not_read_holds_nobody_up() -> None:
 
 def test_what_was_dropped_is_counted_and_told_once_lines_are_taken_again() -> None:
     reading, writing = os.pipe()
-    speaker = Speaker(writing)
+    speaker = LogWriter(writing)
     for number in range(3 * WAITING_LINES):
         speaker.say(f"{number:05d}" + "x" * 4000)
     dropped, heard = speaker.dropped, b""
@@ -54,7 +54,7 @@ def test_what_was_dropped_is_counted_and_told_once_lines_are_taken_again() -> No
 def test_the_tick_hands_a_line_over_without_a_lock() -> None:
     """It would wait for a thread that may not run for long: one that is not real-time, and holds the lock."""
     reading, writing = os.pipe()
-    speaker = Speaker(writing)
+    speaker = LogWriter(writing)
     locks: list[str] = []
     kinds = (type(threading.Lock()), type(threading.RLock()))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from appliance.box.show_state import House
+from appliance.box.show_state import ShowState
 from appliance.show_control.order_dispatch import Then
 from appliance.show_control.orders import Order
 from appliance.show_control.standstill import Standstill
@@ -24,7 +24,7 @@ class Sight:
         return "stopped"
 
 
-class Errands:
+class OrderDispatch:
     """Orders that were given, and nobody answers."""
 
     def __init__(self) -> None:
@@ -38,23 +38,23 @@ class Errands:
 
 
 def test_a_start_that_nobody_answered_is_given_again_until_it_is_done() -> None:
-    errands = Errands()
+    errands = OrderDispatch()
     standstill = Standstill(Sight(), errands)  # type: ignore[arg-type]
-    standstill.go(House(), NOW)
-    standstill.look(House(), NOW + 1.1)
+    standstill.go(ShowState(), NOW)
+    standstill.look(ShowState(), NOW + 1.1)
     assert errands.names == ["start", "start"]
     errands.thens[-1](True, "")
-    standstill.look(House(), NOW + 3.0)
+    standstill.look(ShowState(), NOW + 3.0)
     assert errands.names == ["start", "start"]
 
 
 def test_what_somebody_does_by_hand_since_is_not_overruled() -> None:
-    errands = Errands()
+    errands = OrderDispatch()
     standstill = Standstill(Sight(), errands)  # type: ignore[arg-type]
-    standstill.look(House(), NOW)
-    standstill.go(House(), NOW)
+    standstill.look(ShowState(), NOW)
+    standstill.go(ShowState(), NOW)
     standstill.leave()
-    standstill.look(House(), NOW + 1.1)
+    standstill.look(ShowState(), NOW + 1.1)
     assert errands.names == ["start"]
-    standstill.look(House(going=False, going_since=NOW), NOW + 9.0)
+    standstill.look(ShowState(going=False, going_since=NOW), NOW + 9.0)
     assert errands.names == ["start", "stop"]  # the show as a whole is stopped all the same

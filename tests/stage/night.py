@@ -15,7 +15,7 @@ from appliance.show_control.orders import Order
 from appliance.stage.carry_out import carry_out
 from appliance.stage.iterations import Iterations
 from appliance.stage.recorder import Recorder
-from appliance.stage.sensor_fit import Wearing
+from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import assemble
 from appliance.stage.tick import Tick
@@ -32,7 +32,7 @@ class Night:
         self.runtime, self.show, self.said = runtime, load_show(show), list[str]()
         self.cast = assemble(self.show, BOX)
         self.heard = self.cast.link = _Heard()
-        self.wearing = Wearing(self.cast, SensorMemory(None, self.said.append), self.said.append)
+        self.wearing = SensorFit(self.cast, SensorMemory(None, self.said.append), self.said.append)
         self.tick = Tick(self.cast, self.wearing, Iterations(3, 2, 10), LATEST_START_S)
         self.recorder = Recorder(runtime, facts_of_run(self.show, list(self.cast.worn)))
         self.slot = Slot(-1, begins_at, begins_at)

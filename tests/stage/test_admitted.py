@@ -14,7 +14,7 @@ from appliance.show.show import load_show
 from appliance.stage import admission_cache as module
 from appliance.stage.admission import Admission
 from appliance.stage.admission_cache import FILE, admitted
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.stage_parts import StageParts, assemble
 from tests.stage.bundles import write_show
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
@@ -26,7 +26,7 @@ def bundle(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def cast(bundle: Path) -> Iterator[Cast]:
+def cast(bundle: Path) -> Iterator[StageParts]:
     cast = assemble(load_show(bundle), BOX)
     yield cast
     cast.close()
@@ -47,7 +47,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_measured_at_a_fresh_start_and_taken_at_a_return(
-    cast: Cast, bundle: Path, tmp_path: Path, measured: list[int]
+    cast: StageParts, bundle: Path, tmp_path: Path, measured: list[int]
 ) -> None:
     show = load_show(bundle)
     first = admitted(tmp_path, cast, show, BOX, comes_back=False)
@@ -57,7 +57,9 @@ def test_measured_at_a_fresh_start_and_taken_at_a_return(
     assert len(measured) == 2
 
 
-def test_whatever_changes_is_measured(cast: Cast, bundle: Path, tmp_path: Path, measured: list[int]) -> None:
+def test_whatever_changes_is_measured(
+    cast: StageParts, bundle: Path, tmp_path: Path, measured: list[int]
+) -> None:
     admitted(tmp_path, cast, load_show(bundle), BOX, comes_back=False)
     slower = BOX.model_copy(update={"limits": LimitsConfig(tick_budget_ms=3.0)})
     assert admitted(tmp_path, cast, load_show(bundle), slower, comes_back=True).budget_ms == 3.0
@@ -73,7 +75,7 @@ def test_whatever_changes_is_measured(cast: Cast, bundle: Path, tmp_path: Path, 
 
 @pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b'{"asked": 1, "measured": {}}', b"\xff\xfe"])
 def test_what_cannot_be_read_is_measured(
-    cast: Cast, bundle: Path, tmp_path: Path, measured: list[int], content: bytes
+    cast: StageParts, bundle: Path, tmp_path: Path, measured: list[int], content: bytes
 ) -> None:
     show = load_show(bundle)
     admitted(tmp_path, cast, show, BOX, comes_back=False)
@@ -86,6 +88,8 @@ def test_what_cannot_be_read_is_measured(
     assert len(measured) == 3
 
 
-def test_a_folder_that_takes_no_file_costs_nothing_but_time(cast: Cast, bundle: Path, tmp_path: Path) -> None:
+def test_a_folder_that_takes_no_file_costs_nothing_but_time(
+    cast: StageParts, bundle: Path, tmp_path: Path
+) -> None:
     (tmp_path / FILE).mkdir()
     assert admitted(tmp_path, cast, load_show(bundle), BOX, comes_back=True).coding >= 1

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from appliance.box.clock import Slot
-from appliance.box.show_state import House, HouseWriter
+from appliance.box.show_state import ShowState, ShowStateWriter
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
@@ -20,9 +20,9 @@ from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey, resume
 from appliance.stage.iterations import Iterations
 from appliance.stage.run import Stage
-from appliance.stage.sensor_fit import Wearing
+from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show
 
@@ -52,7 +52,7 @@ def show(tmp_path: Path) -> Show:
 
 
 @pytest.fixture
-def cast(show: Show) -> Iterator[Cast]:
+def cast(show: Show) -> Iterator[StageParts]:
     cast = assemble(show, BOX)
     yield cast
     cast.close()
@@ -64,8 +64,8 @@ def iterations() -> Iterations:
 
 
 @pytest.fixture
-def tick(cast: Cast, iterations: Iterations) -> Tick:
-    return Tick(cast, Wearing(cast, SensorMemory(None, print), print), iterations, 1.0)
+def tick(cast: StageParts, iterations: Iterations) -> Tick:
+    return Tick(cast, SensorFit(cast, SensorMemory(None, print), print), iterations, 1.0)
 
 
 def danced(tick: Tick, ticks: int, begin: int = 0) -> np.ndarray:
@@ -86,11 +86,11 @@ def reached(iterations: Iterations) -> tuple[int, int]:
     return iterations.coding, iterations.interaction
 
 
-def enabled(cast: Cast) -> dict[str, bool]:
+def enabled(cast: StageParts) -> dict[str, bool]:
     return {puppeteer.joint: puppeteer.enabled for puppeteer in cast.hands.puppeteers}
 
 
-def test_a_cue_changes_phrase_iterations_and_hands(cast: Cast, iterations: Iterations) -> None:
+def test_a_cue_changes_phrase_iterations_and_hands(cast: StageParts, iterations: Iterations) -> None:
     done, words = obey(Order("cue", text="storm"), cast, iterations, 1.0)
     assert done and "with 8 and 7: at most 8 fit" in words  # the cue asks for 12 and 11
     assert reached(iterations) == (8, 7)
@@ -104,7 +104,7 @@ def test_a_cue_changes_phrase_iterations_and_hands(cast: Cast, iterations: Itera
     assert enabled(cast) == {"lShldr": True, "Chest": True}
 
 
-def test_what_a_cue_leaves_out_stays(cast: Cast, iterations: Iterations) -> None:
+def test_what_a_cue_leaves_out_stays(cast: StageParts, iterations: Iterations) -> None:
     obey(Order("cue", text="storm"), cast, iterations, 1.0)
     obey(Order("cue", text="lights only"), cast, iterations, 1.0)
     assert reached(iterations) == (8, 7)
@@ -126,7 +126,7 @@ def test_what_a_cue_leaves_out_stays(cast: Cast, iterations: Iterations) -> None
     ],
 )
 def test_an_unknown_name_changes_nothing(
-    cast: Cast, iterations: Iterations, order: Order, words: str
+    cast: StageParts, iterations: Iterations, order: Order, words: str
 ) -> None:
     done, said = obey(order, cast, iterations, 1.0)
     assert not done and words in said
@@ -134,7 +134,7 @@ def test_an_unknown_name_changes_nothing(
     assert (cast.cue, cast.motion.jumped, enabled(cast)) == ("", False, {"lShldr": True, "Chest": True})
 
 
-def test_a_phrase_is_called_with_its_own_fade(cast: Cast, iterations: Iterations) -> None:
+def test_a_phrase_is_called_with_its_own_fade(cast: StageParts, iterations: Iterations) -> None:
     assert obey(Order("phrase", (1.0,), "slow"), cast, iterations, 1.0) == (True, "")
     cast.motion.advance()
     assert cast.motion.jumped
@@ -142,7 +142,9 @@ def test_a_phrase_is_called_with_its_own_fade(cast: Cast, iterations: Iterations
     assert obey(Order("phrase", text="main"), cast, iterations, 1.0) == (True, "")
 
 
-def test_a_hand_lets_go_and_holds_by_name_or_number(cast: Cast, iterations: Iterations, tick: Tick) -> None:
+def test_a_hand_lets_go_and_holds_by_name_or_number(
+    cast: StageParts, iterations: Iterations, tick: Tick
+) -> None:
     place = cast.hand_places[0]
     danced(tick, 50)
     assert cast.hands.weights[place] == 1.0
@@ -156,7 +158,7 @@ def test_a_hand_lets_go_and_holds_by_name_or_number(cast: Cast, iterations: Iter
 
 
 def test_a_hand_by_osc_that_was_told_nothing_holds_its_joint_where_it_is(
-    cast: Cast, iterations: Iterations, tick: Tick
+    cast: StageParts, iterations: Iterations, tick: Tick
 ) -> None:
     chest = FIGURE.index("Chest")
     before = danced(tick, 62)
@@ -168,7 +170,7 @@ def test_a_hand_by_osc_that_was_told_nothing_holds_its_joint_where_it_is(
     assert quaternion.angle_between(after[-50:, chest], held).max() < 1e-3
 
 
-def test_a_cue_shows_no_jump(cast: Cast, iterations: Iterations, tick: Tick) -> None:
+def test_a_cue_shows_no_jump(cast: StageParts, iterations: Iterations, tick: Tick) -> None:
     parts = [danced(tick, 70)]
     for place, name in enumerate(("storm", "start", "alone", "storm")):
         obey(Order("cue", text=name), cast, iterations, 1.0)
@@ -179,7 +181,7 @@ def test_a_cue_shows_no_jump(cast: Cast, iterations: Iterations, tick: Tick) -> 
     assert quaternion.angle_between(poses[1:, still], poses[:-1, still]).max() < 1e-3
 
 
-def test_a_show_that_is_started_again_comes_back_in_its_cue(cast: Cast, iterations: Iterations) -> None:
+def test_a_show_that_is_started_again_comes_back_in_its_cue(cast: StageParts, iterations: Iterations) -> None:
     sentence = resume("storm", cast, iterations)
     assert "goes on in the cue 'storm'" in sentence and "at most 8 fit" in sentence
     assert (cast.cue, cast.motion.phrase, cast.motion.position_s) == ("storm", "slow", 0.0)
@@ -194,7 +196,7 @@ def test_a_show_that_is_started_again_comes_back_in_its_cue(cast: Cast, iteratio
 
 @pytest.mark.parametrize("name", ["", "of another show"])
 def test_without_a_cue_of_this_show_it_begins_as_it_does(
-    cast: Cast, iterations: Iterations, name: str
+    cast: StageParts, iterations: Iterations, name: str
 ) -> None:
     assert resume(name, cast, iterations) == ""
     assert (cast.cue, cast.motion.phrase, iterations.coding) == ("", "main", 3)
@@ -205,8 +207,8 @@ def test_the_stage_asks_the_house_in_which_cue_it_was(show: Show, tmp_path: Path
     runtime.mkdir(mode=0o700)
     box = BOX.model_copy(update={"runtime": runtime, "realtime": RealtimeConfig(enabled=False)})
     for cue, phrase in (("storm", "slow"), ("", "main")):
-        with closing(HouseWriter(runtime)) as house:
-            house.write(House(cue=cue))
+        with closing(ShowStateWriter(runtime)) as show_state:
+            show_state.write(ShowState(cue=cue))
         said: list[str] = []
         stage = Stage(show, box, said.append)
         with closing(stage):

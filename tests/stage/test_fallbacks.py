@@ -22,8 +22,8 @@ from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
 from appliance.stage.fallback import OF_THE_STAGE, StageFallbacks
 from appliance.stage.health import Health
-from appliance.stage.resume import Resuming
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.resume import Resumption
+from appliance.stage.stage_parts import StageParts, assemble
 from tests.stage.bundles import write_show
 
 FITS = Admission(3, 2, 3, 2, 64, 0.1, 0.2, 0.3, 10.0)
@@ -31,7 +31,7 @@ DOES_NOT_FIT = Admission(30, 20, 9, 6, 9, 1.0, 20.0, 30.0, 10.0)
 
 
 @pytest.fixture
-def danced(tmp_path: Path) -> Iterator[Cast]:
+def danced(tmp_path: Path) -> Iterator[StageParts]:
     """A cast with one sensor, a cable that is not there, and a receiver."""
     cable = SerialConfig(device=str(tmp_path / "ttyACM0"))
     box = BoxConfig(
@@ -43,7 +43,7 @@ def danced(tmp_path: Path) -> Iterator[Cast]:
 
 
 @pytest.fixture
-def stage(danced: Cast) -> StageFallbacks:
+def stage(danced: StageParts) -> StageFallbacks:
     return StageFallbacks(danced, FITS)
 
 
@@ -52,11 +52,11 @@ def of(stage: StageFallbacks, row: Fallback, now: float) -> Fallen:
     return found[0] if found else Fallen(row.name, 0, False, row.words)
 
 
-def hear(danced: Cast, at: float) -> None:
+def hear(danced: StageParts, at: float) -> None:
     danced.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, at, at, 90, 255))
 
 
-def test_sensor_silent(stage: StageFallbacks, danced: Cast) -> None:
+def test_sensor_silent(stage: StageFallbacks, danced: StageParts) -> None:
     for now in (1.0, 1.02):
         stage.watch(now)
     assert of(stage, rows.SENSOR_SILENT, 1.0).times == 0, "one that was never heard is not silent"
@@ -72,7 +72,7 @@ def test_sensor_silent(stage: StageFallbacks, danced: Cast) -> None:
 
 
 @pytest.mark.parametrize("reason", ["zero", "norm", "torn", "rate"])
-def test_reading_refused(stage: StageFallbacks, danced: Cast, reason: str) -> None:
+def test_reading_refused(stage: StageFallbacks, danced: StageParts, reason: str) -> None:
     danced.link._counts[reason] += 3
     stage.look(1.0, Health())
     stage.look(2.0, Health())
@@ -81,13 +81,13 @@ def test_reading_refused(stage: StageFallbacks, danced: Cast, reason: str) -> No
 
 
 @pytest.mark.parametrize("reason", ["length", "magic", "device", "tag"])
-def test_packet_refused(stage: StageFallbacks, danced: Cast, reason: str) -> None:
+def test_packet_refused(stage: StageFallbacks, danced: StageParts, reason: str) -> None:
     danced.link._counts[reason] += 1
     stage.look(1.0, Health())
     assert of(stage, rows.PACKET_REFUSED, 1.0)[1:3] == (1, True)
 
 
-def test_cable_away(stage: StageFallbacks, danced: Cast) -> None:
+def test_cable_away(stage: StageFallbacks, danced: StageParts) -> None:
     stage.look(1.0, Health())
     told = of(stage, rows.CABLE_AWAY, 1.0)
     assert told[1:3] == (1, True)
@@ -97,7 +97,7 @@ def test_cable_away(stage: StageFallbacks, danced: Cast) -> None:
     assert of(stage, rows.CABLE_AWAY, 2.0)[1:3] == (1, False)
 
 
-def test_address_absent(stage: StageFallbacks, danced: Cast) -> None:
+def test_address_absent(stage: StageFallbacks, danced: StageParts) -> None:
     stage.look(1.0, Health())
     assert of(stage, rows.ADDRESS_ABSENT, 1.0).times == 0
     danced.link.intakes[0].address_is_absent = True  # type: ignore[attr-defined]
@@ -131,14 +131,14 @@ def test_what_health_counts(stage: StageFallbacks, row: Fallback, counter: str) 
     assert of(stage, row, 3.0 + RECENT_S)[1:3] == (5, False)
 
 
-def test_iterations_lowered(danced: Cast, stage: StageFallbacks) -> None:
+def test_iterations_lowered(danced: StageParts, stage: StageFallbacks) -> None:
     assert of(stage, rows.ITERATIONS_LOWERED, 0.0).times == 0
     told = of(StageFallbacks(danced, DOES_NOT_FIT), rows.ITERATIONS_LOWERED, 0.0)
     assert told[1:3] == (1, True)
     assert "30 coding iterations do not fit" in told.words
 
 
-def test_receiver_gone(stage: StageFallbacks, danced: Cast) -> None:
+def test_receiver_gone(stage: StageFallbacks, danced: StageParts) -> None:
     stage.look(1.0, Health())
     danced.outputs.receivers[0].dropped += 4
     stage.look(2.0, Health())
@@ -154,8 +154,8 @@ def test_not_realtime(stage: StageFallbacks) -> None:
     assert of(stage, rows.NOT_REALTIME, 0.0) == Fallen("not-realtime", 1, True, "Memory is not locked.")
 
 
-def resumed(**changes: Any) -> Resuming:
-    return cast(Resuming, SimpleNamespace(**{"restarts": 0, "power_cuts": 0, "complaint": ""} | changes))
+def resumed(**changes: Any) -> Resumption:
+    return cast(Resumption, SimpleNamespace(**{"restarts": 0, "power_cuts": 0, "complaint": ""} | changes))
 
 
 BEGINNINGS: dict[str, tuple[Fallback, Callable[[StageFallbacks], None]]] = {
@@ -199,7 +199,7 @@ def test_other_versions_say_what_they_like() -> None:
     assert fallen([["tick-late", 2, True, "Words."]]) == (Fallen("tick-late", 2, True, "Words."),)
 
 
-def test_a_look_costs_little_and_a_watch_makes_nothing(stage: StageFallbacks, danced: Cast) -> None:
+def test_a_look_costs_little_and_a_watch_makes_nothing(stage: StageFallbacks, danced: StageParts) -> None:
     """Objects that a tick leaves behind would call the collector, which is switched off during a show."""
     import sys
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.box.checkpoint import Place, PlaceReader, PlaceWriter
+from appliance.box.checkpoint import Checkpoint, CheckpointReader, CheckpointWriter
 from appliance.box.clock import TICK_S
 from appliance.box.ring_file import RingFileWriter
 from appliance.box.runtime_folder import Claim
@@ -27,7 +27,7 @@ from tests.stage.fakes import FakeTime
 from tests.stage.night import Night
 
 DISK_BYTES = 8 << 20
-PLACE = Place("A show", "main", 1.5, (0.0, 30.0))
+PLACE = Checkpoint("A show", "main", 1.5, (0.0, 30.0))
 
 
 @pytest.fixture
@@ -187,7 +187,7 @@ def test_the_keeper_turns_until_it_is_stopped_and_then_once_more() -> None:
     assert happened == ["turn at 0.0", "turn at 0.5", "turn at 1.0", "last turn"]
 
 
-def end_of(place: PlaceWriter, runtime: Path, ends_at: float, end_s: float = END_S) -> list[float]:
+def end_of(place: CheckpointWriter, runtime: Path, ends_at: float, end_s: float = END_S) -> list[float]:
     """When a keeper that is stopped at 0.7 s turns, the last time at its end; its stage ends at `ends_at`."""
     time, turned = FakeTime(), list[float]()
 
@@ -205,7 +205,7 @@ def end_of(place: PlaceWriter, runtime: Path, ends_at: float, end_s: float = END
         place.write(replace(PLACE, position_s=time.now - 1000.0, ended=time.now > 1000.0 + ends_at))
 
     place.write(PLACE)
-    with closing(PlaceReader(runtime)) as reader:
+    with closing(CheckpointReader(runtime)) as reader:
         clock = {"monotonic": time.monotonic, "sleep": sleep}
         keep_on([Carried()], lambda: time.now > 1000.69, goes_on=reader.goes_on, end_s=end_s, **clock)
     return turned
@@ -213,7 +213,7 @@ def end_of(place: PlaceWriter, runtime: Path, ends_at: float, end_s: float = END
 
 def test_a_show_is_carried_to_its_end_which_comes_after_lights_that_fade(tmp_path: Path) -> None:
     """The power may fail meanwhile, and what happens until then belongs into the journal."""
-    with closing(PlaceWriter(tmp_path)) as place:
+    with closing(CheckpointWriter(tmp_path)) as place:
         turned = end_of(place, tmp_path, ends_at=5.0)
         assert turned[-1] == pytest.approx(5.05, abs=0.06)
         assert max(np.diff(turned)) == pytest.approx(TURN_S)
@@ -221,12 +221,12 @@ def test_a_show_is_carried_to_its_end_which_comes_after_lights_that_fade(tmp_pat
 
 
 def test_a_show_that_does_not_end_is_not_waited_for_for_ever(tmp_path: Path) -> None:
-    place = PlaceWriter(tmp_path)
+    place = CheckpointWriter(tmp_path)
     assert end_of(place, tmp_path, ends_at=99.0)[-1] == pytest.approx(0.7 + END_S, abs=0.06)
     assert end_of(place, tmp_path, ends_at=99.0, end_s=1.0)[-1] == pytest.approx(1.7, abs=0.06)
     place.write(PLACE)
     place.close()
-    with closing(PlaceReader(tmp_path)) as reader:
+    with closing(CheckpointReader(tmp_path)) as reader:
         assert not reader.goes_on(), "the stage is gone: nobody will say that its show has ended"
 
 

@@ -16,16 +16,16 @@ from appliance.show.show import load_show
 from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey, obey_for_sensors
 from appliance.stage.iterations import Iterations
-from appliance.stage.sensor_fit import Wearing
+from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.stage_parts import StageParts, assemble
 from tests.stage.bundles import write_show
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
 
 
 @pytest.fixture
-def cast(tmp_path: Path) -> Iterator[Cast]:
+def cast(tmp_path: Path) -> Iterator[StageParts]:
     show = load_show(write_show(tmp_path / "show", [{"osc": True, "joint": "lShldr"}]))
     cast = assemble(show, BOX)
     yield cast
@@ -37,7 +37,7 @@ def cast(tmp_path: Path) -> Iterator[Cast]:
     [((5, 4), (5, 4)), ((12, 11), (8, 7)), ((12, 2), (8, 0)), ((3, 3), (3, 3)), ((0, 0), (1, 0))],
 )
 def test_iterations_change_within_what_fits(
-    cast: Cast, asked: tuple[int, int], danced: tuple[int, int]
+    cast: StageParts, asked: tuple[int, int], danced: tuple[int, int]
 ) -> None:
     iterations = Iterations(3, 2, most=8)
     done, words = obey(Order("iterations", tuple(map(float, asked))), cast, iterations, 1.0)
@@ -45,7 +45,7 @@ def test_iterations_change_within_what_fits(
     assert done and bool(words) == (asked != danced)
 
 
-def test_playback_stops_starts_jumps_and_plays_excerpts(cast: Cast) -> None:
+def test_playback_stops_starts_jumps_and_plays_excerpts(cast: StageParts) -> None:
     iterations = Iterations(3, 2, 8)
     obey(Order("stop"), cast, iterations, 0.5)
     assert cast.motion.rate == 0.0
@@ -60,7 +60,7 @@ def test_playback_stops_starts_jumps_and_plays_excerpts(cast: Cast) -> None:
     assert not done and "from 2 s to 2.04 s" in words
 
 
-def test_a_joint_is_held_and_released_by_osc(cast: Cast) -> None:
+def test_a_joint_is_held_and_released_by_osc(cast: StageParts) -> None:
     iterations = Iterations(3, 2, 8)
     assert obey(Order("hold", (1.0, 0.0, 0.0, np.pi / 2), "lShldr"), cast, iterations, 1.0) == (True, "")
     for tick in range(100):
@@ -90,7 +90,7 @@ def test_a_kept_joint_holds_and_lets_go_by_order(tmp_path: Path) -> None:
     cast.close()
 
 
-def test_iterations_that_leave_the_hands_idle_are_told(cast: Cast) -> None:
+def test_iterations_that_leave_the_hands_idle_are_told(cast: StageParts) -> None:
     iterations = Iterations(3, 2, 8)
     done, words = obey(Order("iterations", (1.0, 0.0)), cast, iterations, 1.0)
     assert done and words == "None of the iterations is interactive: the hands move nothing."
@@ -98,7 +98,7 @@ def test_iterations_that_leave_the_hands_idle_are_told(cast: Cast) -> None:
     assert obey(Order("iterations", (1.0, 0.0)), cast, iterations, 1.0) == (True, "")
 
 
-def test_a_joint_that_no_hand_holds_by_osc_is_refused_in_words(cast: Cast) -> None:
+def test_a_joint_that_no_hand_holds_by_osc_is_refused_in_words(cast: StageParts) -> None:
     iterations = Iterations(3, 2, 8)
     for order, words in [
         (Order("hold", (1.0, 0.0, 0.0, 1.0), "Chest"), "No hand of this show holds 'Chest'"),
@@ -134,7 +134,7 @@ class HeardLink(SensorLink):
 
 
 @pytest.fixture
-def worn(tmp_path: Path) -> Iterator[Cast]:
+def worn(tmp_path: Path) -> Iterator[StageParts]:
     """left-wrist is worn and heard, head is worn and lost, spare-1 is heard."""
     hands: list[dict[str, object]] = [
         {"sensor": "left-wrist", "joint": "lShldr"},
@@ -169,10 +169,10 @@ def worn(tmp_path: Path) -> Iterator[Cast]:
     ],
 )
 def test_commands_about_sensors_are_done_or_refused_in_words(
-    worn: Cast, order: Order, done: bool, words: str
+    worn: StageParts, order: Order, done: bool, words: str
 ) -> None:
     assert isinstance(worn.link, HeardLink)
-    wearing = Wearing(worn, SensorMemory(None, print), print)
+    wearing = SensorFit(worn, SensorMemory(None, print), print)
     wearing.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, 99.6, 99.6, 90, 255))
     outcome = obey_for_sensors(order, worn, wearing, 100.0)
     assert outcome[0] == done
@@ -184,17 +184,17 @@ def test_commands_about_sensors_are_done_or_refused_in_words(
 @pytest.mark.parametrize("name", ["neutral", "heading"])
 @pytest.mark.parametrize("sensor", ["left-wrist", ""])
 def test_whoever_asks_a_sensor_that_is_linked_and_not_heard_now_is_told_that_nothing_is_done(
-    worn: Cast, name: str, sensor: str
+    worn: StageParts, name: str, sensor: str
 ) -> None:
-    wearing = Wearing(worn, SensorMemory(None, print), print)
+    wearing = SensorFit(worn, SensorMemory(None, print), print)
     wearing.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, 99.4, 99.4, 90, 255))
     done, words = obey_for_sensors(Order(name, text=sensor), worn, wearing, 100.0)
     assert not done
     assert words.startswith("Not heard at this moment: left-wrist") and "Nothing is changed." in words
 
 
-def test_a_show_without_sensors_has_no_neutral_pose(cast: Cast) -> None:
-    wearing = Wearing(cast, SensorMemory(None, print), print)
+def test_a_show_without_sensors_has_no_neutral_pose(cast: StageParts) -> None:
+    wearing = SensorFit(cast, SensorMemory(None, print), print)
     assert obey_for_sensors(Order("neutral"), cast, wearing, 100.0) == (
         False,
         "No hand of this show is held by a sensor.",

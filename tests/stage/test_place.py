@@ -17,10 +17,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from appliance.box import ring_file
-from appliance.box.checkpoint import FILE, LARGEST, Place, PlaceReader, PlaceWriter, boot_id, packed, unpacked
+from appliance.box.checkpoint import (
+    FILE,
+    LARGEST,
+    Checkpoint,
+    CheckpointReader,
+    CheckpointWriter,
+    boot_id,
+    packed,
+    unpacked,
+)
 from appliance.box.ring_file import RingFileWriter
 
-PLACE = Place(
+PLACE = Checkpoint(
     "Évora, night",
     "second",
     12.34,
@@ -47,7 +56,7 @@ _names = st.text(max_size=60)
 
 @given(
     st.builds(
-        Place,
+        Checkpoint,
         show=_names,
         phrase=_names,
         position_s=_finite,
@@ -64,7 +73,7 @@ _names = st.text(max_size=60)
         tries=st.integers(0, 255),
     )
 )
-def test_comes_back_as_it_was(place: Place) -> None:
+def test_comes_back_as_it_was(place: Checkpoint) -> None:
     assert unpacked(packed(place)) == place
 
 
@@ -89,10 +98,10 @@ def test_names_that_are_too_long_are_refused() -> None:
 
 
 def test_outlives_its_writer_and_is_written_on_by_the_next(tmp_path: Path) -> None:
-    reader = PlaceReader(tmp_path)
+    reader = CheckpointReader(tmp_path)
     assert reader.read() is None
     for tick in (1, 2, 3):
-        writer = PlaceWriter(tmp_path)
+        writer = CheckpointWriter(tmp_path)
         writer.write(replace(PLACE, tick=tick))
         assert reader.stage_lives() is (tick > 1)  # the reader has looked at the file once it was there
         assert reader.read() == replace(PLACE, tick=tick)
@@ -107,9 +116,9 @@ WRITER = """
 import sys
 from dataclasses import replace
 from pathlib import Path
-from appliance.box.checkpoint import PlaceWriter, unpacked
+from appliance.box.checkpoint import CheckpointWriter, unpacked
 PLACE = unpacked(bytes.fromhex(sys.argv[3]))
-writer, tick = PlaceWriter(Path(sys.argv[1])), int(sys.argv[2])
+writer, tick = CheckpointWriter(Path(sys.argv[1])), int(sys.argv[2])
 while True:
     tick += 1
     writer.write(replace(PLACE, tick=tick))
@@ -128,7 +137,7 @@ def test_a_writer_killed_in_the_middle_leaves_the_newest_whole_place(tmp_path: P
                 told = int(writer.stdout.readline())
             finally:
                 writer.send_signal(signal.SIGKILL)
-        reader = PlaceReader(tmp_path)
+        reader = CheckpointReader(tmp_path)
         place = reader.read()
         reader.close()
         assert place is not None and place.tick >= told > newest
@@ -140,7 +149,7 @@ def test_who_looks_whether_the_stage_lives_does_not_keep_the_next_one_from_its_p
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It holds the file's lock for a moment, and may stand still in that moment."""
-    PlaceWriter(tmp_path).close()
+    CheckpointWriter(tmp_path).close()
     looking = os.open(tmp_path / FILE, os.O_RDONLY)
     fcntl.flock(looking, fcntl.LOCK_SH)
     waited: list[float] = []
@@ -151,10 +160,10 @@ def test_who_looks_whether_the_stage_lives_does_not_keep_the_next_one_from_its_p
             fcntl.flock(looking, fcntl.LOCK_UN)
 
     monkeypatch.setattr(ring_file, "time", SimpleNamespace(sleep=sleep))
-    writer = PlaceWriter(tmp_path)
+    writer = CheckpointWriter(tmp_path)
     assert len(waited) == 5
     with pytest.raises(BlockingIOError):  # that one lives
-        PlaceWriter(tmp_path)
+        CheckpointWriter(tmp_path)
     assert sum(waited) < 0.5
     writer.close()
     os.close(looking)
@@ -208,7 +217,7 @@ def test_a_writer_whose_file_was_cleared_away_before_it_was_locked_makes_another
 
 def test_every_byte_of_the_file_may_be_wrong(tmp_path: Path) -> None:
     """Whichever byte is: what is read is one of the two newest places, or none; and it can be written on."""
-    writer = PlaceWriter(tmp_path)
+    writer = CheckpointWriter(tmp_path)
     places = [replace(PLACE, tick=tick) for tick in (1, 2)]
     for place in places:
         writer.write(place)
@@ -217,14 +226,14 @@ def test_every_byte_of_the_file_may_be_wrong(tmp_path: Path) -> None:
     whole = path.read_bytes()
     for at in range(0, len(whole), 31):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
-        reader = PlaceReader(tmp_path)
+        reader = CheckpointReader(tmp_path)
         assert reader.read() in (*places, None)
         reader.close()
     os.truncate(path, 100)
-    writer = PlaceWriter(tmp_path)
+    writer = CheckpointWriter(tmp_path)
     writer.write(PLACE)
     writer.close()
-    reader = PlaceReader(tmp_path)
+    reader = CheckpointReader(tmp_path)
     assert reader.read() == PLACE
     reader.close()
 

@@ -11,31 +11,31 @@ from pathlib import Path
 
 import pytest
 
-from appliance.box.checkpoint import FILE, Place, PlaceWriter, packed
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, packed
 from appliance.box.checkpoint_file import (
     EVERY_S,
     RETRY_S,
     SLOT_BYTES,
     SLOTS,
-    PlaceCarrier,
-    PlaceFile,
-    read_place,
+    CheckpointCarrier,
+    CheckpointFile,
+    read_checkpoint,
 )
 from tests.deploy.cut import cut_off
 from tests.stage import disks
 
 HEAD_BYTES = 24  # of a slot
-PLACE = Place("A show", "main", 1.5, (0.0, 30.0), let_go=("lShldr",), boot="here")
+PLACE = Checkpoint("A show", "main", 1.5, (0.0, 30.0), let_go=("lShldr",), boot="here")
 
 needs_mounts = pytest.mark.skipif(disks.why_not() is not None, reason=str(disks.why_not()))
 
 
-def at(tick: int) -> Place:
+def at(tick: int) -> Checkpoint:
     return replace(PLACE, tick=tick)
 
 
 def written(path: Path, *ticks: int) -> None:
-    file = PlaceFile(path)
+    file = CheckpointFile(path)
     for tick in ticks:
         file.write(at(tick))
     file.close()
@@ -47,13 +47,13 @@ class Carried:
     def __init__(self, runtime: Path, state: Path) -> None:
         runtime.mkdir(exist_ok=True)
         self.said: list[str] = []
-        self.stage = PlaceWriter(runtime)
+        self.stage = CheckpointWriter(runtime)
         self.state = state
-        self.carrier = PlaceCarrier(runtime, state, self.said.append)
+        self.carrier = CheckpointCarrier(runtime, state, self.said.append)
 
     @property
-    def on_disk(self) -> Place | None:
-        return read_place(self.state / FILE)
+    def on_disk(self) -> Checkpoint | None:
+        return read_checkpoint(self.state / FILE)
 
 
 @pytest.fixture
@@ -67,21 +67,21 @@ def test_the_newest_is_read(tmp_path: Path) -> None:
     path = tmp_path / "state" / FILE
     for newest in range(1, 6):
         written(path, newest)
-        assert read_place(path) == at(newest)
+        assert read_checkpoint(path) == at(newest)
     assert path.stat().st_size == SLOTS * SLOT_BYTES
     assert [one.name for one in path.parent.iterdir()] == [FILE]
 
 
 def test_no_file_a_folder_and_rubbish_are_no_place(tmp_path: Path) -> None:
-    assert read_place(tmp_path / FILE) is None
+    assert read_checkpoint(tmp_path / FILE) is None
     (tmp_path / FILE).mkdir()
-    assert read_place(tmp_path / FILE) is None
+    assert read_checkpoint(tmp_path / FILE) is None
     (tmp_path / FILE).rmdir()
     for rubbish in (b"", b"x" * 100, bytes(8192), os.urandom(8192), os.urandom(20000)):
         (tmp_path / FILE).write_bytes(rubbish)
-        assert read_place(tmp_path / FILE) is None
+        assert read_checkpoint(tmp_path / FILE) is None
         written(tmp_path / FILE, 7)
-        assert read_place(tmp_path / FILE) == at(7)
+        assert read_checkpoint(tmp_path / FILE) == at(7)
 
 
 @pytest.mark.parametrize("newest", [8, 9])
@@ -95,7 +95,7 @@ def test_whichever_byte_is_damaged_one_of_the_two_newest_is_taken(tmp_path: Path
         damaged = bytearray(whole)
         damaged[place] ^= 0xFF
         path.write_bytes(damaged)
-        assert read_place(path) == at(newest - 1 if place in says_something else newest)
+        assert read_checkpoint(path) == at(newest - 1 if place in says_something else newest)
 
 
 def test_a_write_torn_at_any_byte_leaves_the_place_before(tmp_path: Path) -> None:
@@ -106,9 +106,9 @@ def test_a_write_torn_at_any_byte_leaves_the_place_before(tmp_path: Path) -> Non
     after = path.read_bytes()
     for torn in range(0, len(after), 97):
         path.write_bytes(after[:torn] + before[torn:])
-        assert read_place(path) in (at(2), at(3))
+        assert read_checkpoint(path) in (at(2), at(3))
         written(path, 4)  # and over a torn slot, never over the whole one
-        assert read_place(path) == at(4)
+        assert read_checkpoint(path) == at(4)
         path.write_bytes(before)
 
 
@@ -121,20 +121,20 @@ def test_the_older_slot_is_the_one_that_is_written(tmp_path: Path) -> None:
     assert path.read_bytes()[newest * SLOT_BYTES :][:SLOT_BYTES] == slots[newest]
 
 
-def _alone(path: Path, slots: list[bytes], slot: int) -> Place | None:
+def _alone(path: Path, slots: list[bytes], slot: int) -> Checkpoint | None:
     path.write_bytes(b"".join(one if place == slot else bytes(SLOT_BYTES) for place, one in enumerate(slots)))
-    return read_place(path)
+    return read_checkpoint(path)
 
 
 def test_a_file_that_another_disk_covers_is_left(tmp_path: Path) -> None:
     """A data partition that is mounted late lies over the folder in which the file was made."""
-    file = PlaceFile(tmp_path / "state" / FILE)
+    file = CheckpointFile(tmp_path / "state" / FILE)
     file.write(at(1))
     (tmp_path / "state").rename(tmp_path / "covered")
     file.write(at(2))
     file.close()
-    assert read_place(tmp_path / "covered" / FILE) == at(1)
-    assert read_place(tmp_path / "state" / FILE) == at(2)
+    assert read_checkpoint(tmp_path / "covered" / FILE) == at(1)
+    assert read_checkpoint(tmp_path / "state" / FILE) == at(2)
 
 
 def test_carried_once_in_each_turn_and_only_what_is_new(carried: Carried) -> None:
@@ -230,8 +230,8 @@ WRITER = """
 import sys
 from pathlib import Path
 from appliance.box.checkpoint import Place
-from appliance.box.checkpoint_file import PlaceFile
-file, tick = PlaceFile(Path(sys.argv[1])), int(sys.argv[2])
+from appliance.box.checkpoint_file import CheckpointFile
+file, tick = CheckpointFile(Path(sys.argv[1])), int(sys.argv[2])
 while True:
     tick += 1
     try:
@@ -249,7 +249,7 @@ def test_power_cuts_at_any_moment_lose_nothing_that_was_synced(tmp_path: Path) -
     newest = 0
     for cut in range(10):
         with disks.disk(image, folder):
-            before = read_place(folder / "state" / FILE)
+            before = read_checkpoint(folder / "state" / FILE)
             assert cut == 0 or (before is not None and before.tick >= newest)
             command = [sys.executable, "-c", WRITER, str(folder / "state" / FILE), str(newest)]
             with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:

@@ -12,7 +12,7 @@ from appliance.dancer.motion_source import Playback
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.skeleton import Skeleton
 from appliance.stage import phrase_cache as prepared
-from appliance.stage.phrase_cache import FOLDER, SUFFIX, Preparations, prepare
+from appliance.stage.phrase_cache import FOLDER, SUFFIX, PhraseCache, prepare
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show
 
 
@@ -28,8 +28,8 @@ def kept_in(folder: Path) -> list[Path]:
 def test_what_was_kept_dances_the_same_to_the_bit(bundle: Path, tmp_path: Path) -> None:
     path = bundle / "phrase.bvh"
     write_bvh(path, swaying_phrase(4.0).resampled(60.0))
-    preparations = Preparations(bundle, tmp_path / "memory")
-    made = [Preparations(bundle, None), preparations, preparations]
+    preparations = PhraseCache(bundle, tmp_path / "memory")
+    made = [PhraseCache(bundle, None), preparations, preparations]
     windows = []
     for one in made:
         found = one.phrase(path, FIGURE, grounded=True)
@@ -46,11 +46,11 @@ def test_the_floor_is_the_one_that_a_survey_finds(bundle: Path, tmp_path: Path) 
     path = bundle / "phrase.bvh"
     floor = survey(read_bvh(path).resampled(50.0))
     for _ in range(2):
-        found = Preparations(bundle, tmp_path / "memory").phrase(path, FIGURE, grounded=True)
+        found = PhraseCache(bundle, tmp_path / "memory").phrase(path, FIGURE, grounded=True)
         assert found is not None and found[1] is not None
         np.testing.assert_array_equal(found[1].rest_heights, floor.rest_heights)
         np.testing.assert_array_equal(found[1].lifts, floor.lifts)
-        ungrounded = Preparations(bundle, tmp_path / "memory").phrase(path, FIGURE, grounded=False)
+        ungrounded = PhraseCache(bundle, tmp_path / "memory").phrase(path, FIGURE, grounded=False)
         assert ungrounded is not None and ungrounded[1] is None
 
 
@@ -59,7 +59,7 @@ def test_another_phrase_under_the_same_name_is_another_one(bundle: Path, tmp_pat
     lengths = []
     for seconds in (3.0, 4.0):
         write_bvh(path, swaying_phrase(seconds))
-        preparations = Preparations(bundle, memory)
+        preparations = PhraseCache(bundle, memory)
         found = preparations.phrase(path, FIGURE, grounded=True)
         assert found is not None
         lengths.append(len(found[0]))
@@ -71,13 +71,13 @@ def test_another_phrase_under_the_same_name_is_another_one(bundle: Path, tmp_pat
 def test_another_skeleton_is_refused_as_before(bundle: Path, tmp_path: Path) -> None:
     other = Skeleton((*FIGURE.names[:-1], "rHand"), FIGURE.parents, FIGURE.offsets, FIGURE.ends)
     for skeleton, fits in ((other, False), (FIGURE, True), (other, False)):  # also where one was kept
-        found = Preparations(bundle, tmp_path / "m").phrase(bundle / "phrase.bvh", skeleton, grounded=False)
+        found = PhraseCache(bundle, tmp_path / "m").phrase(bundle / "phrase.bvh", skeleton, grounded=False)
         assert (found is not None) is fits
 
 
 def test_whatever_is_damaged_is_read_anew(bundle: Path, tmp_path: Path) -> None:
     path, memory = bundle / "phrase.bvh", tmp_path / "memory"
-    first = Preparations(bundle, memory).phrase(path, FIGURE, grounded=True)
+    first = PhraseCache(bundle, memory).phrase(path, FIGURE, grounded=True)
     assert first is not None
     [kept] = kept_in(memory)
     whole = kept.read_bytes()
@@ -86,7 +86,7 @@ def test_whatever_is_damaged_is_read_anew(bundle: Path, tmp_path: Path) -> None:
     damaged += [whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :] for at in flipped]
     for content in damaged:
         kept.write_bytes(content)
-        found = Preparations(bundle, memory).phrase(path, FIGURE, grounded=True)
+        found = PhraseCache(bundle, memory).phrase(path, FIGURE, grounded=True)
         assert found is not None
         np.testing.assert_array_equal(np.float32(found[0].poses), np.float32(first[0].poses))
         assert kept.read_bytes() == whole  # and what was kept is mended
@@ -94,14 +94,14 @@ def test_whatever_is_damaged_is_read_anew(bundle: Path, tmp_path: Path) -> None:
 
 def test_memory_without_room_costs_nothing_but_time(bundle: Path, tmp_path: Path) -> None:
     (tmp_path / "memory").write_bytes(b"")
-    assert Preparations(bundle, tmp_path / "memory").phrase(bundle / "phrase.bvh", FIGURE, True) is not None
+    assert PhraseCache(bundle, tmp_path / "memory").phrase(bundle / "phrase.bvh", FIGURE, True) is not None
 
 
 def test_a_phrase_that_is_too_long_for_memory_is_not_kept(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(prepared, "LARGEST", 1000)
-    assert Preparations(bundle, tmp_path / "memory").phrase(bundle / "phrase.bvh", FIGURE, True) is not None
+    assert PhraseCache(bundle, tmp_path / "memory").phrase(bundle / "phrase.bvh", FIGURE, True) is not None
     assert kept_in(tmp_path / "memory") == []
 
 
@@ -111,4 +111,4 @@ def test_a_bundle_can_be_prepared_beforehand(
     prepare([bundle / "phrase.bvh"], bundle, FIGURE, grounded=True)
     assert len(kept_in(bundle / FOLDER)) == 1
     monkeypatch.setattr(prepared, "read_bvh", lambda path: pytest.fail("it was read once more"))
-    assert Preparations(bundle, tmp_path / "memory").phrase(bundle / "phrase.bvh", FIGURE, True) is not None
+    assert PhraseCache(bundle, tmp_path / "memory").phrase(bundle / "phrase.bvh", FIGURE, True) is not None

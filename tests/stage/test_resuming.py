@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import yaml
 
-from appliance.box.checkpoint import FILE, Place, PlaceReader, PlaceWriter, boot_id
-from appliance.box.checkpoint_file import PlaceFile
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, CheckpointWriter, boot_id
+from appliance.box.checkpoint_file import CheckpointFile
 from appliance.box.clock import TICK_S, Slot
-from appliance.box.show_state import House, HouseWriter
+from appliance.box.show_state import ShowState, ShowStateWriter
 from appliance.dancer.motion_source import Playback
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
@@ -23,9 +23,9 @@ from appliance.show.show import Show, load_show
 from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
-from appliance.stage.resume import TRIES, Resuming
+from appliance.stage.resume import TRIES, Resumption
 from appliance.stage.run import Stage
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.stage_parts import StageParts, assemble
 from tests.stage.bundles import FIGURE, swaying_phrase, write_show
 
 CUES = [{"name": "storm", "phrase": "walk", "iterations": [6, 5], "hands": ["Chest"], "fade_s": 0.2}]
@@ -57,10 +57,10 @@ def show(tmp_path: Path) -> Show:
 
 
 @pytest.fixture
-def cast_of(show: Show) -> Iterator[Callable[[], Cast]]:
-    casts: list[Cast] = []
+def cast_of(show: Show) -> Iterator[Callable[[], StageParts]]:
+    casts: list[StageParts] = []
 
-    def made() -> Cast:
+    def made() -> StageParts:
         casts.append(assemble(show, BOX))
         return casts[-1]
 
@@ -79,12 +79,12 @@ def window_of(motion: Playback) -> tuple[np.ndarray, np.ndarray]:
     return motion.window().copy(), motion.roots().copy()
 
 
-def goes_on(cast: Cast, runtime: Path, cast_again: Cast, iterations: Iterations) -> str:
+def goes_on(cast: StageParts, runtime: Path, cast_again: StageParts, iterations: Iterations) -> str:
     """Note the place of one cast, and take it up with another one; gives what was said."""
-    noting = Resuming("A test", runtime, None, "always")
+    noting = Resumption("A test", runtime, None, "always")
     noting.note(cast, iterations, 7)
     noting.close()
-    again = Resuming("A test", runtime, None, "always")
+    again = Resumption("A test", runtime, None, "always")
     words = again.go_on(cast_again, Iterations(1, 0, 20))
     again.close()
     return words
@@ -93,7 +93,7 @@ def goes_on(cast: Cast, runtime: Path, cast_again: Cast, iterations: Iterations)
 @pytest.mark.parametrize("ticks", [0, 1, 30, 149, 151, 400, 1234])
 @pytest.mark.parametrize("rate", [1.0, 0.7, -1.0])
 def test_the_very_next_pose_comes_next_at_its_place_on_the_stage(
-    cast_of: Callable[[], Cast], runtime: Path, ticks: int, rate: float
+    cast_of: Callable[[], StageParts], runtime: Path, ticks: int, rate: float
 ) -> None:
     before, after = cast_of(), cast_of()
     obey(Order("phrase", (0.5,), "walk"), before, Iterations(3, 2, 10), 1.0)
@@ -114,7 +114,7 @@ def test_the_very_next_pose_comes_next_at_its_place_on_the_stage(
 
 @pytest.mark.parametrize("ticks", [0, 1, 4, 8, 20])
 def test_a_phrase_that_was_just_asked_for_is_the_one_that_comes_back(
-    cast_of: Callable[[], Cast], runtime: Path, ticks: int
+    cast_of: Callable[[], StageParts], runtime: Path, ticks: int
 ) -> None:
     """Also while it has not reached the window's first pose, or is still fading in."""
     before, after = cast_of(), cast_of()
@@ -128,7 +128,9 @@ def test_a_phrase_that_was_just_asked_for_is_the_one_that_comes_back(
     assert after.motion.position_s == pytest.approx(max(0.0, (ticks - 8) * TICK_S), abs=0.03)
 
 
-def test_excerpt_rate_iterations_hands_and_cue_come_back(cast_of: Callable[[], Cast], runtime: Path) -> None:
+def test_excerpt_rate_iterations_hands_and_cue_come_back(
+    cast_of: Callable[[], StageParts], runtime: Path
+) -> None:
     before, after, iterations = cast_of(), cast_of(), Iterations(3, 2, 20)
     obey(Order("cue", text="storm"), before, iterations, 1.0)
     obey(Order("excerpt", (1.0, 3.0)), before, iterations, 1.0)
@@ -136,10 +138,10 @@ def test_excerpt_rate_iterations_hands_and_cue_come_back(cast_of: Callable[[], C
     for _ in range(80):
         before.motion.advance()
         iterations.advance()
-    noting = Resuming("A test", runtime, None, "always")
+    noting = Resumption("A test", runtime, None, "always")
     noting.note(before, iterations, 80)
     noting.close()
-    again, iterations_again = Resuming("A test", runtime, None, "always"), Iterations(3, 2, 20)
+    again, iterations_again = Resumption("A test", runtime, None, "always"), Iterations(3, 2, 20)
     words = again.go_on(after, iterations_again)
     again.close()
     assert "in the cue 'storm'" in words
@@ -149,7 +151,7 @@ def test_excerpt_rate_iterations_hands_and_cue_come_back(cast_of: Callable[[], C
     assert again.went_on and again.comes_back and (again.restarts, again.power_cuts) == (1, 0)
 
 
-def test_a_show_that_stands_comes_back_standing(cast_of: Callable[[], Cast], runtime: Path) -> None:
+def test_a_show_that_stands_comes_back_standing(cast_of: Callable[[], StageParts], runtime: Path) -> None:
     before, after = cast_of(), cast_of()
     for tick in range(100):
         before.motion.rate = 0.0 if tick > 50 else 1.0
@@ -163,25 +165,27 @@ def test_a_show_that_stands_comes_back_standing(cast_of: Callable[[], Cast], run
 
 @pytest.mark.parametrize(("boot", "rate"), [("another", 1.0), (boot_id(), 0.0)])
 def test_after_a_power_cut_a_show_that_stood_dances(
-    cast_of: Callable[[], Cast], runtime: Path, tmp_path: Path, boot: str, rate: float
+    cast_of: Callable[[], StageParts], runtime: Path, tmp_path: Path, boot: str, rate: float
 ) -> None:
-    """The house that was dark has gone with the memory: in full light the phrase does not stand still."""
-    with closing(PlaceFile(tmp_path / "state" / FILE)) as file:
+    """The dark show state has gone with the memory: in full light the phrase does not stand still."""
+    with closing(CheckpointFile(tmp_path / "state" / FILE)) as file:
         file.write(replace(PLACE, rate=0.0, boot=boot))
     cast = cast_of()
-    with closing(Resuming("A test", runtime, tmp_path / "state", "always")) as resuming:
+    with closing(Resumption("A test", runtime, tmp_path / "state", "always")) as resuming:
         assert "goes on at 2.0 s" in resuming.go_on(cast, Iterations(1, 0, 20))
     assert cast.motion.rate == rate
 
 
-def test_what_grounding_moved_the_figure_by_comes_back(cast_of: Callable[[], Cast], runtime: Path) -> None:
+def test_what_grounding_moved_the_figure_by_comes_back(
+    cast_of: Callable[[], StageParts], runtime: Path
+) -> None:
     before, after = cast_of(), cast_of()
     before.grounding.strayed = (0.2, -0.1)
     goes_on(before, runtime, after, Iterations(3, 2, 10))
     assert after.grounding.strayed == (0.2, -0.1)
 
 
-PLACE = Place("A test", "walk", 2.0, (0.0, 5.0), coding=3, interaction=2, boot="another")
+PLACE = Checkpoint("A test", "walk", 2.0, (0.0, 5.0), coding=3, interaction=2, boot="another")
 
 
 @pytest.mark.parametrize(
@@ -194,11 +198,11 @@ PLACE = Place("A test", "walk", 2.0, (0.0, 5.0), coding=3, interaction=2, boot="
     ],
 )
 def test_a_place_that_this_show_does_not_have_is_no_place(
-    cast_of: Callable[[], Cast], runtime: Path, place: Place, reason: str
+    cast_of: Callable[[], StageParts], runtime: Path, place: Checkpoint, reason: str
 ) -> None:
     cast = cast_of()
     put(runtime, place)
-    resuming = Resuming("A test", runtime, None, "always")
+    resuming = Resumption("A test", runtime, None, "always")
     words = resuming.go_on(cast, Iterations(1, 0, 20))
     resuming.close()
     assert "begins at the beginning" in words and reason in words
@@ -210,22 +214,22 @@ def test_a_place_that_this_show_does_not_have_is_no_place(
     assert cast.motion.going_on[1] == pytest.approx(20 * TICK_S, abs=2e-3)
 
 
-def test_a_second_beyond_the_phrase_is_its_last_one(cast_of: Callable[[], Cast], runtime: Path) -> None:
+def test_a_second_beyond_the_phrase_is_its_last_one(cast_of: Callable[[], StageParts], runtime: Path) -> None:
     cast = cast_of()
     put(runtime, replace(PLACE, position_s=99.0))
-    resuming = Resuming("A test", runtime, None, "always")
+    resuming = Resumption("A test", runtime, None, "always")
     assert "goes on" in resuming.go_on(cast, Iterations(1, 0, 20))
     resuming.close()
     assert cast.motion.position_s == pytest.approx(5.0, abs=0.1)
 
 
-def put(runtime: Path, place: Place) -> None:
-    with closing(PlaceWriter(runtime)) as writer:
+def put(runtime: Path, place: Checkpoint) -> None:
+    with closing(CheckpointWriter(runtime)) as writer:
         writer.write(place)
 
 
 def boot_of(runtime: Path) -> str:
-    with closing(Resuming("x", runtime, None, "never")) as one:
+    with closing(Resumption("x", runtime, None, "never")) as one:
         return one._boot
 
 
@@ -246,7 +250,7 @@ def boot_of(runtime: Path) -> str:
     ],
 )
 def test_memory_is_asked_first_then_the_disk(
-    cast_of: Callable[[], Cast],
+    cast_of: Callable[[], StageParts],
     runtime: Path,
     tmp_path: Path,
     wanted: str,
@@ -262,11 +266,11 @@ def test_memory_is_asked_first_then_the_disk(
         put(runtime, replace(PLACE, boot=here, ended=in_memory == "ended"))
     if on_disk:
         boot = here if on_disk == "here" else "another"
-        file = PlaceFile(tmp_path / "state" / FILE)
+        file = CheckpointFile(tmp_path / "state" / FILE)
         file.write(replace(PLACE, position_s=3.0, boot=boot, ended=on_disk == "ended"))
         file.close()
     cast = cast_of()
-    resuming = Resuming("A test", runtime, tmp_path / "state", wanted)  # type: ignore[arg-type]
+    resuming = Resumption("A test", runtime, tmp_path / "state", wanted)  # type: ignore[arg-type]
     words = resuming.go_on(cast, Iterations(1, 0, 20))
     resuming.close()
     assert (resuming.power_cuts, resuming.restarts) == (power_cuts, restarts)
@@ -275,48 +279,48 @@ def test_memory_is_asked_first_then_the_disk(
     assert ("After a power cut" in words) == bool(power_cuts)
 
 
-def test_counts_go_on_until_the_show_is_ended(cast_of: Callable[[], Cast], runtime: Path) -> None:
+def test_counts_go_on_until_the_show_is_ended(cast_of: Callable[[], StageParts], runtime: Path) -> None:
     for start in range(3):
-        resuming, cast = Resuming("A test", runtime, None, "always"), cast_of()
+        resuming, cast = Resumption("A test", runtime, None, "always"), cast_of()
         resuming.go_on(cast, Iterations(1, 0, 20))
         assert resuming.restarts == start
         resuming.note(cast, Iterations(1, 0, 20), 1)
         resuming.close()
-    resuming = Resuming("A test", runtime, None, "always")
+    resuming = Resumption("A test", runtime, None, "always")
     resuming.note(cast_of(), Iterations(1, 0, 20), 2)
     resuming.end()
     resuming.close()
-    resuming = Resuming("A test", runtime, None, "always")
+    resuming = Resumption("A test", runtime, None, "always")
     assert not resuming.comes_back and resuming.restarts == 0
     resuming.close()
 
 
 def test_a_place_from_which_no_frame_ever_leaves_is_given_up(
-    cast_of: Callable[[], Cast], runtime: Path
+    cast_of: Callable[[], StageParts], runtime: Path
 ) -> None:
     """A crash at the first tick would otherwise come back for ever."""
     put(runtime, PLACE)
     begun: list[float] = []
     for _ in range(TRIES + 1):
         cast = cast_of()
-        resuming = Resuming("A test", runtime, None, "always")
+        resuming = Resumption("A test", runtime, None, "always")
         words = resuming.go_on(cast, Iterations(1, 0, 20))
         resuming.begin(cast, Iterations(1, 0, 20))  # and no note: it died in its first tick
         resuming.close()
         begun.append(cast.motion.position_s)
     assert begun == pytest.approx([2.0] * TRIES + [0.0], abs=1e-3)
     assert f"{TRIES} starts" in words and "begins at the beginning" in words
-    with closing(PlaceReader(runtime)) as reader:
+    with closing(CheckpointReader(runtime)) as reader:
         place = reader.read()
     assert place is not None and place.tries == 1
 
 
 def test_one_frame_is_enough_to_come_back_as_often_as_it_takes(
-    cast_of: Callable[[], Cast], runtime: Path
+    cast_of: Callable[[], StageParts], runtime: Path
 ) -> None:
     put(runtime, PLACE)
     for _ in range(2 * TRIES):
-        resuming, cast = Resuming("A test", runtime, None, "always"), cast_of()
+        resuming, cast = Resumption("A test", runtime, None, "always"), cast_of()
         assert "goes on" in resuming.go_on(cast, Iterations(1, 0, 20))
         resuming.begin(cast, Iterations(1, 0, 20))
         cast.motion.advance()
@@ -325,9 +329,9 @@ def test_one_frame_is_enough_to_come_back_as_often_as_it_takes(
     assert cast.motion.position_s == pytest.approx(2.0 + 2 * TRIES * TICK_S, abs=0.01)
 
 
-def test_without_room_for_it_the_dance_goes_on(cast_of: Callable[[], Cast], runtime: Path) -> None:
+def test_without_room_for_it_the_dance_goes_on(cast_of: Callable[[], StageParts], runtime: Path) -> None:
     (runtime / FILE).mkdir()
-    resuming, cast = Resuming("A test", runtime, None, "always"), cast_of()
+    resuming, cast = Resumption("A test", runtime, None, "always"), cast_of()
     assert resuming.go_on(cast, Iterations(1, 0, 20)) == ""
     assert "cannot be kept" in resuming.complaint and "`runtime:`" in resuming.complaint
     resuming.begin(cast, Iterations(1, 0, 20))
@@ -362,8 +366,8 @@ def test_the_whole_stage_goes_on_where_it_was(show: Show, box: BoxConfig) -> Non
 
 def test_a_place_goes_before_the_house_s_cue(show: Show, box: BoxConfig, runtime: Path) -> None:
     """The cue was called, and another phrase after it: the phrase is the newer one."""
-    with closing(HouseWriter(runtime)) as house:
-        house.write(House(cue="storm"))
+    with closing(ShowStateWriter(runtime)) as show_state:
+        show_state.write(ShowState(cue="storm"))
     put(runtime, replace(PLACE, phrase="main", excerpt=(0.0, 3.0), cue="storm", boot=boot_of(runtime)))
     with closing(Stage(show, box, lambda words: None)) as stage:
         assert (stage.cast.cue, stage.cast.motion.phrase) == ("storm", "main")
@@ -371,7 +375,7 @@ def test_a_place_goes_before_the_house_s_cue(show: Show, box: BoxConfig, runtime
 
 
 def test_slots_are_not_needed_to_know_the_place(
-    cast_of: Callable[[], Cast], runtime: Path, show: Show, box: BoxConfig
+    cast_of: Callable[[], StageParts], runtime: Path, show: Show, box: BoxConfig
 ) -> None:
     """A late tick does not dance: the phrase stands, and so does its place."""
     stage = Stage(show, box, lambda words: None)
@@ -380,6 +384,6 @@ def test_slots_are_not_needed_to_know_the_place(
             slot = Slot(number, 10.0 + number * TICK_S, 10.019 + number * TICK_S)
             stage.tick.run(slot)
             stage._note(slot)
-        with closing(PlaceReader(runtime)) as reader:
+        with closing(CheckpointReader(runtime)) as reader:
             place = reader.read()
     assert place is not None and (place.tick, place.position_s) == (2, 0.0)

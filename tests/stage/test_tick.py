@@ -15,9 +15,9 @@ from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.stage.iterations import Iterations
-from appliance.stage.sensor_fit import Wearing
+from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from hw_sim.osc_receiver import OscReceiver
 from tests.stage.bundles import FIGURE, write_show
@@ -35,7 +35,7 @@ def receiver() -> Iterator[OscReceiver]:
 
 @pytest.fixture
 def stage(tmp_path: Path, receiver: OscReceiver) -> Iterator[Callable[..., Tick]]:
-    casts: list[Cast] = []
+    casts: list[StageParts] = []
 
     def made(network: str = "plain", hands: list[dict[str, object]] | None = None) -> Tick:
         show = load_show(write_show(tmp_path / network, hands, network))
@@ -51,8 +51,8 @@ def stage(tmp_path: Path, receiver: OscReceiver) -> Iterator[Callable[..., Tick]
         cast.close()
 
 
-def worn(cast: Cast) -> Wearing:
-    return Wearing(cast, SensorMemory(None, print), print)
+def worn(cast: StageParts) -> SensorFit:
+    return SensorFit(cast, SensorMemory(None, print), print)
 
 
 def dance(tick: Tick, slots: range, late_s: float = 0.0, heard: tuple[float, ...] | None = None) -> None:

@@ -10,7 +10,7 @@ import pytest
 from appliance.sensor.link import SensorReading, SensorState
 from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.watch import Watch
 from hw_sim.osc_receiver import OscReceiver
 from tests.stage.bundles import write_show
@@ -23,7 +23,7 @@ def receiver() -> Iterator[OscReceiver]:
 
 
 @pytest.fixture
-def cast(tmp_path: Path, receiver: OscReceiver) -> Iterator[Cast]:
+def cast(tmp_path: Path, receiver: OscReceiver) -> Iterator[StageParts]:
     box = BoxConfig(
         sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[OscConfig(port=receiver.port)])
     )
@@ -32,11 +32,11 @@ def cast(tmp_path: Path, receiver: OscReceiver) -> Iterator[Cast]:
     cast.close()
 
 
-def hear(cast: Cast, at: float) -> None:
+def hear(cast: StageParts, at: float) -> None:
     cast.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, at, at, 90, 255))
 
 
-def test_a_silent_sensor_and_its_return(cast: Cast) -> None:
+def test_a_silent_sensor_and_its_return(cast: StageParts) -> None:
     watch = Watch(cast)
     assert list(watch.news(10.0)) == []  # never heard: the introduction and the status line say so
     hear(cast, 11.0)
@@ -50,7 +50,7 @@ def test_a_silent_sensor_and_its_return(cast: Cast) -> None:
     assert list(watch.news(13.1)) == ["Sensor left-wrist is back. It takes its joint again."]
 
 
-def test_a_sensor_that_is_heard_and_lost_between_two_looks_is_silent_too(cast: Cast) -> None:
+def test_a_sensor_that_is_heard_and_lost_between_two_looks_is_silent_too(cast: StageParts) -> None:
     watch = Watch(cast)
     assert list(watch.news(10.0, [sensor(state="absent", way="")])) == []
     hear(cast, 10.2)
@@ -61,7 +61,7 @@ def test_a_sensor_that_is_heard_and_lost_between_two_looks_is_silent_too(cast: C
     assert list(watch.news(12.0, lost)) == []
 
 
-def test_a_revoked_sensor_has_no_battery_to_be_checked(cast: Cast) -> None:
+def test_a_revoked_sensor_has_no_battery_to_be_checked(cast: StageParts) -> None:
     watch = Watch(cast)
     hear(cast, 11.0)
     assert len(list(watch.news(11.1, [sensor()]))) == 1
@@ -81,7 +81,7 @@ def sensor(
     )
 
 
-def test_a_sensor_that_is_linked_and_what_it_holds(cast: Cast) -> None:
+def test_a_sensor_that_is_linked_and_what_it_holds(cast: StageParts) -> None:
     watch = Watch(cast)
     assert list(watch.news(1.0, [sensor(state="absent", way="")])) == []
     assert list(watch.news(2.0, [sensor(state="greeted", way="")])) == []
@@ -92,7 +92,7 @@ def test_a_sensor_that_is_linked_and_what_it_holds(cast: Cast) -> None:
     assert list(watch.news(4.0, [sensor(), sensor(name="spare", way="10.0.0.8:2390")])) == []
 
 
-def test_a_sensor_that_moves_to_a_cable_and_back(cast: Cast) -> None:
+def test_a_sensor_that_moves_to_a_cable_and_back(cast: StageParts) -> None:
     watch = Watch(cast)
     list(watch.news(1.0, [sensor()]))
     assert list(watch.news(2.0, [sensor(way="/dev/ttyACM0")])) == [
@@ -103,21 +103,21 @@ def test_a_sensor_that_moves_to_a_cable_and_back(cast: Cast) -> None:
     assert len(list(watch.news(5.0, [sensor()]))) == 1
 
 
-def test_a_low_battery_is_told_of_once_until_it_was_charged(cast: Cast) -> None:
+def test_a_low_battery_is_told_of_once_until_it_was_charged(cast: StageParts) -> None:
     watch = Watch(cast)
     told = [list(watch.news(1.0, [sensor(battery=level)])) for level in (16, 14, 15, 13, 255, 12, 80, 9)]
     assert [len(words) for words in told] == [1, 1, 0, 0, 0, 0, 0, 1]  # the first one: linked
     assert told[1] == ["Sensor left-wrist: 14 % of its battery left. The dance goes on. Charge it soon."]
 
 
-def test_a_complaint_of_the_link_is_passed_on_once(cast: Cast) -> None:
+def test_a_complaint_of_the_link_is_passed_on_once(cast: StageParts) -> None:
     watch = Watch(cast)
     stranger = sensor(state="greeted", way="", complaint="Sensor left-wrist speaks another wire.")
     assert list(watch.news(1.0, [stranger])) == ["Sensor left-wrist speaks another wire."]
     assert list(watch.news(2.0, [stranger])) == []
 
 
-def test_a_receiver_that_goes_and_comes_back(cast: Cast, receiver: OscReceiver) -> None:
+def test_a_receiver_that_goes_and_comes_back(cast: StageParts, receiver: OscReceiver) -> None:
     watch = Watch(cast)
     counters = cast.outputs.receivers[0]
     assert list(watch.news(1.0)) == []
@@ -132,7 +132,7 @@ def test_a_receiver_that_goes_and_comes_back(cast: Cast, receiver: OscReceiver) 
     assert "gets the dance again" in words
 
 
-def test_a_network_that_fails_and_recovers(cast: Cast) -> None:
+def test_a_network_that_fails_and_recovers(cast: StageParts) -> None:
     watch = Watch(cast)
     cast.puppet.is_broken = True
     [words] = watch.news(1.0)

@@ -15,9 +15,9 @@ from appliance.sensor.link import SensorReading
 from appliance.sensor.neutral import NeutralPose
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.sensor_fit import Wearing
+from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
-from appliance.stage.stage_parts import Cast, assemble
+from appliance.stage.stage_parts import StageParts, assemble
 from tests.sensor.peers import Box, Wearable
 from tests.stage.bundles import write_show
 
@@ -46,13 +46,13 @@ def multiply(a: Orientation, b: Orientation) -> Orientation:
 
 
 class Stage:
-    """What Wearing joins, without ports: readings come from the test, at 50 Hz of its own time."""
+    """What SensorFit joins, without ports: readings come from the test, at 50 Hz of its own time."""
 
-    def __init__(self, cast: Cast, memory: SensorMemory) -> None:
+    def __init__(self, cast: StageParts, memory: SensorMemory) -> None:
         self.said: list[str] = []
         self.cast = cast
         self.memory = memory
-        self.wearing = Wearing(cast, memory, self.said.append)
+        self.wearing = SensorFit(cast, memory, self.said.append)
         self.now = 100.0
         self.sequence = 0
 
@@ -118,7 +118,7 @@ def memory() -> SensorMemory:
 
 @pytest.fixture
 def evening(tmp_path: Path, memory: SensorMemory) -> Iterator[Evening]:
-    casts: list[Cast] = []
+    casts: list[StageParts] = []
 
     def begun(hands: list[dict[str, object]] | None = None) -> Stage:
         """The box is switched on; what it remembers of before stays."""

@@ -14,7 +14,7 @@ from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
-from appliance.stage.sensor_fit import Wearing
+from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import assemble
 from hw_sim.device import Device
@@ -22,7 +22,7 @@ from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.firmware import FirmwareSensor, firmware_maker
 from hw_sim.motions import IDENTITY, Motion, Quaternion, about, multiply
 from hw_sim.network import PERFECT, VenueNetwork
-from hw_sim.wearer import Wearer
+from hw_sim.wearer import SensorBinding
 from tests.hw_sim.joined import TICK_S, Show
 from tests.stage.bundles import write_show
 
@@ -63,7 +63,7 @@ class Evening:
         self.cast = assemble(self._bundle, box)
         self.cast.link = self.show.link
         self.said: list[str] = []
-        self.wearing = Wearing(self.cast, self.memory, self.said.append)
+        self.wearing = SensorFit(self.cast, self.memory, self.said.append)
 
     def restart_box(self) -> None:
         self.close()
@@ -100,7 +100,7 @@ def begin(tmp_path: Path) -> Iterator[Begin]:
     def begun(
         maker: str, motion: Motion = evening_of_a_dancer, reboot_every_s: float | None = None
     ) -> Evening:
-        wearer = Wearer(motion)
+        wearer = SensorBinding(motion)
         device: Device
         if maker == "firmware":
             make = firmware_maker(seed=5)

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from appliance.box.fallback import Fallen
-from appliance.box.process_health import Company
+from appliance.box.process_health import ProcessHealth
 from appliance.lights.fallback import DMX_AWAY
 from appliance.lights.fallback import STAGE_UNSEEN as LIGHTS_SAFE
 from appliance.projector.fallback import STAGE_UNSEEN as PICTURE_BLACK
@@ -41,7 +41,7 @@ def lit(show: Path, folder: Path, device: Path) -> Iterator[Box]:
 
 def await_told(runtime: Path, name: str, is_wanted: Callable[[Fallen], bool]) -> Fallen:
     until = time.monotonic() + PATIENCE_S
-    with closing(Company(runtime)) as company:
+    with closing(ProcessHealth(runtime)) as company:
         while True:
             told = {one.name: one for _, one in company.fallbacks(time.monotonic())}
             if name in told and is_wanted(told[name]):

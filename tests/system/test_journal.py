@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from appliance.box.checkpoint import PlaceReader
+from appliance.box.checkpoint import CheckpointReader
 from appliance.pose.bvh import write_bvh
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import read_journal
@@ -88,7 +88,7 @@ def disturb(box: Box) -> None:
 def await_rate(box: Box, desk: Asker, rate: float) -> None:
     """What a player streams is not answered: it is sent again until the stage has noted it."""
     until = time.monotonic() + PATIENCE_S
-    with contextlib.closing(PlaceReader(box.words_file.with_name("runtime"))) as reader:
+    with contextlib.closing(CheckpointReader(box.words_file.with_name("runtime"))) as reader:
         while (place := reader.read()) is None or place.rate != rate:
             assert time.monotonic() < until, place
             desk.tell("/player/rate", rate)

@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 import yaml
 
-from appliance.box.checkpoint import FILE, Place, PlaceWriter
-from appliance.box.checkpoint_file import read_place
-from appliance.box.process_health import Company
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter
+from appliance.box.checkpoint_file import read_checkpoint
+from appliance.box.process_health import ProcessHealth
 from appliance.box.ring_file import RingFileWriter
 from appliance.keeper.keeper_health import JOURNAL_STOPPED, SENSORS_NOT_KEPT
 from appliance.keeper.kept import keep_rest
@@ -51,7 +51,7 @@ class Keeper:
     def __init__(self, folder: Path) -> None:
         self.folder, self.runtime = folder, folder / "runtime"
         self.night = Night(write_show(folder / "show"), self.runtime)
-        self.place = PlaceWriter(self.runtime)
+        self.place = CheckpointWriter(self.runtime)
         self.position_s = 0.0
         self.box_file = folder / "box.yaml"
         self.box_file.write_text(
@@ -80,17 +80,17 @@ class Keeper:
     def goes_on(self, ended: bool = False) -> None:
         """The place moves, and is on the disk soon after."""
         self.position_s += 0.02
-        place = Place("A show", "main", self.position_s, (0.0, 30.0))
+        place = Checkpoint("A show", "main", self.position_s, (0.0, 30.0))
         self.place.write(replace(place, ended=ended))
         await_that(lambda: self.kept_place() == self.position_s, f"the place stays behind: {self.words}")
 
     def kept_place(self) -> float | None:
-        place = read_place(self.folder / "state" / FILE)
+        place = read_checkpoint(self.folder / "state" / FILE)
         return None if place is None else place.position_s
 
     def fallbacks(self) -> set[str]:
         """Those in force, as desks hear them."""
-        with closing(Company(self.runtime)) as company:
+        with closing(ProcessHealth(self.runtime)) as company:
             found = company.fallbacks(time.monotonic())
         return {one.name for process, one in found if process == "keeper" and one.active}
 
@@ -146,7 +146,7 @@ def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Pat
 def test_what_a_keeper_left_is_not_waited_for_on_a_disk_that_hangs(disk: Path, keeper: Keeper) -> None:
     keeper.end()
     keeper.night.dance(10)
-    keeper.place.write(Place("A show", "main", 7.5, (0.0, 30.0), ended=True))
+    keeper.place.write(Checkpoint("A show", "main", 7.5, (0.0, 30.0), ended=True))
     said: list[str] = []
     with disks.frozen(disk):
         keep_rest(load_box(keeper.box_file), keeper.runtime, keeper.journal, 1.0, said.append)

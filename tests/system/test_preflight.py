@@ -16,7 +16,7 @@ import pytest
 from appliance.cli import candidate
 from appliance.cli import preflight as commands
 from appliance.cli.preflight import ANEW, Options, candidate_problems, preflight
-from appliance.cli.run_with_timeout import GivenUpError, within
+from appliance.cli.run_with_timeout import TimedOutError, within
 from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, alone_in
 from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
@@ -327,7 +327,7 @@ def _crash() -> bytes:
 
 
 def test_what_crashes_is_given_up_at_once() -> None:
-    with pytest.raises(GivenUpError, match="crashed"):
+    with pytest.raises(TimedOutError, match="crashed"):
         within(60.0, _crash)
 
 
@@ -340,7 +340,7 @@ def test_what_is_given_up_is_ended_with_all_that_it_started() -> None:
             sleeper.wait()
         return b""
 
-    with pytest.raises(GivenUpError, match="not within"):
+    with pytest.raises(TimedOutError, match="not within"):
         within(0.5, endless)
     os.close(writing)
     assert select.select([reading], [], [], PATIENCE_S)[0], "somebody still holds the other end"

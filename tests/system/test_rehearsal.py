@@ -9,7 +9,7 @@ from contextlib import closing
 from pathlib import Path
 
 from appliance.box.checkpoint import FILE
-from appliance.box.checkpoint_file import read_place
+from appliance.box.checkpoint_file import read_checkpoint
 from appliance.outputs.frame_reader import FrameReader
 from appliance.recorder.reading import read_journal
 from appliance.sensor.memory_block import FILE_NAME, MemoryWriter
@@ -38,7 +38,7 @@ def test_a_rehearsal_leaves_what_the_venue_keeps_and_the_show_goes_on_behind_it(
     show = write_show(tmp_path / "show")
     runtime = tmp_path / "runtime"
     with playing(show, tmp_path, settings=VENUE) as box:
-        box.frame_that(lambda frame: read_place(tmp_path / "state" / FILE) is not None)
+        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
         box.frames(60)
         box.end(signal.SIGKILL)
         await_end_of_keeper(runtime)

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from appliance.box.checkpoint import FILE, Place, PlaceReader
-from appliance.box.checkpoint_file import PlaceFile, read_place
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader
+from appliance.box.checkpoint_file import CheckpointFile, read_checkpoint
 from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
 
@@ -28,8 +28,8 @@ def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_show(tmp_path_factory.mktemp("resume") / "show")
 
 
-def place_in(folder: Path) -> Place:
-    reader = PlaceReader(folder / "runtime")
+def place_in(folder: Path) -> Checkpoint:
+    reader = CheckpointReader(folder / "runtime")
     place = reader.read()
     reader.close()
     assert place is not None
@@ -104,9 +104,9 @@ def test_a_show_that_was_ended_begins_at_the_beginning(show: Path, tmp_path: Pat
 def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Path) -> None:
     settings = {**NO_REALTIME, "journal": {"folder": "journal"}}
     with playing(show, tmp_path, command=PLAY, settings=settings) as box:
-        box.frame_that(lambda frame: read_place(tmp_path / "state" / FILE) is not None)
+        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
         assert box.end() == 0
-        place = read_place(tmp_path / "state" / FILE)
+        place = read_checkpoint(tmp_path / "state" / FILE)
         assert place is not None and place.ended
         shutil.rmtree(tmp_path / "runtime")
         box.kill_and_restart()
@@ -119,13 +119,13 @@ def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path)
     """The whole box with its keeper. What a power cut takes is memory: the runtime folder and the boot id."""
     settings = {**NO_REALTIME, "journal": {"folder": "journal"}}
     with playing(show, tmp_path, command=PLAY, settings=settings) as box:
-        box.frame_that(lambda frame: read_place(tmp_path / "state" / FILE) is not None)
+        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
         box.frames(60)
         await_carried(tmp_path)
         box.end(signal.SIGKILL)
         await_end_of_keeper(tmp_path / "runtime")
         at_cut = place_in(tmp_path)
-        on_disk = read_place(tmp_path / "state" / FILE)
+        on_disk = read_checkpoint(tmp_path / "state" / FILE)
         assert on_disk is not None and not on_disk.ended and on_disk.tick <= at_cut.tick
         shutil.rmtree(tmp_path / "runtime")
         _as_of_another_boot(tmp_path / "state" / FILE, on_disk)
@@ -138,23 +138,23 @@ def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path)
 
 def test_a_box_without_a_journal_keeps_its_place_on_the_disk_too(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME) as box:
-        box.frame_that(lambda frame: read_place(tmp_path / "state" / FILE) is not None)
+        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
         assert box.end() == 0
-        place = read_place(tmp_path / "state" / FILE)
+        place = read_checkpoint(tmp_path / "state" / FILE)
         assert place is not None and place.ended
 
 
 def await_carried(folder: Path) -> None:
     """Until the keeper has brought another place to the disk: it works, however busy the machine is."""
-    before = read_place(folder / "state" / FILE)
+    before = read_checkpoint(folder / "state" / FILE)
     until = time.monotonic() + PATIENCE_S
-    while read_place(folder / "state" / FILE) == before:
+    while read_checkpoint(folder / "state" / FILE) == before:
         assert time.monotonic() < until
         time.sleep(0.02)
 
 
-def _as_of_another_boot(path: Path, place: Place) -> None:
-    file = PlaceFile(path)
+def _as_of_another_boot(path: Path, place: Checkpoint) -> None:
+    file = CheckpointFile(path)
     file.write(replace(place, boot="of another boot"))
     file.close()
 

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import yaml
 
-from appliance.box.show_state import House, HouseReader
+from appliance.box.show_state import ShowState, ShowStateReader
 from appliance.outputs.frame_reader import FrameReader
 from appliance.recorder.reading import read_journal
 from hw_sim.peers import HOST, free_ports
@@ -78,8 +78,8 @@ def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def house(folder: Path) -> House:
-    with contextlib.closing(HouseReader(folder / "runtime")) as reader:
+def show_state(folder: Path) -> ShowState:
+    with contextlib.closing(ShowStateReader(folder / "runtime")) as reader:
         return reader.read()
 
 
@@ -224,7 +224,7 @@ def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(
             hangs(box)
         until(lambda: "State:\tT" in Path(f"/proc/{box.process.pid}/status").read_text())
         assert asker.ask("/panic")[2] == 1
-        assert house(tmp_path).panic
+        assert show_state(tmp_path).panic
         await_status(asker, state="hung")
         assert status(asker)["panic"] == 1
         assert "The stage does not answer" in asker.ask("/cue", "storm")[3]
@@ -233,7 +233,7 @@ def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(
         box.process.send_signal(signal.SIGCONT)
         box.frames(20)
         await_status(asker, state="panic")
-        assert house(tmp_path).panic
+        assert show_state(tmp_path).panic
         now = status(asker)
         assert (now["cue"], now["coding"]) == ("", 3)  # what was told not to be done is not done later
         assert asker.ask("/go")[2] == 1
@@ -247,7 +247,7 @@ def test_panic_works_while_the_stage_spins(show: Path, tmp_path: Path) -> None:
         box.frame_that(lambda frame: frame[0] >= 100)
         await_status(asker, state="hung")
         assert asker.ask("/panic")[2] == 1
-        assert house(tmp_path).panic
+        assert show_state(tmp_path).panic
         box.process.kill()
 
 
@@ -278,7 +278,7 @@ def test_a_show_that_ends_as_usual_leaves_nothing_in_force(show: Path, tmp_path:
         with asking(box) as asker:
             asker.ask("/panic")
         assert box.end() == 0
-        assert house(tmp_path) == House()
+        assert show_state(tmp_path) == ShowState()
         assert is_free(box.control)
         left = {"stage.lock", "place", "journal", "prepared", "admission.json"}  # for the next start
         left |= {"keeper.lock", "keeper.health", "sensors.memory"}
@@ -292,8 +292,8 @@ def test_show_control_that_is_killed_comes_back_and_misses_nothing(show: Path, t
         os.kill(control, signal.SIGKILL)
         asker.tell("/master", 0.5)  # the port is there all the time
         assert asker.hear()[:3] == ["/reply", "/master", 1]  # type: ignore[index]
-        assert house(tmp_path).panic
-        assert house(tmp_path).master == 0.5
+        assert show_state(tmp_path).panic
+        assert show_state(tmp_path).master == 0.5
         assert control_of(box.process.pid) != control
         assert box.end() == 0
     assert "Show control was killed (signal 9)." in box.words
@@ -349,7 +349,7 @@ def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_bo
                 await_status(asker, state="panic")
             first.send_signal(signal.SIGKILL)
             first.wait()
-        assert house(tmp_path).panic
+        assert show_state(tmp_path).panic
         with process(control, tmp_path / "control.txt") as second, asking(box) as asker:
             await_status(asker, state="panic")
             with process(control, tmp_path / "third.txt") as third:
@@ -359,7 +359,7 @@ def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_bo
             assert second.wait(PATIENCE_S) == 0
         assert is_free(box.control)
         assert box.end() == 0
-        assert house(tmp_path).panic  # nobody ended the show: its units were stopped
+        assert show_state(tmp_path).panic  # nobody ended the show: its units were stopped
     assert "Traceback" not in (tmp_path / "control.txt").read_text()
 
 

@@ -9,7 +9,7 @@ import subprocess
 from collections.abc import Iterator
 
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
-from appliance.cli.doctor.host_view import Patient
+from appliance.cli.doctor.host_view import HostView
 from appliance.release.choice import CHOSEN, RUN
 
 _EARLIEST = 2026  # this program did not exist before
@@ -18,7 +18,7 @@ _ASK_S = 3.0
 _LATE_SHARE = 0.001
 
 
-def stage(patient: Patient) -> Iterator[Finding]:
+def stage(patient: HostView) -> Iterator[Finding]:
     """How the dance that runs here fares."""
     if patient.stage is None:
         if patient.at(RUN / CHOSEN).exists():  # the units run, or should
@@ -46,7 +46,7 @@ def stage(patient: Patient) -> Iterator[Finding]:
             yield better(f"{whose}: {fallback.name}", fallback.words, "docs/technician.md has more.")
 
 
-def units(patient: Patient) -> Iterator[Finding]:
+def units(patient: HostView) -> Iterator[Finding]:
     """What systemd says about the box's units."""
     if not patient.is_here or not patient.at("/run/systemd/system").is_dir():
         return
@@ -84,7 +84,7 @@ def _asked_about(*patterns: str) -> list[dict[str, str]]:
     return [dict(line.split("=", 1) for line in block.splitlines() if "=" in line) for block in blocks]
 
 
-def watchdog(patient: Patient) -> Iterator[Finding]:
+def watchdog(patient: HostView) -> Iterator[Finding]:
     """Does a machine that hangs as a whole switch itself off and on?"""
     devices = patient.found("/sys/class/watchdog/watchdog[0-9]*")
     cure = "RuntimeWatchdogSec=10s in /etc/systemd/system.conf; the installed box does that by itself."
@@ -101,7 +101,7 @@ def watchdog(patient: Patient) -> Iterator[Finding]:
         yield better("watchdog", "Nobody uses it: a machine that hangs as a whole stays so.", cure)
 
 
-def clock(patient: Patient) -> Iterator[Finding]:
+def clock(patient: HostView) -> Iterator[Finding]:
     """The dance needs none; the times in the journal do."""
     if not patient.is_here:
         return

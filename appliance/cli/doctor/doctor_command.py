@@ -13,7 +13,7 @@ from rich.text import Text
 
 from appliance.cli.doctor import box_state, processor, storage, venue
 from appliance.cli.doctor.finding import ORDER, Finding, wrong
-from appliance.cli.doctor.host_view import Patient, living_stage
+from appliance.cli.doctor.host_view import HostView, running_stage
 from appliance.cli.doctor.sample import Sample, sample
 from appliance.release.installed_box import box_here
 from appliance.show.box import BoxConfig, load_box
@@ -48,7 +48,7 @@ def doctor(box_file: Path | None, chosen: Path | None, as_json: bool) -> int:
     except ConfigError as error:
         box = BoxConfig()
         found.append(wrong("box file", str(error), "Below, a box without a box file is looked at."))
-    found += findings(Patient(box=box, stage=living_stage(box)))
+    found += findings(HostView(box=box, stage=running_stage(box)))
     found.sort(key=lambda finding: ORDER.index(finding.verdict))
     if as_json:
         print(json.dumps([finding._asdict() for finding in found], indent=1))
@@ -57,7 +57,7 @@ def doctor(box_file: Path | None, chosen: Path | None, as_json: bool) -> int:
     return int(any(finding.verdict == "wrong" for finding in found))
 
 
-def findings(patient: Patient) -> Iterator[Finding]:
+def findings(patient: HostView) -> Iterator[Finding]:
     """Of all checks; a second of measuring for those that need it."""
     for check in CHECKS:
         yield from check(patient)
@@ -67,7 +67,7 @@ def findings(patient: Patient) -> Iterator[Finding]:
             yield from look(seen)
 
 
-def _sampled(patient: Patient) -> Sample:
+def _sampled(patient: HostView) -> Sample:
     """A second, in which the box's own processes may use what they use."""
     ours = {os.getpid()}
     for folder in patient.found("/proc/[0-9]*"):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from appliance.box.fallback import Fallen, fallen
-from appliance.box.process_health import Company
+from appliance.box.process_health import ProcessHealth
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.outputs.frame_reader import FrameReader
 from appliance.release.choice import RUN
@@ -18,7 +18,7 @@ from appliance.show.box import BoxConfig
 
 
 @dataclass(frozen=True)
-class LivingStage:
+class RunningStage:
     """The stage that dances here: its process, and what it last said about itself."""
 
     pid: int
@@ -27,7 +27,7 @@ class LivingStage:
 
 
 @dataclass(frozen=True)
-class Patient:
+class HostView:
     """A machine seen from `root`: what /proc, /sys and /etc say is read from there.
 
     `is_here`: it is this machine, so that its clock, ports and processor can be asked as well. Nothing here
@@ -36,7 +36,7 @@ class Patient:
 
     root: Path = Path("/")
     box: BoxConfig = field(default_factory=BoxConfig)
-    stage: LivingStage | None = None
+    stage: RunningStage | None = None
 
     @property
     def is_here(self) -> bool:
@@ -75,7 +75,7 @@ class Patient:
         return {row[1]: (row[2], row[3].split(",")) for row in rows if len(row) >= 4}
 
 
-def living_stage(box: BoxConfig) -> LivingStage | None:
+def running_stage(box: BoxConfig) -> RunningStage | None:
     """The stage of this box, if one lives; found also by root, whose folder it is not."""
     folder = box.runtime
     if folder is None and (RUN / "frame").exists():
@@ -89,6 +89,6 @@ def living_stage(box: BoxConfig) -> LivingStage | None:
         if not reader.is_alive(time.monotonic()) or reader.facts is None:
             return None
         health, now = reader.health() or {}, time.monotonic()
-        with contextlib.closing(Company(folder)) as company:
+        with contextlib.closing(ProcessHealth(folder)) as company:
             told = [("stage", one) for one in fallen(health.get("fallbacks"))] + company.fallbacks(now)
-        return LivingStage(reader.facts.pid, health, tuple(told))
+        return RunningStage(reader.facts.pid, health, tuple(told))

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from appliance.box.realtime import borrowed_priority
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
-from appliance.cli.doctor.host_view import Patient
+from appliance.cli.doctor.host_view import HostView
 from appliance.cli.doctor.sample import Sample
 
 LATE_MS, VERY_LATE_MS = 5.0, 15.0
@@ -18,7 +18,7 @@ _FIFO = 1
 _UNITS = "The installed units do that by themselves; for a trial by hand: `sudo .venv/bin/bunraku play`."
 
 
-def realtime_rights(patient: Patient) -> Iterator[Finding]:
+def realtime_rights(patient: HostView) -> Iterator[Finding]:
     """May the stage go before everybody else, and does it?"""
     what, priority = "real time", patient.box.realtime.priority
     if not patient.box.realtime.enabled:
@@ -51,7 +51,7 @@ def _may_take(priority: int) -> bool:
         return bool(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO)
 
 
-def locked_memory(patient: Patient) -> Iterator[Finding]:
+def locked_memory(patient: HostView) -> Iterator[Finding]:
     """A tick must not wait for the disk."""
     what, limit = "locked memory", resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
     cure = "`ulimit -l unlimited`, or LimitMEMLOCK=infinity in the unit."
@@ -123,7 +123,7 @@ def interrupts(seen: Sample) -> Iterator[Finding]:
         )
 
 
-def governor(patient: Patient) -> Iterator[Finding]:
+def governor(patient: HostView) -> Iterator[Finding]:
     """How fast the processor runs between two ticks."""
     files = patient.found("/sys/devices/system/cpu/cpu[0-9]*/cpufreq/scaling_governor")
     names = {patient.text(file) or "" for file in files}
@@ -141,7 +141,7 @@ def governor(patient: Patient) -> Iterator[Finding]:
         )
 
 
-def warmth(patient: Patient) -> Iterator[Finding]:
+def warmth(patient: HostView) -> Iterator[Finding]:
     """The warmest of all sensors that Linux knows."""
     found = [patient.number(zone) for zone in patient.found("/sys/class/thermal/thermal_zone*/temp")]
     degrees = [number / 1000.0 for number in found if number is not None]
@@ -159,7 +159,7 @@ def warmth(patient: Patient) -> Iterator[Finding]:
         yield ok(what, words)
 
 
-def power(patient: Patient) -> Iterator[Finding]:
+def power(patient: HostView) -> Iterator[Finding]:
     """A Raspberry Pi says whether its supply is too weak (bits of `vcgencmd get_throttled`)."""
     files = patient.found("/sys/devices/platform/soc*/soc*firmware/get_throttled")
     bits = next((int(text, 16) for file in files if (text := patient.text(file))), None)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
-from appliance.cli.doctor.host_view import Patient
+from appliance.cli.doctor.host_view import HostView
 from appliance.release.choice import DATA, RUN, STICK, Choice
 
 LEAST_FREE_BYTES, LEAST_FREE_SHARE = 256 << 20, 0.10
@@ -17,7 +17,7 @@ WORN = 8  # of ten steps of an eMMC's life
 _KEPT = "the journal, the place of the dance, what the box knows about sensors"
 
 
-def data_folders(patient: Patient) -> Iterator[Finding]:
+def data_folders(patient: HostView) -> Iterator[Finding]:
     """Where the box keeps what must survive a power cut."""
     box = patient.box
     wanted = {"state": box.state_folder, "journal": box.journal.folder}
@@ -34,7 +34,7 @@ def data_folders(patient: Patient) -> Iterator[Finding]:
         yield _folder(patient, folder)
 
 
-def _folder(patient: Patient, folder: Path) -> Finding:
+def _folder(patient: HostView, folder: Path) -> Finding:
     """One of them, or the nearest one above it that is there."""
     what, there = "data", patient.at(folder)
     while not there.exists() and there != there.parent:
@@ -70,7 +70,7 @@ def _folder(patient: Patient, folder: Path) -> Finding:
     return ok(what, words)
 
 
-def media(patient: Patient) -> Iterator[Finding]:
+def media(patient: HostView) -> Iterator[Finding]:
     """The data partition that /etc/fstab names, and the stick."""
     mounted = patient.mounts()
     rows = (line.split() for line in (patient.text("/etc/fstab") or "").splitlines())
@@ -90,7 +90,7 @@ def media(patient: Patient) -> Iterator[Finding]:
         yield ok("stick", "One is plugged in, to read.")
 
 
-def system_partition(patient: Patient) -> Iterator[Finding]:
+def system_partition(patient: HostView) -> Iterator[Finding]:
     """On an appliance a power cut finds nothing to damage."""
     kind, options = patient.mounts().get("/", ("", ()))
     if not kind:
@@ -105,7 +105,7 @@ def system_partition(patient: Patient) -> Iterator[Finding]:
         )
 
 
-def wear(patient: Patient) -> Iterator[Finding]:
+def wear(patient: HostView) -> Iterator[Finding]:
     """An eMMC tells how much of its life is over; SD cards do not."""
     for device in patient.found("/sys/block/mmcblk*/device"):
         name, kind = device.parent.name, patient.text(device / "type")
@@ -121,7 +121,7 @@ def wear(patient: Patient) -> Iterator[Finding]:
             yield ok(f"wear of {name}", "An SD card does not tell: a new industrial one each season.")
 
 
-def memory(patient: Patient) -> Iterator[Finding]:
+def memory(patient: HostView) -> Iterator[Finding]:
     """Room for the box, and nothing that is paged out."""
     rows = dict(line.split(":", 1) for line in (patient.text("/proc/meminfo") or "").splitlines())
     try:
@@ -142,7 +142,7 @@ def memory(patient: Patient) -> Iterator[Finding]:
         )
 
 
-def choice(patient: Patient) -> Iterator[Finding]:
+def choice(patient: HostView) -> Iterator[Finding]:
     """Which show was chosen at power-on, and what was refused."""
     chosen = Choice.read(patient.at(RUN / "chosen.json"))
     if chosen is None:
@@ -153,7 +153,7 @@ def choice(patient: Patient) -> Iterator[Finding]:
         yield better("show", words, "Mend it on the stick, and plug it in anew.")
 
 
-def releases(patient: Patient) -> Iterator[Finding]:
+def releases(patient: HostView) -> Iterator[Finding]:
     """Installed releases that did not dance at a power-on; bunraku-install leaves a note."""
     for note in sorted(patient.at(RELEASES).glob("*.aside")):
         version, reason = note.stem, note.read_text(errors="replace").strip()

@@ -12,7 +12,7 @@ from pathlib import Path
 from serial.tools.list_ports_common import ListPortInfo
 
 from appliance.cli.doctor.finding import Finding, better, ok, wrong
-from appliance.cli.doctor.host_view import Patient
+from appliance.cli.doctor.host_view import HostView
 from appliance.outputs.dmx.adapter_wire import AdapterError
 from appliance.outputs.dmx.serial_port import find_device, is_bare_ftdi, is_usb_pro
 from appliance.show.box import out_of_reach
@@ -23,7 +23,7 @@ _UDMX = ("16c0", "05dc")
 _ASK_S = 2.0
 
 
-def ports(patient: Patient) -> Iterator[Finding]:
+def ports(patient: HostView) -> Iterator[Finding]:
     """The box's own ports are free, or the box has them."""
     udp, control = patient.box.sensors.udp, patient.box.control
     wanted = [("sensors", udp.host, udp.port)] if udp is not None else []
@@ -45,7 +45,7 @@ def ports(patient: Patient) -> Iterator[Finding]:
         yield better("sensors by Wi-Fi", words, "For sensors on cables alone: leave it.")
 
 
-def _holders(patient: Patient, port: int) -> list[tuple[str, str]]:
+def _holders(patient: HostView, port: int) -> list[tuple[str, str]]:
     """(name, command line) of each process that has this UDP port."""
     rows = [line.split() for line in (patient.text("/proc/net/udp") or "").splitlines()]
     inodes = {f"socket:[{row[9]}]" for row in rows if len(row) > 9 and row[1].endswith(f":{port:04X}")}
@@ -65,7 +65,7 @@ def _links(folder: Path) -> Iterator[str]:
                 yield str(Path(entry.path).readlink())
 
 
-def network(patient: Patient) -> Iterator[Finding]:
+def network(patient: HostView) -> Iterator[Finding]:
     """Is any network there?"""
     names = [card.parent.name for card in patient.found("/sys/class/net/*/carrier")]
     cards = [name for name in names if name != "lo" and _is_card(patient, name)]
@@ -82,12 +82,12 @@ def network(patient: Patient) -> Iterator[Finding]:
         )
 
 
-def _is_card(patient: Patient, name: str) -> bool:
+def _is_card(patient: HostView, name: str) -> bool:
     """A real one, and none that a program made."""
     return patient.at(f"/sys/class/net/{name}/device").exists()
 
 
-def radios(patient: Patient) -> Iterator[Finding]:
+def radios(patient: HostView) -> Iterator[Finding]:
     """Wi-Fi that sleeps or is switched off, Bluetooth that disturbs, a Pi's own access point."""
     for switch in patient.found("/sys/class/rfkill/rfkill*"):
         kind, name = patient.text(switch / "type"), patient.text(switch / "name")
@@ -118,7 +118,7 @@ def radios(patient: Patient) -> Iterator[Finding]:
             )
 
 
-def _is_access_point(patient: Patient) -> bool:
+def _is_access_point(patient: HostView) -> bool:
     """As `bunraku-access-point` makes it."""
     return bool(patient.found("/data/network/sensors.nmconnection"))
 
@@ -133,7 +133,7 @@ def _asked(*command: str) -> str:
     return done.stdout
 
 
-def cables(patient: Patient) -> Iterator[Finding]:
+def cables(patient: HostView) -> Iterator[Finding]:
     """Sensors on cables that the box file names."""
     for cable in patient.box.sensors.serial:
         yield _device(patient, f"sensor on {cable.device}", cable.device)
@@ -144,7 +144,7 @@ def cables(patient: Patient) -> Iterator[Finding]:
         )
 
 
-def adapters(patient: Patient) -> Iterator[Finding]:
+def adapters(patient: HostView) -> Iterator[Finding]:
     """The lights' USB adapters that the box file names."""
     for wire in patient.box.outputs.dmx:
         what = f"lights, universe {wire.universe}"
@@ -154,7 +154,7 @@ def adapters(patient: Patient) -> Iterator[Finding]:
             yield _adapter(patient, what, wire)
 
 
-def _udmx(patient: Patient, what: str) -> Finding:
+def _udmx(patient: HostView, what: str) -> Finding:
     for device in patient.found("/sys/bus/usb/devices/*/idVendor"):
         if (patient.text(device), patient.text(device.with_name("idProduct"))) == _UDMX:
             return ok(what, "The uDMX is plugged in.")
@@ -163,7 +163,7 @@ def _udmx(patient: Patient, what: str) -> Finding:
     )
 
 
-def _adapter(patient: Patient, what: str, wire: DmxConfig) -> Finding:
+def _adapter(patient: HostView, what: str, wire: DmxConfig) -> Finding:
     if not patient.is_here:
         return ok(what, "It is looked for on the machine itself.")
     try:
@@ -176,7 +176,7 @@ def _adapter(patient: Patient, what: str, wire: DmxConfig) -> Finding:
     return _device(patient, what, device)
 
 
-def _device(patient: Patient, what: str, device: str) -> Finding:
+def _device(patient: HostView, what: str, device: str) -> Finding:
     there = patient.at(device)
     if not there.exists():
         return wrong(what, f"{device} is not plugged in.", "Plug it in: it is taken by itself.")
@@ -187,7 +187,7 @@ def _device(patient: Patient, what: str, device: str) -> Finding:
     return ok(what, f"{device} is there.")
 
 
-def display(patient: Patient) -> Iterator[Finding]:
+def display(patient: HostView) -> Iterator[Finding]:
     """Is there somewhere to project, and something that draws?"""
     sockets = patient.found("/sys/class/drm/card*-*/status")
     connected = [path.parent.name for path in sockets if patient.text(path) == "connected"]

@@ -1,0 +1,146 @@
+"""What the commands of show control make of the show state: functions from one state to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from appliance.box.show_state import ShowState
+from appliance.outputs.shared_frame import Facts
+from appliance.show.config_error import did_you_mean
+from appliance.show_control.command import Command
+
+STOP_FADE_S = 2.0
+GO_FADE_S = 1.0
+LOOK_FADE_S = 2.0  # of looks and lights, where a command gives none
+
+Change = Callable[[ShowState, Command, "Facts | None", float], tuple[ShowState, str]]
+
+
+def _go(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> tuple[ShowState, str]:
+    dark = show_state.panic or not show_state.going
+    if show_state.panic:
+        show_state = replace(show_state, panic=False, going=True, going_since=now, going_fade_s=GO_FADE_S)
+    elif not show_state.going:
+        show_state = show_state.with_going(True, now, GO_FADE_S)
+    if show_state.blackout:
+        return show_state, "The show goes on, in the dark: /blackout 0 brings picture and lights back."
+    return show_state, "The show goes on: picture and lights come back." if dark else "The show goes on."
+
+
+def _stop(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> tuple[ShowState, str]:
+    fade_s = command.values[0] if command.values else STOP_FADE_S
+    if not show_state.going and show_state.going_level(now) <= 0.0:
+        return show_state, "The show stands still already. /go lets it go on."
+    if not show_state.going and fade_s == 0.0:  # a button let go: the fade of its press is not to be cut
+        return show_state, "The show stops already, and its fade runs on. /go lets it go on."
+    words = f"Picture and lights fade out over {fade_s:g} s, then the phrase stands still. /go lets it go on."
+    return show_state.with_going(False, now, fade_s), words
+
+
+def _panic(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> tuple[ShowState, str]:
+    words = "The picture is black, and the lights show their safe look. /go lifts it."
+    return replace(show_state, panic=True), words
+
+
+def _blackout(
+    show_state: ShowState, command: Command, facts: Facts | None, now: float
+) -> tuple[ShowState, str]:
+    if command.values[0]:
+        return replace(show_state, blackout=True), "Dark; the dance goes on. /blackout 0 lifts it."
+    return replace(show_state, blackout=False), "Picture and lights are as bright as master says."
+
+
+def _master(
+    show_state: ShowState, command: Command, facts: Facts | None, now: float
+) -> tuple[ShowState, str]:
+    master, *fade = command.values
+    show_state = show_state.with_master(master, now, fade[0] if fade else 0.0)
+    return show_state, f"Master goes to {100 * master:.0f} %."
+
+
+def _look(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> tuple[ShowState, str]:
+    name = known("look", command.text, facts.looks if facts else None)
+    fade_s = command.values[0] if command.values else LOOK_FADE_S
+    return show_state.with_look(name, now, fade_s), f"The look {name} comes over {fade_s:g} s."
+
+
+def _lights(
+    show_state: ShowState, command: Command, facts: Facts | None, now: float
+) -> tuple[ShowState, str]:
+    name = known("set of light mappings", command.text, facts.lights if facts else None)
+    fade_s = command.values[0] if command.values else LOOK_FADE_S
+    return show_state.with_lights(name, now, fade_s), f"The lights {name} come over {fade_s:g} s."
+
+
+CHANGES: dict[str, Change] = {
+    "/go": _go,
+    "/stop": _stop,
+    "/panic": _panic,
+    "/blackout": _blackout,
+    "/master": _master,
+    "/look": _look,
+    "/lights": _lights,
+}
+
+_LET_GO = {
+    "/go": "/go 0 is a button let go: nothing changes.",
+    "/panic": "/panic 0 is a button let go: nothing changes. /go lifts a panic.",
+}
+
+
+def let_go(command: Command) -> str:
+    """What to answer when a tablet's button, which sent 1 when it was pressed, sends 0; else empty."""
+    return _LET_GO.get(command.address, "") if command.values == (0.0,) else ""
+
+
+PARTS = ("look", "lights", "master")  # of the show state, that cues set
+
+
+def in_cue(show_state: ShowState, cue: Mapping[str, Any], parts: Collection[str], now: float) -> ShowState:
+    """The show state in a cue that the stage has fired: of PARTS only `parts` that the cue names."""
+    fade_s = float(cue["fade_s"])
+    wanted = {part: cue[part] for part in parts if cue.get(part) is not None}
+    if "look" in wanted:
+        show_state = show_state.with_look(wanted["look"], now, fade_s)
+    if "lights" in wanted:
+        show_state = show_state.with_lights(wanted["lights"], now, fade_s)
+    if "master" in wanted:
+        show_state = show_state.with_master(float(wanted["master"]), now, fade_s)
+    return replace(show_state, cue=cue["name"])
+
+
+def of_this_show(show_state: ShowState, facts: Facts) -> ShowState:
+    """A show state that another show has left: names that this one does not know are forgotten."""
+    return replace(
+        show_state,
+        look=show_state.look if show_state.look in facts.looks else "",
+        look_before=show_state.look_before if show_state.look_before in facts.looks else "",
+        lights=show_state.lights if show_state.lights in facts.lights else "",
+        lights_before=show_state.lights_before if show_state.lights_before in facts.lights else "",
+        cue=show_state.cue if show_state.cue in [cue["name"] for cue in facts.cues] else "",
+    )
+
+
+def known(kind: str, name: str | int, names: Sequence[str] | None) -> str:
+    """The name, if the show has it. Raises ValueError with the nearest one; `names` None: no stage so far."""
+    if names is None:
+        raise ValueError(
+            f"No stage has danced on this box yet: whether there is a {kind} '{name}' is unknown."
+        )
+    if name not in names:
+        cure = did_you_mean(name, names) if names else "It has none at all: show.yaml names them."
+        raise ValueError(f"This show has no {kind} '{name}'. {cure}")
+    return str(name)
+
+
+def next_cue(show_state: ShowState, facts: Facts | None) -> str:
+    """The one after the cue in force, in the order of show.yaml; the first one at the beginning."""
+    names = [str(cue["name"]) for cue in facts.cues] if facts else []
+    if not names:
+        raise ValueError("This show has no cues: show.yaml names them.")
+    place = names.index(show_state.cue) + 1 if show_state.cue in names else 0
+    if place == len(names):
+        raise ValueError(f"{show_state.cue} was the last cue. Name one, like /cue {names[0]}.")
+    return names[place]
