@@ -26,7 +26,7 @@ def admitted(folder: Path, cast: Cast, show: Show, box: BoxConfig, comes_back: b
     asked = _asked(show, box)
     before = _remembered(folder / FILE, asked) if comes_back else None
     if before is not None:
-        warm_up(cast, before)
+        warm_up(cast, show, before)
         return before
     measured = admission(cast, show, box)
     with contextlib.suppress(OSError):
