@@ -10,6 +10,12 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
+_LARGEST_KEPT = 1 << 22
+
+
+class TooLargeError(OSError):
+    """A file that is larger than its reader takes."""
+
 
 def opened(path: Path) -> BufferedReader:
     """A regular file, to be read. Raises OSError for anything else: a FIFO or a device may never end."""
@@ -22,12 +28,12 @@ def opened(path: Path) -> BufferedReader:
 
 
 def content(path: Path, largest: int) -> bytes:
-    """All of a regular file of at most `largest` bytes. Raises OSError for any other."""
+    """All of a regular file. Raises TooLargeError above `largest` bytes, OSError for what is no such file."""
     with opened(path) as stream:
         data = stream.read(largest + 1) if os.fstat(stream.fileno()).st_size <= largest else None
     if data is None or len(data) > largest:
         size = f"{largest / 1e6:g} MB" if largest >= 1e6 else f"{largest / 1024:g} kB"
-        raise OSError(errno.EFBIG, f"it is larger than {size}", str(path))
+        raise TooLargeError(errno.EFBIG, f"it is larger than {size}", str(path))
     return data
 
 
@@ -36,6 +42,11 @@ def require_inside(path: Path, folder: Path) -> None:
     real = Path(os.path.realpath(path, strict=True))
     if not real.is_relative_to(os.path.realpath(folder)):
         raise OSError(errno.EXDEV, "a link leads out of the folder: put the file itself there", str(path))
+
+
+def kept_json(path: Path) -> Any:
+    """The values in a small file that this box wrote. Raises OSError, or ValueError for a spoilt one."""
+    return plain_json(content(path, _LARGEST_KEPT))
 
 
 def plain_json(text: str | bytes) -> Any:

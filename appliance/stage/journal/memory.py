@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
+import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from appliance.outputs.ring_file import RingFileReader
+from appliance.pose.foreign_file import plain_json
 from appliance.stage.journal.keyframe import POSITION
 from appliance.stage.journal.log import Entry
 from appliance.stage.journal.record import TICK, layout_of
@@ -67,10 +68,11 @@ class RunMemory:
         reader = RingFileReader(path, KIND, FORMAT, "the stage (bunraku play)")
         reader.look()
         said = reader.rings[FACTS].newest() if reader.rings else None
-        if said is None:
-            reader.close()
-            return None
-        return cls(reader, json.loads(said[1]), (found.st_dev, found.st_ino))
+        with contextlib.suppress(ValueError, LookupError, TypeError):  # facts of something else
+            if said is not None:
+                return cls(reader, plain_json(said[1]), (found.st_dev, found.st_ino))
+        reader.close()
+        return None
 
     def is_at(self, path: Path) -> bool:
         """Whether this path still leads to it; if not, another stage has taken its place."""
