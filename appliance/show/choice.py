@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from appliance.pose.foreign_file import kept_json
 from appliance.show.durable import write_whole
 
 APPLIANCE_BOX = Path(__file__).resolve().parent / "appliance_box.yaml"
@@ -83,7 +84,7 @@ class Choice(NamedTuple):
     def read(path: Path) -> Choice | None:
         """As written; None where there is none, no whole one, or an empty one."""
         try:
-            choice = Choice.of(json.loads(path.read_bytes()))
+            choice = Choice.of(kept_json(path))
         except (OSError, ValueError):
             return None
         return choice if choice.pairs else None
