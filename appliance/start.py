@@ -82,7 +82,7 @@ def _play(wishes: Wishes) -> int:
         from appliance.release.start_attempts import ended_well, pair_to_dance
 
         pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
-        wishes |= {"show": pair.show, "box": pair.box}
+        wishes |= {"show": pair.show, "box": pair.box, "proven": True}  # by the preflight
     named = {_PARAMETERS.get(name, name): wish for name, wish in wishes.items()}
     status = play_show(**named)  # type: ignore[arg-type]  # wishes_to_play gives each name its type
     if isinstance(chosen, Path):

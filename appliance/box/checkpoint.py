@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from appliance.box.block import BlockReader, BlockWriter
+from appliance.pose.foreign_file import plain_json
 
 FILE, KIND = "place", "place"
 LARGEST = 4000  # bytes of a packed place; one slot on the disk is a page of 4096
@@ -80,7 +81,7 @@ def unpacked(payload: bytes) -> Checkpoint | None:
         tick, position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, *small = (
             _NUMBERS.unpack_from(payload)
         )
-        show, phrase, cue, let_go, boot = json.loads(payload[_NUMBERS.size :])
+        show, phrase, cue, let_go, boot = plain_json(payload[_NUMBERS.size :])
         place = Checkpoint(
             str(show),
             str(phrase),

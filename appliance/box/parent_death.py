@@ -17,8 +17,13 @@ def end_with_parent() -> None:
     parent = os.environ.pop(PARENT, "")
     if not parent:
         return
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-    if os.getppid() != int(parent):  # it ended while this one started
+    end_with(int(parent), signal.SIGTERM)
+
+
+def end_with(parent: int, by: signal.Signals) -> None:
+    """From now on this process ends by a signal when its parent ends."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, by, 0, 0, 0)
+    if os.getppid() != parent:  # it ended while this one started
         sys.exit(0)
 
 

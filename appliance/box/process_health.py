@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from appliance.box.block import BlockReader, BlockWriter
 from appliance.box.fallback import Fallback, Fallbacks, Fallen, fallen
+from appliance.pose.foreign_file import kept_json, plain_json
 
 WHO = ("lights", "projector", "keeper")
 BEAT_S, LATE_S = 1.0, 5.0
@@ -143,7 +144,7 @@ class ProcessHealth:
             changed = self._chosen.stat().st_mtime_ns
             if changed != self._chosen_at:
                 self._chosen_at = changed
-                values = json.loads(self._chosen.read_bytes())
+                values = kept_json(self._chosen)
                 self._of_choice = tuple(_of_choice(values["refused"], values["aside"]))
         except (OSError, ValueError, KeyError, TypeError):
             self._of_choice = ()
@@ -165,7 +166,7 @@ def _read(folder: Path, who: str) -> dict[str, Any] | None:
 
 def _parsed(payload: bytes | None) -> dict[str, Any] | None:
     try:
-        values = json.loads(payload) if payload else None
+        values = plain_json(payload) if payload else None
     except ValueError:
         return None
     return values if isinstance(values, dict) else None

@@ -21,6 +21,7 @@ _HEADER = struct.Struct("<8s16sII")  # magic, kind, format, number of rings: the
 _SHAPE = struct.Struct("<II")
 _CHECK = struct.Struct("<I")  # CRC-32 of header and shapes
 _MOST_RINGS = 8
+_LARGEST_PAYLOAD = 1 << 24  # bytes; a reader takes a slot at once, however much of it was written
 _LONGEST = _HEADER.size + _MOST_RINGS * _SHAPE.size + _CHECK.size
 _LOCK_TRIES, _LOCK_RETRY_S = 10, 0.01  # who looks whether a writer lives holds the lock for a moment
 
@@ -172,6 +173,8 @@ class RingFileReader:
         if _CHECK.unpack_from(header, end) != (zlib.crc32(header[:end]),):
             return f"{self._path} is damaged. Start {self._writer} again."
         shapes = list(_SHAPE.iter_unpack(header[_HEADER.size : end]))
+        if not all(slots and capacity <= _LARGEST_PAYLOAD for slots, capacity in shapes):
+            return f"{self._path} is damaged. Start {self._writer} again."
         self.rings = [RingReader(ring, descriptor) for ring in _rings(shapes)]
         return ""
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from appliance.box.block import BlockReader, BlockWriter
+from appliance.pose.foreign_file import plain_json
 
 FILE, KIND = "show_state", "show_state"
 LARGEST = 8192  # bytes; the longest names of a show fit, whatever they are written in
@@ -151,7 +152,7 @@ def _parsed(payload: bytes) -> ShowState:
     """A show state of another version of this program keeps what both know."""
     known = {one.name for one in fields(ShowState)}
     try:
-        values: dict[str, Any] = json.loads(payload)
+        values: dict[str, Any] = plain_json(payload)
         return ShowState(**{name: value for name, value in values.items() if name in known})
     except (ValueError, TypeError, AttributeError):
         return ShowState()

@@ -76,7 +76,9 @@ def play(
     from appliance.cli.play import play_show
 
     show, box = pair_of(show, box, chosen)
-    raise typer.Exit(play_show(show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse))
+    raise typer.Exit(
+        play_show(show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse, bool(chosen))
+    )
 
 
 @app.command()

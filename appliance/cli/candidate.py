@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import resource
 import sys
 from pathlib import Path
 
@@ -15,11 +13,10 @@ prepare_environment()
 from appliance.box.runtime_folder import RuntimeFolderError  # noqa: E402
 from appliance.cli.check import verified  # noqa: E402  (numpy must find the environment prepared)
 from appliance.cli.prepare_show import prepare_show  # noqa: E402
+from appliance.cli.run_with_timeout import limit_memory  # noqa: E402
 from appliance.pose.bvh import BvhError  # noqa: E402
 from appliance.show.config_error import ConfigError  # noqa: E402
 from appliance.stage.stage_error import StageError  # noqa: E402
-
-_OF_ALL_MEMORY, _LEAST_MEMORY_BYTES = 0.2, 400 << 20
 
 
 def main(show: str, box: str) -> int:
@@ -29,7 +26,7 @@ def main(show: str, box: str) -> int:
     to lower: another program may have come between at the measurement, as many do while a box starts. A
     network is too slow when half of its runs are, were they of one iteration alone.
     """
-    _limit_memory()
+    limit_memory()
     try:
         _, verdict = verified(Path(show), Path(box))
     except (BvhError, ConfigError, RuntimeFolderError, StageError) as error:
@@ -44,14 +41,6 @@ def main(show: str, box: str) -> int:
     with contextlib.suppress(Exception):  # it dances all the same, and starts somewhat later
         prepare_show(Path(show))
     return 0
-
-
-def _limit_memory() -> None:
-    """A show that takes all memory ends this check, and not the preflight that waits for it, or the dance."""
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    most = max(_LEAST_MEMORY_BYTES, int(_OF_ALL_MEMORY * memory))
-    with contextlib.suppress(OSError, ValueError):  # a lower limit holds already
-        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
 if __name__ == "__main__":

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from appliance.cli.network_proof import proved
+from appliance.pose.foreign_file import content
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
-from appliance.show.bundle import CHECKSUMS, bundle_bytes, bundle_files, default_show_path, write_checksums
+from appliance.show.bundle import (
+    CHECKSUMS,
+    LARGEST_CHECKSUMS,
+    bundle_bytes,
+    bundle_files,
+    default_show_path,
+    write_checksums,
+)
 from appliance.show.check import verify_bundle
 from appliance.show.config_error import ConfigError
 from appliance.show.cues import too_much
@@ -17,10 +26,24 @@ from appliance.stage.open_sensors import reach
 from appliance.stage.stage_error import StageError
 from appliance.stage.stage_parts import StageParts, admission, assemble
 
+_PATIENCE_S = 60.0  # a person may wait longer than a box that starts
 
-def check_show(directory: Path | None, box_file: Path | None) -> None:
-    """Print what was found; raises StageError or ConfigError with all that is wrong."""
+
+def check_show(directory: Path | None, box_file: Path | None, patience_s: float = _PATIENCE_S) -> None:
+    """Print what was found; raises StageError with all that is wrong."""
     directory = directory or default_show_path()
+    print(proved(_network(directory), lambda: _check(directory, box_file), patience_s), end="")
+
+
+def _network(directory: Path) -> Path:
+    """What is to blame for a check that never ends: all other files are read in bounds."""
+    try:
+        return load_show(directory).network
+    except ConfigError:
+        return directory
+
+
+def _check(directory: Path, box_file: Path | None) -> None:
     cast, verdict = verified(directory, box_file)
     show, box = load_show(directory), load_box(box_file)
     if box.sensors.keys is not None and cast.complaints:
@@ -51,12 +74,16 @@ def verified(directory: Path, box_file: Path | None) -> tuple[StageParts, Admiss
 
 def pack_show(directory: Path) -> None:
     """Write new checksums over a changed bundle, then check it; the old ones return if it is not sound."""
+    network = load_show(directory).network
     checksums = directory / CHECKSUMS
-    before = checksums.read_bytes() if checksums.exists() else None
-    load_show(directory)
-    write_checksums(directory)
     try:
-        _refuse_damage(directory)
+        before = content(checksums, LARGEST_CHECKSUMS) if checksums.exists() else None
+        write_checksums(directory)
+    except OSError as error:
+        what = error.filename or directory
+        raise StageError(f"{what}: it cannot be packed ({error.strerror}). Nothing was changed.") from error
+    try:
+        print(proved(network, lambda: _refuse_damage(directory)), end="")
     except StageError:
         checksums.unlink() if before is None else checksums.write_bytes(before)
         raise

@@ -52,13 +52,18 @@ def play_show(
     alone: bool = False,
     window: bool = False,
     rehearse: Path | None = None,
+    proven: bool = False,
 ) -> int:
     """Dance until the seconds are over or a signal comes; the exit status.
 
     alone: start no companions. window: show the projection in a window. rehearse: the same where there is
-    a display, and a picture of the projection at the end.
+    a display, and a picture of the projection at the end. proven: the network was seen to run here.
     """
     show, box = load_show(directory or default_show_path()), load_box(box_file)
+    if directory is not None and not proven:  # no signal reaches a run that never ends
+        from appliance.cli.network_proof import prove_network
+
+        prove_network(show)
     with ExitStack() as opened:
         stopped = opened.enter_context(stop_signals())
         scratch = _scratch(opened) if emulate or filmstrip or rehearse else None

@@ -10,14 +10,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from appliance.cli.run_with_timeout import TimedOutError, within
+from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, within
 from appliance.release.arrivals import look
 from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice, alone_in
 from appliance.release.choosing import Outcome, Places, built_in_box, choose, remembered
 
 ANEW = "anew"  # touched when units have to start anew, for another show or box file dances
 _AT_ONCE_S = 120.0  # after power-on a stick takes effect at once; later no show is interrupted
-_PATIENCE_S, _CHECK_S = 45.0, 30.0  # a stick that is read for ever keeps nobody from dancing
+_PATIENCE_S = 45.0  # a stick that is read for ever keeps nobody from dancing
 _TURN_S, _LATE_TURN_S = 20.0, 60.0  # how long another preflight is waited for
 _NOT_WRITTEN = 1
 
@@ -110,10 +110,10 @@ def candidate_problems(show: Path, box: Path) -> list[str]:
     command = (sys.executable, "-m", "appliance.cli.candidate", str(show), str(box))
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", check=False, timeout=_CHECK_S
+            command, capture_output=True, text=True, errors="replace", check=False, timeout=CHECK_S
         )
     except subprocess.TimeoutExpired:
-        return [f"{show}: its check did not end within {_CHECK_S:g} s. Try it with: bunraku check."]
+        return [f"{show}: its check did not end within {CHECK_S:g} s. Try it with: bunraku check."]
     except OSError as error:
         return [f"{show}: it cannot be checked ({error.strerror})."]
     if done.returncode == 0:

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import os
+import resource
 import select
 import signal
 import time
 from collections.abc import Callable
+
+from appliance.box.parent_death import end_with
+
+CHECK_S = 30.0  # for a show: some seconds on a slow box
+_OF_ALL_MEMORY, _LEAST_MEMORY_BYTES = 0.2, 400 << 20
 
 
 class TimedOutError(Exception):
@@ -20,9 +26,10 @@ def within(seconds: float, do: Callable[[], bytes]) -> bytes:
     Whoever hangs in the kernel, on a stick that does not answer, cannot be ended: nobody waits for it.
     """
     reading, writing = os.pipe()
+    parent = os.getpid()
     child = os.fork()
     if child == 0:
-        _answer(writing, do)
+        _answer(writing, do, parent)
     with contextlib.suppress(OSError):
         os.setpgid(child, child)  # as it does itself, but perhaps not before its time is up
     os.close(writing)
@@ -39,11 +46,20 @@ def within(seconds: float, do: Callable[[], bytes]) -> bytes:
     return answer
 
 
-def _answer(writing: int, do: Callable[[], bytes]) -> None:
+def limit_memory() -> None:
+    """What takes all memory ends this process, and not those that wait for it, or the dance."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    most = max(_LEAST_MEMORY_BYTES, int(_OF_ALL_MEMORY * memory))
+    with contextlib.suppress(OSError, ValueError):  # a lower limit holds already
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+
+def _answer(writing: int, do: Callable[[], bytes], parent: int) -> None:
     """In the fork; does not return."""
     status = 1
     try:
         os.setpgid(0, 0)  # what it starts is given up with it
+        end_with(parent, signal.SIGKILL)
         with os.fdopen(writing, "wb") as stream:
             stream.write(b"!" + do())
         status = 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,10 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from appliance.dancer.slerp import FloatArray
+from appliance.pose.foreign_file import content
 from appliance.pose.skeleton import Skeleton, UnknownJointError
+from appliance.show.bundle import LARGEST_FILE
+from appliance.show.network import WINDOW, rest_pose
 
 _INPUTS = {  # and how many dimensions each has
     "window": 3,
@@ -114,7 +116,8 @@ def _session(path: Path) -> onnxruntime.InferenceSession:
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.add_session_config_entry("session.inter_op.allow_spinning", "0")
     try:
-        session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        network = content(path, LARGEST_FILE)  # as bytes: a network then cannot name other files to be read
+        session = onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime has a class of its own for every way to be damaged
         raise PuppetError(
             f"{path}: onnxruntime cannot read this network ({_short(error)}). {_CURE}"
@@ -139,7 +142,9 @@ def _read_facts(path: Path, facts: dict[str, str]) -> tuple[tuple[str, ...], int
     try:
         joints = tuple(facts["bunraku.joints"].split(","))
         window = int(facts["bunraku.window"])
-        rest = np.array(json.loads(facts["bunraku.rest"]), dtype=np.float32).reshape(len(joints), 4)
+        rest = rest_pose(facts, len(joints))
+        if window != WINDOW:
+            raise ValueError(f"its windows are {window} poses long; the box dances windows of {WINDOW}")
     except (KeyError, ValueError) as error:
         raise PuppetError(
             f"{path}: the network does not say what it moves ({_short(error)}). {_CURE}"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from appliance.box.ring_file import RingFileReader
+from appliance.pose.foreign_file import plain_json
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import POSITION
 from appliance.recorder.log import Entry
@@ -80,7 +80,7 @@ class RunMemory:
             if said is None or len(reader.rings) != RINGS:
                 raise JournalError(reader.complaint or _foreign(path, "other rings"))
             try:
-                facts = json.loads(said[1])
+                facts = plain_json(said[1])
                 require_sound(
                     facts | {"show_files": dict.fromkeys(facts["show_files"], ""), "written_at": 0.0}
                 )

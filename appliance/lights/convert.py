@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import yaml
 
 from appliance.lights.open_fixture_library import LibraryError, profile_values
+from appliance.pose.foreign_file import content, plain_json
 from appliance.show.config_error import ConfigError, Problem
 from appliance.show.fixture_profile import FOLDER, ProfileConfig
 from appliance.show.validation import validated
 from appliance.show.yaml_file import read_yaml
 
+_LARGEST = 4_000_000  # bytes; the largest fixture of the library has 1.2 MB
 _HEAD = """\
 # Made by `bunraku lights convert` from {name}, a fixture of the Open Fixture Library.
 # Prove it with `bunraku lights test` before the show.
@@ -44,13 +45,14 @@ def convert_file(source: Path, out: Path | None) -> None:
 
 def _values(source: Path) -> tuple[dict[str, object], list[str]]:
     try:
-        return profile_values(json.loads(source.read_text(encoding="utf-8")))
+        return profile_values(plain_json(content(source, _LARGEST).decode()))
     except OSError as error:
         message, line = f"The file cannot be read ({error.strerror}).", 0
     except UnicodeDecodeError:
         message, line = "This is not text. Download the fixture as JSON.", 1
-    except json.JSONDecodeError as error:
-        message, line = f"This is not JSON: {error.msg}. Download the fixture again.", error.lineno
     except LibraryError as error:
         message, line = str(error), 0
+    except ValueError as error:
+        why, line = getattr(error, "msg", error), getattr(error, "lineno", 1)
+        message = f"This is not JSON: {why}. Download the fixture again."
     raise ConfigError([Problem(source, line, message)])

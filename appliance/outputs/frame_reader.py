@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Callable
@@ -27,6 +26,7 @@ from appliance.outputs.shared_frame import (
     Facts,
     FrameLayout,
 )
+from appliance.pose.foreign_file import plain_json
 
 State = Literal["absent", "fresh", "stale"]
 STALE_S = 0.5
@@ -98,7 +98,7 @@ class FrameReader:
         if found is None:
             return None
         try:
-            said = json.loads(found[1])
+            said = plain_json(found[1])
         except ValueError:
             return None
         return said if isinstance(said, dict) else None

@@ -14,6 +14,7 @@ import numpy as np
 
 from appliance.box.ring_file import RingFileWriter
 from appliance.outputs.joint_frame import JointFrame
+from appliance.pose.foreign_file import plain_json
 from appliance.pose.skeleton import Skeleton
 
 FILE, KIND, FORMAT, WRITER = "frame", "frame", 1, "the stage (bunraku play)"
@@ -64,7 +65,7 @@ class Facts:
     @classmethod
     def unpacked(cls, packed: bytes) -> Facts:
         """From JSON; raises ValueError, KeyError or TypeError where that is none of ours."""
-        facts = json.loads(packed)
+        facts = plain_json(packed)
         skeleton, box_file = facts["skeleton"], facts["box_file"]
         names = ("held", "hands", "phrases", "cues", "looks", "lights")
         return cls(

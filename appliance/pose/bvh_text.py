@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
+from io import TextIOWrapper
 from pathlib import Path
-from typing import NoReturn, TextIO
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
+
+from appliance.pose.foreign_file import opened
 
 MAX_LINE = 1 << 17  # characters; the longest honest line is one frame of some hundred channels
 MAX_BLANK_LINES = 1000  # in a row; a file of nothing but line ends must not keep anybody waiting
 MAX_JOINTS = 1000
 MAX_VALUES = 50_000_000  # 400 MB: 50 minutes of 132 channels at 120 poses a second
+_STAGE_FPS = 50  # a recording is danced at this rate: slow frames become many
 _CHANNELS = {f"{axis}{kind}" for axis in "XYZ" for kind in ("position", "rotation")}
 
 
@@ -46,7 +51,7 @@ class BvhText:
 
 def read_bvh_text(path: Path) -> BvhText:
     """Read all of a file; raises BvhError or OSError."""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
+    with TextIOWrapper(opened(path), encoding="utf-8-sig", errors="replace") as file:
         lines = _Lines(path, file)
         joints, ends = _read_hierarchy(lines)
         frames, fps = _read_motion(lines, joints)
@@ -56,8 +61,9 @@ def read_bvh_text(path: Path) -> BvhText:
 class _Lines:
     """Lines of a file with their number, without blank ones, never longer than MAX_LINE."""
 
-    def __init__(self, path: Path, file: TextIO) -> None:
+    def __init__(self, path: Path, file: TextIOWrapper) -> None:
         self.path, self.number, self._file = path, 0, file
+        self.bytes = os.fstat(file.fileno()).st_size
 
     def next(self, expected: str) -> list[str]:
         """Words of the next line that has any; fails at the end of the file."""
@@ -208,8 +214,11 @@ def _read_motion(lines: _Lines, joints: list[BvhJoint]) -> tuple[NDArray[np.floa
     width = sum(len(joint.channels) for joint in joints)
     if not width:
         lines.fail("no joint has a channel: nothing can move.")
-    if count * width > MAX_VALUES:
-        lines.fail(f"{count} frames of {width} values are too many to read. Cut the recording into pieces.")
+    if count * width * max(1.0, _STAGE_FPS * frame_time) > MAX_VALUES:
+        lines.fail(
+            f"{count} frames of {width} values ({count * frame_time:.0f} s) are too many to read. "
+            "Cut the recording into pieces."
+        )
     return _read_frames(lines, count, width), 1 / frame_time
 
 
@@ -223,7 +232,7 @@ def _headed(lines: _Lines, heading: str, what: str) -> str:
 
 
 def _read_frames(lines: _Lines, count: int, width: int) -> NDArray[np.float64]:
-    frames = np.empty((count, width))  # the system gives the memory page by page, as frames really come
+    frames = np.empty((min(count, lines.bytes // (2 * width) + 1), width))  # a value is two bytes or more
     for frame in range(count):
         words = lines.next(f"frame {frame + 1} of {count}")
         if len(words) != width:

@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 from appliance.box.private_file import replace_private
+from appliance.pose.foreign_file import TooLargeError, content
 from appliance.projector.corners import WHOLE, Corners, complaint
 from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
@@ -130,23 +131,29 @@ class AlignmentFile:
 
     def _load(self) -> Alignment:
         try:
-            if self.path.stat().st_size > _LARGEST_FILE:
-                raise ValueError("it is too large")
-            return _read(yaml.safe_load(self.path.read_text(encoding="utf-8")), self._from_box)
+            return _read(yaml.safe_load(content(self.path, _LARGEST_FILE).decode()), self._from_box)
         except (FileNotFoundError, NotADirectoryError):
             return self._from_box
-        except OSError as error:
-            self._say(
-                f"{self.path}: the alignment cannot be read ({error.strerror}). The picture fills the "
-                "display. Check who may read this file."
-            )
-        except (ValueError, TypeError, KeyError, OverflowError, RecursionError, yaml.YAMLError):
+        except (
+            TooLargeError,
+            ValueError,
+            TypeError,
+            KeyError,
+            OverflowError,
+            RecursionError,
+            yaml.YAMLError,
+        ):
             broken = self.path.with_name(self.path.name + ".broken")
             with contextlib.suppress(OSError):
                 self.path.replace(broken)
             self._say(
                 f"{self.path}: the alignment is damaged and set aside as {broken.name}. The picture fills "
                 "the display. Lay it onto the wall again: key c."
+            )
+        except OSError as error:
+            self._say(
+                f"{self.path}: the alignment cannot be read ({error.strerror}). The picture fills the "
+                "display. Check who may read this file."
             )
         return self._from_box
 

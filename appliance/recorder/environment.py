@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 import zlib
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from appliance.pose.foreign_file import opened
+from appliance.show.bundle import LARGEST_FILE
 
 CPU_INFO = Path("/proc/cpuinfo")
 _UNKNOWN = "unknown"
@@ -55,10 +59,9 @@ def differing_files(recorded: dict[str, str], directory: Path) -> list[str]:
 
 def _fingerprint(path: Path) -> str:
     try:
-        if not path.is_file():  # the names come from a file that anybody may have made
-            return ""
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        with opened(path) as file:  # the names come from a file that anybody may have made
+            is_too_large = os.fstat(file.fileno()).st_size > LARGEST_FILE
+            return "" if is_too_large else hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return ""
 

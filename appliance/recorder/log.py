@@ -26,10 +26,12 @@ def packed(entries: Sequence[Entry]) -> bytes:
 
 
 def unpacked(data: bytes) -> Iterator[Entry]:
-    """The entries of a chunk."""
+    """The entries of a chunk, as far as they are whole."""
     at = 0
     while at + _HEAD.size <= len(data):
         number, kind, length = _HEAD.unpack_from(data, at)
         at += _HEAD.size
+        if length > len(data) - at:
+            return
         yield Entry(number, kind, data[at : at + length])
         at += length

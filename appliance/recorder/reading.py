@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import errno
+import itertools
 import json
-import os
 import tarfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from appliance.pose.foreign_file import content, opened
 from appliance.pose.skeleton import Skeleton
 from appliance.recorder import chunks, log
 from appliance.recorder.journal_error import JournalError
@@ -24,7 +24,12 @@ from appliance.recorder.segments import SUFFIX, segment_paths
 EXPORTED = ".bunraku"
 _OLD_MAGIC = b"bunraku journal 1\n"
 _NAME_ONE = "Name the folder of `bunraku play --journal`, a segment in it, or an exported file."
-_LARGEST = 1 << 28  # bytes of a segment: one that the keeper wrote has a hundredth of it
+_LARGEST = 1 << 26  # bytes of a segment: a minute of the show that comes with the box has a fiftieth of it
+_MOST_SEGMENTS = 20_000  # in an exported file; a day has 1440 where the disk has room
+_USTAR = slice(257, 262), b"ustar"  # where an archive says that it is one
+# What may be held: hours of ticks. An entry costs more than its bytes, and values read from JSON much more.
+_MOST_BYTES = 512 << 20
+_OF_AN_ENTRY, _OF_JSON = 200, 16
 
 Ticks = np.ndarray[Any, np.dtype[np.void]]
 
@@ -82,9 +87,10 @@ class JournalRecording:
 def read_journal(path: Path) -> JournalRecording:
     """Read a journal, finished or torn off by a kill or a power cut. Raises JournalError with the reason."""
     parts: dict[str, _Part] = {}
+    room = _Room(path)
     for name, data in segments_of(path):
         try:
-            _add(parts, data)
+            _add(parts, data, room)
         except DAMAGED as error:
             raise JournalError(
                 f"{path}: {name} is damaged ({error}). Remove it, and read the rest."
@@ -111,17 +117,17 @@ def segments_of(path: Path) -> Iterator[tuple[str, bytes]]:
                 with contextlib.suppress(FileNotFoundError):  # the keeper let the oldest go meanwhile
                     yield segment.name, _read(segment)
             return
-        with path.open("rb") as file:
+        with opened(path) as file:
             begin = file.read(512)
         if chunks.is_segment(begin):
             yield path.name, _read(path)
-        elif tarfile.is_tarfile(path):
+        elif begin[_USTAR[0]] == _USTAR[1]:
             yield from _exported(path)
         else:
             raise JournalError(_no_journal(path, begin))
     except OSError as error:
         raise JournalError(f"{path}: cannot be read ({error.strerror}). {_NAME_ONE}") from error
-    except tarfile.TarError as error:
+    except (tarfile.TarError, EOFError, *DAMAGED) as error:
         raise JournalError(f"{path}: cannot be read ({error}). Export the journal again.") from error
 
 
@@ -161,20 +167,47 @@ def last_kept(folder: Path, run: str) -> tuple[int, int]:
     return max(entries, keyframe), keyframe
 
 
+class _Room:
+    """How much of a journal may still be held in memory."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._left = path, _MOST_BYTES
+
+    def take(self, size: int) -> None:
+        """Raises JournalError when there is none left."""
+        self._left -= size
+        if self._left < 0:
+            raise JournalError(
+                f"{self._path}: it holds more than can be read at once ({_MOST_BYTES >> 20} MB). Name one of "
+                "its segments; an exported file is a tar archive of them: tar --extract --file."
+            )
+
+
+class _Parts:
+    """A file as an archive reads it: never more of it at once than a segment has."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self.tell, self.seek = file, file.tell, file.seek
+
+    def read(self, size: int = -1) -> bytes:
+        if not 0 <= size <= _LARGEST:
+            raise tarfile.ReadError("a part of it is larger than any journal's")
+        return self._file.read(size)
+
+
 def _read(path: Path) -> bytes:
-    if path.stat().st_size > _LARGEST:
-        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
-    return path.read_bytes()
+    return content(path, _LARGEST)
 
 
 def _exported(path: Path) -> Iterator[tuple[str, bytes]]:
-    with tarfile.open(path, "r:") as archive:
-        members = [member for member in archive if member.isfile() and member.name.endswith(SUFFIX)]
+    with opened(path) as whole, tarfile.open(fileobj=_Parts(whole), mode="r:") as archive:  # type: ignore[call-overload]
+        found = list(itertools.islice(archive, _MOST_SEGMENTS + 1))
+        members = [one for one in found if one.isfile() and not one.issparse() and one.name.endswith(SUFFIX)]
         if not members:
             raise JournalError(f"{path}: no journal is in this archive. Name a file that was exported.")
         for member in sorted(members, key=lambda member: member.name):
             file = archive.extractfile(member)
-            if file is None or member.size > _LARGEST:
+            if file is None or member.size > _LARGEST or len(found) > _MOST_SEGMENTS:
                 raise JournalError(f"{path}: a part of it is larger than any journal's. Export it again.")
             yield PurePosixPath(member.name).name, file.read()  # a foreign archive may name any folder
 
@@ -211,21 +244,29 @@ class _Part:
         )
 
 
-def _add(parts: dict[str, _Part], data: bytes) -> None:
+def _add(parts: dict[str, _Part], data: bytes, room: _Room) -> None:
     """Add a segment to its run; one whose begin is torn has nothing in it yet."""
     header = header_of(data)
     if header is None:
         return
+    if header["run"] not in parts:
+        room.take(_OF_JSON * len(json.dumps(header)))
     part = parts.setdefault(header["run"], _Part(header))
+    tick_bytes = layout_of(header).itemsize
     for one in chunks.chunks(data):
+        room.take(len(one.data))
         if one.kind == chunks.KEYFRAME:
             (position,) = POSITION.unpack_from(one.data)
             part.keyframes[position] = one.data[POSITION.size :]
         elif one.kind == chunks.LOG:
             for entry in log.unpacked(one.data):
+                room.take(_OF_AN_ENTRY)
                 if entry.kind == TICK:
+                    if len(entry.data) != tick_bytes:
+                        raise ValueError("a tick of another length")
                     part.ticks[entry.number] = entry.data
                 elif entry.kind == EVENT:
+                    room.take(_OF_JSON * len(entry.data))
                     part.events[entry.number] = _event(entry.data)
 
 

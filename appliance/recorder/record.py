@@ -20,7 +20,7 @@ SECTIONS = ("drain", "motion", "puppeteers", "puppet", "blend", "figure", "send"
 TICK, EVENT = 1, 2  # kinds of entries
 ORDER = "order"  # kind of the event that show control asked for something, and what came of it
 # What facts, events and ticks raise that no box wrote.
-DAMAGED = (ValueError, KeyError, TypeError, AttributeError, RecursionError, struct.error)
+DAMAGED = (ValueError, LookupError, ArithmeticError, TypeError, AttributeError, RecursionError, struct.error)
 _LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970: the year 5138
 SAID = "said"  # kind of the event that people were told something
 

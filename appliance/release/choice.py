@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from appliance.box.durable import write_whole
+from appliance.pose.foreign_file import kept_json
 
 _SHOWS = Path(__file__).resolve().parents[1] / "show"
 APPLIANCE_BOX, EMBEDDED_SHOW = _SHOWS / "appliance_box.yaml", _SHOWS / "default_show"
@@ -83,7 +84,7 @@ class Choice(NamedTuple):
     def read(path: Path) -> Choice | None:
         """As written; None where there is none, no whole one, or an empty one."""
         try:
-            choice = Choice.of(json.loads(path.read_bytes()))
+            choice = Choice.of(kept_json(path))
         except (OSError, ValueError):
             return None
         return choice if choice.pairs else None

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from appliance.box.durable import write_whole
+from appliance.pose.foreign_file import kept_json
 from appliance.release.arrivals import Arrival
 from appliance.release.choice import APPLIANCE_BOX, CHOSEN, DATA, RUN, Choice, Pair, appliance_box
 
@@ -210,7 +211,7 @@ def _seen(arrival: Arrival, refused: list[str], taken: str) -> dict[str, Any]:
 
 def _read_seen(data: Path) -> dict[str, Any]:
     try:
-        seen = json.loads((data / SEEN).read_bytes())
+        seen = kept_json(data / SEEN)
         return {
             str(source): {
                 "listing": one["listing"],

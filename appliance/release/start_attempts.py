@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from appliance.box.durable import write_whole
 from appliance.outputs.frame_reader import FrameReader
+from appliance.pose.foreign_file import kept_json
 from appliance.release.choice import Choice, Pair
 
 TRIES, ANEW = "tries", "anew"
@@ -62,7 +63,7 @@ def ended_well(chosen: Path) -> None:
 def _counted(folder: Path, pair: Pair, now: float) -> Tries | None:
     """What became of the starts before this one; None while another process still dances."""
     try:
-        tries = Tries(*json.loads((folder / TRIES).read_bytes()))
+        tries = Tries(*kept_json(folder / TRIES))
     except (OSError, ValueError, TypeError):
         return Tries(pair.id)
     if tries.pid != os.getpid() and Path(f"/proc/{tries.pid}").exists():

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import yaml
 
+from appliance.pose.foreign_file import content
 from appliance.sensor.wire import KEY_BYTES
 
 HEADER = "# Sensors of this box and their secret keys. Whoever has this file can move the puppet: keep it.\n"
@@ -57,7 +58,7 @@ def read_text(path: Path) -> str:
     if path.stat().st_size > LARGEST_FILE:
         raise KeyFileError(path, 1, f"is larger than {LARGEST_FILE // 1024} KiB, so it is no key file")
     try:
-        return path.read_text(encoding="utf-8")
+        return content(path, LARGEST_FILE).decode()
     except UnicodeDecodeError:
         raise KeyFileError(path, 1, "is not a text file in UTF-8, so it is no key file") from None
 

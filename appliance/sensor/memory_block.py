@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from appliance.box.block import BlockReader, BlockWriter
+from appliance.pose.foreign_file import TooLargeError, content
 from appliance.sensor.memory_text import LARGEST
 
 FILE_NAME = "sensors.memory"  # in the state folder; in the runtime folder it is a block
@@ -53,13 +54,11 @@ def text_on_disk(state: Path) -> str | None:
     """What the state folder's file says, None without one. Raises OSError, ValueError for what is no text."""
     path = state / FILE_NAME
     try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
+        return content(path, LARGEST).decode()
     except (FileNotFoundError, NotADirectoryError):
         return None
-    if len(data) > LARGEST:
-        raise ValueError("it is too large")
-    return data.decode()
+    except TooLargeError as error:
+        raise ValueError(error.strerror) from None
 
 
 def forget_memory(runtime: Path, state: Path) -> None:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from appliance.pose.foreign_file import content, opened, require_inside
 from appliance.show.config_error import Problem
 
 CHECKSUMS = "SHA256SUMS"
 WORKSHOP = ("checkpoint.pt", "training.json", "pictures")  # a training leaves them there: no part of the show
+LARGEST_FILE = 400_000_000  # bytes; a network has some 3 MB, a phrase some 5
+MOST_FILES = 4000
+LARGEST_CHECKSUMS = 1 << 20
 _LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
 _COPY_AGAIN = "Copy the whole bundle again."
 
@@ -21,25 +27,45 @@ def default_show_path() -> Path:
 
 
 def bundle_files(directory: Path) -> list[str]:
-    """Names of all files of a show, relative to it, sorted; without checksums, hidden and training files."""
-    names = (path.relative_to(directory) for path in directory.rglob("*") if path.is_file())
-    return sorted(
-        name.as_posix()
-        for name in names
-        if name.as_posix() != CHECKSUMS
-        and name.parts[0] not in WORKSHOP
-        and not any(part.startswith(".") for part in name.parts)
-    )
+    """Names of all files of a show, relative to it, sorted; without checksums, hidden and training files.
+
+    Links, FIFOs and devices are named too: what opens them refuses them. Raises OSError for too many.
+    """
+    names: list[str] = []
+    for folder, folders, files in os.walk(directory):
+        inside = Path(folder).relative_to(directory)
+        own = WORKSHOP if folder == str(directory) else ()
+        folders[:] = [name for name in folders if not name.startswith(".") and name not in own]
+        links = [name for name in folders if (Path(folder) / name).is_symlink()]
+        names += [
+            (inside / name).as_posix()
+            for name in (*files, *links)
+            if not name.startswith(".") and name not in own
+        ]
+        if len(names) > MOST_FILES:
+            raise OSError(errno.E2BIG, f"it has more than {MOST_FILES} files", str(directory))
+    return sorted(name for name in names if name != CHECKSUMS)
+
+
+def require_file(directory: Path, name: str) -> None:
+    """Raises OSError for a file that cannot be part of a show: too large, not regular, or outside of it."""
+    require_inside(directory / name, directory)
+    with opened(directory / name) as stream:
+        if os.fstat(stream.fileno()).st_size > LARGEST_FILE:
+            raise OSError(errno.EFBIG, f"it is larger than {LARGEST_FILE // 1_000_000} MB", name)
 
 
 def bundle_bytes(directory: Path) -> int:
-    """Size of all its files together."""
-    return sum((directory / name).stat().st_size for name in bundle_files(directory))
+    """Size of all its files together. Raises OSError as bundle_files does."""
+    return sum((directory / name).lstat().st_size for name in bundle_files(directory))
 
 
 def write_checksums(directory: Path) -> Path:
-    """Write SHA256SUMS over all files of the bundle, in the form that `sha256sum --check` reads."""
-    lines = [f"{_sha256(directory / name)}  {name}\n" for name in bundle_files(directory)]
+    """Write SHA256SUMS over all files of the bundle, in the form that `sha256sum --check` reads.
+
+    Raises OSError where one of them cannot be part of a show.
+    """
+    lines = [f"{_sha256(directory, name)}  {name}\n" for name in bundle_files(directory)]
     written = directory / f".{CHECKSUMS}.new"
     written.write_text("".join(lines), encoding="utf-8")
     return written.replace(directory / CHECKSUMS)
@@ -49,7 +75,7 @@ def checksum_problems(directory: Path) -> list[Problem]:
     """Files that changed, are gone, or cannot be read, each with its line in SHA256SUMS."""
     path = directory / CHECKSUMS
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = _checksum_lines(directory)
     except (OSError, UnicodeDecodeError):
         return [Problem(path, 0, "The checksums are missing or unreadable.", _COPY_AGAIN)]
     return [
@@ -60,9 +86,12 @@ def checksum_problems(directory: Path) -> list[Problem]:
 
 
 def unlisted_files(directory: Path) -> list[str]:
-    """Files of the bundle that SHA256SUMS does not vouch for; none where it cannot be read."""
+    """Files of the bundle that SHA256SUMS does not vouch for; none where it cannot be read.
+
+    Raises OSError as bundle_files does.
+    """
     try:
-        lines = (directory / CHECKSUMS).read_text(encoding="utf-8").splitlines()
+        lines = _checksum_lines(directory)
     except (OSError, UnicodeDecodeError):
         return []
     listed = {found[2] for line in lines if (found := _LINE.fullmatch(line))}
@@ -77,7 +106,7 @@ def _line_problems(directory: Path, line: str) -> Iterator[tuple[str, str]]:
         return
     name = found[2]
     try:
-        if _sha256(directory / name) != found[1]:
+        if _sha256(directory, name) != found[1]:
             changed = f"'{name}' is not the file that was packed: it is damaged or was changed."
             yield changed, "Copy the bundle again, or pack it again if you changed it."
     except FileNotFoundError:
@@ -86,6 +115,12 @@ def _line_problems(directory: Path, line: str) -> Iterator[tuple[str, str]]:
         yield f"'{name}' cannot be read ({error.strerror}).", _COPY_AGAIN
 
 
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
+def _checksum_lines(directory: Path) -> list[str]:
+    require_inside(directory / CHECKSUMS, directory)
+    return content(directory / CHECKSUMS, LARGEST_CHECKSUMS).decode().splitlines()
+
+
+def _sha256(directory: Path, name: str) -> str:
+    require_file(directory, name)
+    with opened(directory / name) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from appliance.pose.bvh import BvhError, read_bvh
+from appliance.pose.foreign_file import content, plain_json, require_inside
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import CHECKSUMS, bundle_bytes, checksum_problems, unlisted_files
@@ -20,6 +20,7 @@ from appliance.show.network import WINDOW, inspect_network
 from appliance.show.show import Show, load_show
 
 LARGEST_BYTES = 25_000_000
+LARGEST_REPORT = 16_000_000
 RATE_HZ = 50.0
 OFFSET_TOLERANCE_M = 1e-3
 _COPY_AGAIN = "Copy the whole bundle again."
@@ -47,10 +48,16 @@ def verify_bundle(directory: Path | str) -> list[Finding]:
 def _files(directory: Path) -> Iterator[Finding]:
     for problem in checksum_problems(directory):
         yield _error(problem)
-    for name in unlisted_files(directory):
+    try:
+        unlisted, size = unlisted_files(directory), bundle_bytes(directory)
+    except OSError as error:
+        yield Finding(
+            directory, 0, f"This cannot be a show ({error.strerror}).", "Name the show's own folder."
+        )
+        return
+    for name in unlisted:
         message = f"'{name}' has no checksum in {CHECKSUMS}."
         yield Finding(directory / name, 0, message, "Remove it, or pack the bundle again.", "warning")
-    size = bundle_bytes(directory)
     if size > LARGEST_BYTES:
         message = f"The bundle is {size / 1e6:.1f} MB, more than {LARGEST_BYTES / 1e6:g} MB."
         yield Finding(directory, 0, message, "Shorten the phrase, or quantize the network.", "warning")
@@ -60,12 +67,14 @@ def _files(directory: Path) -> Iterator[Finding]:
 def _report(path: Path) -> Iterator[Finding]:
     cure = "Evaluate and pack the show again."
     try:
-        json.loads(path.read_text(encoding="utf-8"))
-    except OSError:
+        require_inside(path, path.parent)
+        plain_json(content(path, LARGEST_REPORT))
+    except FileNotFoundError:
         yield Finding(path, 0, "The report of the training is missing.", cure, "warning")
+    except OSError as error:
+        yield Finding(path, 0, f"The report cannot be read ({error.strerror}).", cure, "warning")
     except ValueError as error:
-        line = error.lineno if isinstance(error, json.JSONDecodeError) else 1
-        yield Finding(path, line, "The report is not JSON.", cure, "warning")
+        yield Finding(path, getattr(error, "lineno", 1), "The report is not JSON.", cure, "warning")
 
 
 def _show(directory: Path) -> Iterator[Finding]:

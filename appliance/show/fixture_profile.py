@@ -169,7 +169,8 @@ def load_profile(name: str, show: Path | None) -> ProfileConfig:
         raise KeyError(name)
     key = (path, path.stat().st_mtime_ns)
     if key not in _read:
-        _read[key] = validated(ProfileConfig, read_yaml(path), {})
+        inside = show if show is not None and path.is_relative_to(show) else path.parent
+        _read[key] = validated(ProfileConfig, read_yaml(path, inside), {})
     return _read[key]
 
 

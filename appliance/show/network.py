@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from appliance.pose.foreign_file import content, plain_json
+from appliance.show.bundle import LARGEST_FILE
 from appliance.show.config_error import did_you_mean
 
 WINDOW = 8
+MOST_JOINTS = 1000
 UNIT_TOLERANCE = 1e-3
+_MOST_NAMED = 5  # joints that a network has and the skeleton has not
+_LARGEST_REST = 1 << 20  # characters
 _EXPORT_AGAIN = "Export the show again with this release."
 _COPY_AGAIN = "Copy the whole bundle again."
 
@@ -32,7 +36,9 @@ def inspect_network(path: Path, skeleton_joints: Sequence[str]) -> tuple[list[st
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4
     try:
-        session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        # As bytes: a network cannot name other files then, whose contents would be read as weights.
+        network = content(path, LARGEST_FILE)
+        session = onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime has its own exception for each way to be broken
         why = str(error).splitlines()[0][:120]
         return [], [(f"This cannot be read as a network ({why}).", _COPY_AGAIN)]
@@ -42,8 +48,20 @@ def inspect_network(path: Path, skeleton_joints: Sequence[str]) -> tuple[list[st
     complaints += _port_complaints("input", session.get_inputs(), _inputs(len(joints)))
     complaints += _port_complaints("output", session.get_outputs(), _outputs(len(joints)))
     if not complaints:
-        complaints += _run_complaints(session, json.loads(facts["bunraku.rest"]))
+        complaints += _run_complaints(session, rest_pose(facts, len(joints)))
     return joints, complaints
+
+
+def rest_pose(facts: dict[str, str], joints: int) -> np.ndarray:
+    """The rest pose (joints, 4) in a network's metadata. Raises ValueError where there is none."""
+    text = facts.get("bunraku.rest", "")
+    try:
+        rest = np.array(plain_json(text if len(text) <= _LARGEST_REST else ""), dtype=np.float32)
+    except (TypeError, OverflowError) as error:
+        raise ValueError(str(error)) from None
+    if rest.shape != (joints, 4) or not _are_unit(rest):
+        raise ValueError(f"its rest pose is not one quaternion for each of {joints} joints")
+    return rest
 
 
 def _inputs(joints: int) -> dict[str, tuple[str, list[int]]]:
@@ -67,30 +85,27 @@ def _fact_complaints(
     """What is wrong with the metadata."""
     if not joints:
         yield "It does not say which joints it moves (bunraku.joints): it is not a puppet.", _EXPORT_AGAIN
+    if len(joints) > MOST_JOINTS:
+        yield f"It moves {len(joints)} joints, more than {MOST_JOINTS}: this is no dancer.", _EXPORT_AGAIN
+        return
     if len(set(joints)) < len(joints):
         yield "It names a joint twice.", _EXPORT_AGAIN
-    for name in joints:
-        if name not in skeleton_joints:
-            yield (
-                f"It moves the joint '{name}', which the show's skeleton does not have.",
-                f"{did_you_mean(name, skeleton_joints)} Use the skeleton of the recordings it learned from.",
-            )
+    for name in [name[:100] for name in joints if name not in skeleton_joints][:_MOST_NAMED]:
+        yield (
+            f"It moves the joint '{name}', which the show's skeleton does not have.",
+            f"{did_you_mean(name, skeleton_joints)} Use the skeleton of the recordings it learned from.",
+        )
     if facts.get("bunraku.window") != str(WINDOW):
-        found = facts.get("bunraku.window", "nothing")
+        found = facts.get("bunraku.window", "nothing")[:20]
         yield f"Its windows are {found} poses long; the box dances windows of {WINDOW}.", _EXPORT_AGAIN
-    if joints and not _is_rest_pose(facts.get("bunraku.rest", ""), len(joints)):
+    try:
+        if joints:
+            rest_pose(facts, len(joints))
+    except ValueError:
         yield (
             f"Its rest pose (bunraku.rest) is not one quaternion for each of {len(joints)} joints.",
             _EXPORT_AGAIN,
         )
-
-
-def _is_rest_pose(text: str, joints: int) -> bool:
-    try:
-        rest = np.array(json.loads(text), dtype=np.float32)
-    except (ValueError, TypeError):
-        return False
-    return rest.shape == (joints, 4) and bool(_are_unit(rest))
 
 
 def _port_complaints(
@@ -117,13 +132,13 @@ def _fits(found: Sequence[int | str | None], wanted: Sequence[int]) -> bool:
     )
 
 
-def _run_complaints(session: Any, rest: list[list[float]]) -> Iterator[Complaint]:
+def _run_complaints(session: Any, rest: np.ndarray) -> Iterator[Complaint]:
     """One pass over the rest pose: a damaged file gives numbers that are no poses."""
     joints = len(rest)
     feed = {
-        "window": np.tile(np.array(rest, np.float32), (WINDOW, 1, 1)),
+        "window": np.tile(rest, (WINDOW, 1, 1)),
         "mask": np.zeros(joints, bool),
-        "targets": np.tile(np.array(rest, np.float32), (WINDOW, 1, 1)),
+        "targets": np.tile(rest, (WINDOW, 1, 1)),
         "weights": np.zeros(joints, np.float32),
         "coding_iterations": np.array(1, np.int64),
         "interaction_iterations": np.array(0, np.int64),

@@ -10,6 +10,8 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
+from appliance.show.bundle import require_file
+
 UNIT_TOLERANCE = 0.05  # how far from length 1 a hand-written quaternion may be before it is a typing error
 
 
@@ -64,10 +66,14 @@ def _inside_the_bundle(name: str, info: ValidationInfo) -> str:
             f"'{name}' is not inside the show's folder.", "Put the file there and write its name alone."
         )
     directory = (info.context or {}).get("directory")
-    if directory is not None and not (directory / name).is_file():
-        raise refusal(
-            f"There is no file '{name}' in {directory}.", "Check the name, or copy the whole bundle again."
-        )
+    cure = "Check the name, or copy the whole bundle again."
+    try:
+        if directory is not None:
+            require_file(directory, name)
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # no name holds a zero
+        raise refusal(f"There is no file '{name}' in {directory}.", cure) from None
+    except OSError as error:
+        raise refusal(f"'{name}' cannot be part of the show ({error.strerror}).", cure) from None
     return name
 
 

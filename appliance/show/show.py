@@ -10,6 +10,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from appliance.pose.bvh import BvhError, read_bvh
+from appliance.pose.foreign_file import require_inside
 from appliance.pose.skeleton import Skeleton
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.cues import CueConfig, cue_problems
@@ -265,7 +266,7 @@ def load_show(directory: Path | str) -> Show:
         raise ConfigError(
             [Problem(directory, 0, "There is no such show folder.", "Check the path of the show.")]
         )
-    file = read_yaml(directory / "show.yaml")
+    file = read_yaml(directory / "show.yaml", directory)
     skeleton, problems = _skeleton(directory / "skeleton.bvh")
     context = {"directory": directory, "joints": skeleton.names if skeleton else None}
     try:
@@ -282,6 +283,7 @@ def load_show(directory: Path | str) -> Show:
 def _skeleton(path: Path) -> tuple[Skeleton | None, list[Problem]]:
     cure = "Copy the whole bundle again."
     try:
+        require_inside(path, path.parent)
         return read_bvh(path).skeleton, []
     except BvhError as error:
         return None, [Problem(path, error.line, str(error).split(": ", 1)[-1], cure)]

@@ -10,9 +10,12 @@ from typing import Any
 
 import yaml
 
+from appliance.pose.foreign_file import content, require_inside
 from appliance.show.config_error import ConfigError, Problem
 
 MAX_BYTES = 256 * 1024  # a long show file has some 2 kB
+_DEEPEST = 32
+_LARGEST_NUMBER = 1 << 63  # 60:60:... and 0xff... may have so many digits that Python does not print them
 _BARE_COLOUR = re.compile(r"[:\[,]\s+#[0-9a-fA-F]{3}")
 _TIMESTAMP = "tag:yaml.org,2002:timestamp"
 _TAGS = {
@@ -38,16 +41,16 @@ class YamlFile:
         return 1
 
 
-def read_yaml(path: Path) -> YamlFile:
-    """Read one document whose top level has keys.
+def read_yaml(path: Path, inside: Path | None = None) -> YamlFile:
+    """Read one document whose top level has keys. inside: the folder out of which no link may lead.
 
     Raises ConfigError: file missing or unreadable, not YAML, a key written twice, anchors, too large.
     """
-    text = _read_text(path)
+    text = _read_text(path, inside)
     file = YamlFile(path)
     problems: list[Problem] = []
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        root = yaml.compose(text, Loader=_ShallowLoader)
         if root is not None:
             file.values = _Plain(file, problems).value(root, ())
     except yaml.MarkedYAMLError as error:
@@ -63,20 +66,18 @@ def read_yaml(path: Path) -> YamlFile:
     return file
 
 
-def _read_text(path: Path) -> str:
+def _read_text(path: Path, inside: Path | None) -> str:
     try:
-        with path.open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
+        if inside is not None:
+            require_inside(path, inside)
+        data = content(path, MAX_BYTES)
     except OSError as error:
         why = f"The file cannot be read ({error.strerror})."
         raise ConfigError([Problem(path, 0, why, "Check its name and place.")]) from None
-    if len(content) > MAX_BYTES:
-        why = f"The file is larger than {MAX_BYTES // 1024} kB: it is no configuration."
-        raise ConfigError([Problem(path, 0, why, "Check that it is the right file.")])
     try:
-        return content.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
+        line = data[: error.start].count(b"\n") + 1
         raise ConfigError([Problem(path, line, "This line is not text.", "Save it as UTF-8.")]) from None
 
 
@@ -104,6 +105,20 @@ def _not_yaml(path: Path, text: str, error: yaml.MarkedYAMLError) -> ConfigError
 def _refused(path: Path, line: int, why: str, cure: str = "") -> ConfigError:
     cure = cure or "Check indentation, colons and brackets on this line and the one above."
     return ConfigError([Problem(path, line, f"This is not YAML: {why}.", cure)])
+
+
+class _ShallowLoader(yaml.SafeLoader):
+    """Gives up on a depth that no show has, for which the library takes seconds."""
+
+    _depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise RecursionError
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
 
 
 class _Plain:
@@ -150,10 +165,14 @@ class _Plain:
         if node.tag == _TIMESTAMP:
             return node.value
         try:
-            return self._scalars.construct_object(node)
+            value = self._scalars.construct_object(node)
+            if not isinstance(value, int) or abs(value) < _LARGEST_NUMBER:
+                return value
         except (yaml.YAMLError, ValueError, OverflowError):
-            self._problem(node, f"'{node.value}' cannot be read.", "Write a number, a word or 'quoted text'.")
-            return None
+            pass
+        shown = node.value if len(node.value) <= 60 else f"{node.value[:57]}..."
+        self._problem(node, f"'{shown}' cannot be read.", "Write a number, a word or 'quoted text'.")
+        return None
 
     def _problem(self, node: yaml.Node, message: str, cure: str) -> None:
         self._problems.append(Problem(self._file.path, node.start_mark.line + 1, message, cure))

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from appliance.pose.foreign_file import kept_json
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.admission import Admission
@@ -26,7 +27,7 @@ def admitted(folder: Path, cast: StageParts, show: Show, box: BoxConfig, comes_b
     asked = _asked(show, box)
     before = _remembered(folder / FILE, asked) if comes_back else None
     if before is not None:
-        warm_up(cast, before)
+        warm_up(cast, show, before)
         return before
     measured = admission(cast, show, box)
     with contextlib.suppress(OSError):
@@ -48,7 +49,7 @@ def _asked(show: Show, box: BoxConfig) -> dict[str, Any]:
 
 def _remembered(path: Path, asked: dict[str, Any]) -> Admission | None:
     try:
-        kept = json.loads(path.read_bytes())
+        kept = kept_json(path)
         return Admission(**kept["measured"]) if kept["asked"] == asked else None
     except (OSError, ValueError, KeyError, TypeError):
         return None

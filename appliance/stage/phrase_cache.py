@@ -14,10 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from appliance.dancer.forward_kinematics import soles_of
 from appliance.dancer.grounding import Floor, survey
 from appliance.dancer.phrase import FPS
 from appliance.dancer.slerp import FloatArray
 from appliance.pose.bvh import read_bvh
+from appliance.pose.foreign_file import opened, plain_json
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
@@ -120,17 +122,25 @@ def _keep(path: Path, phrase: Recording, floor: Floor | None) -> None:
 def _kept(path: Path, skeleton: Skeleton) -> tuple[Recording, Floor | None] | None:
     """What was kept, without a copy of it; None where there is none, or no sound one of this skeleton."""
     try:
-        with path.open("rb") as stream:
+        with opened(path) as stream:
+            if os.fstat(stream.fileno()).st_size > LARGEST:
+                return None
             memory = mmap.mmap(stream.fileno(), 0, mmap.MAP_PRIVATE | mmap.MAP_POPULATE)
         magic, length, check = _HEAD.unpack_from(memory)
         whole = memoryview(memory)
         if magic != _MAGIC or zlib.crc32(whole[_HEAD.size :]) != check:
             return None
-        facts = json.loads(whole[_HEAD.size : _HEAD.size + length].tobytes())
+        facts = plain_json(whole[_HEAD.size : _HEAD.size + length].tobytes())
         poses, roots, *floor = _taken(memory, _HEAD.size + length, facts["shapes"])
-    except (OSError, ValueError, KeyError, TypeError, struct.error):
+        figure = tuple(facts["joints"]), tuple(facts["parents"])
+        shapes = [(len(poses), len(skeleton), 4), (len(poses), 3)]
+        if floor:
+            shapes += [(sum(map(len, soles_of(skeleton))),), (len(poses),)]
+    except (OSError, ValueError, LookupError, ArithmeticError, TypeError, struct.error):
         return None
-    if (tuple(facts["joints"]), tuple(facts["parents"])) != (skeleton.names, tuple(skeleton.parents)):
+    if figure != (skeleton.names, tuple(skeleton.parents)) or shapes != [
+        array.shape for array in (poses, roots, *floor)
+    ]:
         return None
     return Recording(skeleton, poses, roots, FPS), Floor(floor[0], floor[1]) if floor else None
 

@@ -139,8 +139,11 @@ def assemble(
 
 
 def admission(cast: StageParts, show: Show, box: BoxConfig) -> Admission:
-    """Measure the show's iterations on this machine with the first window and all hands of the show."""
-    dance = _dance(cast)
+    """Measure the show's iterations on this machine with the first window and all hands of the show.
+
+    Raises StageError where the network fails.
+    """
+    dance = _dance(cast, show.network)
     dancer = show.config.dancer
     with borrowed_priority(box.realtime.priority if box.realtime.enabled else None):
         return admit(
@@ -148,19 +151,25 @@ def admission(cast: StageParts, show: Show, box: BoxConfig) -> Admission:
         )
 
 
-def warm_up(cast: StageParts, admitted: Admission) -> None:
+def warm_up(cast: StageParts, show: Show, admitted: Admission) -> None:
     """Let the network run once as the first tick will: its first run takes several times as long."""
-    _dance(cast)(admitted.coding, admitted.interaction)
+    _dance(cast, show.network)(admitted.coding, admitted.interaction)
 
 
-def _dance(cast: StageParts) -> Callable[[int, int], object]:
+def _dance(cast: StageParts, network: Path) -> Callable[[int, int], object]:
     """Runs the puppet with the first window and all hands of the show; its poses go nowhere."""
     window = cast.puppet.select(cast.motion.window()).copy()
     mask, targets, weights = cast.hands.mask.copy(), cast.hands.targets, cast.hands.weights
     mask[cast.hand_places] = True
 
     def dance(coding: int, interaction: int) -> object:
-        return cast.puppet.dance(window, mask, targets, weights, coding, interaction)
+        try:
+            return cast.puppet.dance(window, mask, targets, weights, coding, interaction)
+        except Exception as error:  # onnxruntime has a class of its own for every way to fail
+            raise StageError(
+                f"{network}: the network fails at {coding} coding iterations ({str(error)[:200]}). "
+                "Nothing is danced. Export the show again."
+            ) from None
 
     return dance
 

@@ -8,7 +8,7 @@ from hw_sim.device import Sample, Way
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.motions import Motion
 from hw_sim.senders import UdpSender
-from hw_sim.wearer import SensorBinding
+from hw_sim.wearer import Wearer
 
 TICK_S = 0.02
 STARTS_WITHIN_TICKS = 60  # the IMU alone needs 35
@@ -18,7 +18,7 @@ class PairedSensor:
     """`now` is in seconds and moves with `advance`; a reading is due with each tick of 20 ms."""
 
     def __init__(self, key: SensorKey, port: int, motion: Motion, now: float) -> None:
-        self.sensor = EmulatedSensor(key, SensorBinding(motion), phase_s=TICK_S / 2)
+        self.sensor = EmulatedSensor(key, Wearer(motion), phase_s=TICK_S / 2)
         self._way = UdpSender("127.0.0.1", port)
         self.sensor.start(now)
         self.sensor.connect(Way.NETWORK, True, now)

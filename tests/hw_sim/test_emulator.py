@@ -14,7 +14,7 @@ from hw_sim.casting import cast_sensors
 from hw_sim.emulated_sensor import EmulatedSensor, sensor_axes
 from hw_sim.emulator import Emulator, Sent
 from hw_sim.network import BAD, VENUE, VenueNetwork
-from hw_sim.wearer import SensorBinding
+from hw_sim.wearer import Wearer
 from tests.hw_sim.joined import Show
 from tests.hw_sim.tiny_box import KEY, FakeClock, Pair
 
@@ -23,7 +23,7 @@ FIRST_READING_S = 0.7
 
 
 def sensor(motion: motions.Motion | None = None, **options: object) -> EmulatedSensor:
-    return EmulatedSensor(KEY, SensorBinding(motion or motions.still()), **options)  # type: ignore[arg-type]
+    return EmulatedSensor(KEY, Wearer(motion or motions.still()), **options)  # type: ignore[arg-type]
 
 
 def stage_axes(orientation: motions.Quaternion) -> motions.Quaternion:
@@ -79,7 +79,7 @@ def test_the_orientation_follows_the_motion_in_stage_axes() -> None:
 
 
 def test_the_dancer_stands_still_once_heard_and_then_goes_over_into_the_dance() -> None:
-    wearer = SensorBinding(motions.dance(4), stand_still_s=2.0)
+    wearer = Wearer(motions.dance(4), stand_still_s=2.0)
     pair = Pair(EmulatedSensor(KEY, wearer))
     pair.box.answers = False
     pair.run(5.0)  # nobody hears: nobody dances

@@ -19,7 +19,7 @@ from hw_sim.device import Outgoing, Way
 from hw_sim.firmware import BOX, NETWORK, PASSWORD, FirmwareSensor, ask, provision
 from hw_sim.firmware_library import CompiledWearable, FirmwareMissingError, State, load_library
 from hw_sim.network import VENUE, VenueNetwork
-from hw_sim.wearer import SensorBinding
+from hw_sim.wearer import Wearer
 from tests.hw_sim.conftest import Emulate
 from tests.hw_sim.joined import Show
 from tests.hw_sim.null_modem import NullModem
@@ -34,7 +34,7 @@ def keys_of(*names: str) -> dict[str, SensorKey]:
 
 
 def device(key: SensorKey = KEY, seed: int = 1, **options: float) -> FirmwareSensor:
-    return FirmwareSensor(key, SensorBinding(motions.dance(seed)), seed=seed, **options)
+    return FirmwareSensor(key, Wearer(motions.dance(seed)), seed=seed, **options)
 
 
 @pytest.fixture

@@ -11,14 +11,14 @@ from appliance.sensor.keys import SensorKey
 from hw_sim import motions
 from hw_sim.emulated_sensor import EmulatedSensor, sensor_axes
 from hw_sim.pairing import LOST_S
-from hw_sim.wearer import SensorBinding
+from hw_sim.wearer import Wearer
 from tests.hw_sim.tiny_box import KEY, Pair, TinyBox
 
 STRANGER = SensorKey("left-wrist", KEY.device_id, bytes(16))
 
 
 def paired(motion: motions.Motion | None = None, box: TinyBox | None = None, **options: object) -> Pair:
-    sensor = EmulatedSensor(KEY, SensorBinding(motion or motions.still()), **options)  # type: ignore[arg-type]
+    sensor = EmulatedSensor(KEY, Wearer(motion or motions.still()), **options)  # type: ignore[arg-type]
     return Pair(sensor, box)
 
 
@@ -271,7 +271,7 @@ class TestRoaming:
         assert 3 <= len(charger.of(wire.Hello)) <= 5
 
     def test_a_cable_alone(self) -> None:
-        sensor = EmulatedSensor(KEY, SensorBinding(motions.still()))
+        sensor = EmulatedSensor(KEY, Wearer(motions.still()))
         pair = Pair(sensor)
         pair.line.is_up = False
         pair.cable.is_up = True

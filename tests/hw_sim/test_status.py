@@ -10,13 +10,13 @@ from hw_sim import motions
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.emulator import Emulator
 from hw_sim.status import StatusLine
-from hw_sim.wearer import SensorBinding
+from hw_sim.wearer import Wearer
 from tests.hw_sim.tiny_box import KEY, Pair
 
 
 def played(answers: bool = True, is_up: bool = True) -> Emulator:
     """A second of readings, after the start-up of the IMU."""
-    pair = Pair(EmulatedSensor(KEY, SensorBinding(motions.still())))
+    pair = Pair(EmulatedSensor(KEY, Wearer(motions.still())))
     pair.box.answers, pair.line.is_up = answers, is_up
     pair.run(1.69)
     return pair.emulator

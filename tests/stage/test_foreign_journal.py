@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
+import os
+import resource
 import tarfile
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from appliance.cli.app import main
 from appliance.cli.replay import replay_journal
+from appliance.cli.run_with_timeout import within
 from appliance.recorder import chunks, log
 from appliance.recorder.environment import fingerprints
 from appliance.recorder.export import export
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import POSITION
 from appliance.recorder.reading import last_kept, read_journal
-from appliance.recorder.record import EVENT, TICK
+from appliance.recorder.record import EVENT, TICK, layout_of
 from appliance.recorder.segments import segment_paths
 from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from tests.stage.bundles import write_show
 from tests.stage.night import Night
+
+PATIENCE_S = 300.0
 
 
 @pytest.fixture(scope="module")
@@ -147,6 +154,123 @@ def test_names_in_an_archive_lead_nowhere(whole: bytes, tmp_path: Path) -> None:
             "00000003.segment",
             "SHA256SUMS",
         ]
+
+
+PEAK = (
+    1200 << 20
+)  # bytes: what may be held, once more while it is put together, and Python with its libraries
+
+
+def listed_in_bounds(path: Path) -> str:
+    """What `journal list` says of a journal, in bounded memory and time."""
+
+    def listed() -> bytes:
+        with contextlib.redirect_stderr(io.StringIO()) as refused, pytest.raises(SystemExit):
+            main(("journal", "list", "--journal", str(path), "--events"))
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
+        return json.dumps([refused.getvalue() or "listed", peak]).encode()
+
+    words, peak = json.loads(within(PATIENCE_S, listed))
+    assert peak < PEAK, f"{peak >> 20} MB"
+    return str(words)
+
+
+def many_ticks(whole: bytes, count: int) -> bytes:
+    """So many ticks of zeros: a hundredth of their bytes."""
+    facts, *_ = chunks.chunks(whole)
+    tick_bytes = layout_of(json.loads(facts.data)).itemsize
+    rows = np.zeros(
+        20_000, [("number", "<u8"), ("kind", "<u4"), ("bytes", "<u4"), ("tick", f"V{tick_bytes}")]
+    )
+    rows["kind"], rows["bytes"] = TICK, tick_bytes
+    parts = [chunks.chunk(chunks.HEADER, facts.data)]
+    for first in range(1, count, len(rows)):
+        rows["number"] = np.arange(first, first + len(rows))
+        parts.append(chunks.chunk(chunks.LOG, rows.tobytes(), len(rows)))
+    return b"".join(parts)
+
+
+def test_a_small_file_of_very_many_ticks_is_refused(whole: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "odd.segment"
+    path.write_bytes(many_ticks(whole, 2_000_000))
+    assert path.stat().st_size < 60_000_000
+    assert "more than can be read at once" in listed_in_bounds(path)
+    path.write_bytes(many_ticks(whole, 90_000))  # half an hour is read
+    assert listed_in_bounds(path) == "listed"
+
+
+@pytest.mark.parametrize("kind", [TICK, EVENT])
+def test_a_small_file_of_very_many_entries_is_refused(whole: bytes, tmp_path: Path, kind: int) -> None:
+    path = tmp_path / "odd.segment"
+    rows = np.zeros(2_000_000, [("number", "<u8"), ("kind", "<u4"), ("bytes", "<u4")])
+    rows["number"], rows["kind"] = np.arange(len(rows)), kind
+    facts, *_ = chunks.chunks(whole)
+    entries = chunks.chunk(chunks.LOG, rows.tobytes(), 1)
+    path.write_bytes(chunks.chunk(chunks.HEADER, facts.data) + entries * 4)
+    assert "damaged" in listed_in_bounds(path) or "more than can be read" in listed_in_bounds(path)
+
+
+def test_a_small_file_of_enormous_events_is_refused(whole: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "odd.segment"
+    event = b'{"kind": "said", "now": 1, "order": {"values": [' + b"[]," * 1_000_000 + b"0]}}"
+    entries = [chunks.chunk(chunks.LOG, log.packed([log.Entry(n, EVENT, event)])) for n in range(26, 60)]
+    path.write_bytes(whole + b"".join(entries))
+    assert "more than can be read" in listed_in_bounds(path)
+
+
+def test_headers_that_stand_for_gigabytes_are_refused(whole: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "odd.segment"
+    path.write_bytes(with_header(whole, header(whole) | {"more": [[]] * 10_000_000}))
+    assert "nothing was recorded" in listed_in_bounds(path)
+    path = tmp_path / "odd.bunraku"
+    with tarfile.open(path, "w:") as archive:
+        for number in range(200):
+            member = tarfile.TarInfo(f"{number}.segment")
+            data = with_header(whole, header(whole) | {"run": str(number), "more": [[]] * 200_000})
+            member.size = len(data)
+            archive.addfile(member, io.BytesIO(data))
+    assert "more than can be read" in listed_in_bounds(path)
+
+
+def test_an_archive_of_very_many_parts_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "odd.bunraku"
+    path.write_bytes(b"".join(tarfile.TarInfo(f"{n}.segment").tobuf() for n in range(25_000)) + bytes(1024))
+    assert "larger than any journal" in listed_in_bounds(path)
+
+
+def test_an_archive_whose_names_are_enormous_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "odd.bunraku"
+    name = tarfile.TarInfo("././@LongLink")
+    name.type, name.size = tarfile.GNUTYPE_LONGNAME, 1 << 36
+    path.write_bytes(name.tobuf(tarfile.GNU_FORMAT))
+    with path.open("r+b") as file:
+        file.truncate(1 << 37)
+    assert "larger than any journal" in listed_in_bounds(path)
+
+
+@pytest.mark.parametrize("place", ["odd.segment", "folder/00000001.segment"])
+def test_a_fifo_or_a_device_holds_nothing_up(whole: bytes, tmp_path: Path, place: str) -> None:
+    path = tmp_path / place
+    path.parent.mkdir(exist_ok=True)
+    journal = path if path.parent == tmp_path else path.parent
+    for make in (os.mkfifo, lambda path: path.symlink_to("/dev/zero")):
+        make(path)
+        assert "no regular file" in listed_in_bounds(journal) or "no journal is" in listed_in_bounds(journal)
+        within(PATIENCE_S, lambda: str(last_kept(path.parent, "another run")).encode())
+        path.unlink()
+
+
+def test_a_keeper_passes_by_what_is_no_segment(show: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "journal"
+    folder.mkdir()
+    os.mkfifo(folder / "00000007.segment")
+
+    def kept() -> bytes:
+        night = Night(show, tmp_path / "runtime")
+        night.dance(20)
+        return str(len(read_journal(night.kept(folder)).ticks)).encode()
+
+    assert within(PATIENCE_S, kept) == b"20"
 
 
 def test_a_part_that_claims_to_be_enormous_is_refused(tmp_path: Path) -> None:

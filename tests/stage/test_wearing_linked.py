@@ -22,7 +22,7 @@ from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.firmware import FirmwareSensor, firmware_maker
 from hw_sim.motions import IDENTITY, Motion, Quaternion, about, multiply
 from hw_sim.network import PERFECT, VenueNetwork
-from hw_sim.wearer import SensorBinding
+from hw_sim.wearer import Wearer
 from tests.hw_sim.joined import TICK_S, Show
 from tests.stage.bundles import write_show
 
@@ -100,7 +100,7 @@ def begin(tmp_path: Path) -> Iterator[Begin]:
     def begun(
         maker: str, motion: Motion = evening_of_a_dancer, reboot_every_s: float | None = None
     ) -> Evening:
-        wearer = SensorBinding(motion)
+        wearer = Wearer(motion)
         device: Device
         if maker == "firmware":
             make = firmware_maker(seed=5)

@@ -307,7 +307,7 @@ def test_a_check_that_crashes_refuses_the_show(tmp_path: Path, monkeypatch: pyte
 
 def test_a_check_that_hangs_refuses_the_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     acting(tmp_path, monkeypatch, "exec sleep 60")
-    monkeypatch.setattr(commands, "_CHECK_S", 0.2)
+    monkeypatch.setattr(commands, "CHECK_S", 0.2)
     assert "did not end" in candidate_problems(tmp_path, APPLIANCE_BOX)[0]
 
 

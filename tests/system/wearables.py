@@ -18,7 +18,7 @@ from hw_sim.emulator import Emulator, Sender, Sent
 from hw_sim.motions import Motion, dance
 from hw_sim.network import VENUE, VenueNetwork
 from hw_sim.senders import SerialSender, UdpSender
-from hw_sim.wearer import SensorBinding
+from hw_sim.wearer import Wearer
 
 HOST = "127.0.0.1"
 
@@ -53,7 +53,7 @@ class Wearables:
         motion: Callable[[int], Motion] = dance,
         on_sent: Callable[[Sent], None] | None = None,
     ) -> None:
-        self._wearers = [SensorBinding(motion(number), math.inf) for number in range(len(keys))]
+        self._wearers = [Wearer(motion(number), math.inf) for number in range(len(keys))]
         self.sensors = [EmulatedSensor(key, wearer) for key, wearer in zip(keys, self._wearers, strict=True)]
         self.radios = [Radio(HOST, port) for _ in keys]
         ways: list[dict[Way, Sender]] = [{Way.NETWORK: radio} for radio in self.radios]

@@ -7,7 +7,10 @@ import os
 from pathlib import Path
 from uuid import UUID, uuid4
 
+from appliance.pose.foreign_file import content
+
 FILE = "sacn-cid"
+_LARGEST = 100
 
 
 def component_identifier(state: Path | None) -> UUID:
@@ -31,6 +34,6 @@ def component_identifier(state: Path | None) -> UUID:
 
 def _read(file: Path) -> UUID | None:
     try:
-        return UUID(file.read_text(encoding="ascii").strip())
+        return UUID(content(file, _LARGEST).decode("ascii").strip())
     except (OSError, ValueError):
         return None

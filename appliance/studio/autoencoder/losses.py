@@ -24,7 +24,7 @@ class LossWeights:
     position: float = 1.0
     prior: float = 0.003
     advance: float = 1.0
-    energy: float = 7.0
+    energy: float = 8.0
     first: float = 0.5  # of rotations after the first pass of several
     hands: float = 2.0  # of all losses of dances with hands
 

@@ -1,0 +1,68 @@
+"""A show's network runs first in a process that can be given up: it may hang, crash, or take all memory."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from appliance.box.runtime_folder import RuntimeFolderError
+from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, limit_memory, within
+from appliance.dancer.puppet import Puppet, PuppetError
+from appliance.pose.bvh import BvhError
+from appliance.show.config_error import ConfigError
+from appliance.show.show import Show
+from appliance.stage.stage_error import StageError
+
+_ONE_RUN_S = 10.0
+_FOR_PEOPLE = (BvhError, ConfigError, PuppetError, RuntimeFolderError, StageError)
+
+
+def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> str:
+    """What `do` prints. Raises StageError with what it raised for people, or why it was given up."""
+
+    def told() -> bytes:
+        limit_memory()
+        error = ""
+        with contextlib.redirect_stdout(io.StringIO()) as words:
+            try:
+                do()
+            except _FOR_PEOPLE as found:
+                error = str(found)
+            except MemoryError:
+                error = f"{network}: the show takes more memory than this box has for one. Export it again."
+        return json.dumps([words.getvalue(), error]).encode()
+
+    try:
+        words, error = json.loads(within(seconds, told))
+    except TimedOutError as reason:
+        raise StageError(
+            f"{network}: this network was given up ({reason}): it never ends, or it crashes. "
+            "Nothing is danced. Export the show again, or copy the bundle again."
+        ) from None
+    if error:
+        raise StageError(words + error)
+    return str(words)
+
+
+def prove_network(show: Show) -> None:
+    """Let it run once, at the show's iterations. Raises StageError where it cannot, or does not end."""
+
+    def run() -> None:
+        puppet, dancer = Puppet(show.network, show.skeleton), show.config.dancer
+        window = np.tile(puppet.rest, (puppet.window, 1, 1))
+        held = np.isin(puppet.joints, [hand.joint for hand in show.config.hands])
+        iterations = dancer.coding_iterations, dancer.interaction_iterations
+        try:
+            puppet.dance(window, held, window, held.astype(np.float32), *iterations)
+        except Exception as error:  # onnxruntime has a class of its own for every way to fail
+            raise StageError(
+                f"{show.network}: the network fails when it runs ({str(error)[:200]}). Nothing is danced. "
+                "Export the show again, or copy the bundle again."
+            ) from None
+
+    proved(show.network, run, _ONE_RUN_S)

@@ -1,0 +1,57 @@
+"""Files that others made: regular ones alone are opened, and no more is read than their reader takes."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import stat
+from io import BufferedReader
+from pathlib import Path
+from typing import Any
+
+_LARGEST_KEPT = 1 << 22
+
+
+class TooLargeError(OSError):
+    """A file that is larger than its reader takes."""
+
+
+def opened(path: Path) -> BufferedReader:
+    """A regular file, to be read. Raises OSError for anything else: a FIFO or a device may never end."""
+    kind = path.stat().st_mode
+    if stat.S_ISDIR(kind):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not stat.S_ISREG(kind):
+        raise OSError(errno.EINVAL, "it is no regular file", str(path))
+    return os.fdopen(os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb")
+
+
+def content(path: Path, largest: int) -> bytes:
+    """All of a regular file. Raises TooLargeError above `largest` bytes, OSError for what is no such file."""
+    with opened(path) as stream:
+        data = stream.read(largest + 1) if os.fstat(stream.fileno()).st_size <= largest else None
+    if data is None or len(data) > largest:
+        size = f"{largest / 1e6:g} MB" if largest >= 1e6 else f"{largest / 1024:g} kB"
+        raise TooLargeError(errno.EFBIG, f"it is larger than {size}", str(path))
+    return data
+
+
+def require_inside(path: Path, folder: Path) -> None:
+    """Raises OSError where a link leads out of the folder, or nowhere."""
+    real = Path(os.path.realpath(path, strict=True))
+    if not real.is_relative_to(os.path.realpath(folder)):
+        raise OSError(errno.EXDEV, "a link leads out of the folder: put the file itself there", str(path))
+
+
+def kept_json(path: Path) -> Any:
+    """The values in a small file that this box wrote. Raises OSError, or ValueError for a spoilt one."""
+    return plain_json(content(path, _LARGEST_KEPT))
+
+
+def plain_json(text: str | bytes) -> Any:
+    """The values in a text. Raises ValueError for what is no JSON, also where it is nested too deeply."""
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None

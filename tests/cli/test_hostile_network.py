@@ -1,0 +1,140 @@
+"""Networks that never end or take all memory: check and play refuse them, name the file, and can be ended."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper
+
+from appliance.cli.app import main
+from appliance.cli.check import check_show, pack_show
+from appliance.show.bundle import write_checksums
+from appliance.stage.stage_error import StageError
+from tests.stage.bundles import write_show
+
+PATIENCE_S = 120.0
+
+
+def spoilt(show: Path, nodes: list[onnx.NodeProto], constants: list[onnx.TensorProto]) -> Path:
+    """The show with a network that does this before it hands its window on."""
+    model = onnx.load(str(show / "puppet.onnx"))
+    poses = next(node for node in model.graph.node if "poses" in node.output)
+    poses.output[0] = "sound"
+    model.graph.node.extend([*nodes, helper.make_node("Add", ["sound", "nothing"], ["poses"])])
+    model.graph.initializer.extend(constants)
+    onnx.save(model, str(show / "puppet.onnx"))
+    write_checksums(show)
+    return show
+
+
+def endless(show: Path, from_iterations: int) -> Path:
+    """A show whose network never ends from so many coding iterations on."""
+    body = helper.make_graph(
+        [
+            helper.make_node("Identity", ["so_far"], ["as_it_was"]),
+            helper.make_node("GreaterOrEqual", ["coding_iterations", "many"], ["again"]),
+        ],
+        "body",
+        [
+            helper.make_tensor_value_info("turn", TensorProto.INT64, []),
+            helper.make_tensor_value_info("before", TensorProto.BOOL, []),
+            helper.make_tensor_value_info("so_far", TensorProto.FLOAT, [1]),
+        ],
+        [
+            helper.make_tensor_value_info("again", TensorProto.BOOL, []),
+            helper.make_tensor_value_info("as_it_was", TensorProto.FLOAT, [1]),
+        ],
+    )
+    constants = [
+        helper.make_tensor("many", TensorProto.INT64, [], [from_iterations]),
+        helper.make_tensor("zero", TensorProto.FLOAT, [1], [0.0]),
+        helper.make_tensor("yes", TensorProto.BOOL, [], [True]),
+    ]
+    return spoilt(show, [helper.make_node("Loop", ["", "yes", "zero"], ["nothing"], body=body)], constants)
+
+
+def greedy(show: Path) -> Path:
+    """A show whose network needs a terabyte."""
+    constants = [
+        helper.make_tensor("shape", TensorProto.INT64, [2], np.array([1 << 19, 1 << 19])),
+        helper.make_tensor("last", TensorProto.INT64, [1], np.array([-1])),
+    ]
+    nodes = [
+        helper.make_node("Cast", ["coding_iterations"], ["number"], to=TensorProto.FLOAT),
+        helper.make_node("Expand", ["number", "shape"], ["enormous"]),
+        helper.make_node("ReduceMin", ["enormous"], ["least"], keepdims=0),
+        helper.make_node("Sub", ["least", "least"], ["nothing"]),
+    ]
+    return spoilt(show, nodes, constants)
+
+
+def box(folder: Path) -> Path:
+    path = folder / "box.yaml"
+    path.write_text("control: null\nsensors: {udp: null}\noutputs: {osc: []}\n")
+    return path
+
+
+@pytest.mark.parametrize("from_iterations", [1, 3])
+def test_check_gives_an_endless_network_up_and_names_it(tmp_path: Path, from_iterations: int) -> None:
+    show = endless(write_show(tmp_path / "show"), from_iterations)
+    with pytest.raises(StageError, match=r"puppet\.onnx: .*it never ends.*Export the show"):
+        check_show(show, box(tmp_path), patience_s=5.0)
+
+
+def test_a_network_that_needs_all_memory_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    show = greedy(write_show(tmp_path / "show"))
+    with pytest.raises(StageError, match=r"puppet\.onnx"):
+        check_show(show, box(tmp_path))
+    with pytest.raises(StageError, match=r"puppet\.onnx"):
+        pack_show(show)
+    with pytest.raises(SystemExit) as ended:
+        main(["play", "--show", str(show), "--box", str(box(tmp_path)), "--seconds", "1"])
+    assert ended.value.code == 2
+    said = capfd.readouterr().err
+    assert "puppet.onnx" in said and "Traceback" not in said
+
+
+def test_play_refuses_an_endless_network(tmp_path: Path) -> None:
+    show = endless(write_show(tmp_path / "show"), 3)
+    done = subprocess.run(
+        [sys.executable, "-m", "appliance.start", "play", "--show", show, "--box", box(tmp_path)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    assert "puppet.onnx: this network was given up" in done.stderr and "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_play_while_its_network_hangs(tmp_path: Path, number: signal.Signals) -> None:
+    """What it had started to prove the network ends too, though nobody is left to give it up."""
+    show = endless(write_show(tmp_path / "show"), 3)
+    command = [sys.executable, "-m", "appliance.start", "play", "--show", show, "--box", box(tmp_path)]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:
+        child = first_child(process.pid)
+        process.send_signal(number)
+        assert process.wait(PATIENCE_S)
+    until = time.monotonic() + PATIENCE_S
+    while Path(f"/proc/{child}").exists():
+        assert time.monotonic() < until, "it goes on for ever"
+        time.sleep(0.1)
+
+
+def first_child(pid: int) -> int:
+    children = Path(f"/proc/{pid}/task/{pid}/children")
+    until = time.monotonic() + PATIENCE_S
+    while not (found := children.read_text().split()):
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    return int(found[0])

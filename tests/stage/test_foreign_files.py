@@ -1,0 +1,222 @@
+"""Files that the box finds in its folders: no FIFO, device or enormous file holds it up or ends it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import resource
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from uuid import UUID
+
+import numpy as np
+import pytest
+
+from appliance.box.block import BlockReader, BlockWriter
+from appliance.box.checkpoint import unpacked
+from appliance.box.checkpoint_file import read_checkpoint
+from appliance.cli.run_with_timeout import within
+from appliance.lights.convert import convert_file
+from appliance.outputs.dmx.identity import component_identifier
+from appliance.pose.bvh import BvhError, read_bvh, write_bvh
+from appliance.projector.alignment import AlignmentFile
+from appliance.release.choice import Choice
+from appliance.release.start_attempts import pair_to_dance
+from appliance.sensor.keys import KeyFileError, load_keys
+from appliance.show.config_error import ConfigError
+from appliance.show.projector import ProjectorConfig
+from appliance.stage.phrase_cache import FOLDER, LARGEST, SUFFIX, PhraseCache, prepare
+from appliance.stage.sensor_memory import SensorMemory
+from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+
+PATIENCE_S = 120.0
+PEAK = 400 << 20  # bytes: the libraries have half of it
+DEEP = b"[" * 100_000
+
+
+def keys(path: Path) -> None:
+    with pytest.raises((KeyFileError, OSError)):
+        load_keys(path)
+
+
+def memory(path: Path) -> None:
+    path.rename(path.with_name("sensors.memory"))
+    SensorMemory(path.parent, print)
+
+
+def alignment(path: Path) -> None:
+    kept = AlignmentFile(path.parent, ProjectorConfig(), print)
+    path.rename(kept.path)
+    kept.close()
+    AlignmentFile(path.parent, ProjectorConfig(), print).close()
+
+
+def identity(path: Path) -> None:
+    path.rename(path.with_name("sacn-cid"))
+    assert isinstance(component_identifier(path.parent), UUID)
+
+
+def fixture(path: Path) -> None:
+    with pytest.raises(ConfigError, match=path.name):
+        convert_file(path, path.with_suffix(".yaml"))
+
+
+def choice(path: Path) -> None:
+    assert Choice.read(path) is None
+    assert pair_to_dance(path, 0.0, print).good
+
+
+def recording(path: Path) -> None:
+    with pytest.raises((BvhError, OSError)):
+        read_bvh(path)
+
+
+def place(path: Path) -> None:
+    assert read_checkpoint(path) is None
+
+
+def fifo(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def device(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+def enormous(path: Path) -> None:
+    path.touch()
+    os.truncate(path, 1 << 40)  # and no room taken
+
+
+def deep(path: Path) -> None:
+    path.write_bytes(DEEP)
+
+
+@pytest.mark.parametrize("made", [fifo, device, enormous, deep])
+@pytest.mark.parametrize("read", [keys, memory, alignment, identity, fixture, choice, recording, place])
+def test_nothing_is_held_up_or_ended(
+    tmp_path: Path, made: Callable[[Path], None], read: Callable[[Path], None]
+) -> None:
+    made(tmp_path / "found.json")
+
+    def done() -> bytes:
+        read(tmp_path / "found.json")
+        return str(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10).encode()
+
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
+    assert int(within(PATIENCE_S, done)) < max(PEAK, before + (100 << 20))
+
+
+def test_a_block_whose_slots_are_enormous_or_none_is_refused(tmp_path: Path) -> None:
+    """Its header vouches for itself with a checksum, and for nothing else."""
+    path = tmp_path / "block"
+    for slots, capacity in ((0, 100), (2, 0xFFFFFFC0), (2, 1 << 30)):
+        header = struct.pack("<8s16sIIII", b"bunraku\n", b"test", 1, 1, slots, capacity)
+        with path.open("wb") as file:
+            file.write(header + struct.pack("<I", zlib.crc32(header)))
+            file.seek(128)
+            file.write((1).to_bytes(8, "little"))
+            file.truncate(1 << 40)
+
+        def read() -> bytes:
+            block = BlockReader(path, "test")
+            assert block.read() is None
+            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
+            return json.dumps([block.complaint, peak]).encode()
+
+        complaint, peak = json.loads(within(PATIENCE_S, read))
+        assert "is damaged" in complaint
+        assert peak < max(PEAK, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10) + (100 << 20))
+
+
+def test_a_block_of_this_box_is_still_read(tmp_path: Path) -> None:
+    writer, reader = BlockWriter(tmp_path / "block", "test", 1 << 24), BlockReader(tmp_path / "block", "test")
+    writer.write(b"x" * (1 << 24))
+    assert reader.read() == b"x" * (1 << 24)
+
+
+def test_a_place_whose_names_are_nested_too_deeply_is_none() -> None:
+    assert unpacked(bytes(200) + DEEP) is None
+
+
+def test_a_recording_that_claims_very_much_takes_no_more_memory_than_it_has(tmp_path: Path) -> None:
+    path = tmp_path / "claims.bvh"
+    write_bvh(path, swaying_phrase(0.1))
+    whole = path.read_text()
+    width = len(whole.splitlines()[-1].split())
+    path.write_text(whole.replace("Frames: 5", f"Frames: {50_000_000 // width}"))
+    resource_limit = 600 << 20
+
+    def read() -> bytes:
+        resource.setrlimit(resource.RLIMIT_DATA, (resource_limit, resource_limit))
+        with pytest.raises(BvhError, match="the file ends here, frame 6"):
+            read_bvh(path)
+        return b"refused"
+
+    assert within(PATIENCE_S, read) == b"refused"
+
+
+def test_slow_frames_that_stand_for_days_are_refused(tmp_path: Path) -> None:
+    """At the stage's rate each of them would become five hundred."""
+    path = tmp_path / "slow.bvh"
+    write_bvh(path, swaying_phrase(100.0))
+    lines = path.read_text().splitlines()
+    number = next(number for number, line in enumerate(lines, 1) if line.startswith("Frame Time"))
+    lines[number - 1] = "Frame Time: 10"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(BvhError, match=rf"slow.bvh:{number}: 5000 frames of .* \(50000 s\) are too many"):
+        read_bvh(path)
+
+
+def forged(facts: object, arrays: bytes) -> bytes:
+    """What a bundle may bring as its prepared phrase."""
+    words = json.dumps(facts).encode() if not isinstance(facts, bytes) else facts
+    words = words.ljust(-(-(28 + len(words)) // 64) * 64 - 28)
+    body = words + arrays
+    return struct.pack("<17sII3x", b"bunraku phrase 1\n", len(words), zlib.crc32(body)) + body
+
+
+@pytest.mark.parametrize(
+    "shapes",
+    [
+        [[5, 8, 4], [5, 3], [2]],
+        [[5, 8, 4]],
+        [[5, 8], [5, 3]],
+        [[5, 8, 4], [4, 3]],
+        [[5, 8, 4], [5, 3], [1], [5]],
+        [[-1, 8, 4], [5, 3]],
+        [[1 << 62, 1 << 62], [5, 3]],
+        [[math.inf, 8, 4], [5, 3]],
+        [5],
+        DEEP,
+        None,
+    ],
+)
+def test_a_prepared_phrase_of_something_else_is_read_anew(tmp_path: Path, shapes: object) -> None:
+    show = write_show(tmp_path / "show")
+    prepare([show / "phrase.bvh"], show, FIGURE, grounded=True)
+    (kept,) = (show / FOLDER).glob(f"*{SUFFIX}")
+    names = {"joints": FIGURE.names, "parents": [int(parent) for parent in FIGURE.parents]}
+    facts = shapes if isinstance(shapes, bytes) else names | {"shapes": shapes}
+    kept.write_bytes(forged(facts, np.zeros(1000, np.float32).tobytes()))
+    found = PhraseCache(show, None).phrase(show / "phrase.bvh", FIGURE, grounded=True)
+    assert found is not None and len(found[0]) == 150
+
+
+@pytest.mark.parametrize("made", [fifo, device, enormous])
+def test_a_prepared_phrase_that_is_no_file_is_read_anew(tmp_path: Path, made: Callable[[Path], None]) -> None:
+    show = write_show(tmp_path / "show")
+    prepare([show / "phrase.bvh"], show, FIGURE, grounded=True)
+    (kept,) = (show / FOLDER).glob(f"*{SUFFIX}")
+    kept.unlink()
+    made(kept)
+
+    def read() -> bytes:
+        found = PhraseCache(show, None).phrase(show / "phrase.bvh", FIGURE, grounded=True)
+        return str(found and len(found[0])).encode()
+
+    assert within(PATIENCE_S, read) == b"150"
+    assert LARGEST < 1 << 40
