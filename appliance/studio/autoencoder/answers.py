@@ -42,14 +42,14 @@ class AnswerSettings:
     passes: int = 10  # at most, the last one without hands
     reserve: int = 1024  # dances whose answers are searched for together
     uses: int = 2  # of each dance, with different numbers of passes
-    light: float = 0.2  # weights between 0 and 1
+    light: float = 0.4  # weights between 0 and 1
     frozen: float = 0.3  # hands that stand still
-    wild: float = 0.25  # hands at orientations that no dancer had
+    wild: float = 0.15  # hands at orientations that no dancer had
     with_hands: float = 0.5  # of a batch; the others are without hands
     disturbed: float = 0.25  # of the windows without hands: some joints are those of another window
     wandering: int = 512  # windows that are coded over and over: half of those without hands
     wander: int = 100  # passes at most
-    pull: float = 0.3
+    pull: float = 0.15
     nearness: Nearness = field(default_factory=Nearness)
 
 

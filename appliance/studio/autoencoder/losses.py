@@ -26,7 +26,7 @@ class LossWeights:
     advance: float = 1.0
     energy: float = 8.0
     first: float = 0.5  # of rotations after the first pass of several
-    hands: float = 2.0  # of all losses of dances with hands
+    hands: float = 1.0  # of all losses of dances with hands
 
 
 def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:

@@ -19,7 +19,7 @@ from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import slerp_towards
 
 _SEARCH_ROWS = 512  # at a time: a search is a matrix product
-_BELIEVED_RADIANS = 1.0  # a hand that far from all that the dancer does counts e^-1
+_BELIEVED_RADIANS = 1.5  # a hand that far from all that the dancer does counts e^-1
 _SHARPNESS = 3.0  # the furthest of the neighbours counts e^-3 of the nearest
 
 
