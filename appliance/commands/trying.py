@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from appliance.outputs.frame_reader import FrameReader
-from appliance.show.choice import Choice, Pair
+from appliance.show.choice import Aside, Choice, Pair
 from appliance.show.durable import write_whole
 
 TRIES, ANEW = "tries", "anew"
@@ -89,9 +89,7 @@ def _put_aside(chosen: Path, choice: Choice, starts: int, say: Callable[[str], N
         f"The {before.source} did not dance in {starts} starts and is put aside. The audience sees the dance "
         f"that {_source(after)}. Run bunraku check on it, mend it, and bring it again."
     )
-    left = choice._replace(
-        pairs=choice.pairs[1:], refused=(*choice.refused, words), aside=(*choice.aside, before.id)
-    )
+    left = choice._replace(pairs=choice.pairs[1:], aside=(*choice.aside, Aside(before.id, words)))
     return _told(chosen, choice, left, words, say)
 
 

@@ -1,4 +1,4 @@
-"""Which process has a port, and whether it is the box's: told also while that program opens and closes files."""
+"""Which process has a port, and whether it is the box's: told also while it opens and closes files."""
 
 from __future__ import annotations
 
