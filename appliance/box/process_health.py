@@ -151,11 +151,9 @@ class ProcessHealth:
         return self._of_choice
 
 
-def _of_choice(refused: list[str], aside: list[str]) -> list[Fallen]:
-    """The stage notes the pairs that it has put aside behind what the preflight refused."""
-    put_aside = refused[len(refused) - len(aside) :]
-    broken = refused[: len(refused) - len(aside)]
-    both = ((SHOW_REFUSED, broken), (SHOW_PUT_ASIDE, put_aside))
+def _of_choice(refused: list[str], aside: list[list[str]]) -> list[Fallen]:
+    """The preflight notes what it refused, the stage the pairs that it has put aside."""
+    both = ((SHOW_REFUSED, refused), (SHOW_PUT_ASIDE, [words for _, words in aside]))
     return [Fallen(one.name, len(words), True, " ".join(words)) for one, words in both if words]
 
 

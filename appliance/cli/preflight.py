@@ -13,7 +13,7 @@ from typing import NamedTuple
 from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, within
 from appliance.release.arrivals import look
 from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice, alone_in
-from appliance.release.choosing import Outcome, Places, built_in_box, choose, remembered
+from appliance.release.choosing import Outcome, Places, built_in_box, choose, chosen_before
 
 ANEW = "anew"  # touched when units have to start anew, for another show or box file dances
 _AT_ONCE_S = 120.0  # after power-on a stick takes effect at once; later no show is interrupted
@@ -40,7 +40,7 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
             os.nice(19)
     try:
         if not options.late:  # whatever becomes of what is new: this dances, should it end this process
-            _publish(places, Outcome(remembered(places.data), False, ()), False, uptime_s, say)
+            _publish(places, Outcome(chosen_before(places), False, ()), False, uptime_s, say)
         patience_s = _LATE_TURN_S if options.late else _TURN_S
         with alone_in(options.data, patience_s), alone_in(options.run, patience_s):
             outcome = _found(options, places)
@@ -97,7 +97,9 @@ def _publish(
         if outcome.taken:
             say("The running show goes on. The new one dances after the next power-on.")
         return
-    outcome.choice.complete(built_in_box(places))._replace(data=places.data).write(path)
+    choice = outcome.choice.complete(built_in_box(places))._replace(data=places.data)
+    aside = () if before is None else before.aside  # also what the stage put aside during the checks
+    choice.without(Choice(aside=tuple(one for one in aside if one.id != choice.first.id))).write(path)
     if before is not None:
         (places.run / ANEW).touch()
         say("The box was switched on only just now: the new show dances at once.")

@@ -63,16 +63,23 @@ class Pair(NamedTuple):
             return False
 
 
+class Aside(NamedTuple):
+    """A pair that did not dance, by its id; words: a sentence about it, for people."""
+
+    id: str
+    words: str
+
+
 class Choice(NamedTuple):
     """pairs: in the order in which they are tried, never empty in a file that a stage reads.
 
-    refused: what was found and is not danced, sentences for people, those about pairs that did not dance at
-    the end; aside: ids of these pairs; data: the folder in which it is kept over power-off.
+    refused: what was found and is not danced, sentences for people; aside: the pairs that did not dance;
+    data: the folder in which it is kept over power-off.
     """
 
     pairs: tuple[Pair, ...] = (Pair(good=True),)
     refused: tuple[str, ...] = ()
-    aside: tuple[str, ...] = ()
+    aside: tuple[Aside, ...] = ()
     data: Path = DATA
 
     @property
@@ -93,7 +100,8 @@ class Choice(NamedTuple):
     def of(values: dict[str, Any]) -> Choice:
         """From plain values; raises ValueError."""
         try:
-            refused, aside = (tuple(map(str, values[name])) for name in ("refused", "aside"))
+            refused = tuple(map(str, values["refused"]))
+            aside = tuple(Aside(*map(str, one)) for one in values["aside"])
             pairs = tuple(_pair(one) for one in values["pairs"])
             return Choice(pairs, refused, aside, Path(values["data"]))
         except (KeyError, TypeError) as error:
@@ -132,17 +140,11 @@ class Choice(NamedTuple):
         So does what has danced on this box: that it does not tonight may be tonight's fault.
         """
         good = {one.id for one in self.pairs if one.good}
-        both = zip(other.aside, other.put_aside, strict=False)
-        told = [(one, words) for one, words in both if one not in good]
-        aside = tuple(one for one, _ in told)
+        aside = {one.id: one for one in (*self.aside, *other.aside) if one.id not in good}
+        if not aside:
+            return self
         pairs = tuple(one for one in self.pairs if not one.id or one.id not in aside)
-        refused = tuple(words for _, words in told)
-        return self._replace(pairs=pairs or (Pair(good=True),), refused=refused, aside=aside)
-
-    @property
-    def put_aside(self) -> tuple[str, ...]:
-        """The sentences about pairs that did not dance."""
-        return self.refused[len(self.refused) - len(self.aside) :]
+        return self._replace(pairs=pairs or (Pair(good=True),), aside=tuple(aside.values()))
 
     def complete(self, box: Path = APPLIANCE_BOX) -> Choice:
         """With what comes with the box at the end, on the venue's box files first: never nothing on stage.

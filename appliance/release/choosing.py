@@ -60,20 +60,25 @@ def remembered(data: Path) -> Choice:
     return choice._replace(pairs=tuple(one for one in pairs if one.is_there))
 
 
+def chosen_before(places: Places) -> Choice:
+    """What is remembered, without what did not dance since power-on: the keeper may not have noted it yet."""
+    return remembered(places.data).without(Choice.read(places.run / CHOSEN) or Choice())
+
+
 def choose(places: Places, arrivals: list[Arrival], check: Check, late: bool = False) -> Outcome:
     """Take what is new and sound. The newest arrival counts; the stick goes before the boot partition.
 
     late: beside a running show, where a check may fail for want of time or memory: what is refused then is
     checked once more at the next power-on.
     """
-    before, seen = remembered(places.data), _read_seen(places.data)
+    before, seen = chosen_before(places), _read_seen(places.data)
     lost = _lost(places.data, seen)
     fresh = [one for one in arrivals if one.listing and _is_new(one, seen, lost)]
     refused = [
         words for one in arrivals if one.listing and one not in fresh for words in seen[one.source]["refused"]
     ]
     if not fresh:
-        return Outcome(before._replace(refused=(*refused, *before.put_aside)), False, ())
+        return Outcome(before._replace(refused=tuple(refused)), False, ())
     choice, taken, said = before, False, []
     brought: frozenset[str] = frozenset()  # a show from the stick goes with a box file from elsewhere
     for arrival in fresh:
@@ -91,7 +96,7 @@ def choose(places: Places, arrivals: list[Arrival], check: Check, late: bool = F
             choice, brought = choice.with_newest(newest), brought | lacking.parts
             said.append(f"{newest.source[0].upper()}{newest.source[1:]}: its show is checked and dances.")
     said += _remember(places.data, choice, seen)
-    return Outcome(choice._replace(refused=(*refused, *choice.put_aside)), taken, tuple(said))
+    return Outcome(choice._replace(refused=tuple(refused)), taken, tuple(said))
 
 
 def _take(
@@ -170,7 +175,7 @@ def _printable(words: str) -> str:
 def _remember(data: Path, choice: Choice, seen: dict[str, Any]) -> list[str]:
     try:
         if choice.pairs:
-            choice._replace(refused=choice.put_aside, data=data).write(data / CHOSEN)
+            choice._replace(refused=(), data=data).write(data / CHOSEN)
         write_whole(data / SEEN, json.dumps(seen).encode())
         _write_refusals(data / "refusals", seen)
     except OSError as error:

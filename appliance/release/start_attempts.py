@@ -12,7 +12,7 @@ from typing import NamedTuple
 from appliance.box.durable import write_whole
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.foreign_file import kept_json
-from appliance.release.choice import Choice, Pair
+from appliance.release.choice import Aside, Choice, Pair
 
 TRIES, ANEW = "tries", "anew"
 PROVEN_S = 10.0  # a show that has danced for so long dances on this box
@@ -90,9 +90,7 @@ def _put_aside(chosen: Path, choice: Choice, starts: int, say: Callable[[str], N
         f"The {before.source} did not dance in {starts} starts and is put aside. The audience sees the dance "
         f"that {_source(after)}. Run bunraku check on it, mend it, and bring it again."
     )
-    left = choice._replace(
-        pairs=choice.pairs[1:], refused=(*choice.refused, words), aside=(*choice.aside, before.id)
-    )
+    left = choice._replace(pairs=choice.pairs[1:], aside=(*choice.aside, Aside(before.id, words)))
     return _told(chosen, choice, left, words, say)
 
 

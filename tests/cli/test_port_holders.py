@@ -1,8 +1,12 @@
-"""Who has a port: told also while that program opens and closes files."""
+"""Which process has a port, and whether it is the box's: told also while it opens and closes files."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
+
+import pytest
 
 from appliance.cli.doctor.host_view import HostView
 from appliance.cli.doctor.venue import ports
@@ -24,3 +28,46 @@ def test_a_file_that_is_closed_meanwhile_hides_no_process(tmp_path: Path) -> Non
         (process / f"fd/{number}").touch()  # no link, so that it cannot be read as one
     (finding, *_) = ports(HostView(tmp_path, box))
     assert finding.words.endswith("the box listens."), finding
+
+
+# Binds a port, says which, and waits until its standard input is closed.
+LISTENS = """import socket, sys
+port = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+port.bind(("127.0.0.1", 0))
+print(port.getsockname()[1], flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize(
+    ("program", "command", "is_ours"),
+    [
+        ("my box/bin/bunraku", ("my box/bin/bunraku", "play"), True),
+        ("my box/bin/bunraku", ("-I", "-X", "utf8", "my box/bin/bunraku", "play"), True),
+        ("appliance/stage.py", ("-m", "appliance.stage"), True),
+        ("bunraku/listen.py", ("bunraku/listen.py", "--beside", "bunraku"), False),
+        ("my bunraku/appliance.py", ("my bunraku/appliance.py", "-m", "appliance.stage"), False),
+        ("appliances/listen.py", ("-m", "appliances.listen"), False),
+    ],
+)
+def test_the_box_is_known_by_what_runs_and_not_by_where_it_lies(
+    tmp_path: Path, program: str, command: tuple[str, ...], is_ours: bool
+) -> None:
+    file = tmp_path / program
+    file.parent.mkdir(parents=True)
+    file.write_text(LISTENS)
+    here = [word if word != program else str(file) for word in command]
+    with subprocess.Popen(
+        [sys.executable, *here],
+        cwd=tmp_path,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={"PYTHONPATH": ""},
+    ) as process:
+        assert process.stdin is not None and process.stdout is not None
+        port = int(process.stdout.readline())
+        box = BoxConfig.model_validate({"sensors": {"udp": {"port": port}}, "control": None})
+        found = next(iter(ports(HostView(box=box))))
+        process.stdin.close()
+    assert found.verdict == ("ok" if is_ours else "wrong"), found

@@ -16,6 +16,7 @@ from appliance.release.choice import (
     APPLIANCE_BOX,
     CHOSEN,
     EMBEDDED_SHOW,
+    Aside,
     Choice,
     Pair,
     box_of,
@@ -287,18 +288,18 @@ def test_what_comes_with_the_box_follows_the_release(venue: Venue, tmp_path: Pat
 def test_a_pair_put_aside_is_not_taken_again_from_the_same_stick(venue: Venue) -> None:
     venue.bring(venue.stick, "spring")
     choice = venue.look().choice
-    aside = choice._replace(pairs=(), refused=("It did not dance.",), aside=(choice.first.id,))
+    aside = Choice(aside=(Aside(choice.first.id, "It did not dance."),))
     choice.without(aside).write(venue.places.data / CHOSEN)
     again = venue.look()
     assert again.choice.complete().first.show == EMBEDDED_SHOW
-    assert again.choice.refused == ("It did not dance.",)
+    assert (again.choice.refused, again.choice.aside) == ((), aside.aside)
     venue.bring(venue.stick, "mended")
     assert dancing(venue.look()) == "mended"
 
 
 def test_a_choice_is_read_as_it_was_written(tmp_path: Path) -> None:
     pair = Pair(tmp_path / "show", tmp_path / "box.yaml", "a+b", "show from the stick", True)
-    choice = Choice((pair, Pair(good=True)), ("refused",), ("c+",), tmp_path)
+    choice = Choice((pair, Pair(good=True)), ("refused",), (Aside("c+", "It did not dance."),), tmp_path)
     choice.write(tmp_path / CHOSEN)
     assert Choice.read(tmp_path / CHOSEN) == choice
     top = json.loads((tmp_path / CHOSEN).read_text())

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from appliance.release.arrivals import look
-from appliance.release.choice import CHOSEN, Choice, Pair, alone_in
+from appliance.release.choice import CHOSEN, Aside, Choice, Pair, alone_in
 from appliance.release.choosing import choose, remembered
 from appliance.release.shelf import Shelf, UnreadableError
 from tests.show.test_choice import BROKEN, Venue, dancing
@@ -57,7 +57,7 @@ def test_a_show_from_the_stick_goes_with_the_box_file_from_the_boot_partition(
 def test_a_show_put_aside_does_not_come_back_once_another_one_is_there(venue: Venue) -> None:
     venue.bring(venue.boot, "never danced")
     choice = venue.look().choice
-    aside = choice._replace(pairs=(), refused=("It did not dance.",), aside=(choice.first.id,))
+    aside = Choice(aside=(Aside(choice.first.id, "It did not dance."),))
     choice.without(aside).write(venue.places.data / CHOSEN)
     venue.bring(venue.stick, "spring")
     assert [_power_on(venue) for _ in range(3)] == ["spring"] * 3
@@ -96,8 +96,9 @@ def test_the_same_show_again_is_as_good_as_before(venue: Venue) -> None:
 
 def test_a_good_show_that_does_not_dance_tonight_is_tried_again_after_power_off(tmp_path: Path) -> None:
     good, new = Pair(id="good+", good=True), Pair(id="new+")
-    kept = Choice((good, new)).without(Choice((), ("Not danced.", "Nor this."), ("good+", "new+")))
-    assert (kept.pairs, kept.aside, kept.refused) == ((good,), ("new+",), ("Nor this.",))
+    aside = (Aside("good+", "Not danced."), Aside("new+", "Nor this."))
+    kept = Choice((good, new)).without(Choice(aside=aside))
+    assert (kept.pairs, kept.aside) == ((good,), aside[1:])
 
 
 @pytest.mark.parametrize("content", ["spring", BROKEN])
@@ -155,7 +156,7 @@ def test_memory_is_never_filled_by_a_show(venue: Venue) -> None:
 _AS_THE_BOX = """
 import os
 from pathlib import Path
-from appliance.release.choice import Choice
+from appliance.release.choice import Aside, Choice
 os.setuid(990)
 choice = Choice.read(Path({file!r}))
 print([one.is_there for one in choice.pairs], choice.complete().first.id)

@@ -20,7 +20,7 @@ from appliance.keeper.sensor_memory_carrier import MemoryCarrier
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
-from appliance.release.choice import CHOSEN, Choice, Pair
+from appliance.release.choice import CHOSEN, Aside, Choice, Pair
 from appliance.release.promote_show import Proof
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import Status
@@ -111,11 +111,13 @@ def test_the_keeper_tells_all_that_it_cannot_keep(folder: Path) -> None:
 def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
     company = ProcessHealth(folder)
     assert told(company, 1.0) == {}
-    Choice((Pair(),), ("Broken one.", "Broken two.", "Did not dance."), ("a+",)).write(folder / CHOSEN)
+    aside = (Aside("a+", "Did not dance."),)
+    Choice((Pair(),), ("Broken one.", "Broken two."), aside).write(folder / CHOSEN)
     assert told(company, 1.0) == {
         "show-refused": ("preflight", 2, True),
         "show-put-aside": ("preflight", 1, True),
     }
+    assert [one.words for _, one in company.fallbacks(1.0)] == ["Broken one. Broken two.", "Did not dance."]
     (folder / CHOSEN).write_bytes(b"{")
     assert told(company, 1.0) == {}
 

@@ -19,7 +19,7 @@ from appliance.cli.doctor.doctor_command import CHECKS, findings
 from appliance.cli.doctor.finding import Finding
 from appliance.cli.doctor.host_view import HostView, RunningStage
 from appliance.cli.doctor.sample import Sample, sample
-from appliance.release.choice import Choice
+from appliance.release.choice import Aside, Choice
 from appliance.show.box import BoxConfig
 from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, playing
@@ -209,6 +209,14 @@ def test_a_show_that_was_refused_is_told(tmp_path: Path) -> None:
     found = list(storage.choice(HostView(tmp_path)))
     assert [one.verdict for one in found] == ["ok", "better"]
     assert "show.yaml:3: no such key.\nIt is not danced." in found[1].words
+
+
+def test_a_show_that_was_put_aside_is_told_as_such(tmp_path: Path) -> None:
+    (tmp_path / "run/bunraku").mkdir(parents=True)
+    Choice(aside=(Aside("new+", "The show did not dance."),)).write(tmp_path / "run/bunraku/chosen.json")
+    found = list(storage.choice(HostView(tmp_path)))
+    assert [one.verdict for one in found] == ["ok", "better"]
+    assert found[1].words == "The show did not dance."
 
 
 def test_a_box_that_is_on_and_does_not_dance_is_wrong(tmp_path: Path) -> None:

@@ -92,8 +92,9 @@ def evening(tmp_path: Path) -> Evening:
 
 def test_a_new_show_that_does_not_dance_is_put_aside_at_the_fourth_start(evening: Evening) -> None:
     assert [evening.start(danced_s=None) for _ in range(4)] == [NEW, NEW, NEW, BEFORE]
-    assert evening.choice.aside == (NEW,)
-    assert "did not dance in 3 starts and is put aside" in evening.choice.refused[0]
+    [(put_aside, words)] = evening.choice.aside
+    assert put_aside == NEW
+    assert "did not dance in 3 starts and is put aside" in words
 
 
 def test_a_new_show_that_crashes_after_some_frames_is_put_aside(evening: Evening) -> None:
@@ -177,8 +178,8 @@ def test_what_was_put_aside_is_let_go_once_another_one_has_danced(evening: Eveni
     evening.dance(seconds=10.5)
     proof.turn(time.monotonic())
     assert [pair.id for pair in evening.kept.pairs] == [BEFORE]
-    assert evening.kept.aside == (NEW,)
-    assert len(evening.kept.put_aside) == 1
+    assert evening.kept.aside == evening.choice.aside
+    assert [put_aside for put_aside, _ in evening.kept.aside] == [NEW]
     proof.last_turn()
 
 

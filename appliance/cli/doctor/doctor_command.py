@@ -70,10 +70,7 @@ def findings(patient: HostView) -> Iterator[Finding]:
 def _sampled(patient: HostView) -> Sample:
     """A second, in which the box's own processes may use what they use."""
     ours = {os.getpid()}
-    for folder in patient.found("/proc/[0-9]*"):
-        command = patient.text(folder / "cmdline") or ""
-        if "appliance." in command or "/bunraku" in command:
-            ours.add(int(folder.name))
+    ours |= {int(folder.name) for folder in patient.found("/proc/[0-9]*") if patient.is_bunraku(folder)}
     return sample(patient.box.realtime.priority, frozenset(ours))
 
 

@@ -69,6 +69,20 @@ class HostView:
             ]
         return []
 
+    def is_bunraku(self, process: Path) -> bool:
+        """Whether Python runs the box there: one of its modules, or the script `bunraku` that is its command.
+
+        Where the program lies says nothing: a checkout has the same name, and all that is started in it.
+        """
+        program, *words = (self.text(process / "cmdline") or "").split("\0")
+        if not Path(program).name.startswith("python"):
+            return False
+        while words and words[0].startswith("-") and words[0] != "-m":
+            del words[: 1 + (words[0] in ("-W", "-X"))]  # these two take the word behind them
+        if words[:1] == ["-m"]:
+            return words[1:2] == ["appliance"] or "".join(words[1:2]).startswith("appliance.")
+        return Path("".join(words[:1])).name == "bunraku"
+
     def mounts(self) -> dict[str, tuple[str, Sequence[str]]]:
         """Mount point -> kind of file system, its options."""
         rows = (line.split() for line in (self.text("/proc/mounts") or "").splitlines())

@@ -143,7 +143,7 @@ def memory(patient: HostView) -> Iterator[Finding]:
 
 
 def choice(patient: HostView) -> Iterator[Finding]:
-    """Which show was chosen at power-on, and what was refused."""
+    """Which show was chosen at power-on, what was refused, and what did not dance."""
     chosen = Choice.read(patient.at(RUN / "chosen.json"))
     if chosen is None:
         return
@@ -151,6 +151,8 @@ def choice(patient: HostView) -> Iterator[Finding]:
     if chosen.refused:
         words = "What is new was refused, and the show before dances:\n" + "\n".join(chosen.refused)
         yield better("show", words, "Mend it on the stick, and plug it in anew.")
+    for one in chosen.aside:
+        yield better("show", one.words, "Mend it, and bring it again on a stick.")
 
 
 def releases(patient: HostView) -> Iterator[Finding]:

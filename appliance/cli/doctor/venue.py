@@ -30,13 +30,13 @@ def ports(patient: HostView) -> Iterator[Finding]:
     wanted += [("commands", control.host, control.port)] if control is not None else []
     for whose, host, port in wanted:
         holders = _holders(patient, port) if port else []
-        ours = [name for name, command in holders if "appliance" in command or "bunraku" in command]
+        strangers = [name for name, is_ours in holders if not is_ours]
         if not holders:
             yield ok(f"port for {whose}", f"{host}:{port} is free.")
-        elif len(ours) == len(holders):
+        elif not strangers:
             yield ok(f"port for {whose}", f"{host}:{port}: the box listens.")
         else:
-            names = ", ".join(name for name, _ in holders if name not in ours)
+            names = ", ".join(strangers)
             yield wrong(
                 *(f"port for {whose}", f"{names} has UDP port {port}: the box would hear nothing there."),
                 "End that program, or give the box another port in its box file.",
@@ -45,16 +45,16 @@ def ports(patient: HostView) -> Iterator[Finding]:
         yield better("sensors by Wi-Fi", words, "For sensors on cables alone: leave it.")
 
 
-def _holders(patient: HostView, port: int) -> list[tuple[str, str]]:
-    """(name, command line) of each process that has this UDP port."""
+def _holders(patient: HostView, port: int) -> list[tuple[str, bool]]:
+    """(name, whether it is one of the box's) of each process that has this UDP port."""
     rows = [line.split() for line in (patient.text("/proc/net/udp") or "").splitlines()]
     inodes = {f"socket:[{row[9]}]" for row in rows if len(row) > 9 and row[1].endswith(f":{port:04X}")}
     found = []
     for folder in patient.found("/proc/[0-9]*") if inodes else []:
         if inodes & set(_links(patient.at(folder / "fd"))):
-            command = (patient.text(folder / "cmdline") or "").replace("\0", " ")
-            found.append((f"{patient.text(folder / 'comm')} (process {folder.name})", command))
-    return found or [("another user's program", "")] * bool(inodes)
+            name = f"{patient.text(folder / 'comm')} (process {folder.name})"
+            found.append((name, patient.is_bunraku(folder)))
+    return found or [("another user's program", False)] * bool(inodes)
 
 
 def _links(folder: Path) -> Iterator[str]:
