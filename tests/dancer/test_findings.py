@@ -148,7 +148,7 @@ def still(dancer: Dancer) -> Dancer:
 def test_the_others_answer_the_hand_more_with_each_iteration(dancer: Dancer, joint: str) -> None:
     """A plain autoencoder that copies gets 3 degrees at 10/9."""
     answers = [dancer.answer(coding, coding - 1, joint) for coding in (2, 4, 10)]
-    assert answers[0] > 1.2 and answers[2] > ANSWER
+    assert answers[0] > 4.0 and answers[2] > ANSWER
     assert np.all(np.diff(answers) > 0.5), answers
     assert dancer.answer(1, 1, joint) < 0.6 * answers[2]
 
@@ -160,14 +160,15 @@ def test_the_answer_grows_with_the_distance_of_the_hand(dancer: Dancer) -> None:
         hand = FixedOrientation("lShldr", dancer.target("lShldr", radians).tolist())
         held = dancer.dance(10, 9, hand)
         answers.append(float(degrees(held.danced[:, others], free.danced[:, others]).mean()))
-    assert np.all(np.diff(answers) > 0.5), answers
+    assert answers[2] > answers[0] + 0.5, answers
 
 
 def test_the_answer_grows_smoothly_with_the_weight(dancer: Dancer) -> None:
-    answers = [dancer.answer(10, 9, "lShldr", weight) for weight in (0.25, 0.5, 0.75, 1.0)]
+    weights = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0)
+    answers = [dancer.answer(10, 9, "lShldr", weight) for weight in weights]
     steps = np.diff([0.0, *answers])
     assert np.all(steps > -0.3), answers
-    assert steps.max() < 0.7 * answers[-1], answers
+    assert steps.max() < 0.35 * answers[-1], answers
 
 
 @pytest.mark.parametrize("joint", ["lShldr", "head"])
@@ -181,7 +182,7 @@ def test_the_whole_body_goes_along_and_goes_on_dancing(dancer: Dancer, joint: st
         places = [dancer.place(name) for name in group]
         assert degrees(held.danced[:, places], free.danced[:, places]).mean() > 3.0, group
     others = dancer.others(joint)
-    assert 0.35 < pace(held.danced[:, others]) / pace(held.phrase[:, others]) < 1.3
+    assert 0.5 < pace(held.danced[:, others]) / pace(held.phrase[:, others]) < 1.3
 
 
 def test_a_joint_that_is_kept_where_the_phrase_has_it_changes_less(dancer: Dancer) -> None:
