@@ -44,8 +44,7 @@ class Puppet:
 
     def __init__(self, path: Path, skeleton: Skeleton) -> None:
         """Raises PuppetError when the file is no network of ours or does not fit the skeleton."""
-        self._session = _session(path)
-        facts = self._session.get_modelmeta().custom_metadata_map
+        self._session, facts = _session(path)
         self.joints, self.window, self.rest = _read_facts(path, facts)
         self.architecture = facts.get("bunraku.architecture", "unknown")
         self.precision = facts.get("bunraku.precision", "unknown")
@@ -105,7 +104,8 @@ class Puppet:
         return poses
 
 
-def _session(path: Path) -> onnxruntime.InferenceSession:
+def _session(path: Path) -> tuple[onnxruntime.InferenceSession, dict[str, str]]:
+    """The network and what it says of itself."""
     if not path.is_file():
         raise PuppetError(f"{path}: there is no such network file. {_CURE}")
     options = onnxruntime.SessionOptions()
@@ -118,12 +118,13 @@ def _session(path: Path) -> onnxruntime.InferenceSession:
     try:
         network = content(path, LARGEST_FILE)  # as bytes: a network then cannot name other files to be read
         session = onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
+        inputs = {value.name: value.shape for value in session.get_inputs()}
+        outputs = {value.name for value in session.get_outputs()}
+        facts: dict[str, str] = session.get_modelmeta().custom_metadata_map  # its words need be no text
     except Exception as error:  # onnxruntime has a class of its own for every way to be damaged
         raise PuppetError(
             f"{path}: onnxruntime cannot read this network ({_short(error)}). {_CURE}"
         ) from None
-    inputs = {value.name: value.shape for value in session.get_inputs()}
-    outputs = {value.name for value in session.get_outputs()}
     if inputs.keys() != _INPUTS.keys() or _OUTPUT not in outputs:
         raise PuppetError(
             f"{path}: this network takes {', '.join(sorted(inputs))} and gives {', '.join(sorted(outputs))}; "
@@ -135,7 +136,7 @@ def _session(path: Path) -> onnxruntime.InferenceSession:
                 f"{path}: the network's input '{name}' has the shape {shape}, as another release exported "
                 "it. Export the show again with this release."
             )
-    return session
+    return session, facts
 
 
 def _read_facts(path: Path, facts: dict[str, str]) -> tuple[tuple[str, ...], int, FloatArray]:

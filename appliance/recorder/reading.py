@@ -27,8 +27,9 @@ _NAME_ONE = "Name the folder of `bunraku play --journal`, a segment in it, or an
 _LARGEST = 1 << 26  # bytes of a segment: a minute of the show that comes with the box has a fiftieth of it
 _MOST_SEGMENTS = 20_000  # in an exported file; a day has 1440 where the disk has room
 _USTAR = slice(257, 262), b"ustar"  # where an archive says that it is one
-# What may be held: hours of ticks. An entry costs more than its bytes, and values read from JSON much more.
-_MOST_BYTES = 512 << 20
+# What may be held: so much, and four times what is stored (a show's ticks unpack to less than three times).
+# An entry costs more than its bytes, and values read from JSON much more.
+_LEAST_ROOM, _OF_STORED = 512 << 20, 4
 _OF_AN_ENTRY, _OF_JSON = 200, 16
 
 Ticks = np.ndarray[Any, np.dtype[np.void]]
@@ -171,15 +172,19 @@ class _Room:
     """How much of a journal may still be held in memory."""
 
     def __init__(self, path: Path) -> None:
-        self._path, self._left = path, _MOST_BYTES
+        self._path, self._left = path, _LEAST_ROOM
+
+    def add_segment(self, stored: int) -> None:
+        """The more is stored, the more may be held."""
+        self._left += _OF_STORED * stored
 
     def take(self, size: int) -> None:
         """Raises JournalError when there is none left."""
         self._left -= size
         if self._left < 0:
             raise JournalError(
-                f"{self._path}: it holds more than can be read at once ({_MOST_BYTES >> 20} MB). Name one of "
-                "its segments; an exported file is a tar archive of them: tar --extract --file."
+                f"{self._path}: it unpacks to more than a journal of its size can hold. Remove it, or name "
+                "one of its segments; an exported file is a tar archive of them."
             )
 
 
@@ -249,6 +254,7 @@ def _add(parts: dict[str, _Part], data: bytes, room: _Room) -> None:
     header = header_of(data)
     if header is None:
         return
+    room.add_segment(len(data))
     if header["run"] not in parts:
         room.take(_OF_JSON * len(json.dumps(header)))
     part = parts.setdefault(header["run"], _Part(header))

@@ -39,14 +39,16 @@ def inspect_network(path: Path, skeleton_joints: Sequence[str]) -> tuple[list[st
         # As bytes: a network cannot name other files then, whose contents would be read as weights.
         network = content(path, LARGEST_FILE)
         session = onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
+        facts: dict[str, str] = session.get_modelmeta().custom_metadata_map  # its words need be no text
+        inputs = {port.name: port for port in session.get_inputs()}
+        outputs = {port.name: port for port in session.get_outputs()}
     except Exception as error:  # onnxruntime has its own exception for each way to be broken
-        why = str(error).splitlines()[0][:120]
+        why = (str(error) or type(error).__name__).splitlines()[0][:120]
         return [], [(f"This cannot be read as a network ({why}).", _COPY_AGAIN)]
-    facts: dict[str, str] = session.get_modelmeta().custom_metadata_map
     joints = moving_joints(facts)
     complaints = list(_fact_complaints(facts, joints, skeleton_joints))
-    complaints += _port_complaints("input", session.get_inputs(), _inputs(len(joints)))
-    complaints += _port_complaints("output", session.get_outputs(), _outputs(len(joints)))
+    complaints += _port_complaints("input", inputs, _inputs(len(joints)))
+    complaints += _port_complaints("output", outputs, _outputs(len(joints)))
     if not complaints:
         complaints += _run_complaints(session, rest_pose(facts, len(joints)))
     return joints, complaints
@@ -109,10 +111,9 @@ def _fact_complaints(
 
 
 def _port_complaints(
-    kind: str, found: Sequence[Any], wanted: dict[str, tuple[str, list[int]]]
+    kind: str, by_name: dict[str, Any], wanted: dict[str, tuple[str, list[int]]]
 ) -> Iterator[Complaint]:
     """Inputs or outputs that are missing, unknown, of another type or another shape."""
-    by_name = {port.name: port for port in found}
     for name in by_name.keys() - wanted.keys() if kind == "input" else ():
         yield f"It has an {kind} '{name}' that the box does not know.", _EXPORT_AGAIN
     for name, (dtype, shape) in wanted.items():

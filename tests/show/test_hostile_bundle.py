@@ -135,6 +135,15 @@ def test_a_rest_pose_that_is_none_is_refused(bundle: Path, rest: str) -> None:
         Puppet(bundle / "puppet.onnx", skeleton())
 
 
+@pytest.mark.parametrize("word", [b"[[1.0", b"targets", b"bunraku.joints", b"poses"])
+def test_a_network_whose_words_are_no_text_is_refused(bundle: Path, word: bytes) -> None:
+    content = (bundle / "puppet.onnx").read_bytes()
+    (bundle / "puppet.onnx").write_bytes(content.replace(word, b"\xd7" + word[1:]))
+    assert about(bundle, "puppet.onnx")
+    with pytest.raises(PuppetError):
+        Puppet(bundle / "puppet.onnx", skeleton())
+
+
 def test_a_network_of_very_many_joints_is_refused_in_few_words(bundle: Path) -> None:
     names = ",".join(f"joint {number}" for number in range(100_000))
     save_network(bundle / "puppet.onnx", facts={"bunraku.joints": names})
