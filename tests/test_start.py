@@ -103,5 +103,5 @@ def test_playing_loads_no_parser_no_simulation_and_no_other_process_s_parts() ->
         "torch",
         "appliance.cli.emulation",
     }
-    needless |= {"appliance.cli", "appliance.cli.companions", "appliance.projector", "subprocess"}
+    needless |= {"appliance.cli.app", "appliance.cli.companions", "appliance.projector", "subprocess"}
     assert not loaded & needless

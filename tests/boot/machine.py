@@ -23,6 +23,7 @@ NSPAWN = Path(__file__).parent / "nspawn.sh"
 PATIENCE_S = 60.0  # for a machine that is busy with other things; nothing here waits without a reason
 _PDEATHSIG = 1
 _ENDS_WITHIN_S = 60.0
+_ENVIRONMENT = {"PATH": "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/root"}
 _numbers = itertools.count()
 
 Found = TypeVar("Found")
@@ -87,9 +88,9 @@ class Machine:
             raise
 
     def run(self, *words: str, check: bool = True, patience_s: float = PATIENCE_S) -> str:
-        """What a command says that runs inside, as root."""
+        """What a command says that runs inside, as root, with nothing of this process's environment."""
         entered = ["nsenter", "--target", str(self.pid1), "--all", *words]
-        done = subprocess.run(entered, capture_output=True, text=True, timeout=patience_s)
+        done = subprocess.run(entered, capture_output=True, text=True, timeout=patience_s, env=_ENVIRONMENT)
         if check and done.returncode != 0:
             raise AssertionError(
                 f"{' '.join(words)}: {done.returncode}\n{done.stdout}{done.stderr}\n{self.log()}"

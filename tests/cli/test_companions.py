@@ -155,7 +155,7 @@ def test_one_that_does_not_end_is_killed(diary: Diary, monkeypatch: pytest.Monke
 PLAYER = """
 import sys, time
 from appliance.cli.companions import Companion, Companions
-child = "from appliance.box.parent_death import hold_lifeline; hold_lifeline(); "
+child = "from appliance.box.parent_death import end_with_parent; end_with_parent(); "
 child += "import os, sys, time; open(sys.argv[1], 'a').write(f'{os.getpid()}\\\\n'); time.sleep(60)"
 command = (sys.executable, "-c", child, sys.argv[1])
 with Companions([Companion("The child", command, "")], print, lambda: True):
@@ -172,7 +172,7 @@ def test_a_killed_player_leaves_no_orphan(diary: Diary) -> None:
 
 
 def test_a_child_whose_player_is_gone_already_does_not_begin(diary: Diary) -> None:
-    script = "from appliance.box.parent_death import hold_lifeline; hold_lifeline(); " + NOTE
+    script = "from appliance.box.parent_death import end_with_parent; end_with_parent(); " + NOTE
     done = subprocess.run(
         [sys.executable, "-c", script, str(diary.path)],
         env={**os.environ, "BUNRAKU_PARENT": "0"},

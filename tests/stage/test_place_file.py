@@ -229,13 +229,13 @@ def test_a_disk_that_fails_in_the_middle(tmp_path: Path, carried: Carried) -> No
 WRITER = """
 import sys
 from pathlib import Path
-from appliance.box.checkpoint import Place
+from appliance.box.checkpoint import Checkpoint
 from appliance.box.checkpoint_file import CheckpointFile
 file, tick = CheckpointFile(Path(sys.argv[1])), int(sys.argv[2])
 while True:
     tick += 1
     try:
-        file.write(Place("A show", "main", 1.5, (0.0, 30.0), tick=tick))
+        file.write(Checkpoint("A show", "main", 1.5, (0.0, 30.0), tick=tick))
     except OSError:
         break
     print(tick, flush=True)
