@@ -15,7 +15,7 @@ from appliance.cli.check import check_show
 from appliance.cli.run_with_timeout import within
 from appliance.show.bundle import CHECKSUMS, write_checksums
 from appliance.stage.stage_error import StageError
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 
 DEADLINE_S = 120.0  # far more than the check's own limit, on a busy machine
 SOUND = b"It is sound."

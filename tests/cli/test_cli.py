@@ -17,8 +17,8 @@ from appliance.pose.bvh import write_bvh
 from appliance.recorder.export import export
 from appliance.sensor.keys import create_keys
 from appliance.show.bundle import write_checksums
-from tests.stage.bundles import swaying_phrase, write_show
-from tests.stage.night import Night
+from tests.bundles import swaying_phrase, write_show
+from tests.recorder.night import Night
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:

@@ -13,8 +13,8 @@ import pytest
 
 from appliance.cli import companions
 from appliance.cli.companions import UNAVAILABLE, Companion, Companions
+from tests.box import disks
 from tests.show_control.doubles import until
-from tests.stage import disks
 
 NOTE = "import os, sys, time; open(sys.argv[1], 'a').write(f'{os.getpid()}\\n'); "
 

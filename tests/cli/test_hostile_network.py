@@ -17,7 +17,7 @@ from appliance.cli.app import main
 from appliance.cli.check import check_show, pack_show
 from appliance.show.bundle import write_checksums
 from appliance.stage.stage_error import StageError
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 
 PATIENCE_S = 120.0
 

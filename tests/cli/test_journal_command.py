@@ -12,8 +12,8 @@ from appliance.cli import journal
 from appliance.cli.app import main
 from appliance.recorder.reading import read_journal
 from appliance.release import choice
-from tests.stage.bundles import write_show
-from tests.stage.night import Night
+from tests.bundles import write_show
+from tests.recorder.night import Night
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.show_control.supervisor import Supervisor
+from tests.box.supervisor import Supervisor
 
 PATIENCE_S = 60.0  # a machine that does ten other things starts a process slowly
 NO_DISPLAY = {"SDL_VIDEODRIVER": "none-such"}

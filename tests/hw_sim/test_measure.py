@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 
 
 def measure(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -10,7 +10,7 @@ import yaml
 from appliance.projector.alignment import Alignment, AlignmentFile, alignment_folder, file_name
 from appliance.show.box import BoxConfig
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
-from tests.stage import disks
+from tests.box import disks
 
 FILE_NAME = "projector.alignment"
 PINNED = Alignment(((0.1, 0.05), (0.9, 0.1), (1.0, 1.0), (1 / 3, 0.9)), True, 0.8)

@@ -18,8 +18,8 @@ from appliance.projector.controls import Controls
 from appliance.projector.loop import Projector
 from appliance.show.look import STYLES
 from appliance.show.projector import ProjectorConfig
+from tests.bundles import write_show
 from tests.projector.stage_double import SIZE, StageDouble, TellingPainter, pixels
-from tests.stage.bundles import write_show
 
 PERIOD_S = 1 / 60
 TICK_S = 0.02

@@ -15,8 +15,8 @@ from appliance.projector.strip import COLUMNS, PICTURE, ROWS, strip
 from appliance.show.look import looks_by_name
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError
-from tests.stage.bundles import FIGURE, swaying_phrase, write_show
-from tests.stage.night import Night
+from tests.bundles import FIGURE, swaying_phrase, write_show
+from tests.recorder.night import Night
 
 WIDTH, HEIGHT = PICTURE
 LARGEST_BYTES = 600_000

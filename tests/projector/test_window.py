@@ -27,8 +27,8 @@ from appliance.projector.sdl import sdl2
 from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
+from tests.bundles import write_show
 from tests.projector.stage_double import StageDouble
-from tests.stage.bundles import write_show
 
 PICTURE = """
 import os, sys

@@ -25,7 +25,7 @@ from appliance.show_control.packet import datagram
 from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
 from appliance.show_control.settings import Settings
-from tests.stage.bundles import FIGURE
+from tests.bundles import FIGURE
 
 HOST = "127.0.0.1"
 PATIENCE_S = 20.0

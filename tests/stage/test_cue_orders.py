@@ -24,7 +24,7 @@ from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
-from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+from tests.bundles import FIGURE, swaying_phrase, write_show
 
 CUES = [
     {"name": "start", "phrase": "main", "iterations": [4, 3], "hands": ["lShldr", "Chest"]},

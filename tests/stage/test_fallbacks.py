@@ -24,7 +24,7 @@ from appliance.stage.fallback import OF_THE_STAGE, StageFallbacks
 from appliance.stage.health import Health
 from appliance.stage.resume import Resumption
 from appliance.stage.stage_parts import StageParts, assemble
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 
 FITS = Admission(3, 2, 3, 2, 64, 0.1, 0.2, 0.3, 10.0)
 DOES_NOT_FIT = Admission(30, 20, 9, 6, 9, 1.0, 20.0, 30.0, 10.0)

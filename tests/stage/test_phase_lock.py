@@ -10,7 +10,7 @@ import pytest
 
 from appliance.box.clock import TICK_S, TickClock
 from appliance.stage.phase_lock import PhaseLock
-from tests.stage.fakes import FakeTime
+from tests.fake_clock import FakeTime
 
 
 @dataclass

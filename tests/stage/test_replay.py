@@ -19,8 +19,8 @@ from appliance.recorder.record import NOT_FINITE, RESENT
 from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
-from tests.stage.bundles import swaying_phrase, write_show
-from tests.stage.night import Night, reading
+from tests.bundles import swaying_phrase, write_show
+from tests.recorder.night import Night, reading
 
 HANDS: list[dict[str, object]] = [
     {"sensor": "left-wrist", "joint": "lShldr"},

@@ -16,8 +16,8 @@ from appliance.show_control.orders import Order
 from appliance.stage import run
 from appliance.stage.fallback import SENSOR_SILENT
 from appliance.stage.run import Stage
-from tests.stage.bundles import write_show
-from tests.stage.fakes import FakeTime
+from tests.bundles import write_show
+from tests.fake_clock import FakeTime
 
 RAISED = (0.8, 0.6, 0.0, 0.0)
 

@@ -20,7 +20,7 @@ from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.tick import Tick
 from hw_sim.osc_receiver import OscReceiver
-from tests.stage.bundles import FIGURE, write_show
+from tests.bundles import FIGURE, write_show
 
 SHOULDER, CHEST = FIGURE.index("lShldr"), FIGURE.index("Chest")
 TURNED = (0.8, 0.6, 0.0, 0.0)  # about the sensor's x, which points to the front

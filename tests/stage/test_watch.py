@@ -13,7 +13,7 @@ from appliance.show.show import load_show
 from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.watch import Watch
 from hw_sim.osc_receiver import OscReceiver
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from appliance.cli.doctor.host_view import HostView, RunningStage
 from appliance.cli.doctor.sample import Sample, sample
 from appliance.release.choice import Aside, Choice
 from appliance.show.box import BoxConfig
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 from tests.system.box import PATIENCE_S, playing
 
 DOCTOR = (sys.executable, "-m", "appliance.cli", "doctor")

@@ -17,7 +17,7 @@ from appliance.lights.fallback import DMX_AWAY
 from appliance.lights.fallback import STAGE_UNSEEN as LIGHTS_SAFE
 from appliance.projector.fallback import STAGE_UNSEEN as PICTURE_BLACK
 from hw_sim.dmx.usb_pro import UsbProWidget
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 from tests.system.box import PATIENCE_S, Box, playing
 from tests.system.lit import RIG, LightsProcess
 from tests.system.test_projector import projecting

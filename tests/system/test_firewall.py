@@ -11,7 +11,7 @@ import pytest
 
 from appliance.cli.firewall import rules
 from appliance.show.box import load_box
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 from tests.system.box import playing
 from tests.system.processes import children
 

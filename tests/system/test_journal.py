@@ -18,8 +18,8 @@ from appliance.pose.bvh import write_bvh
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import read_journal
 from appliance.recorder.segments import segment_paths
+from tests.bundles import swaying_phrase, write_show
 from tests.show_control.doubles import Asker
-from tests.stage.bundles import swaying_phrase, write_show
 from tests.system.box import PATIENCE_S, Box, playing
 from tests.system.processes import children_that_say
 from tests.system.wearables import Wearables

@@ -28,9 +28,9 @@ from appliance.sensor.memory_block import FILE_NAME, MemoryWriter
 from appliance.show.box import load_box
 from appliance.stage.recorder import FILE as JOURNAL_FILE
 from appliance.stage.recorder import FORMAT, KIND
-from tests.stage import disks
-from tests.stage.bundles import write_show
-from tests.stage.night import Night
+from tests.box import disks
+from tests.bundles import write_show
+from tests.recorder.night import Night
 from tests.system.box import PATIENCE_S, started
 from tests.system.processes import children
 

@@ -16,7 +16,7 @@ from pythonosc.udp_client import SimpleUDPClient
 
 from hw_sim.dmx.usb_pro import UsbProWidget
 from hw_sim.peers import HOST
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 from tests.system.box import PATIENCE_S, PLAY, playing
 from tests.system.lit import DIMMER, PAN, PAR, RIG, SAFE, LightsProcess, node
 from tests.system.processes import children_that_say

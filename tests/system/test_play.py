@@ -20,7 +20,7 @@ from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import read_journal
 from appliance.recorder.record import LATE, NOT_FINITE
 from hw_sim.peers import HOST, free_ports
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 from tests.system.box import PATIENCE_S, PLAY, is_free, playing
 from tests.system.wearables import Wearables
 

@@ -22,7 +22,7 @@ from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
 from appliance.show.show import load_show
 from appliance.stage.phrase_cache import FOLDER, SUFFIX
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 
 PATIENCE_S = 120.0
 PREFLIGHT = (sys.executable, "-m", "appliance.cli.preflight")

@@ -15,8 +15,8 @@ from appliance.outputs.shared_frame import FrameWriter
 from appliance.release.choice import CHOSEN
 from appliance.release.promote_show import Proof
 from appliance.release.start_attempts import pair_to_dance
+from tests.bundles import FIGURE
 from tests.show_control.doubles import facts
-from tests.stage.bundles import FIGURE
 from tests.system.test_preflight import Machine, late
 
 STARTS = 4  # the fourth one puts a new show aside that never danced

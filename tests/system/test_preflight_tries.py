@@ -16,8 +16,8 @@ from appliance.outputs.shared_frame import FrameWriter
 from appliance.release.choice import CHOSEN, Choice, Pair, alone_in
 from appliance.release.promote_show import Proof
 from appliance.release.start_attempts import ANEW, TRIES, ended_well, pair_to_dance
+from tests.bundles import FIGURE, write_show
 from tests.show_control.doubles import facts
-from tests.stage.bundles import FIGURE, write_show
 
 PATIENCE_S = 60.0
 NEW, BEFORE = "new+", "before+"

@@ -19,8 +19,8 @@ from PIL import Image
 
 from appliance.projector.projector_error import NO_DISPLAY, NO_PLACE
 from appliance.show.bundle import default_show_path
+from tests.bundles import write_show
 from tests.show_control.doubles import Asker
-from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, Box, playing
 
 PROJECT = (sys.executable, "-m", "appliance.cli", "project")

@@ -21,7 +21,7 @@ from appliance.sensor.keys import SensorKey, load_keys
 from appliance.sensor.link import open_link
 from appliance.sensor.provisioning.wearable_console import WearableConsole
 from hw_sim.firmware_library import State
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 from tests.system.bench import NETWORK, PASSWORD, Bench
 from tests.system.box import PATIENCE_S, Box, playing
 from tests.system.snoop import Snoop

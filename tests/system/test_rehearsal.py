@@ -14,7 +14,7 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.recorder.reading import read_journal
 from appliance.sensor.memory_block import FILE_NAME, MemoryWriter
 from appliance.sensor.memory_text import memory_text, remembered
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 from tests.system.box import Box, await_end_of_keeper, playing
 
 VENUE = {"realtime": {"enabled": False}, "state": "state", "journal": {"folder": "journal", "minutes": 5}}

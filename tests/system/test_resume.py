@@ -15,7 +15,7 @@ import pytest
 
 from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader
 from appliance.box.checkpoint_file import CheckpointFile, read_checkpoint
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
 
 PLAY = (sys.executable, "-m", "appliance.start", "play")

@@ -18,8 +18,8 @@ import pytest
 from appliance.dancer.puppeteers import HOLD_S, TAKE_S
 from appliance.recorder.reading import read_journal
 from hw_sim.emulator import Sent
+from tests.bundles import FIGURE, MOVING, write_show
 from tests.hw_sim.null_modem import NullModem
-from tests.stage.bundles import FIGURE, MOVING, write_show
 from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
 from tests.system.wearables import Wearables
 

@@ -19,7 +19,7 @@ from appliance.outputs.frame_reader import FrameReader
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports
 from hw_sim.posistagenet import PsnReceiver
-from tests.stage.bundles import FIGURE, write_show
+from tests.bundles import FIGURE, write_show
 from tests.system.box import PATIENCE_S, PLAY, playing
 
 pytestmark = pytest.mark.realtime

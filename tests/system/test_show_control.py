@@ -24,8 +24,8 @@ from appliance.box.show_state import ShowState, ShowStateReader
 from appliance.outputs.frame_reader import FrameReader
 from appliance.recorder.reading import read_journal
 from hw_sim.peers import HOST, free_ports
+from tests.bundles import write_show
 from tests.show_control.doubles import Asker, until
-from tests.stage.bundles import write_show
 from tests.system.box import PATIENCE_S, PLAY, Box, is_free, playing
 from tests.system.processes import children_that_say
 

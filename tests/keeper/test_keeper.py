@@ -22,9 +22,9 @@ from appliance.recorder.reading import read_journal
 from appliance.recorder.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
 from appliance.show.box import BoxConfig
 from appliance.stage.recorder import FILE, FORMAT, KIND
-from tests.stage.bundles import write_show
-from tests.stage.fakes import FakeTime
-from tests.stage.night import Night
+from tests.bundles import write_show
+from tests.fake_clock import FakeTime
+from tests.recorder.night import Night
 
 DISK_BYTES = 8 << 20
 PLACE = Checkpoint("A show", "main", 1.5, (0.0, 30.0))

@@ -24,8 +24,8 @@ from appliance.release.choice import CHOSEN, Aside, Choice, Pair
 from appliance.release.promote_show import Proof
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import Status
+from tests.bundles import FIGURE
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble, facts, until
-from tests.stage.bundles import FIGURE
 
 DMX = Fallback("dmx-away", "A wire is away.")
 

@@ -23,8 +23,8 @@ from hw_sim.firmware import FirmwareSensor, firmware_maker
 from hw_sim.motions import IDENTITY, Motion, Quaternion, about, multiply
 from hw_sim.network import PERFECT, VenueNetwork
 from hw_sim.wearer import Wearer
+from tests.bundles import write_show
 from tests.hw_sim.joined import TICK_S, Show
-from tests.stage.bundles import write_show
 
 KEY = SensorKey("left-wrist", 0x1A2B3C4D, bytes(range(16)))
 HANGING: Quaternion = (0.766, 0.0, 0.0, -0.643)

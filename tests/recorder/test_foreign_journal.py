@@ -30,8 +30,8 @@ from appliance.recorder.segments import segment_paths
 from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
-from tests.stage.bundles import write_show
-from tests.stage.night import Night
+from tests.bundles import write_show
+from tests.recorder.night import Night
 
 PATIENCE_S = 300.0
 

@@ -21,8 +21,8 @@ from appliance.box.checkpoint_file import (
     CheckpointFile,
     read_checkpoint,
 )
+from tests.box import disks
 from tests.deploy.cut import cut_off
-from tests.stage import disks
 
 HEAD_BYTES = 24  # of a slot
 PLACE = Checkpoint("A show", "main", 1.5, (0.0, 30.0), let_go=("lShldr",), boot="here")

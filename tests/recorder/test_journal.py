@@ -16,8 +16,8 @@ from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import read_journal
 from appliance.recorder.segments import segment_paths
 from appliance.stage.recorder import EVENT_BYTES, FILE, LOG_SLOTS
-from tests.stage.bundles import FIGURE, WORN, write_show
-from tests.stage.night import Night, reading
+from tests.bundles import FIGURE, WORN, write_show
+from tests.recorder.night import Night, reading
 
 TURNED = (0.8, 0.6, 0.0, 0.0)
 

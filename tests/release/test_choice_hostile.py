@@ -13,7 +13,7 @@ from appliance.release.arrivals import look
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair, alone_in
 from appliance.release.choosing import choose, remembered
 from appliance.release.shelf import Shelf, UnreadableError
-from tests.show.test_choice import BROKEN, Venue, dancing
+from tests.release.test_choice import BROKEN, Venue, dancing
 
 NO_TEXT = os.fsdecode(b"\xff\xfe.bvh")
 

@@ -30,7 +30,7 @@ from appliance.show.config_error import ConfigError
 from appliance.show.projector import ProjectorConfig
 from appliance.stage.phrase_cache import FOLDER, LARGEST, SUFFIX, PhraseCache, prepare
 from appliance.stage.sensor_memory import SensorMemory
-from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+from tests.bundles import FIGURE, swaying_phrase, write_show
 
 PATIENCE_S = 120.0
 PEAK = 400 << 20  # bytes: the libraries have half of it

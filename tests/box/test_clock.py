@@ -7,7 +7,7 @@ import random
 import pytest
 
 from appliance.box.clock import TICK_S, TickClock
-from tests.stage.fakes import FakeTime
+from tests.fake_clock import FakeTime
 
 
 def clock_on(time: FakeTime) -> TickClock:

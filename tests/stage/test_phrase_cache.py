@@ -13,7 +13,7 @@ from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.skeleton import Skeleton
 from appliance.stage import phrase_cache as prepared
 from appliance.stage.phrase_cache import FOLDER, SUFFIX, PhraseCache, prepare
-from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+from tests.bundles import FIGURE, swaying_phrase, write_show
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from appliance.box.notify import Notifier
-from tests.show_control.supervisor import Supervisor
+from tests.box.supervisor import Supervisor
 
 
 @pytest.fixture(params=["path", "abstract"])

@@ -18,8 +18,8 @@ from appliance.show.show import load_show
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import StageParts, assemble
+from tests.bundles import write_show
 from tests.sensor.peers import Box, Wearable
-from tests.stage.bundles import write_show
 
 SENSOR = "left-wrist"
 HANGING = (0.8, 0.0, 0.0, -0.6)

@@ -1,4 +1,4 @@
-"""Records the golden journal anew (`python -m tests.stage.make_golden_journal`): a night with faults.
+"""Records the golden journal anew (`python -m tests.recorder.make_golden_journal`): a night with faults.
 
 A sensor falls silent while it holds a joint, and comes back from another power-on; the network fails for
 half a second; the machine is busy and ticks come late; then the stage is killed and started again.
@@ -11,8 +11,8 @@ import tempfile
 from pathlib import Path
 
 from appliance.recorder.export import export
-from tests.stage.bundles import write_show
-from tests.stage.night import Night, reading
+from tests.bundles import write_show
+from tests.recorder.night import Night, reading
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "fault.bunraku"
 STILL, RAISED, LOWERED = (1.0, 0.0, 0.0, 0.0), (0.8, 0.6, 0.0, 0.0), (0.8, -0.6, 0.0, 0.0)

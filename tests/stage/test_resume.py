@@ -26,7 +26,7 @@ from appliance.stage.iterations import Iterations
 from appliance.stage.resume import TRIES, Resumption
 from appliance.stage.run import Stage
 from appliance.stage.stage_parts import StageParts, assemble
-from tests.stage.bundles import FIGURE, swaying_phrase, write_show
+from tests.bundles import FIGURE, swaying_phrase, write_show
 
 CUES = [{"name": "storm", "phrase": "walk", "iterations": [6, 5], "hands": ["Chest"], "fade_s": 0.2}]
 HANDS: list[dict[str, object]] = [

@@ -14,8 +14,8 @@ from appliance.recorder.record import NOT_FINITE, RESENT
 from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
-from tests.stage.bundles import FIGURE
-from tests.stage.make_golden_journal import (
+from tests.bundles import FIGURE
+from tests.recorder.make_golden_journal import (
     AFTER,
     BEFORE,
     FAILED,

@@ -15,7 +15,7 @@ from appliance.stage import admission_cache as module
 from appliance.stage.admission import Admission
 from appliance.stage.admission_cache import FILE, admitted
 from appliance.stage.stage_parts import StageParts, assemble
-from tests.stage.bundles import write_show
+from tests.bundles import write_show
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from appliance.stage.admission import PACED, admit
-from tests.stage.fakes import FakeTime
+from tests.fake_clock import FakeTime
 
 
 class Puppet:
