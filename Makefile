@@ -16,11 +16,11 @@ DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump 
     doctest-dev:/usr/include/doctest/doctest.h cppcheck:cppcheck clang-14:clang++-14 \
     libclang-rt-14-dev:/usr/lib/llvm-14/lib/clang/*/lib/linux/libclang_rt.fuzzer-* \
     gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \
-    qemu-system-arm:qemu-system-arm systemd:systemd-analyze shellcheck:shellcheck
+    qemu-system-arm:qemu-system-arm systemd:systemd-analyze shellcheck:shellcheck openssh-client:ssh-keygen
 
 # A box that boots in a container.
 DEBIAN_FOR_BOOT := mmdebstrap:mmdebstrap systemd-container:systemd-nspawn squashfs-tools:mksquashfs \
-    e2fsprogs:mke2fs
+    e2fsprogs:mke2fs openssh-client:ssh-keygen
 # Its disk image, and a whole machine in software that starts it.
 DEBIAN_FOR_IMAGE := $(DEBIAN_FOR_BOOT) mtools:mcopy dosfstools:mkfs.vfat fdisk:sfdisk grub-common:grub-mkimage \
     grub-pc-bin:/usr/lib/grub/i386-pc/boot.img grub-efi-amd64-bin:/usr/lib/grub/x86_64-efi/linux.mod
@@ -29,6 +29,8 @@ DEBIAN_FOR_SOAK := $(DEBIAN_FOR_GL) stress-ng:stress-ng rt-tests:cyclictest
 
 FUZZ_SECONDS ?= 30
 MINUTES ?= 60
+# The key that signs releases, and the one after it: docs/releases.md.
+SIGNING = $(if $(KEY),--key '$(KEY)') $(if $(NEXT_KEY),--next-key '$(NEXT_KEY)')
 
 .DEFAULT_GOAL := help
 .PHONY: help run release studio firmware test firmware-test fuzz-corpus lint bench lock clean soak boot-figures \
@@ -83,11 +85,11 @@ endef
 boot-figures: $(VENV)/.ready-to-test debian-for-boot ## boot the box, harm it, cut its power; times in out/boot (root)
 	@BUNRAKU_FIGURES=out/boot $(BIN)/pytest tests/boot -rs $(TEST_ARGS)
 
-image: debian-for-image ## the box's disk image, out/bunraku-amd64.img (ARCH=arm64: a Pi's root as a tar; root)
+image: debian-for-image ## the box's disk image, out/bunraku-amd64.img (ARCH=arm64: a Pi's root as a tar; KEY=FILE; root)
 ifeq ($(ARCH),arm64)
-	@deploy/image/mkroot.sh --arch arm64 out/bunraku-arm64.tar
+	@deploy/image/mkroot.sh --arch arm64 $(SIGNING) out/bunraku-arm64.tar
 else
-	@rm -rf build/image && deploy/image/mkroot.sh build/image
+	@rm -rf build/image && deploy/image/mkroot.sh $(SIGNING) build/image
 	@deploy/image/mkimage.sh build/image out/bunraku-amd64.img
 endif
 
@@ -159,8 +161,8 @@ if [ -n "$$missing" ]; then \
 fi
 endef
 
-release: ## everything for a box without a network, on a stick: out/bunraku-VERSION-ARCH (ARCH=arm64: Pi)
-	@deploy/release/make-release --arch $(or $(ARCH),amd64)
+release: ## everything for a box, on a stick: out/bunraku-VERSION-ARCH (ARCH=arm64: Pi; KEY=FILE signs it)
+	@deploy/release/make-release --arch $(or $(ARCH),amd64) $(SIGNING)
 
 lock: | $(VENV)/bin/python ## choose the newest versions that pyproject.toml allows and pin them
 	@rm -rf build && $(BIN)/python -m venv build/lock

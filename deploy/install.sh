@@ -4,7 +4,8 @@ set -euo pipefail
 
 usage() {
     cat <<'HELP'
-Usage: install.sh [FOLDER]         install the release in FOLDER (left out: where this script lies) and start it
+Usage: install.sh [FOLDER]         install the release in FOLDER (left out: where this script lies, else the
+                                   stick's bunraku/release) and start it
        install.sh --list           the releases on this box; * is the one that dances
        install.sh --rollback       back to the release before
        install.sh --use VERSION    to a release that --list names
@@ -13,11 +14,19 @@ Usage: install.sh [FOLDER]         install the release in FOLDER (left out: wher
 
   --root DIR             work on the root file system in DIR (an image) instead of this machine's
   --until-power-off      keep the release in memory: on a box made from the image, for a trial
+  --key FINGERPRINT      take a release signed with this key (SHA256:...) and no other, whatever this box knows
+  --unsigned             do not ask who made the release. It gives up all protection against a foreign stick:
+                         whoever wrote it has this box. For releases that you have made yourself.
   --help                 this text
 
-For Debian 13 and Raspberry Pi OS (amd64, arm64), as root, with the stick that `make release` is copied to:
+For Debian 13 and Raspberry Pi OS (amd64, arm64), as root, with the stick that `make release` is copied to. The
+first time, on a machine that has no bunraku, with the script on the stick:
   sudo bash /media/bunraku/bunraku/release/install.sh
-On a box that has a release already, the same script is the command bunraku-install.
+On a box that has a release already, with the box's own, for the one on a foreign stick could do anything:
+  sudo bunraku-install
+
+A release is taken when it is signed with a key that the release on this box names. A machine without a release knows
+no key: it takes any signed release, says with which key, and keeps to the keys which that one names.
 
 Nothing is switched before the new release lies whole on the disk and has danced for a moment where nobody
 sees it. If it does not start then, the box goes back to the release before. Whenever the power fails, the
@@ -44,12 +53,15 @@ STAYS_S=3
 DANCES_WITHIN_S=120
 DANCES_FOR_S=5
 POWER_ONS_TRIED=5
+signed_as=bunraku-release # a signature that the same key made for something else counts for nothing
 once=/run/bunraku-release # bunraku-release.service looks for it
 home=/opt/bunraku
 data=/data/bunraku
+stick=/media/bunraku/bunraku/release
 units=usr/lib/systemd/system
 users=system/usr/lib/sysusers.d/bunraku.conf
 root='' action=install source='' chosen='' purge=no fleeting=no part='' fresh=no
+head='' key='' unsigned=no
 
 read_options() {
     while [ $# -gt 0 ]; do
@@ -69,6 +81,13 @@ read_options() {
         --watch) action=watch chosen=${2:?} && shift ;;      # what that starts
         --purge) purge=yes ;;
         --until-power-off) fleeting=yes ;;
+        --key)
+            [[ ${2:-} =~ ^SHA256:[0-9A-Za-z+/]{43}$ ]] ||
+                fail "--key needs the key's fingerprint, SHA256: and 43 characters. Ask the release's maker for it."
+            key=$2
+            shift
+            ;;
+        --unsigned) unsigned=yes ;;
         -h | --help) usage && exit 0 ;;
         -*) fail "unknown option '$1'. See install.sh --help." ;;
         *) source=$1 ;;
@@ -77,6 +96,7 @@ read_options() {
     done
     [ "$root" != / ] || root=''
     [ -n "$source" ] || source=$(dirname "$0")
+    [ -d "$source/wheels" ] || [ "$source" != "$(dirname "$0")" ] || source=$stick
     releases=$root$home/releases kept=$root/data/bunraku-releases store=$releases
     if ! forgets || [ $fleeting = yes ]; then return; fi
     store=$kept
@@ -135,30 +155,72 @@ begin() {
     mkdir -p "$releases"
     exec 9<"$releases"
     flock --nonblock 9 || fail "another installation is running on this box. Wait for its end."
-    trap '[ -z "$part" ] || rm -rf "$part"' EXIT
+    trap '[ -z "$part" ] || rm -rf "$part"; [ -z "$head" ] || rm -rf "$head"' EXIT
     umask 022
     link_kept
 }
 
 # ---- before anything is written
 
+# Nothing of a release is believed before its signature has been checked. What a stick says may change between two
+# looks, so that a copy is looked at.
 check_source() {
     [[ -f $source/release && -f $source/SHA256SUMS ]] ||
         fail "no release in $source. Name the folder that 'make release' wrote; on a stick it is bunraku/release."
-    version=$(fact "$source" version)
+    head=$(mktemp -d)
+    cp "$source/release" "$source/SHA256SUMS" "$head/"
+    [ ! -f "$source/SHA256SUMS.sig" ] || cp "$source/SHA256SUMS.sig" "$head/"
+    check_signature
+    (cd "$head" && grep '  \./release$' SHA256SUMS | sha256sum --check --strict --status) ||
+        fail "the file 'release' in $source is damaged. Nothing was changed. Copy the release to the stick anew."
+    version=$(fact "$head" version)
     [[ $version =~ ^[0-9A-Za-z.+]+$ ]] || fail "the release in $source has no version. Copy it to the stick anew."
+}
+
+signature() { ssh-keygen -Y "$@" -n "$signed_as" -s "$head/SHA256SUMS.sig" <"$head/SHA256SUMS" 2>/dev/null; }
+
+# By the keys that the release on this box names; a box that forgets its root has them with its release.
+check_signature() {
+    local with trusted=$root$home/current/keys
+    if [ "$unsigned" = yes ]; then
+        say "--unsigned: who made this release is not checked. Whoever wrote the stick will have this box."
+        return
+    fi
+    [ -f "$head/SHA256SUMS.sig" ] ||
+        fail "the release in $source is not signed: anybody could have made it. Nothing was changed." \
+            "Ask its maker for a signed one; one that you have made yourself is taken with --unsigned."
+    command -v ssh-keygen >/dev/null ||
+        fail "ssh-keygen is missing, which checks who made a release. Nothing was changed." \
+            "On Debian: apt-get install openssh-client"
+    with=$(signature check-novalidate | grep -o 'SHA256:[0-9A-Za-z+/]*$') ||
+        fail "the release in $source is not what its maker signed. Nothing was changed. Copy it to the stick anew."
+    if [ -n "$key" ]; then
+        [ "$with" = "$key" ] ||
+            fail "the release in $source is signed with the key $with, not with $key. Nothing was changed."
+    elif [ -f "$trusted" ]; then
+        signature verify -f "$trusted" -I release >/dev/null ||
+            fail "the release in $source is signed with the key $with, which this box does not know." \
+                "Nothing was changed. Does its maker have a new key? Ask, by another way than this stick, and" \
+                "compare; then: --key $with"
+    else
+        say "this box knows no key yet. This release is signed with the key $with: compare that with what its maker" \
+            "says. From now on the box takes releases by the keys that this one names."
+    fi
+    grep -q '  \./keys$' "$head/SHA256SUMS" ||
+        fail "the release in $source names no keys for the releases after it. Nothing was changed." \
+            "Ask its maker to sign it with deploy/release/sign."
 }
 
 check_machine() {
     local python arch have needs
     arch=$(in_root dpkg --print-architecture) || fail "this is neither Debian nor Raspberry Pi OS."
-    [ "$arch" = "$(fact "$source" architecture)" ] ||
-        fail "this box is $arch, the release is for $(fact "$source" architecture). Take the release for $arch."
-    python=$(fact "$source" python)
+    [ "$arch" = "$(fact "$head" architecture)" ] ||
+        fail "this box is $arch, the release is for $(fact "$head" architecture). Take the release for $arch."
+    python=$(fact "$head" python)
     in_root "/usr/bin/python$python" -c 'import venv' 2>/dev/null ||
         fail "Python $python is missing. Bunraku is made for Debian 13; there: apt-get install libpython3-stdlib"
     [[ $store = "$releases" ]] || check_data
-    needs=$(fact "$source" needs-mb)
+    needs=$(fact "$head" needs-mb)
     have=$(df --output=avail -m "$store" | tail -n 1 | tr -d ' ')
     [ "$have" -ge "$needs" ] || fail "$have MB are free in $store, $needs MB are needed." \
         "Nothing was changed. Make room, or use a larger card."
@@ -180,10 +242,16 @@ belongs_to_root() { [ "$(stat -c %u:%a "$@" | sort -u)" = 0:755 ]; }
 # ---- a release of its own beside the others
 
 copy_and_verify() {
-    local file
-    mkdir -p "$part/source"
-    install -m 644 "$source/SHA256SUMS" "$source/release" "$part/source/"
+    local file from
+    from=$(realpath "$source")
+    mkdir -p "$part"
+    mkdir -m 700 "$part/source" # root may read files that are not for everybody
+    install -m 644 "$head/SHA256SUMS" "$part/source/"
     while read -r _ file; do
+        file=${file#./}
+        [ "$(realpath -m "$source/$file")" = "$from/$file" ] ||
+            fail "the release in $source leads out of its folder by '$file', which no release does. Nothing was" \
+                "installed. Do not use this stick."
         install -D -m 644 "$source/$file" "$part/source/$file" ||
             fail "$file could not be read from $source. Is the stick still in? The box dances as before."
     done <"$part/source/SHA256SUMS"
@@ -210,8 +278,16 @@ build() {
     in_root "$inside/bin/python" -I -m appliance.cli.prepare_show ||
         echo "The show that comes with the box is not prepared (above): the box starts somewhat slower."
     for file in system release SHA256SUMS install.sh; do mv "$part/source/$file" "$part/"; done
+    keep_keys
     chmod 755 "$part/install.sh"
     rm -rf "$part/source" "$part/.gitignore" "$part/include"
+}
+
+# Whose releases are taken after this one. One that nobody vouches for has no say in it.
+keep_keys() {
+    local from=$part/source/keys
+    [ "$unsigned" = no ] || from=$root$home/current/keys
+    [ ! -f "$from" ] || install -m 644 "$from" "$part/keys"
 }
 
 drop_unneeded() {
@@ -262,8 +338,8 @@ install_release() {
     check_source
     check_machine
     name=$version
-    if [ -d "$releases/$name" ] && ! cmp -s "$releases/$name/SHA256SUMS" "$source/SHA256SUMS"; then
-        name=$version-$(sha256sum <"$source/SHA256SUMS" | cut -c 1-8)
+    if [ -d "$releases/$name" ] && ! cmp -s "$releases/$name/SHA256SUMS" "$head/SHA256SUMS"; then
+        name=$version-$(sha256sum <"$head/SHA256SUMS" | cut -c 1-8)
     fi
     if [[ -L $releases/$name && -n $(flaw "$name") ]]; then discard "$name"; fi
     if [ ! -d "$releases/$name" ]; then

@@ -8,13 +8,14 @@ repository=$(cd "$here/../.." && pwd)
 
 usage() {
     cat <<'END'
-usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--release FOLDER] [--debian TAR] OUT
+usage: mkroot.sh [--arch amd64|arm64] [--without-kernel] [--release FOLDER] [--key KEY] [--debian TAR] OUT
 
 Builds the root file system of a box into OUT: a tar where OUT ends with .tar, else a folder.
 
   --arch ARCH        amd64 (default) or arm64. A foreign one needs qemu-user-static, arch-test, binfmt_misc.
   --without-kernel   no kernel, no firmware: for systemd-nspawn, or for a Raspberry Pi's own boot partition
   --release FOLDER   what `make release` made; left out: one made now from the working tree
+  --key KEY          sign that one, so that the box knows whose releases it takes; --next-key KEY.pub as there
   --debian TAR       keeps Debian's part in TAR, and takes it from there the next time
 
 Must run as root, with mmdebstrap. Debian packages come from where this machine's own come from
@@ -27,12 +28,13 @@ fail() {
     exit 1
 }
 
-arch=amd64 kernel=yes release='' debian='' out=''
+arch=amd64 kernel=yes release='' debian='' out='' signing=()
 while [ $# -gt 0 ]; do
     case $1 in
         --arch) arch=${2:?--arch needs amd64 or arm64}; shift 2 ;;
         --without-kernel) kernel=no; shift ;;
         --release) release=${2:?--release needs a folder}; shift 2 ;;
+        --key | --next-key) signing+=("$1" "${2:?$1 needs a key file}"); shift 2 ;;
         --debian) debian=${2:?--debian needs a file}; shift 2 ;;
         --help | -h) usage; exit 0 ;;
         -*) fail "unknown option $1. See mkroot.sh --help." ;;
@@ -111,18 +113,20 @@ debian_kept() {
 
 # The release as it would be installed from a stick, made now from the working tree unless one was named.
 install_release() {
+    local unsigned=()
     if [ -z "$release" ]; then
         release=$work/release
-        "$repository/deploy/release/make-release" --arch "$arch" --out "$release"
+        "$repository/deploy/release/make-release" --arch "$arch" --out "$release" "${signing[@]}"
     fi
-    "$repository/deploy/install.sh" --root "$root" "$release"
+    [ -f "$release/SHA256SUMS.sig" ] || unsigned=(--unsigned)
+    "$repository/deploy/install.sh" --root "$root" "${unsigned[@]}" "$release"
 }
 
 settle() {
     echo bunraku >"$root/etc/hostname"
     printf '127.0.0.1 localhost bunraku\n::1 localhost\n' >"$root/etc/hosts"
     : >"$root/etc/machine-id"
-    rm -f "$root/etc/resolv.conf" "$root/var/lib/dbus/machine-id"
+    rm -f "$root/etc/resolv.conf" "$root/var/lib/dbus/machine-id" "$root/usr/bin/ssh-agent"
     mkdir -p "$root/data" "$root/media/bunraku"
     # Whoever can plug a keyboard into the box could take its disk as well: there is no password and no ssh.
     sed -i 's|^root:[^:]*:|root::|' "$root/etc/shadow"

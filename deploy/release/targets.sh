@@ -34,3 +34,9 @@ fetch_wheels() {
     pip download --quiet --no-deps --only-binary=:all: --implementation cp --python-version "$PYTHON" \
         "${platforms[@]}" --dest "$folder" "$@"
 }
+
+# SHA256SUMS over all that lies in the release in folder $1.
+write_sums() {
+    (cd "$1" && find . -type f -not -name 'SHA256SUMS*' | LC_ALL=C sort | xargs -d '\n' sha256sum) >"$1.sums"
+    mv "$1.sums" "$1/SHA256SUMS"
+}

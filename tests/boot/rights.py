@@ -14,6 +14,7 @@ _COMMANDS = {
     "mmdebstrap": "mmdebstrap",
     "mksquashfs": "squashfs-tools",
     "mke2fs": "e2fsprogs",
+    "ssh-keygen": "openssh-client",
     "unshare": "util-linux",
     "nsenter": "util-linux",
 }

@@ -14,10 +14,12 @@ from pathlib import Path
 
 from tests.boot import rights
 from tests.conftest import ROOT
+from tests.deploy.small_release import make_key
 
 MKROOT = ROOT / "deploy" / "image" / "mkroot.sh"
 MAKE_RELEASE = ROOT / "deploy" / "release" / "make-release"
 BUILT = ROOT / "build" / "boot"
+MAKER = BUILT / "maker"  # the key of the release's maker, made here, thrown away with `build`
 _INPUTS = ("appliance", "hw_sim", "deploy", "pyproject.toml")
 _DEBIAN = tuple(f"deploy/image/{name}" for name in ("mkroot.sh", "packages-box.txt", "drop-files.txt"))
 _FAST = ("-comp", "zstd", "-Xcompression-level", "3", "-noappend", "-quiet", "-no-progress")
@@ -46,7 +48,9 @@ def _build(folder: Path, image: Path) -> None:
     for old in BUILT.glob("debian-*.tar"):
         if old != debian:
             old.unlink()
-    _run(str(MAKE_RELEASE), "--out", str(folder / "release"))
+    if not MAKER.exists():
+        make_key(MAKER.parent, MAKER.name)
+    _run(str(MAKE_RELEASE), "--out", str(folder / "release"), "--key", str(MAKER))
     made = [str(MKROOT), "--without-kernel", "--release", str(folder / "release"), "--debian", str(debian)]
     _run(*made, str(folder / "root"))
     _run("mksquashfs", str(folder / "root"), str(part), *_FAST)

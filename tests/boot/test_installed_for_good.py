@@ -45,7 +45,7 @@ def with_release(
         box.disk.grown(1024)
         box.power_on(binds=((box.boot, "/boot/bunraku"), (on_the_stick, "/media/bunraku/bunraku/release")))
         box.await_frames(50)
-        said = _bash(box, "bash /media/bunraku/bunraku/release/install.sh 2>&1; echo status $?", 240.0)
+        said = _bash(box, "bunraku-install 2>&1; echo status $?", 240.0)
         assert "status 0" in said, said
         box.machine.cut_power()
         yield box.disk
@@ -117,7 +117,7 @@ def test_without_a_data_partition_what_came_with_the_box_dances(installed: Box, 
     box.power_on(disk=None, binds=((box.boot, "/boot/bunraku"), (on_the_stick, "/media/release")))
     box.await_frames(50)
     assert "9.9.4" not in box.machine.run("readlink", "/opt/bunraku/current")
-    said = _bash(box, "bash /media/release/install.sh 2>&1; echo status $?")
+    said = _bash(box, "bunraku-install /media/release 2>&1; echo status $?")
     assert "status 1" in said and "where releases are kept, is not there" in said, said
 
 

@@ -32,7 +32,7 @@ def _install(box: Box, image: Path, tmp_path: Path, version: str, last_lines: st
         *(
             "sh",
             "-c",
-            "bash /media/bunraku/bunraku/release/install.sh --until-power-off 2>&1; echo status $?",
+            "bunraku-install --until-power-off 2>&1; echo status $?",
         ),
         patience_s=240.0,
     )

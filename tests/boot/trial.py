@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import zipfile
 from pathlib import Path
+
+from tests.boot.root import MAKER
+from tests.deploy.small_release import sign
 
 
 def changed_release(sound: Path, folder: Path, version: str, module: str, last_lines: str) -> Path:
     """The same release as another version, with `last_lines` at the end of one of bunraku's modules.
 
-    All its hashes are right: what is wrong shows only when it runs.
+    All its hashes are right, and its maker has signed it: what is wrong shows only when it runs.
     """
     shutil.copytree(sound, folder)
     wheel = next((folder / "wheels").glob("bunraku-*.whl"))
@@ -20,11 +22,7 @@ def changed_release(sound: Path, folder: Path, version: str, module: str, last_l
         line for line in (folder / "release").read_text().splitlines() if not line.startswith("version ")
     ]
     (folder / "release").write_text("\n".join([f"version {version}", *facts]) + "\n")
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != "SHA256SUMS")
-    sums = [
-        f"{hashlib.sha256(path.read_bytes()).hexdigest()}  ./{path.relative_to(folder)}\n" for path in files
-    ]
-    (folder / "SHA256SUMS").write_text("".join(sums))
+    sign(folder, MAKER)
     return folder
 
 

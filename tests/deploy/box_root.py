@@ -20,7 +20,12 @@ def why_not() -> str | None:
     """Why nothing can be installed into a root here; None when it can."""
     if os.geteuid() != 0:
         return "installing into a root of its own needs root (run the tests as root)"
-    for command, package in (("mke2fs", "e2fsprogs"), ("unshare", "util-linux"), ("dpkg", "dpkg")):
+    for command, package in (
+        ("mke2fs", "e2fsprogs"),
+        ("unshare", "util-linux"),
+        ("dpkg", "dpkg"),
+        ("ssh-keygen", "openssh-client"),
+    ):
         if shutil.which(command) is None:
             return f"the command {command} (Debian package {package}) is missing"
     if python() is None:

@@ -9,7 +9,7 @@ import pytest
 
 from tests.deploy import box_root
 from tests.deploy.box_root import BoxRoot
-from tests.deploy.small_release import write_release
+from tests.deploy.small_release import make_key, write_release
 
 MakeRelease = Callable[..., Path]
 
@@ -22,12 +22,19 @@ def needs_roots() -> None:
 
 
 @pytest.fixture(scope="session")
-def make_release(needs_roots: None, tmp_path_factory: pytest.TempPathFactory) -> MakeRelease:
+def maker(needs_roots: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The key of the maker of all releases here that name no other one."""
+    return make_key(tmp_path_factory.mktemp("keys"))
+
+
+@pytest.fixture(scope="session")
+def make_release(maker: Path, tmp_path_factory: pytest.TempPathFactory) -> MakeRelease:
     """Call it with a version; what write_release takes can be named."""
 
     def make(version: str, **more: object) -> Path:
         folder = tmp_path_factory.mktemp("stick") / "release"
-        return write_release(folder, version, python=str(box_root.python()), **more)  # type: ignore[arg-type]
+        asked = {"key": maker, "python": str(box_root.python()), **more}
+        return write_release(folder, version, **asked)  # type: ignore[arg-type]
 
     return make
 

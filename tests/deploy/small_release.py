@@ -11,6 +11,7 @@ from pathlib import Path
 from tests.conftest import ROOT
 
 INSTALL = ROOT / "deploy" / "install.sh"
+SIGN = ROOT / "deploy" / "release" / "sign"
 TARGET = """[Unit]
 Description=The box, version {version}
 
@@ -20,9 +21,12 @@ WantedBy=multi-user.target
 
 
 def write_release(
-    folder: Path, version: str, *, python: str, extra_unit: str = "", broken: bool = False
+    folder: Path, version: str, *, key: Path, python: str, extra_unit: str = "", broken: bool = False
 ) -> Path:
-    """A release whose command prints its version; broken: one of its modules cannot be imported."""
+    """A release whose command prints its version; broken: one of its modules cannot be imported.
+
+    key: with which it is signed.
+    """
     if folder.exists():
         shutil.rmtree(folder)
     wheels = folder / "wheels"
@@ -39,11 +43,12 @@ def write_release(
     clock.mkdir(parents=True)
     (clock / "bunraku.conf").write_text(f"# of {version}\n")
     write_facts(folder, version=version, python=python)
+    sign(folder, key)
     return folder
 
 
 def write_facts(folder: Path, *, version: str, python: str, arch: str = "", needs_mb: int = 1) -> None:
-    """What the release says of itself, and the sums of all its files."""
+    """What the release says of itself; it has to be signed anew."""
     lines = (
         f"version {version}",
         f"architecture {arch or machine()}",
@@ -51,7 +56,30 @@ def write_facts(folder: Path, *, version: str, python: str, arch: str = "", need
         f"needs-mb {needs_mb}",
     )
     (folder / "release").write_text("\n".join(lines) + "\n")
-    files = sorted(one for one in folder.rglob("*") if one.is_file() and one.name != "SHA256SUMS")
+
+
+def make_key(folder: Path, name: str = "maker") -> Path:
+    """A key of a release's maker; the public half lies beside it, as NAME.pub."""
+    folder.mkdir(parents=True, exist_ok=True)
+    key = folder / name
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-C", name, "-f", str(key)], check=True)
+    return key
+
+
+def fingerprint(key: Path) -> str:
+    """As people compare it."""
+    return subprocess.check_output(["ssh-keygen", "-l", "-f", str(key)], text=True).split()[1]
+
+
+def sign(folder: Path, key: Path, *next_keys: Path) -> None:
+    """As the release's maker does it: keys, sums of all files, signature."""
+    wanted = [word for one in next_keys for word in ("--next-key", f"{one}.pub")]
+    subprocess.run([SIGN, "--key", key, *wanted, folder], check=True, stdout=subprocess.DEVNULL)
+
+
+def write_sums(folder: Path) -> None:
+    """The sums of all files, unsigned, as anybody can write them."""
+    files = sorted(one for one in folder.rglob("*") if one.is_file() and "SHA256SUMS" not in one.name)
     sums = "".join(f"{_digest(one)}  ./{one.relative_to(folder)}\n" for one in files)
     (folder / "SHA256SUMS").write_text(sums)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.deploy.box_root import BoxRoot, python
-from tests.deploy.small_release import INSTALL, write_facts
+from tests.deploy.small_release import INSTALL, sign, write_facts
 
 MakeRelease = Callable[..., Path]
 UNITS = "usr/lib/systemd/system"
@@ -128,10 +128,11 @@ def test_a_release_that_does_not_work_is_refused(box: BoxRoot, make_release: Mak
     ],
 )
 def test_a_machine_that_does_not_fit_is_refused(
-    box: BoxRoot, make_release: MakeRelease, facts: dict[str, str], words: str
+    box: BoxRoot, make_release: MakeRelease, maker: Path, facts: dict[str, str], words: str
 ) -> None:
     release = make_release("1.1.0")
     write_facts(release, **{"version": "1.1.0", "python": str(python()), **facts})  # type: ignore[arg-type]
+    sign(release, maker)
     done = box.install(release)
     assert done.returncode == 1
     assert words in done.stderr

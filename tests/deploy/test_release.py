@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import ROOT
+from tests.deploy.small_release import make_key
 
 RELEASE = ROOT / "deploy" / "release"
 LINE = re.compile(r"(?P<name>[A-Za-z0-9_.]+)==(?P<version>[0-9][0-9A-Za-z.]*) --hash=sha256:[0-9a-f]{64}")
@@ -89,7 +90,7 @@ def test_the_cross_built_wheels_are_for_the_processor_that_they_name() -> None:
 
 
 @pytest.mark.parametrize(
-    "script", ["install.sh", "release/make-release", "release/lock", "release/cross-build"]
+    "script", ["install.sh", "release/make-release", "release/sign", "release/lock", "release/cross-build"]
 )
 def test_every_script_teaches_its_use(script: str) -> None:
     done = subprocess.run([ROOT / "deploy" / script, "--help"], capture_output=True, text=True)
@@ -101,7 +102,9 @@ def test_every_script_teaches_its_use(script: str) -> None:
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A release of this working tree; its packages come from build/release, or from the network once."""
     folder = tmp_path_factory.mktemp("made") / "release"
-    done = subprocess.run([RELEASE / "make-release", "--out", folder], capture_output=True, text=True)
+    key = make_key(folder.parent)
+    command = [RELEASE / "make-release", "--out", folder, "--key", key]
+    done = subprocess.run(command, capture_output=True, text=True)
     if "Is there a network" in done.stderr:
         pytest.skip(f"No release can be made here: {done.stderr.strip().splitlines()[-1]}")
     assert done.returncode == 0, done.stderr
@@ -111,8 +114,22 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_release_names_each_of_its_files_with_its_sum(made: Path) -> None:
     lines = (made / "SHA256SUMS").read_text().splitlines()
     sums = {name: digest for digest, name in (line.split("  ./", 1) for line in lines)}
-    files = {str(path.relative_to(made)) for path in made.rglob("*") if path.is_file()} - {"SHA256SUMS"}
-    assert {name: _sum(made / name) for name in files} == sums
+    files = {str(path.relative_to(made)) for path in made.rglob("*") if path.is_file()}
+    assert {name: _sum(made / name) for name in files - {"SHA256SUMS", "SHA256SUMS.sig"}} == sums
+
+
+def test_a_release_is_signed_with_the_key_that_it_names(made: Path) -> None:
+    with (made / "SHA256SUMS").open() as sums:
+        subprocess.run(
+            [
+                *("ssh-keygen", "-Y", "verify", "-f", made / "keys", "-I", "release"),
+                *("-n", "bunraku-release", "-s", made / "SHA256SUMS.sig"),
+            ],
+            stdin=sums,
+            check=True,
+        )
+    assert (made / "keys").read_text().split()[2:] == (made.parent / "maker.pub").read_text().split()[:2]
+    assert not [path for path in made.rglob("*") if path.is_file() and b"PRIVATE KEY" in path.read_bytes()]
 
 
 def test_a_release_brings_exactly_what_is_pinned_and_the_box_itself(made: Path) -> None:
