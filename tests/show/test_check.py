@@ -189,7 +189,7 @@ def test_a_bundle_that_is_too_large_is_a_warning(bundle: Path) -> None:
 
 
 def test_a_report_that_is_no_json_is_a_warning_with_its_line(bundle: Path) -> None:
-    (bundle / "report.json").write_text('{\n"a": 1,\n}')
+    (bundle / "report.json").write_text('{\n"a": 1,\n"b": nothing\n}')
     finding = only(bundle)
     assert (finding.level, finding.line) == ("warning", 3)
 
