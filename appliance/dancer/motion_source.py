@@ -24,13 +24,13 @@ _FRAME_DIGITS = 2  # of a place to start at: its seconds are exact to some thous
 
 
 class Playback:
-    """Plays one of its phrases for ever. Tick by tick: read window() and roots(), then advance().
+    """Plays one of its phrases for ever. Each tick: read window() and roots(), then advance().
 
-    The motion that it plays is one continuous stream; the window is its next 8 poses, the first of them being
-    the pose of this tick. Every change (phrase, jump, excerpt, rate) enters at the far end of the window,
-    7 ticks before it is seen. The root's position and heading are carried on through loops and changes.
-    Times are seconds of the phrase that plays. Control methods are called between ticks, by the thread that
-    advances it: a change is several fields, which a tick in the midst of them would take for another one.
+    The motion is one continuous stream; the window is its next 8 poses, the first of them the pose of this
+    tick. Every change (phrase, jump, excerpt, rate) enters at the far end of the window, 7 ticks before the
+    audience sees it. Loops and changes carry on the root's position and heading. Times are seconds of the
+    phrase that plays. Only the thread that advances it may call the control methods: a change sets several
+    fields.
     """
 
     def __init__(
@@ -44,8 +44,7 @@ class Playback:
         window: int = 8,
         floor: Floor | None = None,
     ) -> None:
-        """Starts with a phrase, `main`; start_s and end_s cut an excerpt out of it. `floor`: what a survey
-        learnt of the phrase, carried along for the grounding.
+        """Starts with a phrase, `main`; start_s and end_s cut an excerpt. `floor`: of the grounding.
 
         Raises PhraseError, or ValueError for an excerpt or a rate that makes no sense.
         """
@@ -119,9 +118,7 @@ class Playback:
 
     @property
     def going_on(self) -> tuple[str, float]:
-        """Phrase and second at which a playback should start that goes on from here: what is asked for
-        counts, also while it has not come to the window's first pose.
-        """
+        """Phrase and second where a restarted playback continues: where the last request leads."""
         if self._request is not None:
             loop, position, _ = self._request
         elif self._on_the_way:
@@ -223,7 +220,7 @@ class Playback:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state, with the same phrases. Raises KeyError, ValueError."""
+        """Continue from this state, with the same phrases. Raises KeyError, ValueError."""
         self._rate, self._wanted_rate = state["rate"], state["wanted_rate"]
         repertoire = self._repertoire
         self._asked, _ = repertoire.find(state["asked"])
@@ -278,9 +275,7 @@ class Playback:
         self._stream.append()
 
     def _cross_over(self, loop: Loop, position: float, fade: int) -> None:
-        """Begin to fade over so many ticks from the present head to another place, put where the figure
-        stands.
-        """
+        """Begin to fade, over `fade` ticks, to another place of a loop, put where the figure stands."""
         leaving = self._head
         entering = ReadingHead(loop, position, leaving.pose.copy())
         entering.placement = Placement.bringing(entering.standing, leaving.standing)

@@ -1,9 +1,8 @@
-"""Puppeteers: whatever holds a joint (worn sensor, turning axis, fixed orientation, the phrase, OSC)."""
+"""Puppeteers: each holds one joint (worn sensor, turning axis, fixed orientation, the phrase, OSC)."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,10 +13,10 @@ from numpy.typing import NDArray
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
 
-HOLD_S = 0.1  # a sensor may be silent for so long before its joint is given back
+HOLD_S = 0.1  # of silence, after which a sensor's joint is released
 GIVE_BACK_S = 1.0
 TAKE_S = 0.5
-LONGEST_STEP_S = 0.12  # a stage that stood still for longer (six slots) goes on from where it was
+LONGEST_STEP_S = 0.12  # six ticks; after a longer stall the targets continue from where they were
 
 
 @dataclass(slots=True)
@@ -29,10 +28,10 @@ class Target:
     weight: float = 0.0
 
 
-class Puppeteer(ABC):
+class Puppeteer:
     """Holds one joint. The weight grows over TAKE_S when it takes the joint and fades over GIVE_BACK_S when
-    it lets go, level at both ends; a new `weight` is reached at the pace of taking. One that is not `enabled`
-    lets go, whatever it hears, and takes the joint again when it is.
+    it lets go, level at both ends; a new `weight` is reached at the pace of taking. A disabled puppeteer lets
+    go, whatever its source, and takes the joint again when it is enabled.
     """
 
     def __init__(self, joint: str, weight: float = 1.0) -> None:
@@ -46,13 +45,13 @@ class Puppeteer(ABC):
 
     @property
     def is_holding(self) -> bool:
-        """Whether the joint is held, even if only a little, at the last pull."""
+        """Whether the last pull gave the joint any weight."""
         return self._target.weight > 0.0
 
     def pull(self, now: float) -> Target:
         """The target at this moment; it stands still where the time does not go on.
 
-        It never moves further than in LONGEST_STEP_S: who was not asked for longer stood still meanwhile.
+        One pull moves it by LONGEST_STEP_S at most: it stood still in a longer gap between two pulls.
         """
         elapsed = 0.0 if self._pulled_at is None else min(max(0.0, now - self._pulled_at), LONGEST_STEP_S)
         self._pulled_at = now
@@ -79,28 +78,27 @@ class Puppeteer(ABC):
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state."""
+        """Continue from this state."""
         self.weight, self.enabled = state["weight"], state["enabled"]
         self._target.orientation[:], self._target.weight = state["orientation"], state["held"]
         self._presence, self._level = state["presence"], state["level"]
         self._pulled_at = state["pulled_at"]
 
-    @abstractmethod
     def _holds(self, now: float) -> bool:
         """Whether the joint should be held at this moment."""
+        return True
 
-    @abstractmethod
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
-        """Write the orientation (4,) of this moment; `elapsed` seconds since the last one."""
+        """Write the orientation (4,) of the moment `now`, `elapsed` seconds after the last pull."""
 
 
 class WornSensor(Puppeteer):
-    """A sensor that a dancer wears. Silent for 100 ms: its joint is given back over 1 s, taken again over
-    0.5 s, and the target is led to the new readings over as long as the silence lasted (0.5 s at most): what
-    lies between them when it ends is taken out evenly, while the readings move on.
+    """A sensor that a dancer wears. After 100 ms of silence its joint is released over 1 s. When readings
+    return, the joint is taken over 0.5 s, and the target is led to them over the length of the silence (0.5 s
+    at most): the difference at its end is taken out evenly while the readings move on.
 
-    joint_from_reading: the matrix (4, 4) that makes a reading (w, x, y, z; sensor axes) the joint's local
-    orientation; where it keeps the length, so does the target. None: readings are such orientations already.
+    joint_from_reading: the matrix (4, 4) from a reading (w, x, y, z; sensor axes) to the joint's local
+    orientation; it preserves length. None: the readings are local orientations already.
     """
 
     def __init__(
@@ -113,15 +111,10 @@ class WornSensor(Puppeteer):
         self._reading, self._local = quaternion.IDENTITY.copy(), quaternion.IDENTITY.copy()
         self._heard_at: float | None = None
         self._leading_s = self._led_s = 0.0  # what is left of the leading, and how long it takes in all
-        self._apart = (
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        )  # half the angle from reading to target, and its axis
+        self._apart = 0.0, 0.0, 0.0, 0.0  # half the angle from reading to target, and its axis
 
     def wear(self, joint_from_reading: NDArray[np.float32]) -> None:
-        """Take another matrix, for a new neutral pose; the joint is led over, as after a silence."""
+        """Use the matrix of a new neutral pose; the target is led over, as after a silence."""
         self._joint_from_reading = joint_from_reading
         if self._heard_at is not None:
             np.matmul(joint_from_reading, self._reading, out=self._local)
@@ -174,9 +167,8 @@ class WornSensor(Puppeteer):
     def _lead(self, seconds: float) -> None:
         """Lead the target from where it is to the readings, by half a turn in TAKE_S at most.
 
-        The way between them is fixed here and taken out evenly. Led by a share of what lies between them at
-        each tick, the target of a hand that went on by 7 degrees a tick made steps of 25, and it turned round
-        where the hand passed the orientation opposite to it.
+        The difference is fixed here and taken out evenly. Recomputed each tick it made steps of 25 degrees
+        for a hand that moved by 7, and reversed where the hand passed the opposite orientation.
         """
         axis, angle = quaternion.to_axis_angle(
             quaternion.multiply(self._target.orientation, quaternion.inverse(self._local))
@@ -210,9 +202,6 @@ class TurningAxis(Puppeteer):
         super().restore(state)
         self._half_angle = state["half_angle"]
 
-    def _holds(self, now: float) -> bool:
-        return True
-
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
         self._half_angle = math.fmod(self._half_angle + math.pi * elapsed / self.seconds_per_turn, math.tau)
         sine = math.sin(self._half_angle)
@@ -226,12 +215,6 @@ class FixedOrientation(Puppeteer):
         super().__init__(joint, weight)
         self._target.orientation[:] = _unit(orientation)
 
-    def _holds(self, now: float) -> bool:
-        return True
-
-    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
-        return
-
 
 class Kept(Puppeteer):
     """Keeps its joint at the phrase's own orientation, pose by pose (the paper's Figure 4).
@@ -242,12 +225,6 @@ class Kept(Puppeteer):
     def see(self, orientation: FloatArray) -> None:
         """Take the phrase's orientation (4,) of this tick."""
         self._target.orientation[:] = orientation
-
-    def _holds(self, now: float) -> bool:
-        return True
-
-    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
-        return
 
 
 class Remote(Puppeteer):

@@ -26,9 +26,6 @@ class FollowedOrientation(Puppeteer):
         self._orientations = quaternion.continuous(orientations).astype(np.float32)
         self._target.orientation[:] = self._orientations[0]
 
-    def _holds(self, now: float) -> bool:
-        return True
-
     def _point(self, orientation: NDArray[np.float32], now: float, elapsed: float) -> None:
         tick = min(max(round(now / TICK_S), 0), len(self._orientations) - 1)
         orientation[:] = self._orientations[tick]
