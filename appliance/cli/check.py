@@ -65,7 +65,7 @@ def verified(directory: Path, box_file: Path | None) -> tuple[StageParts, Admiss
     box = load_box(box_file)
     _refuse_damage(directory)
     show = load_show(directory)
-    _refuse_misfits(show, box, box_file)
+    _refuse_misfits(show, box)
     cast = assemble(show, without_ports(box))
     verdict = admission(cast, show, box)
     cast.close()
@@ -100,12 +100,9 @@ def _refuse_damage(directory: Path) -> None:
         raise StageError("\n".join(["This show cannot be danced.", *errors]))
 
 
-def _refuse_misfits(show: Show, box: BoxConfig, box_file: Path | None) -> None:
-    """Whether what the box file says about joints and fixtures fits this show; raises ConfigError."""
-    problems = [
-        *misfits(box.outputs.posistagenet, show.skeleton.names, box_file),
-        *misplaced(show, box, box_file),
-    ]
+def _refuse_misfits(show: Show, box: BoxConfig) -> None:
+    """Raises ConfigError where the box file names joints or fixtures that do not fit this show."""
+    problems = [*misfits(box.outputs.posistagenet, show.skeleton.names, box.file), *misplaced(show, box)]
     if problems:
         raise ConfigError(problems)
 

@@ -72,7 +72,7 @@ def _project(
     notifier: Notifier,
     say: Callable[[str], None],
 ) -> None:
-    with closing(Run(load_box(box_file), box_file, wish, say)) as run:
+    with closing(Run(load_box(box_file), wish, say)) as run:
         for line in run.introduction():
             say(line)
         say(f"Shown: {run.project(stopped, notifier).sentence()}.")

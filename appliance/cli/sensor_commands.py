@@ -26,8 +26,7 @@ KeyFile = Annotated[
     Path | None, typer.Option("--keys", help="Key file, instead of --box; left out: sensors.keys.")
 ]
 Port = Annotated[
-    str | None,
-    typer.Option(help="Serial port of the wearable; left out: the only one that is plugged in."),
+    str | None, typer.Option(help="Serial port of the wearable; left out: the only one that is plugged in.")
 ]
 Network = Annotated[
     str | None, typer.Option(help="Name of the box's Wi-Fi network (2.4 GHz); left out: by cable only.")

@@ -36,14 +36,12 @@ class Alignment:
     brightness: float = 1.0
 
 
-def alignment_folder(
-    box: BoxConfig, box_file: Path | None, environment: Mapping[str, str] = os.environ
-) -> Path:
+def alignment_folder(box: BoxConfig, environment: Mapping[str, str] = os.environ) -> Path:
     """Where the alignment is kept: the box's state folder, else beside the box file, else with the user."""
     if box.state_folder is not None:
         return box.state_folder
-    if box_file is not None:
-        return box_file.resolve().parent
+    if box.path is not None:
+        return box.path.resolve().parent
     return Path(environment.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "bunraku"
 
 

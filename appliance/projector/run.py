@@ -52,7 +52,7 @@ class Wish:
 class Run:
     """All that is open while the projector runs. Raises ProjectorError, ConfigError or RuntimeFolderError."""
 
-    def __init__(self, box: BoxConfig, box_file: Path | None, wish: Wish, say: Callable[[str], None]) -> None:
+    def __init__(self, box: BoxConfig, wish: Wish, say: Callable[[str], None]) -> None:
         config = box.projector
         self._wish, self._say = wish, say
         with ExitStack() as opened:
@@ -63,7 +63,7 @@ class Run:
             opened.callback(self._window.close)
             self._context = GlContext(self._window)
             opened.callback(self._context.close)
-            self._file = AlignmentFile(alignment_folder(box, box_file), config, say)
+            self._file = AlignmentFile(alignment_folder(box), config, say)
             opened.callback(self._file.close)
             self._controls = Controls(self._file.alignment, self._file.keep, wish.shows_info)
             self._inbox = _inbox(folder, opened, say)

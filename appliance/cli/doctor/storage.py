@@ -50,10 +50,7 @@ def _folder(patient: HostView, folder: Path) -> Finding:
     words = f"{folder}: {free / 1e6:,.0f} of {whole / 1e6:,.0f} MB are free."
     if room.f_flag & os.ST_RDONLY:
         return wrong(
-            *(
-                what,
-                f"{folder} cannot be written: {_KEPT} are lost at a power cut. Nobody sees it.",
-            ),
+            *(what, f"{folder} cannot be written: {_KEPT} are lost at a power cut. Nobody sees it."),
             "After an error Linux writes no more: `dmesg | tail`, then a new card or disk.",
         )
     if not os.access(there, os.W_OK):

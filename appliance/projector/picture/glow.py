@@ -40,13 +40,7 @@ class Glow:
         return first
 
     def finish(
-        self,
-        scene: Scene,
-        look: LookConfig,
-        colours: Palette,
-        picture: Target,
-        opacity: float,
-        wall: Wall,
+        self, scene: Scene, look: LookConfig, colours: Palette, picture: Target, opacity: float, wall: Wall
     ) -> None:
         """Lay the picture with its glow onto the wall."""
         easel, view = self._easel, scene.view
