@@ -16,7 +16,7 @@ from appliance.start import wishes_to_play
 
 
 def play_command() -> typer.main.TyperCommand:  # type: ignore[name-defined]
-    group = typer.main.get_command(cli.app)
+    group = typer.main.get_command(cli.command_line())
     return group.commands["play"]  # type: ignore[attr-defined,no-any-return]
 
 
@@ -93,15 +93,6 @@ def test_playing_loads_no_parser_no_simulation_and_no_other_process_s_parts() ->
     words = "import sys, appliance.start, appliance.cli.play; print(*sorted(sys.modules))"
     ran = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
     loaded = set(ran.stdout.split())
-    needless = {
-        "typer",
-        "rich",
-        "click",
-        "hw_sim",
-        "matplotlib",
-        "onnx",
-        "torch",
-        "appliance.cli.emulation",
-    }
+    needless = {"typer", "rich", "click", "hw_sim", "matplotlib", "onnx", "torch", "appliance.cli.emulation"}
     needless |= {"appliance.cli.app", "appliance.cli.companions", "appliance.projector", "subprocess"}
     assert not loaded & needless

@@ -54,8 +54,8 @@ def file_name(config: ProjectorConfig) -> str:
 class AlignmentFile:
     """Keeps an alignment in a file, which is replaced as a whole by a thread of its own: pictures never wait.
 
-    What was chosen by hand goes over the box file, until somebody changes it in the box file. Nothing here
-    raises; what goes wrong is said in one sentence, and then the alignment holds for this run.
+    What was chosen by hand overrides the box file until that value changes in the box file. Nothing here
+    raises: an error is reported in one sentence, and the alignment then holds for this run alone.
     """
 
     def __init__(self, folder: Path, config: ProjectorConfig, say: Callable[[str], None]) -> None:
@@ -64,7 +64,7 @@ class AlignmentFile:
         self._kept = self._wanted = self._load()
         self._is_wanted = threading.Event()
         self._closing = False
-        self._thread = threading.Thread(target=self._write_on, name="alignment", daemon=True)
+        self._thread = threading.Thread(target=self._write_changes, name="alignment", daemon=True)
         self._thread.start()
 
     @property
@@ -73,7 +73,7 @@ class AlignmentFile:
         return self._wanted
 
     def overrides(self) -> list[str]:
-        """A sentence for each thing that was chosen by hand and goes over the box file."""
+        """A sentence for each thing that was chosen by hand and overrides the box file."""
         chosen, box_file = self._wanted, self._from_box
         sentences = []
         if chosen.corners != WHOLE:
@@ -104,7 +104,7 @@ class AlignmentFile:
                 "the next start the picture may lie as before. Look at the disk: bunraku doctor."
             )
 
-    def _write_on(self) -> None:
+    def _write_changes(self) -> None:
         while True:
             self._is_wanted.wait()
             self._is_wanted.clear()
@@ -151,7 +151,7 @@ class AlignmentFile:
         except OSError as error:
             self._say(
                 f"{self.path}: the alignment cannot be read ({error.strerror}). The picture fills the "
-                "display. Check who may read this file."
+                "display. Check the rights of this file."
             )
         return self._from_box
 

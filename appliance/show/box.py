@@ -24,8 +24,8 @@ class UdpConfig(Section):
     """Where sensors' datagrams arrive."""
 
     host: Ipv4 = key(
-        "Address to listen on. Wearables on Wi-Fi need 0.0.0.0: they call everybody on the "
-        "network, and no other address hears that.",
+        "Address to listen on. Wearables on Wi-Fi need 0.0.0.0: they broadcast, and "
+        "no other address receives that.",
         "127.0.0.1",
     )
     port: int = key("UDP port; 0 takes any free one.", 9750, within=(0, 65535))
@@ -140,7 +140,7 @@ class BoxConfig(Section):
     projector: ProjectorConfig = part(ProjectorConfig)
     runtime: LocalFile | None = key(
         "Folder where the box's processes meet, relative to the box file; a folder in memory. "
-        "null: the one that systemd gives, else one of the user who plays.",
+        "null: the one that systemd gives, else one of the user's own.",
         None,
     )
     limits: LimitsConfig = part(LimitsConfig)

@@ -1,4 +1,4 @@
-"""box.yaml's section about show control: where commands by OSC arrive, from whom, and who hears how it is."""
+"""box.yaml's section about show control: where commands arrive, from whom, and where the heartbeat goes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Senders = Annotated[str, AfterValidator(_network)]
 
 
 class HeartbeatConfig(Section):
-    """Somebody who hears once a second how the box is."""
+    """A receiver of the box's status, once a second."""
 
     host: Ipv4 = key("The listener's address in numbers.", "127.0.0.1")
     port: int = key("The listener's UDP port.", 9003, within=(1, 65535))
@@ -38,13 +38,13 @@ class ControlConfig(Section):
     )
     port: int = key("UDP port; 0 takes any free one.", 9002, within=(0, 65535))
     senders: list[Senders] = key(
-        "Who may command the box: addresses (192.168.0.20) or networks (192.168.0.0/24). "
-        "This machine always may; []: nobody else.",
+        "Senders that may command the box: addresses (192.168.0.20) or networks (192.168.0.0/24). "
+        "This machine always may; []: no other.",
         [],
         length=(0, 32),
     )
     heartbeat: list[HeartbeatConfig] = key(
-        "Who gets /bunraku/status once a second; docs/osc.md explains it.", [], length=(0, 16)
+        "Receivers of /bunraku/status, once a second; docs/osc.md explains it.", [], length=(0, 16)
     )
 
     @model_validator(mode="after")

@@ -72,8 +72,8 @@ class MotionConfig(Section):
         "Speed of playback: 1 as recorded, 0 stands still, below 0 runs backwards.", 1.0, within=(-4, 4)
     )
     crossfade_s: float = key(
-        "How long a loop's end melts into its start, and one phrase into another where nobody "
-        "says how long, in seconds.",
+        "Seconds of cross-fade from a loop's end to its start, and from one phrase to another "
+        "where no fade is given.",
         0.5,
         within=(0, 5),
     )

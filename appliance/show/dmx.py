@@ -127,7 +127,7 @@ class DmxConfig(Section):
 
     @property
     def destination(self) -> tuple[object, ...]:
-        """What no second entry may have: the light that hears it cannot tell the two apart."""
+        """What no second entry may have: a light that receives both cannot tell them apart."""
         if self.wire in NUMBERS:
             host = self.host or ("127.0.0.1" if self.wire == "artnet" else "multicast")
             return (self.wire, host, self.udp_port, self.number_on_wire, self.interface)
@@ -136,10 +136,10 @@ class DmxConfig(Section):
         return (self.wire,)
 
 
-def _require(who: str, low: int, high: int, key: str, number: int) -> None:
+def _require(sender: str, low: int, high: int, key: str, number: int) -> None:
     if not low <= number <= high:
         raise refusal(
-            f"{who} has universes from {low} to {high}; {number} is none of them.",
+            f"{sender} has universes from {low} to {high}; {number} is none of them.",
             f"Write a number from {low} to {high}.",
             at=key,
         )

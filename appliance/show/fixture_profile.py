@@ -42,9 +42,7 @@ class AttributeConfig(Section):
         "For pan (540) and tilt (270): the whole range in degrees.", None, above=0, most=1440
     )
     invert: bool = key("The channel runs the other way round.", False)
-    slew: float | None = key(
-        "For pan and tilt (180): at most so many degrees a second.", None, above=0, most=2000
-    )
+    slew: float | None = key("For pan and tilt (180): the most degrees a second.", None, above=0, most=2000)
     dims: bool = key(
         "Master and blackout scale it, as they scale the dimmer: for fog, strobes, lasers.", False
     )

@@ -1,4 +1,4 @@
-"""box.yaml's PosiStageNet outputs: which joints travel as trackers, where to, in whose axes."""
+"""box.yaml's PosiStageNet outputs: which joints travel as trackers, where to, in which axes."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ Size = Annotated[
 
 
 class EdgeBlendConfig(Section):
-    """Two projectors side by side, each with a box file of its own, whose pictures melt together."""
+    """Two projectors side by side, each with a box file of its own; their pictures blend into one."""
 
     part: Literal["left", "right"] = key("Which part of the wide picture this projector shows.")
     overlap: float = key(

@@ -41,7 +41,7 @@ class FixedConfig(Section):
 
 
 class HandConfig(Section):
-    """A puppeteer's hold on one joint. Exactly one of sensor, turning, fixed, kept, osc says who holds it."""
+    """A puppeteer's hold on one joint. One of sensor, turning, fixed, kept, osc names the puppeteer."""
 
     sensor: str | None = key(
         "Name of the worn sensor that holds it, as in the key file.", None, length=(1, LONGEST_SENSOR_NAME)
@@ -85,7 +85,7 @@ class HandConfig(Section):
             found = " and ".join(given) if given else "none of them"
             raise refusal(
                 f"A hand has exactly one of {', '.join(KINDS)}; this one has {found}.",
-                "Say who holds the joint, and write a second hand for a second puppeteer.",
+                "Name one puppeteer, and write a second hand for a second one.",
                 at=given[1] if given else None,
             )
         for name in SENSOR_KEYS:
@@ -108,7 +108,7 @@ class ShowConfig(Section):
     dancer: DancerConfig = part(DancerConfig)
     motion: MotionConfig = part(MotionConfig)
     hands: list[HandConfig] = key(
-        "Who holds which joints, each joint at most once.", [], length=(0, MAX_HANDS)
+        "Which puppeteer holds which joint, each joint at most once.", [], length=(0, MAX_HANDS)
     )
     looks: list[LookConfig] = key(
         "How the projection looks; the first one is shown at the start. "

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from appliance.cli.app import app
+from appliance.cli.app import command_line
 from appliance.lights.open_fixture_library import LibraryError, profile_values
 from appliance.lights.patch import Patch
 from appliance.show.fixture_profile import load_profile
@@ -61,16 +61,8 @@ MOVER: dict[str, Any] = {
         "Mode": {
             "defaultValue": 0,
             "capabilities": [
-                {
-                    "dmxRange": [0, 99],
-                    "type": "Generic",
-                    "switchChannels": {"Speed / Sound": "Speed"},
-                },
-                {
-                    "dmxRange": [100, 255],
-                    "type": "Generic",
-                    "switchChannels": {"Speed / Sound": "Sound"},
-                },
+                {"dmxRange": [0, 99], "type": "Generic", "switchChannels": {"Speed / Sound": "Speed"}},
+                {"dmxRange": [100, 255], "type": "Generic", "switchChannels": {"Speed / Sound": "Sound"}},
             ],
         },
         "Speed": {"capability": {"type": "Speed", "speedStart": "slow", "speedEnd": "fast"}},
@@ -134,7 +126,7 @@ def converted(fixture: dict[str, Any], folder: Path) -> Any:
     source = folder / "fixture.json"
     source.write_text(json.dumps(fixture))
     out = folder / "profiles" / "converted.yaml"
-    result = CliRunner().invoke(app, ["lights", "convert", str(source), "--out", str(out)])
+    result = CliRunner().invoke(command_line(), ["lights", "convert", str(source), "--out", str(out)])
     assert result.exit_code == 0, result.output
     return load_profile("converted", folder), result.output
 
@@ -257,12 +249,7 @@ def test_a_dimmer_that_glows_at_the_start_of_its_range_is_off_at_nothing() -> No
     dimmer = {
         "capabilities": [
             {"dmxRange": [0, 5], "type": "Intensity", "brightness": "off"},
-            {
-                "dmxRange": [6, 255],
-                "type": "Intensity",
-                "brightnessStart": "dark",
-                "brightnessEnd": "bright",
-            },
+            {"dmxRange": [6, 255], "type": "Intensity", "brightnessStart": "dark", "brightnessEnd": "bright"},
         ]
     }
     strobe = {"name": "S", "availableChannels": {"D": dimmer}, "modes": [{"name": "1", "channels": ["D"]}]}

@@ -8,22 +8,15 @@ import numpy as np
 import pytest
 
 from appliance.cli.pictures import danced
-from appliance.cli.replay import TOLERANCE_DEGREES, replay_journal
+from appliance.cli.replay import TOLERANCE_DEGREES
+from appliance.cli.replay import replay as replay_journal
 from appliance.recorder.reading import Run, read_journal
 from appliance.recorder.record import NOT_FINITE, RESENT
 from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from tests.bundles import FIGURE
-from tests.recorder.make_golden_journal import (
-    AFTER,
-    BEFORE,
-    FAILED,
-    GOLDEN,
-    LATE,
-    SILENT,
-    write_faulty_show,
-)
+from tests.recorder.make_golden_journal import AFTER, BEFORE, FAILED, GOLDEN, LATE, SILENT, write_faulty_show
 
 
 @pytest.fixture(scope="module")
