@@ -9,7 +9,13 @@ from appliance.projector.info import Meter, letters
 
 def test_letters_are_drawn_as_they_are_written() -> None:
     drawn = ["".join(".#"[int(value > 0)] for value in row) for row in letters(("a1",))]
-    assert drawn[1:6] == ["..#...#..", ".#.#.##..", ".###..#..", ".#.#..#..", ".#.#.###."]
+    assert drawn[1:6] == [
+        "..#...#..",
+        ".#.#.##..",
+        ".###..#..",
+        ".#.#..#..",
+        ".#.#.###.",
+    ]
 
 
 def test_no_letter_looks_like_another() -> None:

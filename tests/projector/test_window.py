@@ -82,7 +82,10 @@ def picture(kind: str, **environment: str) -> np.ndarray:
     without = {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}
     clean = {name: value for name, value in os.environ.items() if name not in without}
     done = subprocess.run(
-        [sys.executable, "-c", PICTURE, kind], capture_output=True, check=True, env={**clean, **environment}
+        [sys.executable, "-c", PICTURE, kind],
+        capture_output=True,
+        check=True,
+        env={**clean, **environment},
     )
     return np.frombuffer(done.stdout, np.uint8).reshape(180, 320, 4)[..., :3].astype(int)
 

@@ -83,7 +83,9 @@ def reading(
     """Of the left wrist."""
     w, x, y, z = orientation
     return SensorReading(
-        *("left-wrist", (w, x, y, z), 0, 0, 0.0, 0.0, 90, 255), *(boot_nonce, taps), wearable=wearable
+        *("left-wrist", (w, x, y, z), 0, 0, 0.0, 0.0, 90, 255),
+        *(boot_nonce, taps),
+        wearable=wearable,
     )
 
 

@@ -306,7 +306,8 @@ def test_what_is_no_file_has_no_fingerprint(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "state", [b"", b"\x02\x00\x00\x00{}", b"\xff\xff\xff\xff", b"\x0f\x00\x00\x00" + b'{"motion": 17}']
+    "state",
+    [b"", b"\x02\x00\x00\x00{}", b"\xff\xff\xff\xff", b"\x0f\x00\x00\x00" + b'{"motion": 17}'],
 )
 def test_a_keyframe_of_another_release_is_refused_in_words(
     whole: bytes, show: Path, tmp_path: Path, state: bytes

@@ -16,7 +16,15 @@ from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from tests.bundles import FIGURE
-from tests.recorder.make_golden_journal import AFTER, BEFORE, FAILED, GOLDEN, LATE, SILENT, write_faulty_show
+from tests.recorder.make_golden_journal import (
+    AFTER,
+    BEFORE,
+    FAILED,
+    GOLDEN,
+    LATE,
+    SILENT,
+    write_faulty_show,
+)
 
 
 @pytest.fixture(scope="module")
