@@ -86,13 +86,13 @@ def play_show(
         opened.callback(speaker.close)
         shown = rehearse is not None and _has_display()
         control = None if alone or box.control is None else _opened(box.control, opened)
-        stage = Stage(show, box, speaker.say, box_file, rehearsal=emulate)
+        stage = Stage(show, box, speaker.say, box.path, rehearsal=emulate)
         with closing(stage):
-            keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box_file
+            keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
             keeper = _keeper(keepers_box, journal, minutes) if keeps else None
             for line in _introduction(stage, emulate, control):
                 speaker.say(line)
-            companions = () if alone else tuple(_companions(show, box, box_file, control, window or shown))
+            companions = () if alone else tuple(_companions(show, box, control, window or shown))
             with _running(companions + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:
@@ -175,7 +175,7 @@ def _running(
 
 
 def _companions(
-    show: Show, box: BoxConfig, box_file: Path | None, control: socket.socket | None, window: bool
+    show: Show, box: BoxConfig, control: socket.socket | None, window: bool
 ) -> Iterator[Companion]:
     """The processes beside the stage."""
     from appliance.cli.companions import Companion
@@ -188,7 +188,7 @@ def _companions(
             "What is in force stays in force; commands wait for a moment.",
             descriptors=(control.fileno(),),
         )
-    named = () if box_file is None else ("--box", str(box_file))
+    named = () if box.path is None else ("--box", str(box.path))
     bunraku = (sys.executable, "-m", "appliance.cli")
     if box.outputs.dmx and show.config.lights.fixtures:
         yield Companion(
