@@ -73,8 +73,8 @@ class DmxConfig(Section):
     broadcast: bool = key("artnet: host is a broadcast address.", False)
     priority: int = key("sacn: among sources of a universe, higher wins.", 100, within=(0, 200))
     source_name: str = key("sacn: what consoles call this box.", "Bunraku", length=(1, 63))
-    preview: bool = key("sacn: for visualisers alone, no light shall follow.", False)
-    ttl: int = key("sacn: through how many routers less one multicast goes.", 1, within=(1, 255))
+    preview: bool = key("sacn: for visualisers only; lights should ignore it.", False)
+    ttl: int = key("sacn: how many networks multicast may reach; 1: this one only.", 1, within=(1, 255))
     device: str | None = key(
         "usb-pro, open-dmx: the serial device, like /dev/ttyUSB0.", None, length=(1, 200)
     )

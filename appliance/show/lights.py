@@ -99,7 +99,7 @@ class FixtureConfig(Section):
 
 
 class SafeConfig(Section):
-    """The safe look: on panic, after a stop, when the stage is lost, at the end. Dark unless told so."""
+    """The safe look: on panic, after a stop, when the stage is lost, at the end. Dark unless set here."""
 
     dimmer: float = key("How bright; 0 is dark.", 0.0, within=(0, 1))
     colour: Colour = key("Red, green, blue as shares 0 to 1.", (1.0, 1.0, 1.0))
@@ -165,7 +165,7 @@ class VenueLightsConfig(Section):
     """The rig as it hangs in this venue."""
 
     rate_hz: float = key(
-        "How often lights are reckoned; a full universe takes 22.7 ms.", 40.0, within=(1, 44)
+        "How often lights are computed; a full universe takes 22.7 ms.", 40.0, within=(1, 44)
     )
     places: list[VenuePlaceConfig] = key("Fixtures that differ from the show.", [], length=(0, MAX_FIXTURES))
 

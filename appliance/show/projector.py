@@ -45,8 +45,8 @@ class ProjectorConfig(Section):
         within=(1, 240),
     )
     mirror: bool = key("Left and right exchanged, for rear projection.", False)
-    upside_down: bool = key("Turned by half a turn, for a projector that hangs from the ceiling.", False)
-    brightness: float = key("What the picture is multiplied with.", 1.0, within=(0.0, 2.0))
+    upside_down: bool = key("Turned by 180 degrees, for a projector that hangs from the ceiling.", False)
+    brightness: float = key("Factor on the brightness of the picture.", 1.0, within=(0.0, 2.0))
     gamma: float = key("Above 1 lifts the dark tones, below 1 deepens them.", 1.0, within=(0.3, 3.0))
     edge_blend: EdgeBlendConfig | None = key(
         str(EdgeBlendConfig.__doc__) + " null: one projector alone.", None

@@ -12,6 +12,7 @@ from pydantic import field_validator, model_validator
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import require_inside
 from appliance.pose.skeleton import Skeleton
+from appliance.show.bundle import COPY_AGAIN
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.cues import CueConfig, cue_problems
 from appliance.show.dance import DancerConfig, MotionConfig
@@ -41,7 +42,7 @@ class FixedConfig(Section):
 
 
 class HandConfig(Section):
-    """A puppeteer's hold on one joint. One of sensor, turning, fixed, kept, osc names the puppeteer."""
+    """A puppeteer's hold on one joint. Exactly one of sensor, turning, fixed, kept, osc names the holder."""
 
     sensor: str | None = key(
         "Name of the worn sensor that holds it, as in the key file.", None, length=(1, LONGEST_SENSOR_NAME)
@@ -245,7 +246,7 @@ def load_show(directory: Path | str) -> Show:
 
 
 def _skeleton(path: Path) -> tuple[Skeleton | None, list[Problem]]:
-    cure = "Copy the whole bundle again."
+    cure = COPY_AGAIN
     try:
         require_inside(path, path.parent)
         return read_bvh(path).skeleton, []
