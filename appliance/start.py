@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import faulthandler
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -29,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with contextlib.suppress(OSError, ValueError, AttributeError):  # no standard error to write to
         faulthandler.enable()  # the watchdog's signal prints the line that hung
     given = list(sys.argv[1:] if arguments is None else arguments)
-    if given[:1] == ["preflight"] and "--help" not in given:
+    if given[:1] == ["preflight"]:
         from appliance.cli.preflight import main as preflight
 
         sys.exit(preflight(given[1:]))
@@ -77,17 +76,8 @@ def wishes_to_play(given: Sequence[str]) -> Wishes | None:
 def _play(wishes: Wishes) -> int:
     from appliance.cli.play import play_show
 
-    chosen = wishes.pop("chosen", None)
-    if isinstance(chosen, Path):
-        from appliance.release.start_attempts import ended_well, pair_to_dance
-
-        pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
-        wishes |= {"show": pair.show, "box": pair.box, "proven": True}  # by the preflight
     named = {_PARAMETERS.get(name, name): wish for name, wish in wishes.items()}
-    status = play_show(**named)  # type: ignore[arg-type]  # wishes_to_play gives each name its type
-    if isinstance(chosen, Path):
-        ended_well(chosen)
-    return status
+    return play_show(**named)  # type: ignore[arg-type]  # wishes_to_play gives each name its type
 
 
 def _number(text: str) -> float:

@@ -16,7 +16,7 @@ from appliance.start import wishes_to_play
 
 
 def play_command() -> typer.main.TyperCommand:  # type: ignore[name-defined]
-    group = typer.main.get_command(cli.app)
+    group = typer.main.get_command(cli.command_line())
     return group.commands["play"]  # type: ignore[attr-defined,no-any-return]
 
 

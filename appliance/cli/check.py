@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from appliance.cli.network_proof import proved
+from appliance.cli.options import BoxFile
 from appliance.pose.foreign_file import content
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
 from appliance.show.bundle import (
@@ -29,6 +33,16 @@ from appliance.stage.stage_parts import StageParts, admission, assemble
 _PATIENCE_S = 60.0  # a person may wait longer than a box that starts
 
 
+def check(
+    show: Annotated[
+        Path | None, typer.Argument(help="Show bundle; left out: the show that comes with the box.")
+    ] = None,
+    box: BoxFile = None,
+) -> None:
+    """Verify a show bundle and a box file, and measure whether the iterations fit this machine."""
+    check_show(show, box)
+
+
 def check_show(directory: Path | None, box_file: Path | None, patience_s: float = _PATIENCE_S) -> None:
     """Print what was found; raises StageError with all that is wrong."""
     directory = directory or default_show_path()
@@ -44,16 +58,16 @@ def _network(directory: Path) -> Path:
 
 
 def _check(directory: Path, box_file: Path | None) -> None:
-    cast, verdict = verified(directory, box_file)
+    parts, verdict = verified(directory, box_file)
     show, box = load_show(directory), load_box(box_file)
-    if box.sensors.keys is not None and cast.complaints:
-        raise StageError("\n".join(cast.complaints))
+    if box.sensors.keys is not None and parts.complaints:
+        raise StageError("\n".join(parts.complaints))
     if not verdict.fits:
         raise StageError(verdict.sentence())
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
     too_many = too_much(show.config.cues, verdict.most_coding, show.file)
-    for warning in (*reach(list(cast.worn), box), *unwired(show, box), *too_many):
+    for warning in (*reach(list(parts.worn), box), *unwired(show, box), *too_many):
         print(warning)
 
 
@@ -65,30 +79,30 @@ def verified(directory: Path, box_file: Path | None) -> tuple[StageParts, Admiss
     box = load_box(box_file)
     _refuse_damage(directory)
     show = load_show(directory)
-    _refuse_misfits(show, box, box_file)
-    cast = assemble(show, without_ports(box))
-    verdict = admission(cast, show, box)
-    cast.close()
-    return cast, verdict
+    _refuse_misfits(show, box)
+    parts = assemble(show, without_ports(box))
+    verdict = admission(parts, show, box)
+    parts.close()
+    return parts, verdict
 
 
-def pack_show(directory: Path) -> None:
-    """Write new checksums over a changed bundle, then check it; the old ones return if it is not sound."""
-    network = load_show(directory).network
-    checksums = directory / CHECKSUMS
+def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you changed.")]) -> None:
+    """Verify a changed show bundle and vouch for its files with new checksums."""
+    network = load_show(show).network
+    checksums = show / CHECKSUMS
     try:
         before = content(checksums, LARGEST_CHECKSUMS) if checksums.exists() else None
-        write_checksums(directory)
+        write_checksums(show)
     except OSError as error:
-        what = error.filename or directory
+        what = error.filename or show
         raise StageError(f"{what}: it cannot be packed ({error.strerror}). Nothing was changed.") from error
     try:
-        print(proved(network, lambda: _refuse_damage(directory)), end="")
+        print(proved(network, lambda: _refuse_damage(show)), end="")
     except StageError:
         checksums.unlink() if before is None else checksums.write_bytes(before)
         raise
-    size_mb = bundle_bytes(directory) / 1e6
-    print(f"{directory}: {len(bundle_files(directory))} files, {size_mb:.1f} MB, packed in {CHECKSUMS}.")
+    size_mb = bundle_bytes(show) / 1e6
+    print(f"{show}: {len(bundle_files(show))} files, {size_mb:.1f} MB, packed in {CHECKSUMS}.")
 
 
 def _refuse_damage(directory: Path) -> None:
@@ -100,12 +114,9 @@ def _refuse_damage(directory: Path) -> None:
         raise StageError("\n".join(["This show cannot be danced.", *errors]))
 
 
-def _refuse_misfits(show: Show, box: BoxConfig, box_file: Path | None) -> None:
-    """Whether what the box file says about joints and fixtures fits this show; raises ConfigError."""
-    problems = [
-        *misfits(box.outputs.posistagenet, show.skeleton.names, box_file),
-        *misplaced(show, box, box_file),
-    ]
+def _refuse_misfits(show: Show, box: BoxConfig) -> None:
+    """Raises ConfigError where the box file names joints or fixtures that do not fit this show."""
+    problems = [*misfits(box.outputs.posistagenet, show.skeleton.names, box.file), *misplaced(show, box)]
     if problems:
         raise ConfigError(problems)
 

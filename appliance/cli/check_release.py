@@ -77,9 +77,9 @@ def _danced(pair: Pair) -> tuple[float, float]:
 
     verdict = verified(pair.show, pair.box)[1]
     box = load_box(pair.box)
-    cast, memory = assemble(load_show(pair.show), without_ports(box)), SensorMemory(None, print)
+    parts, memory = assemble(load_show(pair.show), without_ports(box)), SensorMemory(None, print)
     iterations = Iterations(verdict.coding, verdict.interaction, verdict.most_coding)
-    tick = Tick(cast, SensorFit(cast, memory, print), iterations, latest_start_s=TICK_S)
+    tick = Tick(parts, SensorFit(parts, memory, print), iterations, latest_start_s=TICK_S)
     costs_ms: list[float] = []
     for number in range(_TICKS):
         begun = time.monotonic()
@@ -88,6 +88,6 @@ def _danced(pair: Pair) -> tuple[float, float]:
         costs_ms.append(tick.after(slot))
         if not np.isfinite(tick.frame.pose).all():
             raise ValueError("The poses are not numbers.")
-    cast.close()
+    parts.close()
     memory.close()
     return sorted(costs_ms)[_TICKS // 2], box.limits.tick_budget_ms

@@ -9,15 +9,14 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import TracebackType
 
 from appliance.box.parent_death import PARENT, TOLD
 
 SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0
 UNAVAILABLE = 69  # sysexits.h: what it needs is not here, or not yet: a projector is switched on late
 RETRY_S = 10.0
-_LIVED_S = 10.0  # whoever lived so long begins with the shortest pause again
-_SAID = 3  # deaths in a row that are told one by one
+_LIVED_S = 10.0  # after a life of this length the shortest pause counts again
+_REPORTED = 3  # deaths in a row that are reported one by one
 _MOST_DOUBLINGS = 10  # of the pause: beyond it is the longest one anyway
 _LOOK_S = 0.1
 _LAST_WORDS_S, _KILLED_WITHIN_S = 3.0, 1.0
@@ -27,8 +26,8 @@ _LAST_WORDS_S, _KILLED_WITHIN_S = 3.0, 1.0
 class Companion:
     """One process beside the stage.
 
-    meanwhile: what is missing while it is away, a sentence. may_close: a person may end it, and then it stays
-    ended. descriptors: what it inherits.
+    meanwhile: a sentence, what is missing while it is away. may_close: a person may end it, and then it stays
+    ended. descriptors: the open files that it inherits.
     """
 
     name: str
@@ -50,28 +49,26 @@ class Companions:
         self._may_start = may_start
         self._running = [_Running(companion, say) for companion in companions]
         self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._attend, name="companions", daemon=True)
+        self._thread = threading.Thread(target=self._supervise, name="companions", daemon=True)
 
     def __enter__(self) -> Companions:
         if self._running:
             self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._closing.set()
         if self._running:
             self._thread.join()
 
-    def _attend(self) -> None:
+    def _supervise(self) -> None:
         """All children are this thread's: Linux ends them when the thread that started them ends."""
         while not self._may_start():
             if self._closing.wait(_LOOK_S / 4):
                 return
         while True:
             for running in self._running:
-                running.look(time.monotonic())
+                running.check(time.monotonic())
             if self._closing.wait(_LOOK_S):
                 break
         for running in self._running:
@@ -93,11 +90,11 @@ class _Running:
         self._told: int | None = None
         self._is_over = False
 
-    def look(self, now: float) -> None:
+    def check(self, now: float) -> None:
         """Start it when it is time to; notice when it has died."""
         if self._process is not None and (status := self._process.poll()) is not None:
             self._process = None
-            self._note(status, now)
+            self._note_exit(status, now)
         if self._process is None and not self._is_over and now >= self._starts_at:
             self._start(now)
 
@@ -126,13 +123,13 @@ class _Running:
                 start_new_session=True,  # Ctrl-C is for the box, which then ends them
             )
         except OSError as error:
-            self._again(f"cannot be started ({error.strerror})", now)
+            self._start_later(f"cannot be started ({error.strerror})", now)
 
     def _environment(self) -> dict[str, str]:
         told = {} if self._told is None else {TOLD: str(self._told)}
         return {**os.environ, PARENT: str(os.getpid()), **told}
 
-    def _note(self, status: int, now: float) -> None:
+    def _note_exit(self, status: int, now: float) -> None:
         companion = self._companion
         if companion.may_close and status == 0:
             self._is_over = True
@@ -146,19 +143,19 @@ class _Running:
             self._told = status
             self._starts_at = now + RETRY_S
         elif status < 0:
-            self._again(f"was killed (signal {-status})", now)
+            self._start_later(f"was killed (signal {-status})", now)
         else:
-            self._again(f"ended by itself (status {status})", now)
+            self._start_later(f"ended by itself (status {status})", now)
 
-    def _again(self, what: str, now: float) -> None:
+    def _start_later(self, what: str, now: float) -> None:
         self._told = None
         self._deaths = 1 if now - self._started_at > _LIVED_S else self._deaths + 1
         doublings = min(self._deaths - 1, _MOST_DOUBLINGS)
         self._starts_at = now + min(SHORTEST_PAUSE_S * 2**doublings, LONGEST_PAUSE_S)
-        if self._deaths <= _SAID:
+        if self._deaths <= _REPORTED:
             self._say(f"{self._companion.name} {what}. {self._companion.meanwhile} It is started again.")
-        elif self._deaths == _SAID + 1:
+        elif self._deaths == _REPORTED + 1:
             self._say(
                 f"{self._companion.name} {what}, {self._deaths} times in a row. {self._companion.meanwhile} "
-                f"It is tried again each {LONGEST_PAUSE_S:g} s. What it said above tells why."
+                f"It is tried again each {LONGEST_PAUSE_S:g} s. Its messages above say why."
             )

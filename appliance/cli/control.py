@@ -7,9 +7,13 @@ import os
 import socket
 import sys
 import time
-from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
+from appliance.cli.options import BoxFile, ChosenFile
+from appliance.release.choice import box_of
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import NotAskedForError, Problem
 from appliance.show.control import ControlConfig
@@ -21,24 +25,27 @@ _FIRST_OF_SYSTEMD = 3  # sd_listen_fds(3)
 _FREED_WITHIN_S, _LOOK_S = 2.0, 0.05
 
 
-def control_box(box_file: Path | None, descriptor: int | None) -> None:
-    """Never returns: this process becomes one that has loaded nothing that show control does not need.
-
-    `descriptor`: the port's socket where somebody has opened it already. Raises StageError, ConfigError.
-    """
-    box = load_box(box_file)
-    if box.control is None:
+def control(
+    box: BoxFile = None,
+    socket_fd: Annotated[
+        int | None, typer.Option(min=3, help="The control port's socket, where it is open already.")
+    ] = None,
+    chosen: ChosenFile = None,
+) -> None:
+    """Take commands by OSC (go, stop, panic, cues ...), also while the stage hangs or is not there."""
+    config = load_box(box_of(box, chosen))
+    if config.control is None:
         words = "This box file says `control: null`, so nobody commands this box."
         cure = "Write `control: {port: 9002}`."
-        raise NotAskedForError([Problem(box_file or Path("box.yaml"), 0, words, cure)])
-    if descriptor is None:
-        descriptor = _from_systemd()
-    if descriptor is None:
-        descriptor = open_control_port(box.control).detach()
-    _require_udp(descriptor)
-    os.set_inheritable(descriptor, True)
-    command = control_command(box, descriptor)
-    os.execv(command[0], command)
+        raise NotAskedForError([Problem(config.file.path, 0, words, cure)])
+    if socket_fd is None:
+        socket_fd = _from_systemd()
+    if socket_fd is None:
+        socket_fd = open_control_port(config.control).detach()
+    _require_udp(socket_fd)
+    os.set_inheritable(socket_fd, True)
+    command = control_command(config, socket_fd)
+    os.execv(command[0], command)  # a process that has loaded nothing that show control does not need
 
 
 def open_control_port(control: ControlConfig) -> socket.socket:

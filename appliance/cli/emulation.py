@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 
 from appliance.sensor.keys import create_keys
 from appliance.show.box import BoxConfig, UdpConfig
@@ -16,49 +17,38 @@ from appliance.stage.stage_error import StageError
 _LAST_WORDS_S = 2.0
 
 
-class Emulation:
-    """A context: starts `python -m hw_sim emulate` for the show's sensors and ends it.
+@contextmanager
+def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
+    """Meanwhile `python -m hw_sim emulate` is the show's sensors; gives the box that finds them.
 
-    `box` is the given box with the key file of these sensors: the venue's own are not let in meanwhile, and
-    what is learnt of these is forgotten with them. It has no journal: the venue's is not for rehearsals.
+    Its key file is that of these sensors: the venue's own are not let in meanwhile, and what is learnt of
+    these is forgotten with them. It has no journal: the venue's is not for rehearsals. Raises StageError.
     """
-
-    def __init__(self, show: Show, box: BoxConfig, scratch: Path) -> None:
-        names = list(dict.fromkeys(hand.sensor for hand in show.config.hands if hand.sensor))
-        if not names:
-            raise StageError("This show has no sensors to emulate. Leave --emulate out.")
-        keys = scratch / "sensors.keys"
-        create_keys(keys, names)
-        udp = box.sensors.udp or UdpConfig()
-        self._command = [
-            *(sys.executable, "-m", "hw_sim", "emulate", "--keys", str(keys), "--motion", "dance"),
-            *("--host", udp.host, "--port", str(udp.port)),
-        ]
-        sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
-        journal = box.journal.model_copy(update={"folder": None})
-        self.box = box.model_copy(update={"sensors": sensors, "state": None, "journal": journal})
-        self._words = scratch / "emulator.txt"
-        self._process: subprocess.Popen[bytes] | None = None
-
-    def __enter__(self) -> Emulation:
-        with self._words.open("wb") as words:
-            self._process = subprocess.Popen(
-                self._command,
-                stdin=subprocess.DEVNULL,
-                stdout=words,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,  # Ctrl-C is for the box, which then ends the emulator
-            )
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        process = self._process
-        if process is None:
-            return
+    names = list(dict.fromkeys(hand.sensor for hand in show.config.hands if hand.sensor))
+    if not names:
+        raise StageError("This show has no sensors to emulate. Leave --emulate out.")
+    keys, words = scratch / "sensors.keys", scratch / "emulator.txt"
+    create_keys(keys, names)
+    udp = box.sensors.udp or UdpConfig()
+    command = [
+        *(sys.executable, "-m", "hw_sim", "emulate", "--keys", str(keys), "--motion", "dance"),
+        *("--host", udp.host, "--port", str(udp.port)),
+    ]
+    sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
+    journal = box.journal.model_copy(update={"folder": None})
+    with words.open("wb") as output:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,  # Ctrl-C is for the box, which then ends the emulator
+        )
+    try:
+        yield box.model_copy(update={"sensors": sensors, "state": None, "journal": journal})
+    finally:
         if process.poll():
-            print(f"The emulated sensors ended by themselves: {self._words.read_text()}", file=sys.stderr)
+            print(f"The emulated sensors ended by themselves: {words.read_text()}", file=sys.stderr)
         process.terminate()
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(_LAST_WORDS_S)

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import ipaddress
 from collections.abc import Iterator, Sequence
-from pathlib import Path
+from typing import Annotated
 
+import typer
+
+from appliance.cli.options import BoxFile, ChosenFile
+from appliance.release.choice import box_of
 from appliance.show.box import BoxConfig, load_box
 
 _RULES = """\
@@ -30,13 +34,20 @@ table inet bunraku {{
 """
 
 
-def print_rules(box_file: Path | None, access_points: Sequence[str]) -> None:
-    """Rules for `nft -f -`; raises ConfigError for a box file that is not sound."""
-    print(rules(load_box(box_file), access_points), end="")
+def firewall(
+    box: BoxFile = None,
+    chosen: ChosenFile = None,
+    access_point: Annotated[
+        list[str] | None,
+        typer.Option(help="Network card of the access point that the sensors join; several."),
+    ] = None,
+) -> None:
+    """Print rules for nft that let in what the box file opens, and nothing else."""
+    print(rules(load_box(box_of(box, chosen)), access_point or []), end="")
 
 
 def rules(box: BoxConfig, access_points: Sequence[str] = ()) -> str:
-    """One table of our own: what others have set up besides stays as it is."""
+    """One table of our own: all other tables stay as they are."""
     lines = [*_sensors(box), *_commands(box), *_own_network(access_points)]
     return _RULES.format(rules="\n".join(f"\t\t{line}" for line in lines))
 
@@ -48,7 +59,7 @@ def _sensors(box: BoxConfig) -> Iterator[str]:
 
 
 def _commands(box: BoxConfig) -> Iterator[str]:
-    """From those who are listed; without a list from this machine alone, which needs no rule."""
+    """From the senders in the list; without one from this machine alone, which needs no rule."""
     control = box.control
     if control is None or _is_loopback(control.host):
         return

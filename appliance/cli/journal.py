@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from appliance.cli.chosen import ChosenFile
+from appliance.cli.options import ChosenFile, ThisBoxFile, command_group
 from appliance.release.installed_box import box_here
 
 if TYPE_CHECKING:
@@ -21,13 +21,8 @@ if TYPE_CHECKING:
 
 STICK = Path("/media/bunraku")
 
-journal = typer.Typer(
-    help="List what the flight recorder holds, or export it to a stick.", no_args_is_help=True
-)
+journal = command_group("List what the flight recorder holds, or export it to a stick.", needs_command=True)
 
-BoxFile = Annotated[
-    Path | None, typer.Option("--box", help="box.yaml of the venue, which names the journal.")
-]
 Recorded = Annotated[
     Path | None, typer.Option("--journal", help="Folder or exported file; left out: the box file's folder.")
 ]
@@ -35,7 +30,7 @@ Recorded = Annotated[
 
 @journal.command("list")
 def list_journal(
-    box: BoxFile = None,
+    box: ThisBoxFile = None,
     chosen: ChosenFile = None,
     recorded: Recorded = None,
     events: Annotated[
@@ -55,7 +50,7 @@ def list_journal(
 @journal.command("export")
 def export_journal(
     to: Annotated[Path | None, typer.Argument(help="Folder or file; left out: the stick.")] = None,
-    box: BoxFile = None,
+    box: ThisBoxFile = None,
     chosen: ChosenFile = None,
     recorded: Recorded = None,
 ) -> None:
@@ -134,7 +129,7 @@ def _writable(stick: Path) -> Iterator[None]:
 
 
 def _progress(written: int, size: int) -> None:
-    """A line that replaces itself, for who watches."""
+    """A line on the terminal that replaces itself."""
     if sys.stderr.isatty():
         end = "\n" if written >= size else ""
         print(f"\r{written / 1e6:.0f} of {size / 1e6:.0f} MB", end=end, file=sys.stderr, flush=True)

@@ -7,21 +7,10 @@ from typing import Annotated
 
 import typer
 
+from appliance.cli.options import BoxFile, ChosenFile, ShowFolder, command_group, is_for_subcommand
 from appliance.release.choice import box_of
 
-ShowFolder = Annotated[
-    Path | None, typer.Option(help="Show bundle; left out: the show that comes with the box.")
-]
-BoxFile = Annotated[Path | None, typer.Option(help="box.yaml of the venue: its wires and places.")]
-ChosenFile = Annotated[
-    Path | None, typer.Option("--chosen", help="Instead of --box: as `bunraku preflight` chose.")
-]
-
-lights = typer.Typer(
-    help="Light the rig by the dance; walk through it, look at it, convert fixture profiles.",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
+lights = command_group("Light the rig by the dance; walk through it, look at it, convert fixture profiles.")
 
 
 @lights.callback(invoke_without_command=True)
@@ -34,9 +23,7 @@ def light(
     chosen: ChosenFile = None,
 ) -> None:
     """Light the rig by the dance that `bunraku play` dances, until Ctrl-C; `play` starts this by itself."""
-    if context.invoked_subcommand is not None:
-        if (show, box, chosen) != (None, None, None):
-            raise typer.BadParameter(f"write options behind '{context.invoked_subcommand}'")
+    if is_for_subcommand(context, show, box, chosen):
         return
     from appliance.lights.run import light_up
 

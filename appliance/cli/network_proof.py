@@ -1,4 +1,4 @@
-"""A show's network runs first in a process that can be given up: it may hang, crash, or take all memory."""
+"""A first run of a show's network in a process of its own: it may hang, crash, or take all memory."""
 
 from __future__ import annotations
 

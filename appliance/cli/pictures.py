@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from appliance.box.clock import TICK_S
 from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
@@ -12,7 +15,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal
-from appliance.show.look import LookConfig, looks_by_name
+from appliance.show.look import looks_by_name
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError
 
@@ -38,6 +41,24 @@ class Danced:
             )
         kept = slice(first, first + max(1, round(seconds * self.fps)))
         return Danced(self.skeleton, self.poses[kept], self.roots[kept], self.fps, self.held, self.title)
+
+
+def filmstrip(
+    recording: Annotated[Path, typer.Argument(help="A BVH recording, or the journal of a run.")],
+    out: Annotated[Path | None, typer.Option(help="The PNG; left out: beside the recording.")] = None,
+    start: Annotated[
+        float, typer.Option(help="Second at which the pictures begin; negative: counted from the end.")
+    ] = 0.0,
+    seconds: Annotated[float, typer.Option(min=0.1, help="How many seconds they cover.")] = 10.0,
+    metres_per_unit: Annotated[float, typer.Option(min=1e-6, help="Unit of a BVH file, in metres.")] = 0.01,
+    look: Annotated[
+        str | None, typer.Option(help="Render in this look, as the projector shows it: plaster, lines ...")
+    ] = None,
+    show: Annotated[Path | None, typer.Option(help="Show bundle that the look belongs to.")] = None,
+) -> None:
+    """Draw a recording or a journal as a row of poses; held joints are highlighted."""
+    dance, out = danced(recording, metres_per_unit).part(start, seconds), out or recording.with_suffix(".png")
+    print(drawn(dance, out) if look is None else rendered(dance, out, look, show))
 
 
 def danced(source: Path, metres_per_unit: float = 0.01) -> Danced:
@@ -68,7 +89,8 @@ def rendered(dance: Danced, out: Path, look: str, show: Path | None) -> Path:
     """A strip of pictures as the projector shows them, in a look of a show or, without a show, a built-in
     one. Raises ConfigError, or StageError where the look is unknown or nothing can be rendered here."""
     looks = looks_by_name(() if show is None else load_show(show).config.looks)
-    _refuse_unknown(look, looks)
+    if look not in looks:
+        raise StageError(f"There is no look '{look}'. There are: {', '.join(looks)}.")
     try:
         from appliance.projector.strip import strip
 
@@ -77,11 +99,6 @@ def rendered(dance: Danced, out: Path, look: str, show: Path | None) -> Path:
         raise StageError(str(error)) from error
     except OSError as error:
         raise _unwritable(out, error) from error
-
-
-def _refuse_unknown(look: str, looks: dict[str, LookConfig]) -> None:
-    if look not in looks:
-        raise StageError(f"There is no look '{look}'. There are: {', '.join(looks)}.")
 
 
 def _unwritable(out: Path, error: OSError) -> StageError:

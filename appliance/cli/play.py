@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from pathlib import Path
@@ -52,15 +53,19 @@ def play_show(
     alone: bool = False,
     window: bool = False,
     rehearse: Path | None = None,
-    proven: bool = False,
+    chosen: Path | None = None,
 ) -> int:
     """Dance until the seconds are over or a signal comes; the exit status.
 
     alone: start no companions. window: show the projection in a window. rehearse: the same where there is
-    a display, and a picture of the projection at the end. proven: the network was seen to run here.
+    a display, and a picture of the projection at the end. chosen: dance what the preflight chose and proved.
+
+    Raises ConfigError, StageError.
     """
+    if chosen is not None:
+        directory, box_file = _pair_to_dance(chosen, directory, box_file)
     show, box = load_show(directory or default_show_path()), load_box(box_file)
-    if directory is not None and not proven:  # no signal reaches a run that never ends
+    if directory is not None and chosen is None:  # no signal reaches a run that never ends
         from appliance.cli.network_proof import prove_network
 
         prove_network(show)
@@ -68,7 +73,9 @@ def play_show(
         stopped = opened.enter_context(stop_signals())
         scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
         if emulate and scratch:
-            box = _emulated(show, box, scratch, opened)
+            from appliance.cli.emulation import emulated
+
+            box = opened.enter_context(emulated(show, box, scratch))
         keeps, minutes = journal is not None, box.journal.minutes
         journal = _new_folder(journal) if journal is not None else box.journal.folder
         if (filmstrip or rehearse) is not None and scratch and (alone or journal is None):
@@ -79,21 +86,21 @@ def play_show(
         opened.callback(speaker.close)
         shown = rehearse is not None and _has_display()
         control = None if alone or box.control is None else _opened(box.control, opened)
-        stage = Stage(show, box, speaker.say, box_file, rehearsal=emulate)
+        stage = Stage(show, box, speaker.say, box.path, rehearsal=emulate)
         with closing(stage):
-            keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box_file
+            keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
             keeper = _keeper(keepers_box, journal, minutes) if keeps else None
             for line in _introduction(stage, emulate, control):
                 speaker.say(line)
-            company = () if alone else tuple(_company(show, box, box_file, control, window or shown))
-            with _accompanied(company + (() if keeper is None else (keeper,)), speaker, stage):
+            companions = () if alone else tuple(_companions(show, box, control, window or shown))
+            with _running(companions + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:
                 from appliance.keeper.kept import keep_rest
 
                 keep_rest(stage.box, stage.sharing.noted, journal, minutes, speaker.say)
         if not alone:
-            _forget(stage)
+            _forget_run(stage)
         for line in _conclusion(stage):
             speaker.say(line)
         if filmstrip is not None and journal is not None:
@@ -107,7 +114,22 @@ def play_show(
 
             for line in rehearsal_picture(journal, rehearse, show):
                 speaker.say(line)
+    if chosen is not None:
+        from appliance.release.start_attempts import ended_well
+
+        ended_well(chosen)
     return 0
+
+
+def _pair_to_dance(chosen: Path, directory: Path | None, box_file: Path | None) -> tuple[Path, Path]:
+    """Show and box file that the preflight chose; their start is counted."""
+    from appliance.release.choice import require_no
+    from appliance.release.start_attempts import pair_to_dance
+
+    require_no("--show", directory, chosen)
+    require_no("--box", box_file, chosen)
+    pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
+    return pair.show, pair.box
 
 
 def _scratch(opened: ExitStack) -> Path:
@@ -118,13 +140,6 @@ def _scratch(opened: ExitStack) -> Path:
     folder = Path(tempfile.mkdtemp(prefix="bunraku-"))
     opened.callback(shutil.rmtree, folder, ignore_errors=True)
     return folder
-
-
-def _emulated(show: Show, box: BoxConfig, scratch: Path, opened: ExitStack) -> BoxConfig:
-    """The box as emulated sensors find it, which run from now on."""
-    from appliance.cli.emulation import Emulation
-
-    return opened.enter_context(Emulation(show, box, scratch)).box
 
 
 def _rehearsal_box(stage: Stage, scratch: Path) -> Path:
@@ -148,21 +163,21 @@ def _opened(control: ControlConfig, opened: ExitStack) -> socket.socket:
     return port
 
 
-def _accompanied(
-    company: tuple[Companion, ...], speaker: LogWriter, stage: Stage
+def _running(
+    companions: tuple[Companion, ...], speaker: LogWriter, stage: Stage
 ) -> AbstractContextManager[object]:
-    """While inside, they run; without any, nothing is loaded for them: a stage that is back is in a hurry."""
-    if not company:
+    """While inside, they run; without any, nothing is loaded for them, so that a stage restarts soon."""
+    if not companions:
         return nullcontext()
     from appliance.cli.companions import Companions
 
-    return Companions(company, speaker.say, lambda: stage.health.ticks > 0)
+    return Companions(companions, speaker.say, lambda: stage.health.ticks > 0)
 
 
-def _company(
-    show: Show, box: BoxConfig, box_file: Path | None, control: socket.socket | None, window: bool
+def _companions(
+    show: Show, box: BoxConfig, control: socket.socket | None, window: bool
 ) -> Iterator[Companion]:
-    """Who accompanies the stage."""
+    """The processes beside the stage."""
     from appliance.cli.companions import Companion
     from appliance.cli.control import control_command
 
@@ -173,7 +188,7 @@ def _company(
             "What is in force stays in force; commands wait for a moment.",
             descriptors=(control.fileno(),),
         )
-    named = () if box_file is None else ("--box", str(box_file))
+    named = () if box.path is None else ("--box", str(box.path))
     bunraku = (sys.executable, "-m", "appliance.cli")
     if box.outputs.dmx and show.config.lights.fixtures:
         yield Companion(
@@ -190,15 +205,15 @@ def _company(
         )
 
 
-def _forget(stage: Stage) -> None:
-    """All have ended as they should: the next show begins anew."""
+def _forget_run(stage: Stage) -> None:
+    """All have ended as they should: the next show begins at its beginning."""
     forget_show_state(stage.sharing.folder)
     if stage.box.state_folder is not None:
         forget_memory(stage.sharing.noted, stage.box.state_folder)
 
 
 def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Companion:
-    """Who carries the journal, the place and the sensors' memory to the disk."""
+    """The process that carries the journal, the place and the sensors' memory to the disk."""
     from appliance.cli.companions import Companion
 
     named = () if box_file is None else ("--box", str(box_file))
@@ -227,7 +242,7 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
     lines = [
         f"{show.config.name}: {hands or 'no hands, the dancer moves freely'}.",
         f"The dance goes to {receivers}.",
-        _ears(stage, control),
+        _inputs(stage, control),
         stage.admission.sentence(),
     ]
     lines += stage.cast.complaints
@@ -239,8 +254,8 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
     return lines
 
 
-def _ears(stage: Stage, control: socket.socket | None) -> str:
-    """Where sensors and commands are heard."""
+def _inputs(stage: Stage, control: socket.socket | None) -> str:
+    """Where sensors and commands arrive."""
     sensors = ", ".join(intake.name for intake in stage.cast.link.intakes) or "no port"
     if control is not None:
         commands = "on " + ":".join(map(str, control.getsockname()))

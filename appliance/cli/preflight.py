@@ -1,4 +1,4 @@
-"""`bunraku preflight`: decides at power-on which show dances; it imports little, for all wait for it."""
+"""`bunraku preflight`: decides at power-on which show dances; it imports little: the box waits for it."""
 
 from __future__ import annotations
 
@@ -15,21 +15,23 @@ from appliance.release.arrivals import look
 from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice, alone_in
 from appliance.release.choosing import Outcome, Places, built_in_box, choose, chosen_before
 
-ANEW = "anew"  # touched when units have to start anew, for another show or box file dances
+ANEW = "anew"  # touched when units have to restart, for another show or box file dances
 _AT_ONCE_S = 120.0  # after power-on a stick takes effect at once; later no show is interrupted
-_PATIENCE_S = 45.0  # a stick that is read for ever keeps nobody from dancing
+_PATIENCE_S = 45.0  # a stick that never finishes reading does not keep the box from dancing
 _TURN_S, _LATE_TURN_S = 20.0, 60.0  # how long another preflight is waited for
 _NOT_WRITTEN = 1
 
 
 class Options(NamedTuple):
-    """Where to look and where to write. late: a stick was plugged into a box that is on."""
+    """Where to look and where to write. late: a stick was plugged into a box that is on; check_release: only
+    whether this release dances."""
 
     boot: Path | None = None
     stick: Path = STICK
     data: Path = DATA
     run: Path = RUN
     late: bool = False
+    check_release: bool = False
 
 
 def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> int:
@@ -52,7 +54,7 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
     except OSError as error:
         say(
             f"{places.run}: what was chosen cannot be written there ({error.strerror}). The audience "
-            "sees the show that comes with the box. Look who owns this folder."
+            "sees the show that comes with the box. Check the owner of this folder."
         )
         return _NOT_WRITTEN
     return 0
@@ -132,30 +134,30 @@ def parsed(arguments: Sequence[str]) -> Options:
         return Options()
     import argparse
 
-    parser = argparse.ArgumentParser(prog="bunraku preflight", description=DESCRIPTION)
+    description = (
+        "Decide which show dances: a new one from the stick or the boot partition when it is sound, else the "
+        "last good one, else the one that comes with the box."
+    )
+    parser = argparse.ArgumentParser(prog="bunraku preflight", description=description)
     parser.add_argument("--boot", type=Path, help="The boot partition's folder with `show` and `box.yaml`.")
     parser.add_argument("--stick", type=Path, default=STICK, help=f"The same on a stick; {STICK}.")
     parser.add_argument("--data", type=Path, default=DATA, help=f"What is kept over power-off; {DATA}.")
     parser.add_argument("--run", type=Path, default=RUN, help=f"Where all processes look; {RUN}.")
     parser.add_argument("--late", action="store_true", help="A stick was plugged into a box that is on.")
+    help_text = "Instead: can this release dance on this machine?"
+    parser.add_argument("--check-release", action="store_true", help=help_text)
     return Options(**vars(parser.parse_args(list(arguments))))
-
-
-DESCRIPTION = (
-    "Decide which show dances: a new one from the stick or the boot partition when it is sound, else the "
-    "last good one, else the one that comes with the box."
-)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """For `python -m appliance.cli.preflight`, which units run; the exit status."""
     given = sys.argv[1:] if arguments is None else list(arguments)
-    if "--check-release" in given:
+    options = parsed(given)
+    if options.check_release:
         from appliance.cli.check_release import check_release
 
-        given.remove("--check-release")
-        return check_release(parsed(given).data)
-    return preflight(parsed(given), _say, time.clock_gettime(time.CLOCK_BOOTTIME))
+        return check_release(options.data)
+    return preflight(options, _say, time.clock_gettime(time.CLOCK_BOOTTIME))
 
 
 def _say(words: str) -> None:

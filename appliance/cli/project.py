@@ -1,4 +1,4 @@
-"""`bunraku project`: show what the stage dances, until somebody ends it; the exit status for a supervisor."""
+"""`bunraku project`: show what the stage dances until it is stopped; the exit status is for a supervisor."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -14,14 +15,36 @@ from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
 from appliance.box.parent_death import was_told
 from appliance.box.stop_signals import stop_signals
+from appliance.cli.options import BoxFile, ChosenFile
 from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
 from appliance.projector.run import Run, Wish
 from appliance.projector.window import Kind, Size
+from appliance.release.choice import box_of
 from appliance.show.box import load_box
 
 _LARGEST = 16384
 _RETRY_S = 10.0  # without a display: a projector is switched on late
 _LOOK_S = 0.25
+
+
+def project(
+    box: BoxFile = None,
+    window: Annotated[bool, typer.Option("--window", help="In a window, for a rehearsal.")] = False,
+    fullscreen: Annotated[bool, typer.Option("--fullscreen", help="On the whole display.")] = False,
+    offscreen: Annotated[
+        str | None, typer.Option(metavar="WIDTHxHEIGHT", help="On no display, in this size.")
+    ] = None,
+    frames: Annotated[Path | None, typer.Option(help="Write each picture as a PNG into this folder.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after this time.")] = None,
+    info: Annotated[bool, typer.Option("--info", help="Figures on the wall and on the terminal.")] = False,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Without a display wait for one, and look each 10 s.")
+    ] = False,
+    chosen: ChosenFile = None,
+) -> int:
+    """Show what the stage dances, on a projector: before it starts, while it dances and when it is back."""
+    wished = wish(window, fullscreen, offscreen, frames, seconds, info)
+    return project_show(box_of(box, chosen), wished, wait)
 
 
 def wish(
@@ -60,7 +83,7 @@ def project_show(box_file: Path | None, wish: Wish, waits: bool = False) -> int:
                 if str(error) != said:
                     said = str(error)
                     speaker.say(f"{said} It is tried again each {_RETRY_S:g} s.")
-            notifier.ready("No display. It is looked for again and again.")
+            notifier.ready("No display yet; it is tried again.")
             _wait(stopped, notifier)
     return 0
 
@@ -72,7 +95,7 @@ def _project(
     notifier: Notifier,
     say: Callable[[str], None],
 ) -> None:
-    with closing(Run(load_box(box_file), box_file, wish, say)) as run:
+    with closing(Run(load_box(box_file), wish, say)) as run:
         for line in run.introduction():
             say(line)
         say(f"Shown: {run.project(stopped, notifier).sentence()}.")

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from appliance.recorder.environment import differing_files, differing_software, environment
 from appliance.recorder.journal_error import JournalError
@@ -20,14 +23,20 @@ TOLERANCE_DEGREES = 2.0
 _PROGRESS_TICKS = 500
 
 
-def replay_journal(journal: Path, show: Path | None, from_s: float, tolerance_degrees: float | None) -> int:
-    """Print what was replayed and the first tick that differs; 0 when none does, else 1.
-
-    tolerance_degrees: None: none on the machine that recorded it, TOLERANCE_DEGREES on another.
-    Raises JournalError, StageError, ConfigError.
-    """
+def replay(
+    journal: Annotated[
+        Path, typer.Argument(help="Folder of a journal, a segment in it, or an exported file.")
+    ],
+    show: Annotated[Path | None, typer.Option(help="Show bundle; left out: where it was then.")] = None,
+    from_s: Annotated[float, typer.Option("--from", min=0.0, help="Second of a run to begin at.")] = 0.0,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Degrees that a joint may be off; 0: every bit must be the same."),
+    ] = None,
+) -> int:
+    """Dance a journal again through the same tick, and say which is the first that differs."""
     outcomes = [
-        _replay(run, show, from_s, tolerance_degrees, readable(f"Run {number} of '{run.header['show']}'"))
+        _replay(run, show, from_s, tolerance, readable(f"Run {number} of '{run.header['show']}'"))
         for number, run in enumerate(read_journal(journal).runs, 1)
     ]
     if not any(ticks for ticks, _ in outcomes):
@@ -49,22 +58,20 @@ def _replay(
     directory = _show_of(run, given)
     others = differing_software(run.header, environment())
     files = [f"the show's {file}" for file in differing_files(run.header["show_files"], directory)]
-    if tolerance is None:
+    if tolerance is None:  # bit for bit on the machine that recorded it
         tolerance = TOLERANCE_DEGREES if others or files else 0.0
     comparison = Comparison(float(run.ticks["frame_time"][0]), tolerance)
-    replay = Replay(run, load_show(directory))
-    for danced in replay.dance(comparison, from_s):
+    again = Replay(run, load_show(directory))
+    for danced in again.dance(comparison, from_s):
         if danced % _PROGRESS_TICKS == 0:
             _progress(name, danced, len(run.ticks))
     _progress("", 0, 0)
-    for line in _told(name, comparison, replay, [*others, *files], tolerance):
+    for line in _told(name, comparison, again, [*others, *files], tolerance):
         print(readable(line))
     return comparison.ticks, comparison.first is None
 
 
-def _told(
-    name: str, comparison: Comparison, replay: Replay, others: list[str], tolerance: float
-) -> list[str]:
+def _told(name: str, comparison: Comparison, again: Replay, others: list[str], tolerance: float) -> list[str]:
     ticks, first, worst = comparison.ticks, comparison.first, comparison.worst
     if tolerance:
         bound = f"within {tolerance:g} degrees and {1000 * METRES_PER_DEGREE * tolerance:g} mm"
@@ -73,11 +80,11 @@ def _told(
     lines = [f"{name}: {ticks} ticks danced again ({ticks / 50:.1f} s)."]
     if others:
         lines.append(f"Other than in the recording: {'; '.join(others)}.")
-    if replay.skipped:
-        lines.append(f"{replay.skipped} ticks were not: before the first keyframe, or around a gap.")
-    if replay.forced:
+    if again.skipped:
+        lines.append(f"{again.skipped} ticks were not: before the first keyframe, or around a gap.")
+    if again.forced:
         lines.append(
-            f"{replay.forced} ticks had a network that failed then, and not here: taken as they were."
+            f"{again.forced} ticks had a network that failed then, and not here: taken as they were."
         )
     if first is None:
         lines.append(f"All are the same, {bound}.")
@@ -104,7 +111,7 @@ def _show_of(run: Run, given: Path | None) -> Path:
 
 
 def _progress(name: str, danced: int, ticks: int) -> None:
-    """A line that replaces itself, for who watches; an empty one at the end."""
+    """A line on the terminal that replaces itself; an empty one at the end."""
     if sys.stderr.isatty():
         words = f"{name}: {danced} of {ticks} ticks" if name else ""
         print(f"\r{words:<78}\r" if not name else f"\r{words:<78}", end="", file=sys.stderr, flush=True)

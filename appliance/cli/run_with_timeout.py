@@ -1,4 +1,4 @@
-"""Doing something that may never end, in a process that is given up after a while."""
+"""Run something that may never end, in a process that is given up after a timeout."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class TimedOutError(Exception):
 def within(seconds: float, do: Callable[[], bytes]) -> bytes:
     """What `do` gives, from a fork of this process; raises TimedOutError when it is late or has crashed.
 
-    Whoever hangs in the kernel, on a stick that does not answer, cannot be ended: nobody waits for it.
+    A process that hangs in the kernel, on a stick that does not answer, cannot be ended and is left behind.
     """
     reading, writing = os.pipe()
     parent = os.getpid()
@@ -36,7 +36,7 @@ def within(seconds: float, do: Callable[[], bytes]) -> bytes:
     how = os.WNOHANG
     try:
         answer = _answered(reading, time.monotonic() + seconds, seconds)
-        how = 0  # who has answered ends at once
+        how = 0  # a fork that has answered ends at once
     finally:
         os.close(reading)
         with contextlib.suppress(OSError):
@@ -47,7 +47,7 @@ def within(seconds: float, do: Callable[[], bytes]) -> bytes:
 
 
 def limit_memory() -> None:
-    """What takes all memory ends this process, and not those that wait for it, or the dance."""
+    """Running out of memory ends this process alone, not the one that waits for it, nor the dance."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     most = max(_LEAST_MEMORY_BYTES, int(_OF_ALL_MEMORY * memory))
     with contextlib.suppress(OSError, ValueError):  # a lower limit holds already

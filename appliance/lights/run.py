@@ -139,7 +139,7 @@ class Lights:
 
 def rig_problems(show: Show, box: BoxConfig, box_file: Path | None) -> list[Problem]:
     """Why a show's lights cannot hang in this venue."""
-    problems = misplaced(show, box, box_file)
+    problems = misplaced(show, box)
     if not show.config.lights.fixtures:
         cure = "Add them under lights: (docs/lights.md tells how)."
         problems.append(Problem(show.file.path, 0, "The show has no fixtures.", cure))

@@ -36,14 +36,12 @@ class Alignment:
     brightness: float = 1.0
 
 
-def alignment_folder(
-    box: BoxConfig, box_file: Path | None, environment: Mapping[str, str] = os.environ
-) -> Path:
+def alignment_folder(box: BoxConfig, environment: Mapping[str, str] = os.environ) -> Path:
     """Where the alignment is kept: the box's state folder, else beside the box file, else with the user."""
     if box.state_folder is not None:
         return box.state_folder
-    if box_file is not None:
-        return box_file.resolve().parent
+    if box.path is not None:
+        return box.path.resolve().parent
     return Path(environment.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "bunraku"
 
 
@@ -56,8 +54,8 @@ def file_name(config: ProjectorConfig) -> str:
 class AlignmentFile:
     """Keeps an alignment in a file, which is replaced as a whole by a thread of its own: pictures never wait.
 
-    What was chosen by hand goes over the box file, until somebody changes it in the box file. Nothing here
-    raises; what goes wrong is said in one sentence, and then the alignment holds for this run.
+    What was chosen by hand overrides the box file until that value changes in the box file. Nothing here
+    raises: an error is reported in one sentence, and the alignment then holds for this run alone.
     """
 
     def __init__(self, folder: Path, config: ProjectorConfig, say: Callable[[str], None]) -> None:
@@ -66,7 +64,7 @@ class AlignmentFile:
         self._kept = self._wanted = self._load()
         self._is_wanted = threading.Event()
         self._closing = False
-        self._thread = threading.Thread(target=self._write_on, name="alignment", daemon=True)
+        self._thread = threading.Thread(target=self._write_changes, name="alignment", daemon=True)
         self._thread.start()
 
     @property
@@ -75,7 +73,7 @@ class AlignmentFile:
         return self._wanted
 
     def overrides(self) -> list[str]:
-        """A sentence for each thing that was chosen by hand and goes over the box file."""
+        """A sentence for each thing that was chosen by hand and overrides the box file."""
         chosen, box_file = self._wanted, self._from_box
         sentences = []
         if chosen.corners != WHOLE:
@@ -106,7 +104,7 @@ class AlignmentFile:
                 "the next start the picture may lie as before. Look at the disk: bunraku doctor."
             )
 
-    def _write_on(self) -> None:
+    def _write_changes(self) -> None:
         while True:
             self._is_wanted.wait()
             self._is_wanted.clear()
@@ -153,7 +151,7 @@ class AlignmentFile:
         except OSError as error:
             self._say(
                 f"{self.path}: the alignment cannot be read ({error.strerror}). The picture fills the "
-                "display. Check who may read this file."
+                "display. Check the rights of this file."
             )
         return self._from_box
 

@@ -13,7 +13,7 @@ _CORNER_NAMES = ("top left", "top right", "bottom right", "bottom left")
 
 
 class Controls:
-    """The state behind keys and orders. Each change gives a sentence for whoever asked for it.
+    """The state behind keys and orders. Each change returns a sentence about it.
 
     `keep` gets each new alignment. corner: which one keys move in corner mode, 0 to 3; None outside of it.
     """
@@ -28,7 +28,7 @@ class Controls:
         self.has_grid = False
         self.shows_info = shows_info
         self.is_over = False
-        self.wants_fullscreen = False  # whoever owns the window toggles it and takes this back
+        self.wants_fullscreen = False  # the owner of the window toggles it and resets this
 
     @property
     def shows_grid(self) -> bool:
@@ -77,24 +77,24 @@ class Controls:
         refused = complaint(corners)
         if refused:
             return False, refused
-        self._change(replace(self.alignment, corners=corners))
+        self._set_alignment(replace(self.alignment, corners=corners))
         places = ", ".join(f"({x:.4f}, {y:.4f})" for x, y in corners)
         return True, f"The picture's corners lie at {places}."
 
     def reset(self) -> str:
         """The picture fills the display again."""
-        self._change(replace(self.alignment, corners=WHOLE))
+        self._set_alignment(replace(self.alignment, corners=WHOLE))
         return "The picture fills the display."
 
     def set_mirror(self, mirror: bool) -> str:
         """For rear projection or not."""
-        self._change(replace(self.alignment, mirror=mirror))
+        self._set_alignment(replace(self.alignment, mirror=mirror))
         return "The picture is mirrored." if mirror else "The picture is not mirrored."
 
     def set_brightness(self, brightness: float) -> str:
-        """A factor; what lies beyond the bounds is taken to them."""
+        """A factor, limited to 0 and MOST_BRIGHT."""
         brightness = round(min(max(brightness, 0.0), MOST_BRIGHT), 4)
-        self._change(replace(self.alignment, brightness=brightness))
+        self._set_alignment(replace(self.alignment, brightness=brightness))
         return f"Brightness {100 * brightness:.0f} %."
 
     def set_grid(self, grid: bool) -> str:
@@ -107,7 +107,7 @@ class Controls:
         self.shows_info = info
         return "Figures are on the wall." if info else "No figures on the wall."
 
-    def obey(self, order: Order) -> tuple[bool, str]:
+    def carry_out(self, order: Order) -> tuple[bool, str]:
         """An order by OSC: whether it was done, and a sentence."""
         values = order.values
         match order.name, len(values):
@@ -130,6 +130,6 @@ class Controls:
                 return True, self.set_info(values[0] != 0)
         return False, f"The projector knows no order '{order.name}' with these values. Nothing has changed."
 
-    def _change(self, alignment: Alignment) -> None:
+    def _set_alignment(self, alignment: Alignment) -> None:
         self.alignment = alignment
         self._keep(alignment)

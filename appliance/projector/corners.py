@@ -27,11 +27,7 @@ def homography(corners: Corners) -> NDArray[np.float64]:
     g = (sx * by - sy * bx) / area
     h = (ax * sy - ay * sx) / area
     return np.array(
-        [
-            [x1 - x0 + g * x1, x3 - x0 + h * x3, x0],
-            [y1 - y0 + g * y1, y3 - y0 + h * y3, y0],
-            [g, h, 1.0],
-        ]
+        [[x1 - x0 + g * x1, x3 - x0 + h * x3, x0], [y1 - y0 + g * y1, y3 - y0 + h * y3, y0], [g, h, 1.0]]
     )
 
 

@@ -20,7 +20,7 @@ from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 
 _NO_SIZE = (1, 1)  # of a picture that nothing goes through
 _MARKER_RADIUS = 28.0  # pixels
-_TEXT_ROWS = 160  # letters are as large as if the display had so many rows of pixels
+_TEXT_ROWS = 160  # letters are as large as on a display of this many rows of pixels
 _DITHER_STEP = 0.618034  # pixels: no two neighbouring pictures have the same pattern
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 _CLIP_FROM_DISPLAY = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.0]])  # of the square, y down
@@ -98,7 +98,7 @@ class FinalPass:
     def resize(self, size: Size) -> None:
         """The size in which the scene is drawn, pixels."""
         if self.picture.size != size:
-            self._forget_picture()
+            self._release_picture()
             self._texture, self.picture = self._target(size)
 
     def draw(
@@ -129,7 +129,7 @@ class FinalPass:
             inputs["clip_from_part"] = self._clip_from_part(controls)
             drawing = self._unchanged if self._is_graded else self._dimmed
             drawing.draw(self._tally, pixels, inputs, moderngl.TRIANGLE_STRIP, 4)
-        self._tally.move(4 * pixels)
+        self._tally.count_bytes(4 * pixels)
 
     def figures(self) -> Figures:
         """What the last step of the last picture took; nothing where a look did it itself."""
@@ -137,7 +137,7 @@ class FinalPass:
         return self._tally.figures(width * height, 4 * width * height)
 
     def black(self, screen: moderngl.Framebuffer, display: Size) -> None:
-        """Nothing at all, not even what was asked for."""
+        """Nothing at all, not even figures or marks."""
         self._tally.clear()
         screen.use()
         screen.viewport = (0, 0, *display)
@@ -145,7 +145,7 @@ class FinalPass:
 
     def release(self) -> None:
         """Give the GPU's memory back."""
-        self._forget_picture()
+        self._release_picture()
         for owned in (self._text, self._unchanged, self._dimmed, self._marked):
             owned.release()
 
@@ -212,6 +212,6 @@ class FinalPass:
         texture.repeat_x = texture.repeat_y = False
         return texture, self._gl.framebuffer([texture])
 
-    def _forget_picture(self) -> None:
+    def _release_picture(self) -> None:
         self.picture.release()
         self._texture.release()

@@ -14,7 +14,7 @@ from appliance.projector.moment import TRAIL_S, Floats, Moment
 TICK_S = 0.02
 _KEPT = 64  # frames: the ring of the shared frame, a little more than the trail
 _READ_AT_ONCE = 3  # a display of 25 Hz or more misses none; after a gap all of them are read
-_LONGEST_GAP_S = 0.1  # nobody knows where the dancer was in a longer one: the later pose simply follows
+_LONGEST_GAP_S = 0.1  # a longer one is not bridged: the later pose simply follows
 _SLEW = 0.1  # how much faster or slower the dance may seem while the delay is corrected
 
 
@@ -36,7 +36,7 @@ class Interpolation:
         self._reader, self._held = reader, held
         self._seen: deque[_Seen] = deque(maxlen=_KEPT)
         self._tick = -1
-        self._way_s: float | None = None  # from a frame's time to its leaving the stage
+        self._latency_s: float | None = None  # from a frame's time to its leaving the stage
         self._before = 0.0
 
     @property
@@ -45,13 +45,13 @@ class Interpolation:
         return self._seen[-1].time if self._seen else None
 
     def take(self, now: float) -> None:
-        """Read what the stage has written since the last time."""
+        """Read the frames that the stage has written since the last call."""
         frames = self._reader.frames(_READ_AT_ONCE if self._seen else _KEPT, now)
         if self._seen and frames and frames[0].tick > self._tick + 1:
             frames = self._reader.frames(_KEPT, now)
         for frame in frames:
             self._note(frame)
-        self._learn_the_way(now)
+        self._follow_latency(now)
 
     def moment(self, now: float) -> Moment | None:
         """What to draw at `now` (monotonic seconds); None before the first frame."""
@@ -75,12 +75,12 @@ class Interpolation:
 
     @property
     def delay_s(self) -> float:
-        """How far behind the clock the dance is shown: the way out of the stage, and one tick."""
-        return TICK_S + (self._way_s or 0.0)
+        """How far behind the clock the dance is shown: the latency of the stage, and one tick."""
+        return TICK_S + (self._latency_s or 0.0)
 
     def left_stage(self, moment: Moment) -> float:
         """When what this moment shows left the stage, monotonic seconds."""
-        return min(moment.time_s, self._seen[-1].time) + (self._way_s or 0.0)
+        return min(moment.time_s, self._seen[-1].time) + (self._latency_s or 0.0)
 
     def _note(self, frame: SeenFrame) -> None:
         if frame.tick <= self._tick or (self._seen and frame.frame_time <= self._seen[-1].time):
@@ -88,17 +88,17 @@ class Interpolation:
         self._tick = frame.tick
         self._seen.append(_Seen(frame.frame_time, frame.left, frame.positions, frame.world))
 
-    def _learn_the_way(self, now: float) -> None:
-        """Nine of ten frames take at most so long; followed slowly, so that nobody sees it."""
+    def _follow_latency(self, now: float) -> None:
+        """Follow the latency of nine in ten frames, so slowly that it does not show."""
         if not self._seen:
             return
-        ways = sorted(min(max(seen.left - seen.time, 0.0), TICK_S) for seen in self._seen)
-        way_s = ways[(len(ways) * 9) // 10]
-        if self._way_s is None:
-            self._way_s = way_s
+        latencies = sorted(min(max(seen.left - seen.time, 0.0), TICK_S) for seen in self._seen)
+        latency_s = latencies[(len(latencies) * 9) // 10]
+        if self._latency_s is None:
+            self._latency_s = latency_s
         else:
             most_s = _SLEW * max(0.0, now - self._before)
-            self._way_s += min(max(way_s - self._way_s, -most_s), most_s)
+            self._latency_s += min(max(latency_s - self._latency_s, -most_s), most_s)
         self._before = now
 
 

@@ -69,5 +69,5 @@ def _single_key(name: str, controls: Controls) -> str:
             controls.wants_fullscreen = True
         case "Q":
             controls.is_over = True
-            return "The projector ends: somebody pressed q."
+            return "The projector ends: you pressed q."
     return ""

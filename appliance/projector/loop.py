@@ -57,7 +57,7 @@ class Projector:
         make_painter: MakePainter = Renderer,
     ) -> None:
         self._gl, self._config, self._make_painter = gl, config, make_painter
-        self._reader, self._house, self._controls, self._say = reader, show_state, controls, say
+        self._reader, self._show_state, self._controls, self._say = reader, show_state, controls, say
         self._final = FinalPass(gl, config)
         self._presence = Presence(config.rate or USUAL_RATE)
         self._generation = 0
@@ -67,11 +67,11 @@ class Projector:
         self._to_draw: tuple[Skeleton, Looks] | None = None  # a show that waits for its painter
         self._is_black = False  # since that show waits
         self.shown: str | None = None  # the look of the last picture; None: none, or two that cross-fade
-        self.is_preparing = False  # which takes as long as it takes
+        self.is_preparing = False  # no watchdog counts meanwhile
 
     @property
     def sees_stage(self) -> bool:
-        """Whether what is shown is fresh; what held up this process as well does not count against it."""
+        """Whether the dance on the wall is fresh; a pause of this process does not count."""
         return self._presence.sees_stage
 
     def draw(
@@ -82,7 +82,7 @@ class Projector:
         lines: tuple[str, ...] = (),
         share: float = 1.0,
     ) -> float | None:
-        """Draw the picture for `now` (monotonic seconds) onto a display of so many pixels.
+        """Draw the picture for `now` (monotonic seconds) onto a display of that size in pixels.
 
         lines: figures to show; share: of the display's size that the scene is drawn in, where the box file
         does not say its size. Gives when what is shown left the stage; None while no fresh dance is seen.
@@ -94,7 +94,7 @@ class Projector:
             self._prepare(self._to_draw, moment, screen, display, share)
         newest = self._poses.newest if self._poses is not None and self._drawn is not None else None
         presence = self._presence.step(newest, now)
-        show_state = self._house.read()
+        show_state = self._show_state.read()
         level = show_state.level(now) * presence
         is_drawn = self._painter is not None and moment is not None and level > 0.0
         size = picture_size(self._config, display, share)
@@ -103,7 +103,7 @@ class Projector:
             mix = show_state.look_mix(now)
             self._painter.draw(moment, show_state.look, show_state.look_before, mix, wall)
             self.shown = show_state.look if mix in (0.0, 1.0) else None
-        show_state = self._house.read()  # again: a panic that came meanwhile is in this picture already
+        show_state = self._show_state.read()  # again: a panic that came meanwhile is in this picture already
         if show_state.panic or show_state.blackout:
             self._final.black(screen, display)
             self.shown = None
@@ -129,12 +129,12 @@ class Projector:
         return self._poses.moment(now)
 
     def _follow_stage(self, now: float) -> None:
-        """With the first frame of another stage; it may bring another show, which is prepared in the dark."""
-        self._reader.is_alive(now)  # looks for another one
+        """Switch to another stage with its first frame; another show is prepared in the dark."""
+        self._reader.is_alive(now)  # attaches to another stage
         first = self._reader.newest(now) if self._reader.generation != self._generation else None
         if first is not None and self._reader.facts is not None:
             self._generation = self._reader.generation
-            self._meet(self._reader.facts)
+            self._switch_to(self._reader.facts)
 
     def _prepare(
         self,
@@ -146,13 +146,13 @@ class Projector:
     ) -> None:
         """Draw each look once, unseen: what a driver puts off until then would halt the dance.
 
-        Once over itself, as in a cross-fade, onto a texture and onto the display: drivers make shaders anew
-        for each of these.
+        Once over itself, as in a cross-fade, onto a texture and onto the display: drivers compile shaders
+        again for each of these.
         """
         if not self._is_black:
             self._is_black = True
             return
-        if self._painter is not None:  # that took time, which is not to count for the fade
+        if self._painter is not None:  # one picture later, so that the fade does not count that time
             self._drawn, self._to_draw = show, None
             return
         self.is_preparing = True
@@ -165,7 +165,7 @@ class Projector:
         self._gl.finish()
         self.is_preparing = False
 
-    def _meet(self, facts: Facts) -> None:
+    def _switch_to(self, facts: Facts) -> None:
         self._poses = Interpolation(self._reader, facts.held)
         show = (facts.skeleton, self._looks(facts))
         if self._drawn is not None and _are_alike(self._drawn, show):

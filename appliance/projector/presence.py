@@ -9,20 +9,20 @@ from appliance.projector.pacing import USUAL_RATE
 
 STALE_S = 0.5
 FADE_S = 0.5
-_LONGEST_S = 0.25  # between two pictures: who was held up for longer still fades in, in two steps
+_LONGEST_S = 0.25  # between two pictures: after a longer pause the fade still takes at least two steps
 
 
 class Presence:
     """A level from 0 to 1 that follows whether fresh frames come; it starts in the dark.
 
-    rate: how many pictures a second are meant. What held up this process, most often with the whole machine,
-    counts neither for the fade nor against a stage that was held up as well; that it is slow does.
+    rate: the intended pictures a second. A pause of this process, most often of the whole machine, counts
+    neither for the fade nor against a stage that paused with it; slow drawing counts.
     """
 
     def __init__(self, rate: float = USUAL_RATE) -> None:
         self.level = 0.0
         self._pace = Pace(_LONGEST_S, rate)
-        self._unseen_s = math.inf  # how old the newest frame is, without what held up this process
+        self._unseen_s = math.inf  # age of the newest frame, without the pauses of this process
 
     @property
     def sees_stage(self) -> bool:
@@ -40,5 +40,5 @@ class Presence:
         return self.level
 
     def hide(self) -> None:
-        """Black at once, to come back by fading: another show has begun."""
+        """Black at once, then a fade-in: another show has begun."""
         self.level = 0.0

@@ -48,9 +48,9 @@ class Resolution:
         return SHARES[self._place]
 
     def drawn(self, now: float, took_s: float, look: str | None) -> bool:
-        """A picture took so long, waiting for the display not counted; look None: no look alone.
+        """Note the drawing time of a picture; returns whether the next one has another size.
 
-        Whether the next one has another size. now: monotonic seconds.
+        took_s: without waiting for the display; look None: two looks cross-fade; now: monotonic seconds.
         """
         if not self._adapts or look is None:
             self._times.clear()

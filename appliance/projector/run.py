@@ -16,11 +16,16 @@ from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import AlreadyHereError, Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
 from appliance.outputs.frame_reader import FrameReader
-from appliance.projector.advice import about_resolution, about_software
 from appliance.projector.alignment import AlignmentFile, alignment_folder
 from appliance.projector.context import GlContext
 from appliance.projector.controls import Controls
-from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
+from appliance.projector.fallback import (
+    OF_THE_PROJECTOR,
+    PICTURES_SMALLER,
+    STAGE_UNSEEN,
+    about_resolution,
+    about_software,
+)
 from appliance.projector.info import Figures, Meter
 from appliance.projector.keys import press
 from appliance.projector.loop import Projector
@@ -40,7 +45,7 @@ _JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
 
 @dataclass(frozen=True)
 class Wish:
-    """What was asked for on the command line. kind None: as the box file says; frames: a folder for PNGs."""
+    """The options of the command line. kind None: as the box file says; frames: a folder for PNGs."""
 
     kind: Kind | None = None
     size: Size | None = None
@@ -50,9 +55,9 @@ class Wish:
 
 
 class Run:
-    """All that is open while the projector runs. Raises ProjectorError, ConfigError or RuntimeFolderError."""
+    """Everything open while the projector runs. Raises ProjectorError, ConfigError or RuntimeFolderError."""
 
-    def __init__(self, box: BoxConfig, box_file: Path | None, wish: Wish, say: Callable[[str], None]) -> None:
+    def __init__(self, box: BoxConfig, wish: Wish, say: Callable[[str], None]) -> None:
         config = box.projector
         self._wish, self._say = wish, say
         with ExitStack() as opened:
@@ -63,19 +68,19 @@ class Run:
             opened.callback(self._window.close)
             self._context = GlContext(self._window)
             opened.callback(self._context.close)
-            self._file = AlignmentFile(alignment_folder(box, box_file), config, say)
+            self._file = AlignmentFile(alignment_folder(box), config, say)
             opened.callback(self._file.close)
             self._controls = Controls(self._file.alignment, self._file.keep, wish.shows_info)
-            self._inbox = _inbox(folder, opened, say)
+            self._inbox = _open_inbox(folder, opened, say)
             self._fallbacks = Fallbacks(OF_THE_PROJECTOR)
-            self._company = ProcessHealthWriter(folder, "projector", self._fallbacks)
-            opened.callback(self._company.close)
+            self._health = ProcessHealthWriter(folder, "projector", self._fallbacks)
+            opened.callback(self._health.close)
             self._reader = FrameReader(folder)
             opened.callback(self._reader.close)
-            self._house = ShowStateReader(folder)
-            opened.callback(self._house.close)
+            self._show_state = ShowStateReader(folder)
+            opened.callback(self._show_state.close)
             self._projector = Projector(
-                self._context.gl, config, self._reader, self._house, self._controls, say
+                self._context.gl, config, self._reader, self._show_state, self._controls, say
             )
             opened.callback(self._projector.release)
             self._closing = opened.pop_all()
@@ -107,14 +112,14 @@ class Run:
         return lines
 
     def project(self, stopped: Callable[[], bool], notifier: Notifier | None = None) -> Figures:
-        """Show pictures until `stopped`, the seconds are over or somebody ends it; how they came out."""
+        """Show pictures until `stopped`, the end of the seconds, or a key; returns how they came out."""
         notifier = notifier or Notifier({})
         try:
             with guarded(
                 self._patience, lambda: self._projector.is_preparing, end_process, is_well=notifier.ping
             ):
-                self._show_on(stopped, notifier)
-            self._company.end(time.monotonic())
+                self._show_pictures(stopped, notifier)
+            self._health.end(time.monotonic())
         except moderngl.Error as error:
             self._check_context()
             raise ProjectorError(
@@ -128,14 +133,14 @@ class Run:
         """Give display, graphics card and files back."""
         self._closing.close()
 
-    def _show_on(self, stopped: Callable[[], bool], notifier: Notifier) -> None:
+    def _show_pictures(self, stopped: Callable[[], bool], notifier: Notifier) -> None:
         begun = reported = time.monotonic()
         while not stopped() and not self._controls.is_over:
             now = self._pacing.next()
             if self._wish.seconds is not None and now - begun >= self._wish.seconds:
                 return
             self._press_keys()
-            self._obey()
+            self._carry_out_orders()
             self._show(now)
             if self._meter.pictures == 1:
                 notifier.ready("The display shows pictures.")
@@ -148,8 +153,8 @@ class Run:
         lines = self._lines if self._controls.shows_info else ()
         left_stage = self._projector.draw(now, screen, size, lines, self._resolution.share)
         if self._wish.frames is not None:
-            self._keep(self._wish.frames, screen.read(viewport=(0, 0, *size), components=4), size)
-        self._context.finish()  # without it the driver lets pictures queue up, each one older
+            self._write_png(self._wish.frames, screen.read(viewport=(0, 0, *size), components=4), size)
+        self._context.finish()  # else the driver queues pictures, each one older
         drawn = time.monotonic()
         self._window.show()
         swapped = time.monotonic()
@@ -157,17 +162,17 @@ class Run:
         self._meter.shown(swapped, left_stage)
         look = self._projector.shown if left_stage is not None else None
         if self._resolution.drawn(drawn, drawn - begun, look):
-            self._say_resolution()
+            self._report_resolution()
         self._check_context()
 
-    def _say_resolution(self) -> None:
-        """Once: afterwards the figures tell."""
+    def _report_resolution(self) -> None:
+        """Say it once; afterwards the figures show it."""
         if not self._is_resolution_said:
             self._is_resolution_said = True
             rate = 1.0 / self._pacing.period_s
             self._say(about_resolution(self._resolution.share, self._window.size, rate))
 
-    def _keep(self, folder: Path, pixels: bytes, size: Size) -> None:
+    def _write_png(self, folder: Path, pixels: bytes, size: Size) -> None:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             write_png(folder / f"frame-{self._meter.pictures:06d}.png", pixels, *size)
@@ -190,14 +195,14 @@ class Run:
             self._controls.wants_fullscreen = False
             self._window.toggle_fullscreen()
 
-    def _obey(self) -> None:
+    def _carry_out_orders(self) -> None:
         if self._inbox is None:
             return
         for _ in range(_ORDERS_A_PICTURE):
             order = self._inbox.take()
             if order is None:
                 return
-            self._inbox.answer(order, *self._controls.obey(order))
+            self._inbox.answer(order, *self._controls.carry_out(order))
 
     def _report(self, now: float) -> None:
         """Once a second."""
@@ -205,14 +210,14 @@ class Run:
         state = self._reader.state(now)
         width, height = self._window.size
         share = self._resolution.share
-        self._tell(now, state, share)
+        self._publish_health(now, state, share)
         drawn_at = "" if share == 1.0 else f" at {share:.0%}"
         age = "-" if figures.age_p50_ms is None else f"{figures.age_p50_ms:.0f} / {figures.age_p99_ms:.0f} ms"
         self._lines = (
             f"{figures.rate:.1f} pictures/s",
             f"frame age {age}",
             f"stage {state}",
-            f"look {self._house.read().look or 'of the show'}",
+            f"look {self._show_state.read().look or 'of the show'}",
             f"{width}x{height}{drawn_at} {'software' if self._context.is_software else self._window.driver}",
         )
         if self._wish.shows_info:
@@ -221,12 +226,12 @@ class Run:
             self._warned = True
             self._say(about_software(figures.rate, 1.0 / self._pacing.period_s, self._context.renderer))
 
-    def _tell(self, now: float, stage: str, share: float) -> None:
-        """For the box's other processes; a stage that was never seen is none that is away."""
+    def _publish_health(self, now: float, stage: str, share: float) -> None:
+        """For the box's other processes; a stage that was never seen does not count as away."""
         if self._reader.facts is not None:
             self._fallbacks.set(STAGE_UNSEEN.name, stage != "fresh" and not self._projector.sees_stage)
         self._fallbacks.set(PICTURES_SMALLER.name, share < 1.0)
-        self._company.tell(now)
+        self._health.tell(now)
 
     def _check_context(self) -> None:
         if self._context.is_lost:
@@ -238,7 +243,7 @@ class Run:
             )
 
 
-def _inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> OrderInbox | None:
+def _open_inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> OrderInbox | None:
     """Where orders by OSC arrive. Without them keys still work, and the dance is shown all the same."""
     try:
         opened.callback(Claim(folder, "projector").close)

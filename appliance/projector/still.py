@@ -12,7 +12,7 @@ from appliance.pose.recording import Recording
 from appliance.projector.moment import TRAIL_S, Moment
 from appliance.projector.picture.renderer import Renderer
 
-FINER = 2  # drawn so many times larger and then shrunk, as a projector's pixels melt on the wall
+FINER = 2  # drawn this many times larger and then shrunk, as a projector's pixels melt on the wall
 
 Image = NDArray[np.uint8]
 

@@ -1,4 +1,4 @@
-"""The watchdog: waiting for a display has no limit of its own, so a thread ends what waits for too long."""
+"""The watchdog: waiting for a display has no timeout, so a thread ends a process that waits too long."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from appliance.projector.projector_error import GPU_LOST
 
 PATIENCE_S = 5.0
 _LOOK_S = 0.5
-_STOOD_STILL_S = 2.0  # between two looks: this process itself was held up, by Ctrl-Z or a machine asleep
+_STOOD_STILL_S = (
+    2.0  # between two checks: this process itself was suspended, by Ctrl-Z or by a machine asleep
+)
 _LAST_WORDS_S = 0.5
 WORDS = (
     f"The display has taken no picture for {PATIENCE_S:g} s. The audience sees one that stands still, or "
-    "none; the dance goes on. The projector ends so that it can be started anew (a supervisor does it by "
+    "none; the dance goes on. The projector ends so that it can be started again (a supervisor does it by "
     "itself); if it happens often, look at the cable, the projector and the graphics card's driver."
 )
 
@@ -34,7 +36,7 @@ class Patience:
         self._since = now
 
     def is_over(self, now: float, is_preparing: bool) -> bool:
-        """Look often. What a show's preparation takes does not count, nor what held up the looks as well."""
+        """Call it often. Neither preparing a show nor a pause of the whole process counts as hanging."""
         stood_still = now - self._looked_at > _STOOD_STILL_S
         self._looked_at = now
         if self._since is None:
@@ -52,7 +54,7 @@ def guarded(
     monotonic: Callable[[], float] = time.monotonic,
     is_well: Callable[[float], None] = lambda now: None,
 ) -> Iterator[None]:
-    """Meanwhile a thread looks, and gives up once when patience is over; until then it tells `is_well`."""
+    """Meanwhile a thread checks, calls `is_well` while pictures are shown, and `give_up` once they hang."""
     is_done = threading.Event()
 
     def watch() -> None:
@@ -73,7 +75,7 @@ def guarded(
 
 
 def end_process() -> None:
-    """Say why, and end without waiting for anybody: who waits for the display hears no signal either."""
+    """Say why, and end at once: a thread that waits for the display receives no signal either."""
     words = threading.Thread(target=_say, daemon=True)  # a terminal that is stopped may not hold this up
     words.start()
     words.join(_LAST_WORDS_S)

@@ -106,7 +106,7 @@ def _start(kind: Kind) -> str:
 
 
 def _drivers(kind: Kind) -> list[str]:
-    """SDL would also take displays that nobody sees; so those that count are named here."""
+    """The display systems to try: SDL by itself would also take one that shows nothing."""
     if kind == "offscreen":
         return ["offscreen"]
     chosen = os.environ.get("SDL_VIDEODRIVER")

@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import PrivateAttr, field_validator, model_validator
 
 from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
+from appliance.show.lights import VenueLightsConfig
 from appliance.show.posistagenet import PosiStageNetConfig
 from appliance.show.projector import ProjectorConfig
-from appliance.show.section import Ipv4, LocalFile, Section, refusal
+from appliance.show.section import Ipv4, LocalFile, Section, key, part, refusal, refuse_repeats
 from appliance.show.validation import validated
-from appliance.show.venue_lights import VenueLightsConfig
-from appliance.show.yaml_file import read_yaml
+from appliance.show.yaml_file import YamlFile, read_yaml
 
 Dialect = Literal["ai-toolbox", "joint", "vmc"]
 Resume = Literal["always", "after_crash", "never"]
@@ -23,36 +23,33 @@ Resume = Literal["always", "after_crash", "never"]
 class UdpConfig(Section):
     """Where sensors' datagrams arrive."""
 
-    host: Ipv4 = Field(
-        default="127.0.0.1",
-        description="Address to listen on. Wearables on Wi-Fi need 0.0.0.0: they call everybody on the "
-        "network, and no other address hears that.",
+    host: Ipv4 = key(
+        "Address to listen on. Wearables on Wi-Fi need 0.0.0.0: they broadcast, and "
+        "no other address receives that.",
+        "127.0.0.1",
     )
-    port: int = Field(default=9750, ge=0, le=65535, description="UDP port; 0 takes any free one.")
+    port: int = key("UDP port; 0 takes any free one.", 9750, within=(0, 65535))
 
 
 class SerialConfig(Section):
     """A sensor on a cable."""
 
-    device: str = Field(min_length=1, max_length=200, description="The serial device, like /dev/ttyACM0.")
-    baud: int = Field(default=115200, ge=1200, le=4_000_000, description="Speed in baud.")
+    device: str = key("The serial device, like /dev/ttyACM0.", length=(1, 200))
+    baud: int = key("Speed in baud.", 115200, within=(1200, 4_000_000))
 
 
 class SensorsConfig(Section):
     """How sensors reach the box."""
 
-    udp: UdpConfig | None = Field(
-        default_factory=UdpConfig, description="Sensors over the network; null: none."
+    udp: UdpConfig | None = key("Sensors over the network; null: none.", UdpConfig())
+    serial: list[SerialConfig] = key("Sensors on cables.", [], length=(0, 8))
+    keys: LocalFile | None = key(
+        "File with the sensors' keys, relative to the box file; null: none is let in.", None
     )
-    serial: list[SerialConfig] = Field(default_factory=list, max_length=8, description="Sensors on cables.")
-    keys: LocalFile | None = Field(
-        default=None,
-        description="File with the sensors' keys, relative to the box file; null: none is let in.",
-    )
-    light: bool = Field(
-        default=True,
-        description="A short flash of a sensor's lamp each 3 seconds says that it is linked; false: it stays "
+    light: bool = key(
+        "A short flash of a sensor's lamp each 3 seconds says that it is linked; false: it stays "
         "dark on stage. Lights that ask for something are shown all the same.",
+        True,
     )
 
 
@@ -77,113 +74,84 @@ def out_of_reach(sensors: SensorsConfig) -> str | None:
 class OscConfig(Section):
     """One receiver of the dancer's joints."""
 
-    host: Ipv4 = Field(default="127.0.0.1", description="The receiver's address in numbers.")
-    port: int = Field(
-        default=9004, ge=1, le=65535, description="The receiver's UDP port; VMC: usually 39539."
-    )
-    dialect: Dialect = Field(
-        default="ai-toolbox", description="The messages that it understands; docs/osc.md shows them."
-    )
-    frame_message: bool = Field(
-        default=False, description="Send /bunraku/frame (tick, time, sequence, late) before the joints."
-    )
+    host: Ipv4 = key("The receiver's address in numbers.", "127.0.0.1")
+    port: int = key("The receiver's UDP port; VMC: usually 39539.", 9004, within=(1, 65535))
+    dialect: Dialect = key("The messages that it understands; docs/osc.md shows them.", "ai-toolbox")
+    frame_message: bool = key("Send /bunraku/frame (tick, time, sequence, late) before the joints.", False)
 
 
 class OutputsConfig(Section):
     """Where the dance goes."""
 
-    osc: list[OscConfig] = Field(
-        default_factory=lambda: [OscConfig()], max_length=16, description="Receivers by OSC; [] for none."
+    osc: list[OscConfig] = key("Receivers by OSC; [] for none.", [OscConfig()], length=(0, 16))
+    posistagenet: list[PosiStageNetConfig] = key(
+        "Joints' positions by PosiStageNet, for media servers and followspots.", [], length=(0, 8)
     )
-    posistagenet: list[PosiStageNetConfig] = Field(
-        default_factory=list,
-        max_length=8,
-        description="Joints' positions by PosiStageNet, for media servers and followspots.",
-    )
-    dmx: DmxWires = Field(
-        default_factory=list, max_length=32, description="Universes of DMX, each on its wire."
-    )
+    dmx: DmxWires = key("Universes of DMX, each on its wire.", [], length=(0, 32))
 
     @field_validator("osc")
     @classmethod
     def _each_receiver_once(cls, receivers: list[OscConfig]) -> list[OscConfig]:
         seen = [(receiver.host, receiver.port, receiver.dialect) for receiver in receivers]
-        for place, receiver in enumerate(seen):
-            if receiver in seen[:place]:
-                raise refusal("This receiver stands here twice.", "Remove one, or change its port.", at=place)
+        refuse_repeats(seen, "This receiver stands here twice.", "Remove one, or change its port.")
         return receivers
 
 
 class LimitsConfig(Section):
     """How much time the dance may take."""
 
-    tick_budget_ms: float = Field(
-        default=10.0,
-        ge=0.5,
-        le=18,
-        description="What one tick of 20 ms may use; a show needing more is refused.",
+    tick_budget_ms: float = key(
+        "What one tick of 20 ms may use; a show needing more is refused.", 10.0, within=(0.5, 18)
     )
-    late_ms: float = Field(
-        default=15.0,
-        ge=1,
-        le=20,
-        description="A frame that leaves later than this after its slot began counts as late.",
+    late_ms: float = key(
+        "A frame that leaves later than this after its slot began counts as late.", 15.0, within=(1, 20)
     )
 
 
 class RealtimeConfig(Section):
     """Real-time rights of the stage."""
 
-    enabled: bool = Field(default=True, description="Ask for real-time scheduling and locked memory.")
-    priority: int = Field(default=70, ge=1, le=99, description="SCHED_FIFO priority.")
+    enabled: bool = key("Ask for real-time scheduling and locked memory.", True)
+    priority: int = key("SCHED_FIFO priority.", 70, within=(1, 99))
 
 
 class JournalConfig(Section):
     """The flight recorder."""
 
-    folder: LocalFile | None = Field(
-        default=None, description="Folder, relative to the box file; made when missing; null: no journal."
+    folder: LocalFile | None = key(
+        "Folder, relative to the box file; made when missing; null: no journal.", None
     )
-    minutes: float = Field(
-        default=30.0, ge=0.1, le=1440, description="How much it keeps before the oldest goes."
-    )
+    minutes: float = key("How much it keeps before the oldest goes.", 30.0, within=(0.1, 1440))
 
 
 class BoxConfig(Section):
     """box.yaml."""
 
-    state: LocalFile | None = Field(
-        default=None,
-        description="Folder where the box keeps what it learns (neutral poses, sensors' calibrations), "
+    _file: YamlFile | None = PrivateAttr(default=None)
+    state: LocalFile | None = key(
+        "Folder where the box keeps what it learns (neutral poses, sensors' calibrations), "
         "relative to the box file; made when missing; null: the key file's folder.",
+        None,
     )
-    sensors: SensorsConfig = Field(default_factory=SensorsConfig, description=str(SensorsConfig.__doc__))
-    outputs: OutputsConfig = Field(default_factory=OutputsConfig, description=str(OutputsConfig.__doc__))
-    control: ControlConfig | None = Field(
-        default_factory=ControlConfig, description="Where commands by OSC arrive; null: nowhere."
+    sensors: SensorsConfig = part(SensorsConfig)
+    outputs: OutputsConfig = part(OutputsConfig)
+    control: ControlConfig | None = key("Where commands by OSC arrive; null: nowhere.", ControlConfig())
+    lights: VenueLightsConfig = part(VenueLightsConfig)
+    projector: ProjectorConfig = part(ProjectorConfig)
+    runtime: LocalFile | None = key(
+        "Folder where the box's processes meet, relative to the box file; a folder in memory. "
+        "null: the one that systemd gives, else one of the user's own.",
+        None,
     )
-    lights: VenueLightsConfig = Field(
-        default_factory=VenueLightsConfig, description=str(VenueLightsConfig.__doc__)
-    )
-    projector: ProjectorConfig = Field(
-        default_factory=ProjectorConfig, description=str(ProjectorConfig.__doc__)
-    )
-    runtime: LocalFile | None = Field(
-        default=None,
-        description="Folder where the box's processes meet, relative to the box file; a folder in memory. "
-        "null: the one that systemd gives, else one of the user who plays.",
-    )
-    limits: LimitsConfig = Field(default_factory=LimitsConfig, description=str(LimitsConfig.__doc__))
-    realtime: RealtimeConfig = Field(default_factory=RealtimeConfig, description=str(RealtimeConfig.__doc__))
-    phase_lock: bool = Field(
-        default=True, description="Place each tick just after the primary sensor's usual arrival."
-    )
-    resume: Resume = Field(
-        default="always",
-        description="When a show goes on at the place of the phrase where it was: always (after a crash and "
+    limits: LimitsConfig = part(LimitsConfig)
+    realtime: RealtimeConfig = part(RealtimeConfig)
+    phase_lock: bool = key("Place each tick just after the primary sensor's usual arrival.", True)
+    resume: Resume = key(
+        "When a show goes on at the place of the phrase where it was: always (after a crash and "
         "after a power cut), after_crash, or never. A show that was ended begins at the beginning.",
+        "always",
     )
-    journal: JournalConfig = Field(default_factory=JournalConfig, description=str(JournalConfig.__doc__))
+    journal: JournalConfig = part(JournalConfig)
 
     @model_validator(mode="after")
     def _a_port_for_each(self) -> BoxConfig:
@@ -200,6 +168,19 @@ class BoxConfig(Section):
         return self
 
     @property
+    def file(self) -> YamlFile:
+        """The file that it was read from, with its lines; empty without one."""
+        return self._file or YamlFile(Path("box.yaml"))
+
+    @property
+    def path(self) -> Path | None:
+        """Where that file is; None without one."""
+        return None if self._file is None else self._file.path
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, BoxConfig) and dict(self) == dict(other)  # from whichever file
+
+    @property
     def state_folder(self) -> Path | None:
         """Where the box keeps what it learns; None: nowhere, it has neither a folder nor a key file."""
         return self.state or (self.sensors.keys.parent if self.sensors.keys is not None else None)
@@ -212,5 +193,7 @@ def load_box(path: Path | str | None) -> BoxConfig:
     """
     if path is None:
         return BoxConfig()
-    path = Path(path)
-    return validated(BoxConfig, read_yaml(path), {"directory": path.resolve().parent})
+    file = read_yaml(Path(path))
+    box = validated(BoxConfig, file, {"directory": file.path.resolve().parent})
+    box._file = file
+    return box

@@ -18,7 +18,7 @@ LARGEST_FILE = 400_000_000  # bytes; a network has some 3 MB, a phrase some 5
 MOST_FILES = 4000
 LARGEST_CHECKSUMS = 1 << 20
 _LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
-_COPY_AGAIN = "Copy the whole bundle again."
+COPY_AGAIN = "Copy the whole bundle again."
 
 
 def default_show_path() -> Path:
@@ -77,7 +77,7 @@ def checksum_problems(directory: Path) -> list[Problem]:
     try:
         lines = _checksum_lines(directory)
     except (OSError, UnicodeDecodeError):
-        return [Problem(path, 0, "The checksums are missing or unreadable.", _COPY_AGAIN)]
+        return [Problem(path, 0, "The checksums are missing or unreadable.", COPY_AGAIN)]
     return [
         Problem(path, number, message, cure)
         for number, line in enumerate(lines, 1)
@@ -102,7 +102,7 @@ def _line_problems(directory: Path, line: str) -> Iterator[tuple[str, str]]:
     """Message and cure of what is wrong with one line, if anything is."""
     found = _LINE.fullmatch(line)
     if not found or ".." in Path(found[2]).parts or Path(found[2]).is_absolute():
-        yield "This is not a checksum and a file's name.", _COPY_AGAIN
+        yield "This is not a checksum and a file's name.", COPY_AGAIN
         return
     name = found[2]
     try:
@@ -110,9 +110,9 @@ def _line_problems(directory: Path, line: str) -> Iterator[tuple[str, str]]:
             changed = f"'{name}' is not the file that was packed: it is damaged or was changed."
             yield changed, "Copy the bundle again, or pack it again if you changed it."
     except FileNotFoundError:
-        yield f"'{name}' is missing.", _COPY_AGAIN
+        yield f"'{name}' is missing.", COPY_AGAIN
     except OSError as error:
-        yield f"'{name}' cannot be read ({error.strerror}).", _COPY_AGAIN
+        yield f"'{name}' cannot be read ({error.strerror}).", COPY_AGAIN
 
 
 def _checksum_lines(directory: Path) -> list[str]:

@@ -13,7 +13,7 @@ from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import content, plain_json, require_inside
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.show.bundle import CHECKSUMS, bundle_bytes, checksum_problems, unlisted_files
+from appliance.show.bundle import CHECKSUMS, COPY_AGAIN, bundle_bytes, checksum_problems, unlisted_files
 from appliance.show.config_error import ConfigError, Problem
 from appliance.show.dance import MAIN
 from appliance.show.network import WINDOW, inspect_network
@@ -23,7 +23,6 @@ LARGEST_BYTES = 25_000_000
 LARGEST_REPORT = 16_000_000
 RATE_HZ = 50.0
 OFFSET_TOLERANCE_M = 1e-3
-_COPY_AGAIN = "Copy the whole bundle again."
 
 
 @dataclass(frozen=True)
@@ -101,10 +100,10 @@ def _phrase(show: Show, name: str, path: Path) -> Iterator[Finding]:
     try:
         phrase = read_bvh(path)
     except BvhError as error:
-        yield Finding(path, error.line, str(error).split(": ", 1)[-1], _COPY_AGAIN)
+        yield Finding(path, error.line, str(error).split(": ", 1)[-1], COPY_AGAIN)
         return
     except OSError as error:
-        yield Finding(path, 0, f"The phrase cannot be read ({error.strerror}).", _COPY_AGAIN)
+        yield Finding(path, 0, f"The phrase cannot be read ({error.strerror}).", COPY_AGAIN)
         return
     yield from _phrase_skeleton(path, phrase.skeleton, show.skeleton)
     if abs(phrase.fps - RATE_HZ) > 0.1:

@@ -1,13 +1,13 @@
-"""box.yaml's section about show control: where commands by OSC arrive, from whom, and who hears how it is."""
+"""box.yaml's section about show control: where commands arrive, from whom, and where the heartbeat goes."""
 
 from __future__ import annotations
 
 import ipaddress
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, model_validator
 
-from appliance.show.section import Ipv4, Section, refusal
+from appliance.show.section import Ipv4, Section, key, refusal
 
 
 def _network(text: str) -> str:
@@ -24,30 +24,27 @@ Senders = Annotated[str, AfterValidator(_network)]
 
 
 class HeartbeatConfig(Section):
-    """Somebody who hears once a second how the box is."""
+    """A receiver of the box's status, once a second."""
 
-    host: Ipv4 = Field(default="127.0.0.1", description="The listener's address in numbers.")
-    port: int = Field(default=9003, ge=1, le=65535, description="The listener's UDP port.")
+    host: Ipv4 = key("The listener's address in numbers.", "127.0.0.1")
+    port: int = key("The listener's UDP port.", 9003, within=(1, 65535))
 
 
 class ControlConfig(Section):
     """Where commands by OSC arrive, and from whom."""
 
-    host: Ipv4 = Field(
-        default="127.0.0.1",
-        description="Address to listen on; 0.0.0.0: on every network, for those named under `senders`.",
+    host: Ipv4 = key(
+        "Address to listen on; 0.0.0.0: on every network, for those named under `senders`.", "127.0.0.1"
     )
-    port: int = Field(default=9002, ge=0, le=65535, description="UDP port; 0 takes any free one.")
-    senders: list[Senders] = Field(
-        default_factory=list,
-        max_length=32,
-        description="Who may command the box: addresses (192.168.0.20) or networks (192.168.0.0/24). "
-        "This machine always may; []: nobody else.",
+    port: int = key("UDP port; 0 takes any free one.", 9002, within=(0, 65535))
+    senders: list[Senders] = key(
+        "Senders that may command the box: addresses (192.168.0.20) or networks (192.168.0.0/24). "
+        "This machine always may; []: no other.",
+        [],
+        length=(0, 32),
     )
-    heartbeat: list[HeartbeatConfig] = Field(
-        default_factory=list,
-        max_length=16,
-        description="Who gets /bunraku/status once a second; docs/osc.md explains it.",
+    heartbeat: list[HeartbeatConfig] = key(
+        "Receivers of /bunraku/status, once a second; docs/osc.md explains it.", [], length=(0, 16)
     )
 
     @model_validator(mode="after")

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from appliance.show.config_error import Problem, did_you_mean
-from appliance.show.section import Section, refusal
+from appliance.show.section import Section, key, refusal
 from appliance.show.yaml_file import Location, YamlFile
 
 FADE_S = 2.0
@@ -21,32 +21,26 @@ _Times = Annotated[int, Field(ge=0, le=MOST_ITERATIONS)]
 class CueConfig(Section):
     """One cue. What it leaves out stays as it is."""
 
-    name: str = Field(min_length=1, max_length=64, description="What `/cue` calls it.")
-    phrase: Name | None = Field(
-        default=None,
-        description="The phrase that the puppet starts from: `main`, or a name under motion.phrases. "
+    name: str = key("What `/cue` calls it.", length=(1, 64))
+    phrase: Name | None = key(
+        "The phrase that the puppet starts from: `main`, or a name under motion.phrases. "
         "It begins at its start; one that plays already goes on.",
+        None,
     )
-    iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = Field(
-        default=None,
-        description="Coding and interaction iterations, reached in whole steps; more than fit are lowered.",
+    iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = key(
+        "Coding and interaction iterations, reached in whole steps; more than fit are lowered.", None
     )
-    hands: list[Name] | None = Field(
-        default=None,
-        max_length=8,
-        description="Joints whose hands hold in this cue; the other hands let go. []: all let go.",
+    hands: list[Name] | None = key(
+        "Joints whose hands hold in this cue; the other hands let go. []: all let go.", None, length=(0, 8)
     )
-    look: Name | None = Field(default=None, description="Name of the look.")
-    lights: Name | None = Field(default=None, description="Name of the set of light mappings.")
-    master: float | None = Field(
-        default=None, ge=0, le=1, description="Brightness of lights and picture, 0 to 1."
-    )
-    fade_s: float = Field(
-        default=FADE_S,
-        ge=0,
-        le=60,
-        description="How long phrase, iterations, look, lights and master take to change, in seconds. "
+    look: Name | None = key("Name of the look.", None)
+    lights: Name | None = key("Name of the set of light mappings.", None)
+    master: float | None = key("Brightness of lights and picture, 0 to 1.", None, within=(0, 1))
+    fade_s: float = key(
+        "How long phrase, iterations, look, lights and master take to change, in seconds. "
         "Hands take 0.5 s to hold and 1 s to let go, whatever stands here.",
+        FADE_S,
+        within=(0, 60),
     )
 
     @field_validator("iterations")
@@ -73,29 +67,24 @@ def cue_problems(
     for place, cue in enumerate(cues):
         if cue.name in names[:place]:
             first = file.line(("cues", names.index(cue.name), "name"))
-            yield Problem(
-                file.path,
-                file.line(("cues", place, "name")),
-                f"Two cues are called '{cue.name}' (the first on line {first}).",
-                "Give one of them another name.",
-            )
-        for key, location, word in _named(cue, place):
-            if word not in known[key]:
-                cure = did_you_mean(word, known[key]) if known[key] else f"Remove `{key}` from the cue."
-                yield Problem(file.path, file.line(location), _UNKNOWN[key].format(word), cure)
+            message = f"Two cues are called '{cue.name}' (the first on line {first})."
+            yield file.problem(("cues", place, "name"), message, "Give one of them another name.")
+        for what, location, word in _named(cue, place):
+            if word not in known[what]:
+                cure = did_you_mean(word, known[what]) if known[what] else f"Remove `{what}` from the cue."
+                yield file.problem(location, _UNKNOWN[what].format(word), cure)
 
 
 def too_much(cues: Sequence[CueConfig], most: int, file: YamlFile) -> Iterator[Problem]:
     """Cues that ask for more coding iterations than fit this machine: they run with fewer."""
     for place, cue in enumerate(cues):
         if cue.iterations is not None and cue.iterations[0] > most:
-            yield Problem(
-                file.path,
-                file.line(("cues", place, "iterations")),
+            message = (
                 f"The cue '{cue.name}' asks for {cue.iterations[0]} coding iterations; {most} fit the tick's "
-                "budget here, and it runs with those.",
-                "Ask for fewer, or give the box a faster machine.",
+                "budget here, and it runs with those."
             )
+            cure = "Ask for fewer, or give the box a faster machine."
+            yield file.problem(("cues", place, "iterations"), message, cure)
 
 
 _UNKNOWN = {
@@ -108,9 +97,9 @@ _UNKNOWN = {
 
 def _named(cue: CueConfig, place: int) -> Iterator[tuple[str, Location, str]]:
     """Each name in a cue: its key, where it stands, the name."""
-    for key in ("phrase", "look", "lights"):
-        word = getattr(cue, key)
+    for what in ("phrase", "look", "lights"):
+        word = getattr(cue, what)
         if word is not None:
-            yield key, ("cues", place, key), word
+            yield what, ("cues", place, what), word
     for hand, joint in enumerate(cue.hands or ()):
         yield "hands", ("cues", place, "hands", hand), joint

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import ValidationInfo, field_validator, model_validator
 
-from appliance.show.section import BundleFile, Section, refusal
+from appliance.show.section import BundleFile, Section, key, refusal
 
 MAIN = "main"  # the phrase that the show starts with
 
@@ -14,25 +14,21 @@ MAIN = "main"  # the phrase that the show starts with
 class DancerConfig(Section):
     """The puppet: which network dances, and how often it goes over a window."""
 
-    network: BundleFile = Field(default="puppet.onnx", description="The network's file in the bundle.")
-    coding_iterations: int = Field(
-        default=10,
-        ge=1,
-        le=64,
-        description="How often encode and decode run on each window. "
+    network: BundleFile = key("The network's file in the bundle.", "puppet.onnx")
+    coding_iterations: int = key(
+        "How often encode and decode run on each window. "
         "More: away from the phrase, towards the dancer's habits; and more time for each tick.",
+        10,
+        within=(1, 64),
     )
-    interaction_iterations: int = Field(
-        default=9,
-        ge=0,
-        le=64,
-        description="In how many of those, from the first on, the held joints are overwritten; at most "
+    interaction_iterations: int = key(
+        "In how many of those, from the first on, the held joints are overwritten; at most "
         "coding_iterations. Equal to it: the output shows the held orientation itself. "
         "Left out: one less than coding_iterations (but at least 1), so the last pass is free.",
+        9,
+        within=(0, 64),
     )
-    hop: int = Field(
-        default=1, ge=1, le=8, description="Ticks from one window to the next; they are blended."
-    )
+    hop: int = key("Ticks from one window to the next; they are blended.", 1, within=(1, 8))
 
     @model_validator(mode="before")
     @classmethod
@@ -58,42 +54,30 @@ class DancerConfig(Section):
 class MotionConfig(Section):
     """What the puppet starts from: playback of a phrase."""
 
-    phrase: BundleFile = Field(
-        default="phrase.bvh",
-        description="The file in the bundle of the phrase that the show starts with; "
-        "cues and `/phrase` call it `main`.",
+    phrase: BundleFile = key(
+        "The file in the bundle of the phrase that the show starts with; cues and `/phrase` call it `main`.",
+        "phrase.bvh",
     )
-    phrases: dict[str, BundleFile] = Field(
-        default_factory=dict,
-        max_length=32,
-        description="Further phrases of the same skeleton, each with the name that cues and `/phrase` call "
+    phrases: dict[str, BundleFile] = key(
+        "Further phrases of the same skeleton, each with the name that cues and `/phrase` call "
         "it by, like `quiet: quiet.bvh`. They are played from their start to their end.",
+        {},
+        length=(0, 32),
     )
-    start_s: float = Field(
-        default=0.0, ge=0, le=86400, description="Where in `phrase` the excerpt starts, in seconds."
+    start_s: float = key("Where in `phrase` the excerpt starts, in seconds.", 0.0, within=(0, 86400))
+    end_s: float | None = key(
+        "Where it ends, in seconds; after start_s. null: at the phrase's end.", None, above=0, most=86400
     )
-    end_s: float | None = Field(
-        default=None,
-        gt=0,
-        le=86400,
-        description="Where it ends, in seconds; after start_s. null: at the phrase's end.",
+    rate: float = key(
+        "Speed of playback: 1 as recorded, 0 stands still, below 0 runs backwards.", 1.0, within=(-4, 4)
     )
-    rate: float = Field(
-        default=1.0,
-        ge=-4,
-        le=4,
-        description="Speed of playback: 1 as recorded, 0 stands still, below 0 runs backwards.",
+    crossfade_s: float = key(
+        "Seconds of cross-fade from a loop's end to its start, and from one phrase to another "
+        "where no fade is given.",
+        0.5,
+        within=(0, 5),
     )
-    crossfade_s: float = Field(
-        default=0.5,
-        ge=0,
-        le=5,
-        description="How long a loop's end melts into its start, and one phrase into another where nobody "
-        "says how long, in seconds.",
-    )
-    grounded: bool = Field(
-        default=True, description="Keep the lowest foot on the floor after the puppet has changed the legs."
-    )
+    grounded: bool = key("Keep the lowest foot on the floor after the puppet has changed the legs.", True)
 
     @field_validator("phrases")
     @classmethod

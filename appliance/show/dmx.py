@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, model_validator
 
-from appliance.show.section import Ipv4, Section, refusal
+from appliance.show.section import Ipv4, Section, key, refusal
 
 WireKind = Literal["artnet", "sacn", "usb-pro", "open-dmx", "udmx"]
 
@@ -41,60 +41,47 @@ _OWN_KEYS: dict[str, tuple[str, ...]] = {
 class DmxConfig(Section):
     """One universe of lights on one wire. A universe may leave by several wires."""
 
-    universe: int = Field(
-        description="The universe that the show's fixtures name, and its number on the network: artnet 0 to "
+    universe: int = key(
+        "The universe that the show's fixtures name, and its number on the network: artnet 0 to "
         "32767, sacn 1 to 63999."
     )
-    wire: WireKind = Field(
-        description="artnet and sacn: over the network; usb-pro: ENTTEC DMX USB Pro and what speaks like it; "
+    wire: WireKind = key(
+        "artnet and sacn: over the network; usb-pro: ENTTEC DMX USB Pro and what speaks like it; "
         "open-dmx: a bare FTDI cable, not recommended for shows; udmx: anyma uDMX."
     )
-    rate_hz: float | None = Field(
-        default=None, ge=1, le=FASTEST_HZ, description="Universes a second at most; null: 40, open-dmx 30."
+    rate_hz: float | None = key(
+        "Universes a second at most; null: 40, open-dmx 30.", None, within=(1, FASTEST_HZ)
     )
-    channels: int = Field(
-        default=SLOTS, ge=24, le=SLOTS, description="How many channels are sent, from the first on."
-    )
-    number: int | None = Field(
-        default=None,
-        description="artnet (net, subnet and universe in one) and sacn: the number on the network where it "
+    channels: int = key("How many channels are sent, from the first on.", SLOTS, within=(24, SLOTS))
+    number: int | None = key(
+        "artnet (net, subnet and universe in one) and sacn: the number on the network where it "
         "differs from the universe.",
+        None,
     )
-    host: Ipv4 | None = Field(
-        default=None,
-        description="artnet: the node's address, null: this machine; sacn: send to this address alone, null: "
-        "multicast.",
+    host: Ipv4 | None = key(
+        "artnet: the node's address, null: this machine; sacn: send to this address alone, null: multicast.",
+        None,
     )
-    port: int | None = Field(
-        default=None, ge=1, le=65535, description="artnet, sacn: UDP port; null: the usual one (6454, 5568)."
+    port: int | None = key(
+        "artnet, sacn: UDP port; null: the usual one (6454, 5568).", None, within=(1, 65535)
     )
-    interface: Ipv4 | None = Field(
-        default=None,
-        description="artnet, sacn: this machine's own address in the lights' network. null: artnet takes the "
+    interface: Ipv4 | None = key(
+        "artnet, sacn: this machine's own address in the lights' network. null: artnet takes the "
         "way to its host; sacn stays inside this machine.",
+        None,
     )
-    broadcast: bool = Field(default=False, description="artnet: host is a broadcast address.")
-    priority: int = Field(
-        default=100, ge=0, le=200, description="sacn: among sources of a universe, higher wins."
+    broadcast: bool = key("artnet: host is a broadcast address.", False)
+    priority: int = key("sacn: among sources of a universe, higher wins.", 100, within=(0, 200))
+    source_name: str = key("sacn: what consoles call this box.", "Bunraku", length=(1, 63))
+    preview: bool = key("sacn: for visualisers only; lights should ignore it.", False)
+    ttl: int = key("sacn: how many networks multicast may reach; 1: this one only.", 1, within=(1, 255))
+    device: str | None = key(
+        "usb-pro, open-dmx: the serial device, like /dev/ttyUSB0.", None, length=(1, 200)
     )
-    source_name: str = Field(
-        default="Bunraku", min_length=1, max_length=63, description="sacn: what consoles call this box."
-    )
-    preview: bool = Field(default=False, description="sacn: for visualisers alone, no light shall follow.")
-    ttl: int = Field(
-        default=1, ge=1, le=255, description="sacn: through how many routers less one multicast goes."
-    )
-    device: str | None = Field(
-        default=None,
-        min_length=1,
-        max_length=200,
-        description="usb-pro, open-dmx: the serial device, like /dev/ttyUSB0.",
-    )
-    serial: str | None = Field(
-        default=None,
-        min_length=1,
-        max_length=100,
-        description="usb-pro, open-dmx, udmx: the adapter's USB serial number; null: the first one found.",
+    serial: str | None = key(
+        "usb-pro, open-dmx, udmx: the adapter's USB serial number; null: the first one found.",
+        None,
+        length=(1, 100),
     )
 
     @model_validator(mode="before")
@@ -102,13 +89,10 @@ class DmxConfig(Section):
     def _keys_of_this_wire(cls, values: Any) -> Any:
         if not isinstance(values, dict) or values.get("wire") not in IN_WORDS:
             return values
-        for key, wires in _OWN_KEYS.items():
-            if key in values and values["wire"] not in wires:
-                raise refusal(
-                    f"'{key}' belongs to {' and '.join(wires)}, and this wire is {values['wire']}.",
-                    "Remove it.",
-                    at=key,
-                )
+        for name, wires in _OWN_KEYS.items():
+            if name in values and values["wire"] not in wires:
+                message = f"'{name}' belongs to {' and '.join(wires)}, and this wire is {values['wire']}."
+                raise refusal(message, "Remove it.", at=name)
         return values
 
     @model_validator(mode="after")
@@ -143,7 +127,7 @@ class DmxConfig(Section):
 
     @property
     def destination(self) -> tuple[object, ...]:
-        """What no second entry may have: the light that hears it cannot tell the two apart."""
+        """What no second entry may have: a light that receives both cannot tell them apart."""
         if self.wire in NUMBERS:
             host = self.host or ("127.0.0.1" if self.wire == "artnet" else "multicast")
             return (self.wire, host, self.udp_port, self.number_on_wire, self.interface)
@@ -152,10 +136,10 @@ class DmxConfig(Section):
         return (self.wire,)
 
 
-def _require(who: str, low: int, high: int, key: str, number: int) -> None:
+def _require(sender: str, low: int, high: int, key: str, number: int) -> None:
     if not low <= number <= high:
         raise refusal(
-            f"{who} has universes from {low} to {high}; {number} is none of them.",
+            f"{sender} has universes from {low} to {high}; {number} is none of them.",
             f"Write a number from {low} to {high}.",
             at=key,
         )

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field, field_validator, model_validator
 
 from appliance.show.config_error import ConfigError, did_you_mean
-from appliance.show.section import Section, refusal
+from appliance.show.section import Section, key, refusal
 from appliance.show.validation import validated
 from appliance.show.yaml_file import read_yaml
 
@@ -28,32 +28,26 @@ BytePair = Annotated[tuple[Byte, Byte], Field(strict=False)]
 class AttributeConfig(Section):
     """What is special about an attribute; one that is not listed has the defaults."""
 
-    name: str = Field(min_length=1, max_length=64, description="As in the modes' channels, without 'fine'.")
-    default: float | None = Field(
-        default=None,
-        ge=0,
-        le=1,
-        description="Where it stands when no rule drives it, share of its range. Left out: pan and tilt in "
+    name: str = key("As in the modes' channels, without 'fine'.", length=(1, 64))
+    default: float | None = key(
+        "Where it stands when no rule drives it, share of its range. Left out: pan and tilt in "
         "the middle, colours white, everything else 0.",
+        None,
+        within=(0, 1),
     )
-    limits: BytePair = Field(
-        default=(0, 255),
-        description="First and last value (0 to 255) of the part of the channel that is used.",
+    limits: BytePair = key(
+        "First and last value (0 to 255) of the part of the channel that is used.", (0, 255)
     )
-    degrees: float | None = Field(
-        default=None, gt=0, le=1440, description="For pan (540) and tilt (270): the whole range in degrees."
+    degrees: float | None = key(
+        "For pan (540) and tilt (270): the whole range in degrees.", None, above=0, most=1440
     )
-    invert: bool = Field(default=False, description="The channel runs the other way round.")
-    slew: float | None = Field(
-        default=None, gt=0, le=2000, description="For pan and tilt (180): at most so many degrees a second."
+    invert: bool = key("The channel runs the other way round.", False)
+    slew: float | None = key("For pan and tilt (180): the most degrees a second.", None, above=0, most=2000)
+    dims: bool = key(
+        "Master and blackout scale it, as they scale the dimmer: for fog, strobes, lasers.", False
     )
-    dims: bool = Field(
-        default=False,
-        description="Master and blackout scale it, as they scale the dimmer: for fog, strobes, lasers.",
-    )
-    snap: bool = Field(
-        default=False,
-        description="It jumps in the middle of a fade instead of sliding: for gobo and colour wheels.",
+    snap: bool = key(
+        "It jumps in the middle of a fade instead of sliding: for gobo and colour wheels.", False
     )
 
     @field_validator("limits")
@@ -67,12 +61,11 @@ class AttributeConfig(Section):
 class ModeConfig(Section):
     """One layout of channels, as chosen in the fixture's own menu."""
 
-    name: str = Field(min_length=1, max_length=64, description="What the fixture's menu calls it.")
-    channels: list[str] = Field(
-        min_length=1,
-        max_length=MAX_CHANNELS,
-        description="Attributes from the first channel on; 'pan fine' is the second byte of pan, 'pan finer' "
+    name: str = key("What the fixture's menu calls it.", length=(1, 64))
+    channels: list[str] = key(
+        "Attributes from the first channel on; 'pan fine' is the second byte of pan, 'pan finer' "
         "the third, '-' a channel that stays 0.",
+        length=(1, MAX_CHANNELS),
     )
 
     @field_validator("channels")
@@ -80,11 +73,9 @@ class ModeConfig(Section):
     def _each_byte_once(cls, channels: list[str]) -> list[str]:
         for place, channel in enumerate(channels):
             if channel != UNUSED and channel in channels[:place]:
-                raise refusal(
-                    f"'{channel}' stands on channels {channels.index(channel) + 1} and {place + 1}.",
-                    f"Number them ('{channel} 1', '{channel} 2'), or write '{UNUSED}' for one of them.",
-                    at=place,
-                )
+                words = f"'{channel}' stands on channels {channels.index(channel) + 1} and {place + 1}."
+                cure = f"Number them ('{channel} 1', '{channel} 2'), or write '{UNUSED}' for one of them."
+                raise refusal(words, cure, at=place)
             coarse = next((channel.removesuffix(fine) for fine in FINE if channel.endswith(fine)), "")
             if coarse and coarse not in channels:
                 raise refusal(
@@ -103,12 +94,10 @@ class ModeConfig(Section):
 class ProfileConfig(Section):
     """A fixture profile: modes and what is special about attributes."""
 
-    name: str = Field(min_length=1, max_length=200, description="Manufacturer and model.")
-    modes: list[ModeConfig] = Field(
-        min_length=1, max_length=256, description="Layouts; the first one is taken unless the patch says."
-    )
-    attributes: list[AttributeConfig] = Field(
-        default_factory=list, max_length=MAX_CHANNELS, description="What is special about some of them."
+    name: str = key("Manufacturer and model.", length=(1, 200))
+    modes: list[ModeConfig] = key("Layouts; the first one is taken unless the patch says.", length=(1, 256))
+    attributes: list[AttributeConfig] = key(
+        "What is special about some of them.", [], length=(0, MAX_CHANNELS)
     )
 
     @model_validator(mode="after")

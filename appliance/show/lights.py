@@ -20,7 +20,7 @@ from appliance.show.fixture_profile import (
     profile_refusal,
 )
 from appliance.show.light_rules import AIM, COLOUR, Colour, MappingConfig, Metres, Pair, RuleConfig
-from appliance.show.section import Section, refusal
+from appliance.show.section import Section, key, part, refusal, refuse_repeats
 
 MAX_FIXTURES = 2048
 UNIVERSE_CHANNELS = 512
@@ -32,33 +32,30 @@ Pose = Literal["hanging", "standing"]
 class FixtureConfig(Section):
     """One fixture of the rig: what it is, where it listens, where it hangs."""
 
-    name: str = Field(min_length=1, max_length=64, description="What rules, cues and pictures call it.")
-    profile: str = Field(
-        min_length=1,
-        max_length=100,
-        description="Its profile: a file in the show's folder `profiles`, or a built-in one.",
+    name: str = key("What rules, cues and pictures call it.", length=(1, 64))
+    profile: str = key(
+        "Its profile: a file in the show's folder `profiles`, or a built-in one.", length=(1, 100)
     )
-    mode: str | None = Field(default=None, description="Mode of the profile; left out: its first one.")
-    universe: Universe = Field(default=1, description="Its universe; box.yaml says on which wire that is.")
-    address: Address = Field(description="Its first channel, as on the fixture's display.")
-    place: Metres = Field(
-        default=(0.0, 3.0, 0.0),
-        description="Where it is, metres: x to the dancer's left, y up, z towards the audience; the origin "
+    mode: str | None = key("Mode of the profile; left out: its first one.", None)
+    universe: Universe = key("Its universe; box.yaml says on which wire that is.", 1)
+    address: Address = key("Its first channel, as on the fixture's display.")
+    place: Metres = key(
+        "Where it is, metres: x to the dancer's left, y up, z towards the audience; the origin "
         "is on the floor, where the phrase has its own.",
+        (0.0, 3.0, 0.0),
     )
-    pose: Pose = Field(default="hanging", description="Hanging from a bar, or standing on its base.")
-    turn: Metres = Field(
-        default=(0.0, 0.0, 0.0),
-        description="Turned from there, in degrees: yaw about the vertical, pitch about x, roll about z.",
+    pose: Pose = key("Hanging from a bar, or standing on its base.", "hanging")
+    turn: Metres = key(
+        "Turned from there, in degrees: yaw about the vertical, pitch about x, roll about z.", (0.0, 0.0, 0.0)
     )
-    pan_limits: Pair | None = Field(
-        default=None, description="Pan stays between these degrees from its middle; left out: its range."
+    pan_limits: Pair | None = key(
+        "Pan stays between these degrees from its middle; left out: its range.", None
     )
-    tilt_limits: Pair | None = Field(
-        default=None, description="Tilt stays between these degrees from its middle; left out: its range."
+    tilt_limits: Pair | None = key(
+        "Tilt stays between these degrees from its middle; left out: its range.", None
     )
-    invert_pan: bool = Field(default=False, description="Pan runs the other way round here.")
-    invert_tilt: bool = Field(default=False, description="Tilt runs the other way round here.")
+    invert_pan: bool = key("Pan runs the other way round here.", False)
+    invert_tilt: bool = key("Tilt runs the other way round here.", False)
 
     @field_validator("profile")
     @classmethod
@@ -102,36 +99,30 @@ class FixtureConfig(Section):
 
 
 class SafeConfig(Section):
-    """The safe look: on panic, after a stop, when the stage is lost, at the end. Dark unless told so."""
+    """The safe look: on panic, after a stop, when the stage is lost, at the end. Dark unless set here."""
 
-    dimmer: float = Field(default=0.0, ge=0, le=1, description="How bright; 0 is dark.")
-    colour: Colour = Field(default=(1.0, 1.0, 1.0), description="Red, green, blue as shares 0 to 1.")
-    fixtures: list[str] = Field(
-        default_factory=list, max_length=MAX_FIXTURES, description="Those that shine then; []: all of them."
-    )
-    heads: Literal["hold", "home"] = Field(
-        default="hold", description="Moving heads stay where they point, or go to their default."
+    dimmer: float = key("How bright; 0 is dark.", 0.0, within=(0, 1))
+    colour: Colour = key("Red, green, blue as shares 0 to 1.", (1.0, 1.0, 1.0))
+    fixtures: list[str] = key("Those that shine then; []: all of them.", [], length=(0, MAX_FIXTURES))
+    heads: Literal["hold", "home"] = key(
+        "Moving heads stay where they point, or go to their default.", "hold"
     )
 
 
 class LightsConfig(Section):
     """The rig: fixtures, how the dance drives them, and what they show when nothing dances."""
 
-    fixtures: list[FixtureConfig] = Field(
-        default_factory=list, max_length=MAX_FIXTURES, description="The patch."
+    fixtures: list[FixtureConfig] = key("The patch.", [], length=(0, MAX_FIXTURES))
+    mappings: list[MappingConfig] = key(
+        "Sets of rules; the first is in force at the start.", [], length=(0, 64)
     )
-    mappings: list[MappingConfig] = Field(
-        default_factory=list, max_length=64, description="Sets of rules; the first is in force at the start."
-    )
-    safe: SafeConfig = Field(default_factory=SafeConfig, description=str(SafeConfig.__doc__))
+    safe: SafeConfig = part(SafeConfig)
 
     @field_validator("fixtures")
     @classmethod
     def _each_channel_once(cls, fixtures: list[FixtureConfig], info: ValidationInfo) -> list[FixtureConfig]:
         names = [fixture.name for fixture in fixtures]
-        for place, name in enumerate(names):
-            if name in names[:place]:
-                raise refusal(f"Two fixtures are called '{name}'.", "Give one another name.", at=place)
+        refuse_repeats(names, "Two fixtures are called '{value}'.", "Give one another name.")
         for place, words, cure in overlaps(fixtures, _directory(info)):
             raise refusal(words, cure, at=place)
         return fixtures
@@ -140,9 +131,8 @@ class LightsConfig(Section):
     @classmethod
     def _rules_fit_the_rig(cls, mappings: list[MappingConfig], info: ValidationInfo) -> list[MappingConfig]:
         names = [mapping.name for mapping in mappings]
+        refuse_repeats(names, "Two mappings are called '{value}'.", "Give one another name.")
         for place, mapping in enumerate(mappings):
-            if mapping.name in names[:place]:
-                raise refusal(f"Two mappings are called '{mapping.name}'.", "Give one another name.", place)
             for number, rule in enumerate(mapping.rules):
                 fault = _misfit(rule, info.data.get("fixtures"), _directory(info))
                 if fault is not None:
@@ -158,6 +148,26 @@ class LightsConfig(Section):
             if names and name not in names:
                 raise refusal(f"There is no fixture '{name}'.", did_you_mean(name, names), at="fixtures")
         return safe
+
+
+class VenuePlaceConfig(Section):
+    """What is different about one fixture in this venue; what is left out stays as in the show."""
+
+    fixture: str = key("Its name in the show.", length=(1, None))
+    universe: Universe | None = key("Its universe here.", None)
+    address: Address | None = key("Its first channel here.", None)
+    place: Metres | None = key("Where it is here, metres (x, y, z).", None)
+    pose: Pose | None = key("Hanging or standing here.", None)
+    turn: Metres | None = key("How it is turned here: yaw, pitch, roll in degrees.", None)
+
+
+class VenueLightsConfig(Section):
+    """The rig as it hangs in this venue."""
+
+    rate_hz: float = key(
+        "How often lights are computed; a full universe takes 22.7 ms.", 40.0, within=(1, 44)
+    )
+    places: list[VenuePlaceConfig] = key("Fixtures that differ from the show.", [], length=(0, MAX_FIXTURES))
 
 
 def overlaps(fixtures: Sequence[FixtureConfig], directory: Path | None) -> Sequence[tuple[int, str, str]]:

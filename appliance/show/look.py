@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from typing import Annotated, Literal, get_args
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator
 
-from appliance.show.section import Section, refusal
+from appliance.show.section import Section, key, part, refusal
 
 Style = Literal["plaster", "lines", "ink", "cloud", "veil"]
 STYLES: tuple[Style, ...] = get_args(Style)
@@ -38,83 +38,65 @@ Colour = Annotated[Annotated[str, AfterValidator(_hexadecimal)] | None, BeforeVa
 class CameraConfig(Section):
     """From where the figure is seen. Everything is in proportion to the figure, so that any size fits."""
 
-    move: Literal["still", "drift", "orbit"] = Field(
-        default="drift",
-        description="still: stays at its angle; drift: sways slowly about it; orbit: circles the figure.",
+    move: Literal["still", "drift", "orbit"] = key(
+        "still: stays at its angle; drift: sways slowly about it; orbit: circles the figure.", "drift"
     )
-    angle_deg: float = Field(
-        default=24.0,
-        ge=-180,
-        le=180,
-        description="From where it looks: 0 from the front (+z), 90 from the left of the figure (+x).",
+    angle_deg: float = key(
+        "From where it looks: 0 from the front (+z), 90 from the left of the figure (+x).",
+        24.0,
+        within=(-180, 180),
     )
-    elevation_deg: float = Field(
-        default=7.0, ge=-3, le=70, description="How steeply it looks down: 0 from the height of the chest."
+    elevation_deg: float = key(
+        "How steeply it looks down: 0 from the height of the chest.", 7.0, within=(-3, 70)
     )
-    lens_deg: float = Field(
-        default=30.0,
-        ge=10,
-        le=75,
-        description="Angle of view across the picture's shorter side: small is calm and flat, wide is close.",
+    lens_deg: float = key(
+        "Angle of view across the picture's shorter side: small is calm and flat, wide is close.",
+        30.0,
+        within=(10, 75),
     )
-    figure: float = Field(
-        default=0.7,
-        ge=0.1,
-        le=0.9,
-        description="Share of the picture's height that the standing figure takes; in upright pictures of "
+    figure: float = key(
+        "Share of the picture's height that the standing figure takes; in upright pictures of "
         "1.35 times their width.",
+        0.7,
+        within=(0.1, 0.9),
     )
-    follow: float = Field(
-        default=0.75,
-        ge=0,
-        le=1,
-        description="How far it goes along: 1 keeps the dancer in the middle, 0 lets the dancer travel; "
+    follow: float = key(
+        "How far it goes along: 1 keeps the dancer in the middle, 0 lets the dancer travel; "
         "before an arm leaves the picture it moves or draws back by itself.",
+        0.75,
+        within=(0, 1),
     )
-    sweep_deg: float = Field(default=16.0, ge=0, le=90, description="How far drift sways to either side.")
-    period_s: float = Field(
-        default=70.0, ge=10, le=3600, description="Seconds for one sway of drift or one circle of orbit."
-    )
+    sweep_deg: float = key("How far drift sways to either side.", 16.0, within=(0, 90))
+    period_s: float = key("Seconds for one sway of drift or one circle of orbit.", 70.0, within=(10, 3600))
 
 
 class LookConfig(Section):
     """One look of the projection. A colour that is left out is the style's own."""
 
-    name: str = Field(min_length=1, max_length=64, description="What cues and /look call it.")
-    style: Style = Field(
-        default="plaster",
-        description="plaster: a sculpture in stage light; lines: strands of light; ink: brush and paper; "
+    name: str = key("What cues and /look call it.", length=(1, 64))
+    style: Style = key(
+        "plaster: a sculpture in stage light; lines: strands of light; ink: brush and paper; "
         "cloud: thousands of points; veil: glass and its echoes.",
+        "plaster",
     )
-    figure: Colour = Field(default=None, description="The figure: plaster, strands, ink, points.")
-    light: Colour = Field(default=None, description="The key light; what is fresh and fast.")
-    accent: Colour = Field(default=None, description="The rim light; what fades away.")
-    background: Colour = Field(
-        default=None, description="Air and floor, or the paper. Dark ones end in true black at the edges."
-    )
-    exposure: float = Field(default=1.0, ge=0.1, le=4, description="Brightness of the whole picture.")
-    fog: float = Field(default=0.5, ge=0, le=1, description="How much haze hangs in the air.")
-    shadow: float = Field(
-        default=0.8, ge=0, le=1, description="How dark shadows are (plaster), how clear the floor mirrors."
-    )
-    trail_s: float = Field(
-        default=1.0, ge=0, le=1.2, description="How long movement leaves its trace, in seconds; 0: none."
-    )
-    glow: float = Field(default=0.6, ge=0, le=1, description="How far light spills around what is bright.")
-    density: float = Field(
-        default=0.6, ge=0.1, le=1, description="How many strands, echoes or points; the grain of the ink."
-    )
-    vignette: float = Field(
-        default=0.4, ge=0, le=1, description="How far the picture fades to black towards its edges."
-    )
-    render_scale: float = Field(
-        default=0.7,
-        ge=0.25,
-        le=1,
-        description="Resolution that the figure is drawn at, in proportion to the picture; "
+    figure: Colour = key("The figure: plaster, strands, ink, points.", None)
+    light: Colour = key("The key light; what is fresh and fast.", None)
+    accent: Colour = key("The rim light; what fades away.", None)
+    background: Colour = key("Air and floor, or the paper. Dark ones end in true black at the edges.", None)
+    exposure: float = key("Brightness of the whole picture.", 1.0, within=(0.1, 4))
+    fog: float = key("How much haze hangs in the air.", 0.5, within=(0, 1))
+    shadow: float = key("How dark shadows are (plaster), how clear the floor mirrors.", 0.8, within=(0, 1))
+    trail_s: float = key("How long movement leaves its trace, in seconds; 0: none.", 1.0, within=(0, 1.2))
+    glow: float = key("How far light spills around what is bright.", 0.6, within=(0, 1))
+    density: float = key("How many strands, echoes or points; the grain of the ink.", 0.6, within=(0.1, 1))
+    vignette: float = key("How far the picture fades to black towards its edges.", 0.4, within=(0, 1))
+    render_scale: float = key(
+        "Resolution that the figure is drawn at, in proportion to the picture; "
         "smaller is softer and takes less of a small computer.",
+        0.7,
+        within=(0.25, 1),
     )
-    camera: CameraConfig = Field(default_factory=CameraConfig, description=str(CameraConfig.__doc__))
+    camera: CameraConfig = part(CameraConfig)
 
 
 def looks_by_name(looks: Sequence[LookConfig]) -> dict[str, LookConfig]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from appliance.pose.foreign_file import content, plain_json
-from appliance.show.bundle import LARGEST_FILE
+from appliance.show.bundle import COPY_AGAIN, LARGEST_FILE
 from appliance.show.config_error import did_you_mean
 
 WINDOW = 8
@@ -18,7 +18,6 @@ UNIT_TOLERANCE = 1e-3
 _MOST_NAMED = 5  # joints that a network has and the skeleton has not
 _LARGEST_REST = 1 << 20  # characters
 _EXPORT_AGAIN = "Export the show again with this release."
-_COPY_AGAIN = "Copy the whole bundle again."
 
 Complaint = tuple[str, str]  # message, cure
 
@@ -44,7 +43,7 @@ def inspect_network(path: Path, skeleton_joints: Sequence[str]) -> tuple[list[st
         outputs = {port.name: port for port in session.get_outputs()}
     except Exception as error:  # onnxruntime has its own exception for each way to be broken
         why = (str(error) or type(error).__name__).splitlines()[0][:120]
-        return [], [(f"This cannot be read as a network ({why}).", _COPY_AGAIN)]
+        return [], [(f"This cannot be read as a network ({why}).", COPY_AGAIN)]
     joints = moving_joints(facts)
     complaints = list(_fact_complaints(facts, joints, skeleton_joints))
     complaints += _port_complaints("input", inputs, _inputs(len(joints)))
@@ -147,14 +146,14 @@ def _run_complaints(session: Any, rest: np.ndarray) -> Iterator[Complaint]:
     try:
         (poses,) = session.run(["poses"], feed)
     except Exception as error:
-        yield f"It fails when it runs ({str(error).splitlines()[0][:120]}).", _COPY_AGAIN
+        yield f"It fails when it runs ({str(error).splitlines()[0][:120]}).", COPY_AGAIN
         return
     if poses.shape != (WINDOW, joints, 4):
         yield f"It gives poses of the shape {poses.shape}, not {(WINDOW, joints, 4)}.", _EXPORT_AGAIN
     elif not _are_unit(poses):
         yield (
             "It gives numbers that are no rotations (a damaged file, or one that learned nothing).",
-            _COPY_AGAIN,
+            COPY_AGAIN,
         )
 
 

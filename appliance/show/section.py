@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import ipaddress
 import math
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from appliance.show.bundle import require_file
+from appliance.show.config_error import did_you_mean
 
 UNIT_TOLERANCE = 0.05  # how far from length 1 a hand-written quaternion may be before it is a typing error
 
@@ -21,11 +23,50 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
+def key(
+    meaning: str,
+    default: Any = ...,
+    *,
+    within: tuple[float | None, float | None] = (None, None),
+    above: float | None = None,
+    most: float | None = None,
+    length: tuple[int, int | None] | None = None,
+) -> Any:
+    """A key of a section: its sentence in docs/configuration.md, its default (... when needed), its bounds.
+
+    within: least and greatest number; above: just out of bounds; length: fewest and most characters, entries.
+    """
+    least, greatest = within
+    shortest, longest = length or (None, None)
+    return Field(
+        default=default,
+        description=meaning,
+        ge=least,
+        gt=above,
+        le=most if greatest is None else greatest,
+        min_length=shortest or None,
+        max_length=longest,
+    )
+
+
+def part(section: type[Section]) -> Any:
+    """A key that opens another section, which has its own defaults."""
+    return Field(default_factory=section, description=str(section.__doc__))
+
+
 def refusal(
     message: str, cure: str, at: str | int | tuple[str | int, ...] | None = None
 ) -> PydanticCustomError:
     """An error for validators to raise; `at`: the key (or keys) below the validated one where it stands."""
     return PydanticCustomError("refused", "{message}", {"message": message, "cure": cure, "at": at})
+
+
+def refuse_repeats(values: Sequence[object], message: str, cure: str) -> None:
+    """Raise for the first value that stands twice; the message may name {value}, {first} and {place}."""
+    for place, value in enumerate(values):
+        if value in values[:place]:
+            words = message.format(value=value, first=values.index(value), place=place)
+            raise refusal(words, cure, at=place)
 
 
 def _unit(quaternion: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
@@ -77,6 +118,13 @@ def _inside_the_bundle(name: str, info: ValidationInfo) -> str:
     return name
 
 
+def _in_the_skeleton(joint: str, info: ValidationInfo) -> str:
+    joints: Sequence[str] | None = (info.context or {}).get("joints")
+    if joints is not None and joint not in joints:
+        raise refusal(f"The skeleton has no joint '{joint}'.", did_you_mean(joint, joints))
+    return joint
+
+
 def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
     directory = (info.context or {}).get("directory")
     return path if directory is None else Path(directory, path.expanduser())
@@ -84,6 +132,7 @@ def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
 
 Orientation = Annotated[tuple[float, float, float, float], Field(strict=False), AfterValidator(_unit)]
 Axis = Annotated[tuple[float, float, float], Field(strict=False), AfterValidator(_axis)]
+Joint = Annotated[str, AfterValidator(_in_the_skeleton)]
 Ipv4 = Annotated[str, AfterValidator(_ipv4)]
 BundleFile = Annotated[str, Field(min_length=1), AfterValidator(_inside_the_bundle)]
 LocalFile = Annotated[Path, Field(strict=False), AfterValidator(_beside_the_file)]

@@ -7,17 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import require_inside
 from appliance.pose.skeleton import Skeleton
+from appliance.show.bundle import COPY_AGAIN
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.cues import CueConfig, cue_problems
 from appliance.show.dance import DancerConfig, MotionConfig
 from appliance.show.lights import LightsConfig
 from appliance.show.look import LookConfig, looks_by_name
-from appliance.show.section import Axis, Orientation, Section, refusal
+from appliance.show.section import Axis, Joint, Orientation, Section, key, part, refusal, refuse_repeats
 from appliance.show.validation import validated
 from appliance.show.yaml_file import YamlFile, read_yaml
 
@@ -30,65 +31,50 @@ SENSOR_KEYS = ("facing", "at_neutral", "neutral", "primary")  # of a hand, for a
 class TurningConfig(Section):
     """A hand that turns its joint at a constant rate."""
 
-    axis: Axis = Field(
-        default=(0.0, 1.0, 0.0), description="Axis (x, y, z) in the parent's frame, any length."
-    )
-    seconds_per_turn: float = Field(default=5.0, ge=0.1, le=3600, description="Seconds for one turn.")
+    axis: Axis = key("Axis (x, y, z) in the parent's frame, any length.", (0.0, 1.0, 0.0))
+    seconds_per_turn: float = key("Seconds for one turn.", 5.0, within=(0.1, 3600))
 
 
 class FixedConfig(Section):
     """A hand that holds its joint still."""
 
-    orientation: Orientation = Field(
-        default=(1.0, 0.0, 0.0, 0.0), description="Local to the parent joint; order w, x, y, z."
-    )
+    orientation: Orientation = key("Local to the parent joint; order w, x, y, z.", (1.0, 0.0, 0.0, 0.0))
 
 
 class HandConfig(Section):
-    """A puppeteer's hold on one joint. Exactly one of sensor, turning, fixed, kept, osc says who holds it."""
+    """A puppeteer's hold on one joint. Exactly one of sensor, turning, fixed, kept, osc names the holder."""
 
-    sensor: str | None = Field(
-        default=None,
-        min_length=1,
-        max_length=LONGEST_SENSOR_NAME,
-        description="Name of the worn sensor that holds it, as in the key file.",
+    sensor: str | None = key(
+        "Name of the worn sensor that holds it, as in the key file.", None, length=(1, LONGEST_SENSOR_NAME)
     )
-    turning: TurningConfig | None = Field(default=None, description="The joint turns at a constant rate.")
-    fixed: FixedConfig | None = Field(default=None, description="The joint is held still.")
-    kept: Literal[True] | None = Field(
-        default=None,
-        description="The joint is kept where the phrase has it, pose by pose; with as many interaction as "
+    turning: TurningConfig | None = key("The joint turns at a constant rate.", None)
+    fixed: FixedConfig | None = key("The joint is held still.", None)
+    kept: Literal[True] | None = key(
+        "The joint is kept where the phrase has it, pose by pose; with as many interaction as "
         "coding iterations it stays there exactly.",
+        None,
     )
-    osc: Literal[True] | None = Field(
-        default=None, description="Messages to the control port hold the joint."
+    osc: Literal[True] | None = key("Messages to the control port hold the joint.", None)
+    joint: Joint = key("Name of the held joint, one that the network moves.", length=(1, None))
+    weight: float = key(
+        "How firmly it is held: 0 not at all, 1 fully overwritten in each interaction.", 1.0, within=(0, 1)
     )
-    joint: str = Field(min_length=1, description="Name of the held joint, one that the network moves.")
-    weight: float = Field(
-        default=1.0,
-        ge=0,
-        le=1,
-        description="How firmly it is held: 0 not at all, 1 fully overwritten in each interaction.",
-    )
-    facing: Axis = Field(
-        default=(1.0, 0.0, 0.0),
-        description="For sensors: the axis of the sensor (x, y, z; x is the arrow on its case, z comes out "
+    facing: Axis = key(
+        "For sensors: the axis of the sensor (x, y, z; x is the arrow on its case, z comes out "
         "of its lid) that points to the front while the dancer stands in the neutral pose.",
+        (1.0, 0.0, 0.0),
     )
-    at_neutral: Orientation = Field(
-        default=(1.0, 0.0, 0.0, 0.0),
-        description="For sensors: the joint's orientation, local to its parent (w, x, y, z), while the "
+    at_neutral: Orientation = key(
+        "For sensors: the joint's orientation, local to its parent (w, x, y, z), while the "
         "dancer stands in the neutral pose; [1, 0, 0, 0] is the skeleton's rest pose.",
+        (1.0, 0.0, 0.0, 0.0),
     )
-    neutral: Orientation = Field(
-        default=(1.0, 0.0, 0.0, 0.0),
-        description="For sensors: the sensor's own orientation (w, x, y, z in its axes: z up) that counts as "
+    neutral: Orientation = key(
+        "For sensors: the sensor's own orientation (w, x, y, z in its axes: z up) that counts as "
         "the neutral pose until the dancer has stood still for one.",
+        (1.0, 0.0, 0.0, 0.0),
     )
-    primary: bool = Field(
-        default=False,
-        description="For sensors: the tick's phase follows this one; otherwise the first one.",
-    )
+    primary: bool = key("For sensors: the tick's phase follows this one; otherwise the first one.", False)
 
     @model_validator(mode="before")
     @classmethod
@@ -100,23 +86,14 @@ class HandConfig(Section):
             found = " and ".join(given) if given else "none of them"
             raise refusal(
                 f"A hand has exactly one of {', '.join(KINDS)}; this one has {found}.",
-                "Say who holds the joint, and write a second hand for a second puppeteer.",
+                "Name one puppeteer, and write a second hand for a second one.",
                 at=given[1] if given else None,
             )
-        for key in SENSOR_KEYS:
-            if key in values and given != ["sensor"]:
-                raise refusal(
-                    f"'{key}' belongs to a sensor, and this hand is {given[0]}.", "Remove it.", at=key
-                )
+        for name in SENSOR_KEYS:
+            if name in values and given != ["sensor"]:
+                message = f"'{name}' belongs to a sensor, and this hand is {given[0]}."
+                raise refusal(message, "Remove it.", at=name)
         return values
-
-    @field_validator("joint")
-    @classmethod
-    def _in_the_skeleton(cls, name: str, info: ValidationInfo) -> str:
-        joints: Sequence[str] | None = (info.context or {}).get("joints")
-        if joints is not None and name not in joints:
-            raise refusal(f"The skeleton has no joint '{name}'.", did_you_mean(name, joints))
-        return name
 
     @property
     def kind(self) -> str:
@@ -127,37 +104,30 @@ class HandConfig(Section):
 class ShowConfig(Section):
     """show.yaml."""
 
-    name: str = Field(min_length=1, max_length=100, description="What the show is called.")
-    acknowledgement: str = Field(default="", max_length=4000, description="Whom to thank for the recordings.")
-    dancer: DancerConfig = Field(default_factory=DancerConfig, description=str(DancerConfig.__doc__))
-    motion: MotionConfig = Field(default_factory=MotionConfig, description=str(MotionConfig.__doc__))
-    hands: list[HandConfig] = Field(
-        default_factory=list,
-        max_length=MAX_HANDS,
-        description="Who holds which joints, each joint at most once.",
+    name: str = key("What the show is called.", length=(1, 100))
+    acknowledgement: str = key("Whom to thank for the recordings.", "", length=(0, 4000))
+    dancer: DancerConfig = part(DancerConfig)
+    motion: MotionConfig = part(MotionConfig)
+    hands: list[HandConfig] = key(
+        "Which puppeteer holds which joint, each joint at most once.", [], length=(0, MAX_HANDS)
     )
-    looks: list[LookConfig] = Field(
-        default_factory=list,
-        max_length=32,
-        description="How the projection looks; the first one is shown at the start. "
+    looks: list[LookConfig] = key(
+        "How the projection looks; the first one is shown at the start. "
         "[]: the built-in looks, under the names of their styles.",
+        [],
+        length=(0, 32),
     )
-    lights: LightsConfig = Field(default_factory=LightsConfig, description=str(LightsConfig.__doc__))
-    cues: list[CueConfig] = Field(
-        default_factory=list, max_length=200, description="What show control can call up by name, in order."
-    )
+    lights: LightsConfig = part(LightsConfig)
+    cues: list[CueConfig] = key("What show control can call up by name, in order.", [], length=(0, 200))
 
     @field_validator("hands")
     @classmethod
     def _each_joint_once(cls, hands: list[HandConfig]) -> list[HandConfig]:
-        joints = [hand.joint for hand in hands]
-        for place, joint in enumerate(joints):
-            if joint in joints[:place]:
-                raise refusal(
-                    f"Two hands hold the joint '{joint}' (hands[{joints.index(joint)}] and hands[{place}]).",
-                    "Give one of them another joint.",
-                    at=place,
-                )
+        refuse_repeats(
+            [hand.joint for hand in hands],
+            "Two hands hold the joint '{value}' (hands[{first}] and hands[{place}]).",
+            "Give one of them another joint.",
+        )
         primaries = [place for place, hand in enumerate(hands) if hand.primary]
         if len(primaries) > 1:
             raise refusal(
@@ -168,10 +138,9 @@ class ShowConfig(Section):
     @field_validator("looks")
     @classmethod
     def _each_look_once(cls, looks: list[LookConfig]) -> list[LookConfig]:
-        names = [look.name for look in looks]
-        for place, name in enumerate(names):
-            if name in names[:place]:
-                raise refusal(f"Two looks are called '{name}'.", "Give one another name.", at=place)
+        refuse_repeats(
+            [look.name for look in looks], "Two looks are called '{value}'.", "Give one another name."
+        )
         return looks
 
     @property
@@ -217,12 +186,10 @@ class Show:
 
     def require_moving(self, joints: Sequence[str]) -> None:
         """Refuse hands on joints that the network does not move; `joints` are those that it does."""
+        words = "The network does not move the joint '{}'."
         problems = [
-            Problem(
-                self.file.path,
-                self.file.line(("hands", place, "joint")),
-                f"The network does not move the joint '{hand.joint}'.",
-                did_you_mean(hand.joint, joints),
+            self.file.problem(
+                ("hands", place, "joint"), words.format(hand.joint), did_you_mean(hand.joint, joints)
             )
             for place, hand in enumerate(self.config.hands)
             if hand.joint not in joints
@@ -240,19 +207,17 @@ class Show:
         problems = []
         dancer = self.config.dancer
         if dancer.interaction_iterations == 0:
-            line = self.file.line(("dancer", "interaction_iterations"))
             words = "The hands move nothing: interaction_iterations is 0."
             cure = f"Write {max(dancer.coding_iterations - 1, 1)}, or remove the hands."
-            problems.append(Problem(self.file.path, line, words, cure))
+            problems.append(self.file.problem(("dancer", "interaction_iterations"), words, cure))
         for place, cue in enumerate(self.config.cues):
             if cue.iterations is not None and cue.iterations[1] == 0 and cue.hands != []:
-                line = self.file.line(("cues", place, "iterations"))
                 words = (
                     f"The hands move nothing in the cue '{cue.name}': none of its iterations is interactive."
                 )
                 coding = cue.iterations[0]
                 cure = f"Write [{coding}, {max(coding - 1, 1)}], or `hands: []` where they are to let go."
-                problems.append(Problem(self.file.path, line, words, cure))
+                problems.append(self.file.problem(("cues", place, "iterations"), words, cure))
         return problems
 
 
@@ -281,7 +246,7 @@ def load_show(directory: Path | str) -> Show:
 
 
 def _skeleton(path: Path) -> tuple[Skeleton | None, list[Problem]]:
-    cure = "Copy the whole bundle again."
+    cure = COPY_AGAIN
     try:
         require_inside(path, path.parent)
         return read_bvh(path).skeleton, []

@@ -30,9 +30,8 @@ def _problem(model: type[Section], file: YamlFile, error: ErrorDetails) -> Probl
     if error["type"] == "refused":
         at = context["at"] if context["at"] is not None else ()
         below = at if isinstance(at, tuple) else (at,)
-        return Problem(file.path, file.line((*location, *below)), context["message"], context["cure"])
-    message, cure = _words(model, location, error)
-    return Problem(file.path, file.line(location), message, cure)
+        return file.problem((*location, *below), context["message"], context["cure"])
+    return file.problem(location, *_words(model, location, error))
 
 
 def _words(model: type[Section], location: Location, error: ErrorDetails) -> tuple[str, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import Problem, did_you_mean
@@ -11,12 +10,11 @@ from appliance.show.lights import (
     UNIVERSE_CHANNELS,
     FixtureConfig,
     LightsConfig,
+    VenueLightsConfig,
     channel_count,
     overlaps,
 )
 from appliance.show.show import Show
-from appliance.show.venue_lights import VenueLightsConfig
-from appliance.show.yaml_file import YamlFile, read_yaml
 
 
 def unwired(show: Show, box: BoxConfig) -> list[str]:
@@ -30,17 +28,15 @@ def unwired(show: Show, box: BoxConfig) -> list[str]:
     ]
 
 
-def misplaced(show: Show, box: BoxConfig, box_file: Path | None) -> list[Problem]:
-    """What is wrong with the box file's changes to the rig, each with its line: fixtures that the show has
-    not, channels that are used twice or that a universe has not.
-    """
-    file = YamlFile(Path("box.yaml")) if box_file is None else read_yaml(box_file)
+def misplaced(show: Show, box: BoxConfig) -> list[Problem]:
+    """What is wrong with the box file's changes to the rig: fixtures that the show does not have, channels
+    that are used twice or lie beyond the end of a universe."""
     names = [fixture.name for fixture in show.config.lights.fixtures]
     changed = [place.fixture for place in box.lights.places]
 
     def problem(fixture: str, words: str, cure: str) -> Problem:
         number = (changed.index(fixture),) if fixture in changed else ()
-        return Problem(file.path, file.line(("lights", "places", *number)), words, cure)
+        return box.file.problem(("lights", "places", *number), words, cure)
 
     problems = [
         problem(name, f"The show has no fixture '{name}'.", did_you_mean(name, names))

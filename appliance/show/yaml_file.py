@@ -40,6 +40,10 @@ class YamlFile:
                 return self.lines[location[:end]]
         return 1
 
+    def problem(self, location: Location, message: str, cure: str) -> Problem:
+        """What is wrong with the value there."""
+        return Problem(self.path, self.line(location), message, cure)
+
 
 def read_yaml(path: Path, inside: Path | None = None) -> YamlFile:
     """Read one document whose top level has keys. inside: the folder out of which no link may lead.

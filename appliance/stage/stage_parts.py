@@ -227,7 +227,7 @@ def _phrase(show: Show, path: Path, preparations: PhraseCache) -> tuple[Recordin
 
 
 def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:
-    problems = misfits(box.outputs.posistagenet, show.skeleton.names, box_file)
+    problems = misfits(box.outputs.posistagenet, show.skeleton.names, box.file)
     if problems:
         raise ConfigError(problems)
     return Outputs(box.outputs, show.skeleton)

@@ -97,7 +97,7 @@ def test_pauses_grow_and_one_that_lived_begins_anew(monkeypatch: pytest.MonkeyPa
     for lived_s in (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 11.0, 0.1):
         child._started_at = now
         now += lived_s
-        child._note(1, now)
+        child._note_exit(1, now)
         pauses.append(round(child._starts_at - now, 3))
     assert pauses == [0.2, 0.4, 0.8, 1.6, 2.0, 2.0, 0.2, 0.4]
 
@@ -105,7 +105,7 @@ def test_pauses_grow_and_one_that_lived_begins_anew(monkeypatch: pytest.MonkeyPa
 def test_one_that_dies_all_evening_takes_nobody_with_it() -> None:
     child = companions._Running(Companion("The child", ("/nowhere/at/all",), ""), lambda words: None)
     for second in range(0, 3 * 1100, 3):
-        child.look(float(second))
+        child.check(float(second))
     assert child._starts_at - second == companions.LONGEST_PAUSE_S
 
 

@@ -14,7 +14,7 @@ import pytest
 from onnx import TensorProto, helper
 
 from appliance.cli.app import main
-from appliance.cli.check import check_show, pack_show
+from appliance.cli.check import check_show, pack
 from appliance.show.bundle import write_checksums
 from appliance.stage.stage_error import StageError
 from tests.bundles import write_show
@@ -95,7 +95,7 @@ def test_a_network_that_needs_all_memory_is_refused(
     with pytest.raises(StageError, match=r"puppet\.onnx"):
         check_show(show, box(tmp_path))
     with pytest.raises(StageError, match=r"puppet\.onnx"):
-        pack_show(show)
+        pack(show)
     with pytest.raises(SystemExit) as ended:
         main(["play", "--show", str(show), "--box", str(box(tmp_path)), "--seconds", "1"])
     assert ended.value.code == 2

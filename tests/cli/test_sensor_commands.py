@@ -20,11 +20,11 @@ import pytest
 import yaml
 from rich.console import Console
 
-from appliance.cli import sensors
 from appliance.cli.app import main
-from appliance.cli.control_client import Answer, NoBoxError, Roll
-from appliance.cli.control_client import ControlClient as AskedBox
-from appliance.cli.sensor_table import SensorTable
+from appliance.cli.sensors import venue
+from appliance.cli.sensors.control_client import Answer, NoBoxError, Roll
+from appliance.cli.sensors.control_client import ControlClient as AskedBox
+from appliance.cli.sensors.table import SensorTable
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorState
 from appliance.sensor.wire import HAS_PROFILE, IS_NDOF
@@ -41,7 +41,7 @@ LEFT = SensorState(
 )
 LOST = LEFT._replace(name="head", state="lost", rate_hz=0.0, round_trip_s=None, age_s=192.0, battery=255)
 SPARE = SensorState(
-    *("spare-1", 5, "absent", "", 0.0, 0.0, None, None, 255, 0, "", "", 0, 0, "Its firmware is older."),
+    *("spare-1", 5, "absent", "", 0.0, 0.0, None, None, 255, 0, "", "", 0, 0, "Its firmware is older.")
 )
 
 
@@ -288,7 +288,7 @@ def test_show_control_that_is_on_its_way_back_is_asked_again(
         return roll(running)
 
     monkeypatch.setattr(AskedBox, "roll", silent_first)
-    monkeypatch.setattr(sensors, "time", Clock())
+    monkeypatch.setattr(venue, "time", Clock())
     with ends(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
         assert "The running box took it." in out
     assert [order.name for order in box.obeyed] == ["reload"]
@@ -299,7 +299,7 @@ def test_a_stage_that_dances_without_show_control_has_not_taken_it(
 ) -> None:
     clock = Clock()
     monkeypatch.setattr(AskedBox, "_replies", lambda *_: (one for one in ()))
-    monkeypatch.setattr(sensors, "time", clock)
+    monkeypatch.setattr(venue, "time", clock)
     with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
         assert "head is revoked" in out
         assert "A box dances here, but its show control did not answer." in out
@@ -311,7 +311,7 @@ def test_where_no_stage_lives_nobody_waits_for_show_control(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clock = Clock()
-    monkeypatch.setattr(sensors, "time", clock)
+    monkeypatch.setattr(venue, "time", clock)
     create_keys(tmp_path / "sensors.keys", ["head"])
     box_file = tmp_path / "box.yaml"
     settings = {"runtime": str(tmp_path / "none"), "sensors": {"keys": "sensors.keys"}}

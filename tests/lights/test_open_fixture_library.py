@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from appliance.cli.app import app
+from appliance.cli.app import command_line
 from appliance.lights.open_fixture_library import LibraryError, profile_values
 from appliance.lights.patch import Patch
 from appliance.show.fixture_profile import load_profile
@@ -134,7 +134,7 @@ def converted(fixture: dict[str, Any], folder: Path) -> Any:
     source = folder / "fixture.json"
     source.write_text(json.dumps(fixture))
     out = folder / "profiles" / "converted.yaml"
-    result = CliRunner().invoke(app, ["lights", "convert", str(source), "--out", str(out)])
+    result = CliRunner().invoke(command_line(), ["lights", "convert", str(source), "--out", str(out)])
     assert result.exit_code == 0, result.output
     return load_profile("converted", folder), result.output
 

@@ -237,13 +237,14 @@ def test_joints_that_the_show_has_not_are_named_with_line_and_nearest(
     tmp_path: Path, skeleton: Skeleton
 ) -> None:
     path = box_file(tmp_path, "    - joints: [head]\n    - joints:\n        - hip\n        - lhnd\n")
-    outputs = load_box(path).outputs.posistagenet
-    (problem,) = misfits(outputs, skeleton.names, path)
+    box = load_box(path)
+    (problem,) = misfits(box.outputs.posistagenet, skeleton.names, box.file)
     assert str(problem) == f"{path}:6: The show's skeleton has no joint 'lhnd'. Did you mean 'lHand'?"
 
 
 def test_trackers_beyond_the_last_number_are_refused(tmp_path: Path, skeleton: Skeleton) -> None:
     path = box_file(tmp_path, "    - first_tracker: 65530\n")
-    (problem,) = misfits(load_box(path).outputs.posistagenet, skeleton.names, path)
+    box = load_box(path)
+    (problem,) = misfits(box.outputs.posistagenet, skeleton.names, box.file)
     assert problem.line == 3 and f"would end at {65529 + len(skeleton)}" in problem.message
-    assert misfits([PosiStageNetConfig(first_tracker=65530, joints=["hip"])], skeleton.names, None) == []
+    assert misfits([PosiStageNetConfig(first_tracker=65530, joints=["hip"])], skeleton.names, box.file) == []

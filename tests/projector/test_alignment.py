@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from appliance.projector.alignment import Alignment, AlignmentFile, alignment_folder, file_name
-from appliance.show.box import BoxConfig
+from appliance.show.box import BoxConfig, load_box
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 from tests.box import disks
 
@@ -106,10 +106,11 @@ def test_a_place_that_takes_no_file_is_said_once_and_the_alignment_holds(
 
 def test_where_it_is_kept(tmp_path: Path) -> None:
     own = BoxConfig(state=tmp_path / "state")
-    assert alignment_folder(own, tmp_path / "box.yaml") == tmp_path / "state"
-    assert alignment_folder(BoxConfig(), tmp_path / "box.yaml") == tmp_path
-    assert alignment_folder(BoxConfig(), None, {"XDG_STATE_HOME": "/kept"}) == Path("/kept/bunraku")
-    assert alignment_folder(BoxConfig(), None, {}) == Path.home() / ".local" / "state" / "bunraku"
+    assert alignment_folder(own) == tmp_path / "state"
+    (tmp_path / "box.yaml").write_text("")
+    assert alignment_folder(load_box(tmp_path / "box.yaml")) == tmp_path
+    assert alignment_folder(BoxConfig(), {"XDG_STATE_HOME": "/kept"}) == Path("/kept/bunraku")
+    assert alignment_folder(BoxConfig(), {}) == Path.home() / ".local" / "state" / "bunraku"
 
 
 def test_two_projectors_of_one_box_have_a_file_each() -> None:

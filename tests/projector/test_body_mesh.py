@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.body.body_mesh import body_mesh
-from appliance.projector.body.skinning import BodyMesh, skin
+from appliance.projector.body.skinning import BodyMesh, dual_quaternions
 from appliance.projector.body.surface import Grid, surface_of
 from tests.projector import skeletons
 
@@ -29,6 +30,20 @@ def skeleton_of(name: str) -> Skeleton:
 @cache
 def mesh_of(name: str) -> BodyMesh:
     return body_mesh(skeleton_of(name))
+
+
+def skin(mesh: BodyMesh, positions: Array, world: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """As shaders do it: vertices, normals (V, 3) for positions (J, 3), metres, world rotations (J, 4)."""
+    moved_by = dual_quaternions(mesh.bind_positions, mesh.bind_world, positions, world)[
+        mesh.joints
+    ]  # (V, 4, 8)
+    agrees = np.sum(moved_by[..., :4] * moved_by[:, :1, :4], axis=-1) >= 0.0
+    blended = np.einsum("vk,vkc->vc", np.where(agrees, mesh.weights, -mesh.weights), moved_by)
+    blended /= np.linalg.norm(blended[:, :4], axis=1, keepdims=True)
+    turn, dual = blended[:, :4], blended[:, 4:]
+    shift = 2.0 * quaternion.multiply(dual, quaternion.inverse(turn))[:, 1:]
+    vertices = quaternion.rotate(turn, mesh.vertices) + shift
+    return vertices.astype(np.float32), quaternion.rotate(turn, mesh.normals).astype(np.float32)
 
 
 def volume(vertices: NDArray[np.float32], faces: Faces) -> float:

@@ -93,15 +93,15 @@ def test_reset_fills_the_display(controls: Controls) -> None:
 
 
 def test_orders(controls: Controls) -> None:
-    assert controls.obey(Order("corner", (2, 0.9, 0.1)))[0]
+    assert controls.carry_out(Order("corner", (2, 0.9, 0.1)))[0]
     assert controls.alignment.corners[1] == (0.9, 0.1)
-    assert controls.obey(Order("corners", (0.1, 0.1, 0.8, 0.1, 0.8, 0.9, 0.1, 0.9)))[0]
+    assert controls.carry_out(Order("corners", (0.1, 0.1, 0.8, 0.1, 0.8, 0.9, 0.1, 0.9)))[0]
     assert controls.alignment.corners[2] == (0.8, 0.9)
-    assert controls.obey(Order("brightness", (0.4,))) == (True, "Brightness 40 %.")
-    assert controls.obey(Order("mirror", (1,)))[0] and controls.alignment.mirror
-    assert controls.obey(Order("grid", (1,)))[0] and controls.shows_grid
-    assert controls.obey(Order("info", (1,)))[0] and controls.shows_info
-    assert controls.obey(Order("corners/reset"))[0]
+    assert controls.carry_out(Order("brightness", (0.4,))) == (True, "Brightness 40 %.")
+    assert controls.carry_out(Order("mirror", (1,)))[0] and controls.alignment.mirror
+    assert controls.carry_out(Order("grid", (1,)))[0] and controls.shows_grid
+    assert controls.carry_out(Order("info", (1,)))[0] and controls.shows_info
+    assert controls.carry_out(Order("corners/reset"))[0]
     assert controls.alignment.corners == WHOLE
 
 
@@ -112,11 +112,11 @@ def test_commands_reach_as_far_as_keys() -> None:
 
 
 def test_a_nudge_says_where_the_corner_is_now(controls: Controls, kept: list[Alignment]) -> None:
-    done, words = controls.obey(Order("nudge", (2, -0.125, 0.25)))
+    done, words = controls.carry_out(Order("nudge", (2, -0.125, 0.25)))
     assert (done, words) == (True, "The top right corner lies at (0.8750, 0.2500).")
-    assert controls.obey(Order("nudge", (2, 0.0625, 0.0)))[1].endswith("(0.9375, 0.2500).")
+    assert controls.carry_out(Order("nudge", (2, 0.0625, 0.0)))[1].endswith("(0.9375, 0.2500).")
     assert kept[-1].corners[1] == (0.9375, 0.25)
-    done, words = controls.obey(Order("nudge", (2, -1, 1)))
+    done, words = controls.carry_out(Order("nudge", (2, -1, 1)))
     assert not done and "fold" in words and words.endswith("(0.9375, 0.2500).")
 
 
@@ -135,6 +135,6 @@ def test_a_nudge_says_where_the_corner_is_now(controls: Controls, kept: list[Ali
     ],
 )
 def test_refused_orders_change_nothing(controls: Controls, kept: list[Alignment], order: Order) -> None:
-    done, words = controls.obey(order)
+    done, words = controls.carry_out(order)
     assert not done and words.endswith(".") and not kept
     assert controls.alignment == Alignment()

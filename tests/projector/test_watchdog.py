@@ -36,7 +36,7 @@ def hang(window):
 
 Window.show = hang
 place = Path(sys.argv[1])
-run = Run(BoxConfig(runtime=place / "run", state=place / "state"), None, Wish("offscreen", (64, 36)), print)
+run = Run(BoxConfig(runtime=place / "run", state=place / "state"), Wish("offscreen", (64, 36)), print)
 run.project(lambda: False)
 """
 

@@ -177,7 +177,7 @@ def test_a_lost_context_ends_the_projector_with_a_sentence(
 
     monkeypatch.setattr(context_module, "_reset_status", lambda: reset)
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
-    run = Run(box, None, Wish("offscreen", (64, 36), seconds=20), print)
+    run = Run(box, Wish("offscreen", (64, 36), seconds=20), print)
     try:
         with pytest.raises(
             ProjectorError, match=r"was reset.*sees black.*Start the projector again"
@@ -192,7 +192,7 @@ def test_a_lost_context_ends_the_projector_with_a_sentence(
 def test_keys_and_a_closed_window_arrive(tmp_path: Path) -> None:
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
     said: list[str] = []
-    run = Run(box, None, Wish("offscreen", (64, 36), seconds=20), said.append)
+    run = Run(box, Wish("offscreen", (64, 36), seconds=20), said.append)
     try:
         for symbol, modifier in ((sdl2.SDLK_c, 0), (sdl2.SDLK_LEFT, sdl2.KMOD_LSHIFT), (sdl2.SDLK_q, 0)):
             event = sdl2.SDL_Event()
@@ -212,7 +212,7 @@ def test_smaller_pictures_are_said_once_and_told_by_the_figures(
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
     said: list[str] = []
     shares: list[float] = []
-    run = Run(box, None, Wish("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
+    run = Run(box, Wish("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
     monkeypatch.setattr(Resolution, "share", property(lambda _: 0.5))
     monkeypatch.setattr(Resolution, "drawn", lambda *_: True)
     monkeypatch.setattr(run._projector, "draw", lambda *arguments: shares.append(arguments[-1]))
@@ -228,7 +228,7 @@ def test_smaller_pictures_are_said_once_and_told_by_the_figures(
 
 def test_a_stage_that_was_held_up_with_the_projector_is_no_black_picture(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), None, Wish("offscreen", (64, 36)), print)
+    run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), Wish("offscreen", (64, 36)), print)
     now = time.monotonic()
 
     def is_black_told() -> bool:

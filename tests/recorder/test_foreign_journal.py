@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from appliance.cli.app import main
-from appliance.cli.replay import replay_journal
+from appliance.cli.replay import replay as replay_journal
 from appliance.cli.run_with_timeout import within
 from appliance.recorder import chunks, log
 from appliance.recorder.environment import fingerprints

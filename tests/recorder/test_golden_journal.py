@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from appliance.cli.pictures import danced
-from appliance.cli.replay import TOLERANCE_DEGREES, replay_journal
+from appliance.cli.replay import TOLERANCE_DEGREES
+from appliance.cli.replay import replay as replay_journal
 from appliance.recorder.reading import Run, read_journal
 from appliance.recorder.record import NOT_FINITE, RESENT
 from appliance.show.show import load_show

@@ -173,7 +173,7 @@ def test_a_venue_that_hangs_fixtures_where_they_do_not_fit_is_refused(
 ) -> None:
     (bundle / "show.yaml").write_text(SHOW)
     (bundle / "box.yaml").write_text(f"lights:\n  places:\n    - {places}\n")
-    (problem,) = misplaced(load_show(bundle), load_box(bundle / "box.yaml"), bundle / "box.yaml")
+    (problem,) = misplaced(load_show(bundle), load_box(bundle / "box.yaml"))
     assert (problem.file, problem.line) == (bundle / "box.yaml", line)
     for word in words:
         assert word in str(problem)
@@ -183,7 +183,7 @@ def test_a_venue_may_hang_the_rig_otherwise(bundle: Path) -> None:
     (bundle / "show.yaml").write_text(SHOW)
     (bundle / "box.yaml").write_text("lights: {places: [{fixture: wash, universe: 7, address: 1}]}\n")
     show, box = load_show(bundle), load_box(bundle / "box.yaml")
-    assert misplaced(show, box, bundle / "box.yaml") == []
+    assert misplaced(show, box) == []
     assert [sentence[:23] for sentence in unwired(show, box)] == [
         "Universe 1 has no wire,",
         "Universe 7 has no wire,",

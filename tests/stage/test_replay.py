@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from appliance.box.clock import TICK_S
-from appliance.cli.replay import replay_journal
+from appliance.cli.replay import replay as replay_journal
 from appliance.pose.bvh import write_bvh
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import packed, unpacked

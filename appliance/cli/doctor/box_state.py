@@ -13,44 +13,45 @@ from appliance.cli.doctor.host_view import HostView
 from appliance.release.choice import CHOSEN, RUN
 
 _EARLIEST = 2026  # this program did not exist before
-_TIME_ERROR = 5  # adjtimex(2): nobody keeps the clock right
+_TIME_ERROR = 5  # adjtimex(2): the clock is not synchronized
 _ASK_S = 3.0
 _LATE_SHARE = 0.001
 
 
-def stage(patient: HostView) -> Iterator[Finding]:
-    """How the dance that runs here fares."""
-    if patient.stage is None:
-        if patient.at(RUN / CHOSEN).exists():  # the units run, or should
+def stage(host: HostView) -> Iterator[Finding]:
+    """The dance that runs here."""
+    if host.stage is None:
+        if host.at(RUN / CHOSEN).exists():  # the units run, or should
             yield wrong(
-                *("stage", "Nothing dances, though the box is on: the audience sees black."),
+                "stage",
+                "Nothing dances, though the box is on: the audience sees black.",
                 "`journalctl -b -u bunraku-stage` says why. No time? The second box.",
             )
         else:
             yield ok("stage", "Nothing dances here now.")
         return
-    health = patient.stage.health
+    health = host.stage.health
     ticks, late = (
         int(health.get("ticks") or 0),
         int(health.get("late") or 0) + int(health.get("skipped") or 0),
     )
     words = f"{health.get('rate_hz', 0.0):.1f} Hz; {late} of {ticks} ticks late or skipped."
     if ticks and late > _LATE_SHARE * ticks:
-        yield better("stage", f"{words} Nobody sees a few.", "Look at wake-ups and other programs here.")
+        yield better("stage", f"{words} A few do not show.", "Look at wake-ups and other programs here.")
     else:
         yield ok("stage", words)
     for complaint in health.get("complaints") or []:
         yield better("stage", str(complaint), "docs/technician.md has more.")
-    for whose, fallback in patient.stage.fallbacks:
-        if fallback.active and whose != "preflight":  # what that one refused stands beside the show
-            yield better(f"{whose}: {fallback.name}", fallback.words, "docs/technician.md has more.")
+    for process, fallback in host.stage.fallbacks:
+        if fallback.active and process != "preflight":  # its refusals stand beside the show
+            yield better(f"{process}: {fallback.name}", fallback.words, "docs/technician.md has more.")
 
 
-def units(patient: HostView) -> Iterator[Finding]:
+def units(host: HostView) -> Iterator[Finding]:
     """What systemd says about the box's units."""
-    if not patient.is_here or not patient.at("/run/systemd/system").is_dir():
+    if not host.is_here or not host.at("/run/systemd/system").is_dir():
         return
-    for unit in _asked_about("bunraku*.service", "bunraku.target"):
+    for unit in _systemd_properties("bunraku*.service", "bunraku.target"):
         name, state = unit.get("Id", ""), unit.get("ActiveState", "")
         restarts = unit.get("NRestarts", "0")
         if state == "failed":
@@ -59,14 +60,15 @@ def units(patient: HostView) -> Iterator[Finding]:
             )
         elif restarts not in ("", "0"):
             yield better(
-                *(name, f"{state}; it was started again {restarts} times since the box was switched on."),
+                name,
+                f"{state}; it was started again {restarts} times since the box was switched on.",
                 f"`journalctl -b -u {name}` says why.",
             )
         else:
             yield ok(name, f"{state} ({unit.get('SubState')}).")
 
 
-def _asked_about(*patterns: str) -> list[dict[str, str]]:
+def _systemd_properties(*patterns: str) -> list[dict[str, str]]:
     if shutil.which("systemctl") is None:
         return []
     properties = "--property=Id,ActiveState,SubState,NRestarts,Result"
@@ -84,9 +86,9 @@ def _asked_about(*patterns: str) -> list[dict[str, str]]:
     return [dict(line.split("=", 1) for line in block.splitlines() if "=" in line) for block in blocks]
 
 
-def watchdog(patient: HostView) -> Iterator[Finding]:
-    """Does a machine that hangs as a whole switch itself off and on?"""
-    devices = patient.found("/sys/class/watchdog/watchdog[0-9]*")
+def watchdog(host: HostView) -> Iterator[Finding]:
+    """Does a machine that hangs as a whole restart itself?"""
+    devices = host.found("/sys/class/watchdog/watchdog[0-9]*")
     cure = "RuntimeWatchdogSec=10s in /etc/systemd/system.conf; the installed box does that by itself."
     if not devices:
         yield better(
@@ -94,30 +96,31 @@ def watchdog(patient: HostView) -> Iterator[Finding]:
             "This machine has none: if it hangs as a whole, it stays so.",
             "A Raspberry Pi or a NUC has one.",
         )
-    elif any(patient.text(device / "state") == "active" for device in devices):
-        seconds = patient.text(devices[0] / "timeout")
+    elif any(host.text(device / "state") == "active" for device in devices):
+        seconds = host.text(devices[0] / "timeout")
         yield ok("watchdog", f"It restarts the machine after {seconds} s of silence.")
     else:
-        yield better("watchdog", "Nobody uses it: a machine that hangs as a whole stays so.", cure)
+        yield better("watchdog", "It is not in use: a machine that hangs as a whole stays so.", cure)
 
 
-def clock(patient: HostView) -> Iterator[Finding]:
+def clock(host: HostView) -> Iterator[Finding]:
     """The dance needs none; the times in the journal do."""
-    if not patient.is_here:
+    if not host.is_here:
         return
     year, what = datetime.datetime.now(datetime.UTC).year, "clock"
     if year < _EARLIEST:
         yield better(
-            *(what, f"It says {year}. The dance does not mind; journals and logs carry wrong dates."),
+            what,
+            f"It says {year}. The dance does not mind; journals and logs carry wrong dates.",
             "A network with the time, or a battery for the clock (Pi 5: its socket J5).",
         )
-    elif _is_kept_right():
+    elif _is_synchronized():
         yield ok(what, "It is kept right by a time server.")
     else:
-        yield ok(what, "Nobody keeps it right. The dance does not mind; dates may be off by minutes.")
+        yield ok(what, "No time server sets it. The dance does not mind; dates may be off by minutes.")
 
 
-def _is_kept_right() -> bool:
-    """adjtimex(2) with nothing to set: its result tells how the clock is."""
+def _is_synchronized() -> bool:
+    """adjtimex(2) with nothing to set: its result is the state of the clock."""
     empty = ctypes.create_string_buffer(512)  # struct timex is shorter
     return int(ctypes.CDLL(None).adjtimex(empty)) != _TIME_ERROR

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
-from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -15,40 +14,48 @@ from appliance.cli.doctor import box_state, processor, storage, venue
 from appliance.cli.doctor.finding import ORDER, Finding, wrong
 from appliance.cli.doctor.host_view import HostView, running_stage
 from appliance.cli.doctor.sample import Sample, sample
+from appliance.cli.options import AsJson, ChosenFile, ThisBoxFile
 from appliance.release.installed_box import box_here
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError
 
 CHECKS = (
-    *(box_state.stage, storage.choice, storage.releases, box_state.units),
-    *(processor.realtime_rights, processor.locked_memory),
-    *(processor.governor, processor.warmth, processor.power, storage.memory, storage.data_folders),
-    *(
-        storage.media,
-        storage.system_partition,
-        storage.wear,
-        box_state.watchdog,
-        box_state.clock,
-        venue.ports,
-    ),
-    *(venue.network, venue.radios, venue.cables, venue.adapters, venue.display),
+    box_state.stage,
+    storage.choice,
+    storage.releases,
+    box_state.units,
+    processor.realtime_rights,
+    processor.locked_memory,
+    processor.governor,
+    processor.warmth,
+    processor.power,
+    storage.memory,
+    storage.data_folders,
+    storage.media,
+    storage.system_partition,
+    storage.wear,
+    box_state.watchdog,
+    box_state.clock,
+    venue.ports,
+    venue.network,
+    venue.radios,
+    venue.cables,
+    venue.adapters,
+    venue.display,
 )
 LOOKS = (processor.wake_ups, processor.others, processor.interrupts)
 _COLOURS = {"wrong": "bold red", "better": "yellow", "ok": "green"}
 
 
-def doctor(box_file: Path | None, chosen: Path | None, as_json: bool) -> int:
-    """Say how everything is; exit status 1 when something is wrong, else 0.
-
-    With neither file, the one that was chosen at power-on, on a box that has such.
-    """
+def doctor(box: ThisBoxFile = None, chosen: ChosenFile = None, as_json: AsJson = False) -> int:
+    """Look at machine, venue and running box, and say what to do; status 1 when something is wrong."""
     found: list[Finding] = []
     try:
-        box = load_box(box_here(box_file, chosen))
+        config = load_box(box_here(box, chosen))
     except ConfigError as error:
-        box = BoxConfig()
+        config = BoxConfig()
         found.append(wrong("box file", str(error), "Below, a box without a box file is looked at."))
-    found += findings(HostView(box=box, stage=running_stage(box)))
+    found += findings(HostView(box=config, stage=running_stage(config)))
     found.sort(key=lambda finding: ORDER.index(finding.verdict))
     if as_json:
         print(json.dumps([finding._asdict() for finding in found], indent=1))
@@ -57,21 +64,21 @@ def doctor(box_file: Path | None, chosen: Path | None, as_json: bool) -> int:
     return int(any(finding.verdict == "wrong" for finding in found))
 
 
-def findings(patient: HostView) -> Iterator[Finding]:
-    """Of all checks; a second of measuring for those that need it."""
+def findings(host: HostView) -> Iterator[Finding]:
+    """What all checks find; some of them measure for a second."""
     for check in CHECKS:
-        yield from check(patient)
-    if patient.is_here:
-        seen = _sampled(patient)
+        yield from check(host)
+    if host.is_here:
+        seen = _sampled(host)
         for look in LOOKS:
             yield from look(seen)
 
 
-def _sampled(patient: HostView) -> Sample:
+def _sampled(host: HostView) -> Sample:
     """A second, in which the box's own processes may use what they use."""
     ours = {os.getpid()}
-    ours |= {int(folder.name) for folder in patient.found("/proc/[0-9]*") if patient.is_bunraku(folder)}
-    return sample(patient.box.realtime.priority, frozenset(ours))
+    ours |= {int(folder.name) for folder in host.found("/proc/[0-9]*") if host.is_bunraku(folder)}
+    return sample(host.box.realtime.priority, frozenset(ours))
 
 
 def _show(found: list[Finding]) -> None:

@@ -1,4 +1,4 @@
-"""Who is looked at: a machine's file system, a venue's box file, and the stage, where one dances."""
+"""The host under examination: its file system, the venue's box file, and the stage, where one dances."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class RunningStage:
 
     pid: int
     health: dict[str, Any]
-    fallbacks: tuple[tuple[str, Fallen], ...] = ()  # of all processes of the box: whose, and which
+    fallbacks: tuple[tuple[str, Fallen], ...] = ()  # of all processes of the box: the process, the fallback
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class HostView:
 
 
 def running_stage(box: BoxConfig) -> RunningStage | None:
-    """The stage of this box, if one lives; found also by root, whose folder it is not."""
+    """The stage of this box, if one runs; root finds it as well, in the folder of the box's own user."""
     folder = box.runtime
     if folder is None and (RUN / "frame").exists():
         folder = RUN
@@ -103,6 +103,6 @@ def running_stage(box: BoxConfig) -> RunningStage | None:
         if not reader.is_alive(time.monotonic()) or reader.facts is None:
             return None
         health, now = reader.health() or {}, time.monotonic()
-        with contextlib.closing(ProcessHealth(folder)) as company:
-            told = [("stage", one) for one in fallen(health.get("fallbacks"))] + company.fallbacks(now)
+        with contextlib.closing(ProcessHealth(folder)) as shared:
+            told = [("stage", one) for one in fallen(health.get("fallbacks"))] + shared.fallbacks(now)
         return RunningStage(reader.facts.pid, health, tuple(told))

@@ -18,16 +18,17 @@ _FIFO = 1
 _UNITS = "The installed units do that by themselves; for a trial by hand: `sudo .venv/bin/bunraku play`."
 
 
-def realtime_rights(patient: HostView) -> Iterator[Finding]:
-    """May the stage go before everybody else, and does it?"""
-    what, priority = "real time", patient.box.realtime.priority
-    if not patient.box.realtime.enabled:
+def realtime_rights(host: HostView) -> Iterator[Finding]:
+    """May the stage run before all other programs, and does it?"""
+    what, priority = "real time", host.box.realtime.priority
+    if not host.box.realtime.enabled:
         yield better(
-            *(what, "The box file says `realtime: {enabled: false}`. Other programs can hold up the dance."),
+            what,
+            "The box file says `realtime: {enabled: false}`. Other programs can hold up the dance.",
             "Leave that out.",
         )
-    elif patient.stage is not None:
-        fields = (patient.text(f"/proc/{patient.stage.pid}/stat") or "").rpartition(")")[2].split()
+    elif host.stage is not None:
+        fields = (host.text(f"/proc/{host.stage.pid}/stat") or "").rpartition(")")[2].split()
         if len(fields) > 38 and int(fields[38]) == _FIFO:
             yield ok(what, f"The stage dances with real-time priority {fields[37]}.")
         else:
@@ -36,13 +37,13 @@ def realtime_rights(patient: HostView) -> Iterator[Finding]:
                 "The stage dances without real-time priority. The audience sees pauses on a busy machine.",
                 f"Start it with `ulimit -r {priority}` or LimitRTPRIO={priority}. {_UNITS}",
             )
-    elif patient.is_here and not _may_take(priority):
+    elif host.is_here and not _may_take(priority):
         yield wrong(
             what,
             "This user may take no real-time priority. The audience would see pauses on a busy machine.",
             f"`ulimit -r {priority}`, or LimitRTPRIO={priority} in the unit. {_UNITS}",
         )
-    elif patient.is_here:
+    elif host.is_here:
         yield ok(what, f"Priority {priority} can be had.")
 
 
@@ -51,20 +52,20 @@ def _may_take(priority: int) -> bool:
         return bool(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO)
 
 
-def locked_memory(patient: HostView) -> Iterator[Finding]:
+def locked_memory(host: HostView) -> Iterator[Finding]:
     """A tick must not wait for the disk."""
     what, limit = "locked memory", resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
     cure = "`ulimit -l unlimited`, or LimitMEMLOCK=infinity in the unit."
-    if patient.stage is not None:
-        status = patient.text(f"/proc/{patient.stage.pid}/status") or ""
+    if host.stage is not None:
+        status = host.text(f"/proc/{host.stage.pid}/status") or ""
         locked = [line.split()[1] for line in status.splitlines() if line.startswith("VmLck:")]
         if locked and int(locked[0]) > 0:
             yield ok(what, "The stage's memory stays where it is.")
         else:
             yield better(what, "The stage's memory is not locked: a tick can wait for the disk.", cure)
-    elif patient.is_here and limit != resource.RLIM_INFINITY and os.geteuid() != 0:
+    elif host.is_here and limit != resource.RLIM_INFINITY and os.geteuid() != 0:
         yield better(what, "This user may not lock memory: a tick can wait for the disk.", cure)
-    elif patient.is_here:
+    elif host.is_here:
         yield ok(what, "It can be had.")
 
 
@@ -82,13 +83,13 @@ def wake_ups(seen: Sample) -> Iterator[Finding]:
     if very_late > 0.01 * len(late):
         yield wrong(what, f"{words} {very_late} were late by more than a frame may be.", cure)
     elif worst > LATE_MS:
-        yield better(what, f"{words} Some frames will leave late; nobody sees a few.", cure)
+        yield better(what, f"{words} Some frames will leave late; a few do not show.", cure)
     else:
         yield ok(what, words)
 
 
 def others(seen: Sample) -> Iterator[Finding]:
-    """Who else uses the cores."""
+    """What else uses the cores."""
     what = "other programs"
     busy = [(name, pid, share) for name, pid, share in seen.shares if share > BUSY_SHARE]
     total = sum(share for _, _, share in seen.shares)
@@ -98,7 +99,8 @@ def others(seen: Sample) -> Iterator[Finding]:
     if busy:
         verdict = wrong if total > 0.8 * seen.cores else better
         yield verdict(
-            *(what, f"{names}. The dance goes before them, projector and lights do not."),
+            what,
+            f"{names}. The dance goes before them, projector and lights do not.",
             "End what the show does not need; `top` shows more.",
         )
     else:
@@ -106,12 +108,12 @@ def others(seen: Sample) -> Iterator[Finding]:
 
 
 def interrupts(seen: Sample) -> Iterator[Finding]:
-    """What goes before the dance: interrupts, and a virtual machine's host."""
+    """What runs before the dance: interrupts, and a virtual machine's host."""
     if seen.interrupts > BUSY_SHARE:
         yield better(
             "interrupts",
             f"They take {100 * seen.interrupts:.0f} % of a core, and the dance waits for them.",
-            "`watch -d cat /proc/interrupts` shows whose: often a network with much broadcast, or a USB hub.",
+            "`watch -d cat /proc/interrupts` shows the source: often network broadcasts, or a USB hub.",
         )
     else:
         yield ok("interrupts", f"They take {100 * seen.interrupts:.0f} % of a core.")
@@ -123,13 +125,13 @@ def interrupts(seen: Sample) -> Iterator[Finding]:
         )
 
 
-def governor(patient: HostView) -> Iterator[Finding]:
+def governor(host: HostView) -> Iterator[Finding]:
     """How fast the processor runs between two ticks."""
-    files = patient.found("/sys/devices/system/cpu/cpu[0-9]*/cpufreq/scaling_governor")
-    names = {patient.text(file) or "" for file in files}
+    files = host.found("/sys/devices/system/cpu/cpu[0-9]*/cpufreq/scaling_governor")
+    names = {host.text(file) or "" for file in files}
     what = "processor's pace"
     if not names:
-        yield ok(what, "Nobody slows it down, as far as it tells.")
+        yield ok(what, "Nothing slows it down, as far as it tells.")
     elif names == {"performance"}:
         yield ok(what, "It is always at its full pace.")
     else:
@@ -141,9 +143,9 @@ def governor(patient: HostView) -> Iterator[Finding]:
         )
 
 
-def warmth(patient: HostView) -> Iterator[Finding]:
+def warmth(host: HostView) -> Iterator[Finding]:
     """The warmest of all sensors that Linux knows."""
-    found = [patient.number(zone) for zone in patient.found("/sys/class/thermal/thermal_zone*/temp")]
+    found = [host.number(zone) for zone in host.found("/sys/class/thermal/thermal_zone*/temp")]
     degrees = [number / 1000.0 for number in found if number is not None]
     what = "temperature"
     if not degrees:
@@ -159,14 +161,14 @@ def warmth(patient: HostView) -> Iterator[Finding]:
         yield ok(what, words)
 
 
-def power(patient: HostView) -> Iterator[Finding]:
+def power(host: HostView) -> Iterator[Finding]:
     """A Raspberry Pi says whether its supply is too weak (bits of `vcgencmd get_throttled`)."""
-    files = patient.found("/sys/devices/platform/soc*/soc*firmware/get_throttled")
-    bits = next((int(text, 16) for file in files if (text := patient.text(file))), None)
+    files = host.found("/sys/devices/platform/soc*/soc*firmware/get_throttled")
+    bits = next((int(text, 16) for file in files if (text := host.text(file))), None)
     alarms = [
-        patient.number(chip.with_name("in0_lcrit_alarm"))
-        for chip in patient.found("/sys/class/hwmon/hwmon*/name")
-        if patient.text(chip) == "rpi_volt"
+        host.number(chip.with_name("in0_lcrit_alarm"))
+        for chip in host.found("/sys/class/hwmon/hwmon*/name")
+        if host.text(chip) == "rpi_volt"
     ]
     what, supply = (
         "power",
@@ -174,8 +176,8 @@ def power(patient: HostView) -> Iterator[Finding]:
     )
     if bits is None and not alarms:
         slowed = [
-            patient.number(file) or 0
-            for file in patient.found("/sys/devices/system/cpu/cpu*/thermal_throttle/package_throttle_count")
+            host.number(file) or 0
+            for file in host.found("/sys/devices/system/cpu/cpu*/thermal_throttle/package_throttle_count")
         ]
         if any(slowed):
             yield better(

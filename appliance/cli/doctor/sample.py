@@ -1,4 +1,4 @@
-"""One second of looking: how late this machine wakes a real-time thread, and who uses its processors."""
+"""A sample of one second: how late this machine wakes a real-time thread, and what uses its processors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from appliance.box.realtime import borrowed_priority
 
 PERIOD_S = 0.005
 SECONDS = 1.0
-_BELOW = 1  # the stage's priority is this much higher: it waits for us never, we for it
+_BELOW = 1  # the stage's priority is this much higher: it never waits for this sample
 _STEAL, _IRQ, _SOFTIRQ = 7, 5, 6  # columns of /proc/stat
 
 
@@ -30,7 +30,7 @@ class Sample:
 
 
 def sample(priority: int, ours: frozenset[int]) -> Sample:
-    """Look for a second. `priority`: the stage's. `ours`: the box's processes: they may use what they use."""
+    """Measure for a second. priority: the stage's. ours: the box's own processes, which are left out."""
     cores = os.cpu_count() or 1
     begun, before, all_before = time.monotonic(), _used(), _machine()
     late_ms = _wake_ups(max(1, priority - _BELOW))

@@ -17,12 +17,12 @@ WORN = 8  # of ten steps of an eMMC's life
 _KEPT = "the journal, the place of the dance, what the box knows about sensors"
 
 
-def data_folders(patient: HostView) -> Iterator[Finding]:
+def data_folders(host: HostView) -> Iterator[Finding]:
     """Where the box keeps what must survive a power cut."""
-    box = patient.box
+    box = host.box
     wanted = {"state": box.state_folder, "journal": box.journal.folder}
     folders = {folder for folder in wanted.values() if folder is not None}
-    if patient.at(DATA).is_dir():
+    if host.at(DATA).is_dir():
         folders.add(DATA)
     if not folders:
         yield better(
@@ -31,29 +31,28 @@ def data_folders(patient: HostView) -> Iterator[Finding]:
             "Add both; the installed box has them under /data.",
         )
     for folder in sorted(folders):
-        yield _folder(patient, folder)
+        yield _folder(host, folder)
 
 
-def _folder(patient: HostView, folder: Path) -> Finding:
+def _folder(host: HostView, folder: Path) -> Finding:
     """One of them, or the nearest one above it that is there."""
-    what, there = "data", patient.at(folder)
+    what, there = "data", host.at(folder)
     while not there.exists() and there != there.parent:
         there = there.parent
     try:
         room = os.statvfs(there)
     except OSError as error:
         return wrong(
-            *(what, f"{folder} cannot be read ({error.strerror}): {_KEPT} are lost at a power cut."),
+            what,
+            f"{folder} cannot be read ({error.strerror}): {_KEPT} are lost at a power cut.",
             "`dmesg | tail` says why; often the card or its contact.",
         )
     free, whole = room.f_bavail * room.f_frsize, room.f_blocks * room.f_frsize
     words = f"{folder}: {free / 1e6:,.0f} of {whole / 1e6:,.0f} MB are free."
     if room.f_flag & os.ST_RDONLY:
         return wrong(
-            *(
-                what,
-                f"{folder} cannot be written: {_KEPT} are lost at a power cut. Nobody sees it.",
-            ),
+            what,
+            f"{folder} cannot be written: {_KEPT} are lost at a power cut. The audience sees nothing.",
             "After an error Linux writes no more: `dmesg | tail`, then a new card or disk.",
         )
     if not os.access(there, os.W_OK):
@@ -64,24 +63,23 @@ def _folder(patient: HostView, folder: Path) -> Finding:
         )
     if free < min(LEAST_FREE_BYTES, LEAST_FREE_SHARE * whole):
         return better(
-            *(what, f"{words} The journal keeps less than it should. The audience sees nothing."),
+            what,
+            f"{words} The journal keeps less than it should. The audience sees nothing.",
             "`journal: {minutes: 10}` in the box file, or remove what else lies there.",
         )
     return ok(what, words)
 
 
-def media(patient: HostView) -> Iterator[Finding]:
+def media(host: HostView) -> Iterator[Finding]:
     """The data partition that /etc/fstab names, and the stick."""
-    mounted = patient.mounts()
-    rows = (line.split() for line in (patient.text("/etc/fstab") or "").splitlines())
+    mounted = host.mounts()
+    rows = (line.split() for line in (host.text("/etc/fstab") or "").splitlines())
     named = {row[1] for row in rows if len(row) > 1 and not row[0].startswith("#")}
     where = str(DATA.parent)
     if where in named and where not in mounted:
         yield wrong(
-            *(
-                "data partition",
-                f"It is not there: {_KEPT} are lost at a power cut. The audience sees nothing.",
-            ),
+            "data partition",
+            f"It is not there: {_KEPT} are lost at a power cut. The audience sees nothing.",
             "`lsblk -f` and `dmesg | tail` say why; the disk's contact, or a new disk.",
         )
     elif where in mounted:
@@ -90,9 +88,9 @@ def media(patient: HostView) -> Iterator[Finding]:
         yield ok("stick", "One is plugged in, to read.")
 
 
-def system_partition(patient: HostView) -> Iterator[Finding]:
+def system_partition(host: HostView) -> Iterator[Finding]:
     """On an appliance a power cut finds nothing to damage."""
-    kind, options = patient.mounts().get("/", ("", ()))
+    kind, options = host.mounts().get("/", ("", ()))
     if not kind:
         return
     if kind in ("overlay", "squashfs") or "ro" in options:
@@ -105,14 +103,15 @@ def system_partition(patient: HostView) -> Iterator[Finding]:
         )
 
 
-def wear(patient: HostView) -> Iterator[Finding]:
+def wear(host: HostView) -> Iterator[Finding]:
     """An eMMC tells how much of its life is over; SD cards do not."""
-    for device in patient.found("/sys/block/mmcblk*/device"):
-        name, kind = device.parent.name, patient.text(device / "type")
-        steps = [int(word, 0) for word in (patient.text(device / "life_time") or "").split()]
+    for device in host.found("/sys/block/mmcblk*/device"):
+        name, kind = device.parent.name, host.text(device / "type")
+        steps = [int(word, 0) for word in (host.text(device / "life_time") or "").split()]
         if steps and max(steps) >= WORN:
             yield wrong(
-                *(f"wear of {name}", f"{10 * max(steps)} % of its life are over."),
+                f"wear of {name}",
+                f"{10 * max(steps)} % of its life are over.",
                 "Replace it before the next city; docs/touring.md says how.",
             )
         elif steps and max(steps) > 0:
@@ -121,9 +120,9 @@ def wear(patient: HostView) -> Iterator[Finding]:
             yield ok(f"wear of {name}", "An SD card does not tell: a new industrial one each season.")
 
 
-def memory(patient: HostView) -> Iterator[Finding]:
+def memory(host: HostView) -> Iterator[Finding]:
     """Room for the box, and nothing that is paged out."""
-    rows = dict(line.split(":", 1) for line in (patient.text("/proc/meminfo") or "").splitlines())
+    rows = dict(line.split(":", 1) for line in (host.text("/proc/meminfo") or "").splitlines())
     try:
         free_kb = int(rows["MemAvailable"].split()[0])
     except (KeyError, ValueError, IndexError):
@@ -133,33 +132,35 @@ def memory(patient: HostView) -> Iterator[Finding]:
         yield wrong("memory", f"{words} The kernel may end the projector.", "End other programs.")
     else:
         yield ok("memory", words)
-    swaps = [line.split()[0] for line in (patient.text("/proc/swaps") or "").splitlines()[1:]]
+    swaps = [line.split()[0] for line in (host.text("/proc/swaps") or "").splitlines()[1:]]
     on_disk = [name for name in swaps if "zram" not in name]
     if on_disk:
         yield better(
-            *("swap", f"{', '.join(on_disk)}: a card wears out by it, and processes wait for it."),
+            "swap",
+            f"{', '.join(on_disk)}: a card wears out by it, and processes wait for it.",
             "`sudo swapoff -a`, and take it out of /etc/fstab.",
         )
 
 
-def choice(patient: HostView) -> Iterator[Finding]:
+def choice(host: HostView) -> Iterator[Finding]:
     """Which show was chosen at power-on, what was refused, and what did not dance."""
-    chosen = Choice.read(patient.at(RUN / "chosen.json"))
+    chosen = Choice.read(host.at(RUN / "chosen.json"))
     if chosen is None:
         return
     yield ok("show", f"{chosen.first.show}, box file {chosen.first.box} ({chosen.first.source}).")
     if chosen.refused:
         words = "What is new was refused, and the show before dances:\n" + "\n".join(chosen.refused)
-        yield better("show", words, "Mend it on the stick, and plug it in anew.")
+        yield better("show", words, "Mend it on the stick, and plug it in again.")
     for one in chosen.aside:
         yield better("show", one.words, "Mend it, and bring it again on a stick.")
 
 
-def releases(patient: HostView) -> Iterator[Finding]:
+def releases(host: HostView) -> Iterator[Finding]:
     """Installed releases that did not dance at a power-on; bunraku-install leaves a note."""
-    for note in sorted(patient.at(RELEASES).glob("*.aside")):
+    for note in sorted(host.at(RELEASES).glob("*.aside")):
         version, reason = note.stem, note.read_text(errors="replace").strip()
         yield better(
-            *("release", f"{version} is put aside: {reason}. The release that came with the image dances."),
-            f"Install it anew from a stick, or try it again: sudo bunraku-install --use {version}",
+            "release",
+            f"{version} is put aside: {reason}. The release that came with the image dances.",
+            f"Install it again from a stick, or try it again: sudo bunraku-install --use {version}",
         )

@@ -23,107 +23,106 @@ _UDMX = ("16c0", "05dc")
 _ASK_S = 2.0
 
 
-def ports(patient: HostView) -> Iterator[Finding]:
+def ports(host: HostView) -> Iterator[Finding]:
     """The box's own ports are free, or the box has them."""
-    udp, control = patient.box.sensors.udp, patient.box.control
+    udp, control = host.box.sensors.udp, host.box.control
     wanted = [("sensors", udp.host, udp.port)] if udp is not None else []
     wanted += [("commands", control.host, control.port)] if control is not None else []
-    for whose, host, port in wanted:
-        holders = _holders(patient, port) if port else []
-        strangers = [name for name, is_ours in holders if not is_ours]
+    for user, address, port in wanted:
+        holders = _holders(host, port) if port else []
+        others = [name for name, is_ours in holders if not is_ours]
         if not holders:
-            yield ok(f"port for {whose}", f"{host}:{port} is free.")
-        elif not strangers:
-            yield ok(f"port for {whose}", f"{host}:{port}: the box listens.")
+            yield ok(f"port for {user}", f"{address}:{port} is free.")
+        elif not others:
+            yield ok(f"port for {user}", f"{address}:{port}: the box listens.")
         else:
-            names = ", ".join(strangers)
+            names = ", ".join(others)
             yield wrong(
-                *(f"port for {whose}", f"{names} has UDP port {port}: the box would hear nothing there."),
+                f"port for {user}",
+                f"{names} has UDP port {port}: the box would receive nothing there.",
                 "End that program, or give the box another port in its box file.",
             )
-    if (words := out_of_reach(patient.box.sensors)) is not None:
+    if (words := out_of_reach(host.box.sensors)) is not None:
         yield better("sensors by Wi-Fi", words, "For sensors on cables alone: leave it.")
 
 
-def _holders(patient: HostView, port: int) -> list[tuple[str, bool]]:
+def _holders(host: HostView, port: int) -> list[tuple[str, bool]]:
     """(name, whether it is one of the box's) of each process that has this UDP port."""
-    rows = [line.split() for line in (patient.text("/proc/net/udp") or "").splitlines()]
+    rows = [line.split() for line in (host.text("/proc/net/udp") or "").splitlines()]
     inodes = {f"socket:[{row[9]}]" for row in rows if len(row) > 9 and row[1].endswith(f":{port:04X}")}
     found = []
-    for folder in patient.found("/proc/[0-9]*") if inodes else []:
-        if inodes & set(_links(patient.at(folder / "fd"))):
-            name = f"{patient.text(folder / 'comm')} (process {folder.name})"
-            found.append((name, patient.is_bunraku(folder)))
+    for folder in host.found("/proc/[0-9]*") if inodes else []:
+        if inodes & set(_links(host.at(folder / "fd"))):
+            name = f"{host.text(folder / 'comm')} (process {folder.name})"
+            found.append((name, host.is_bunraku(folder)))
     return found or [("another user's program", False)] * bool(inodes)
 
 
 def _links(folder: Path) -> Iterator[str]:
-    """What the links in a folder lead to, without those that are gone when they are read."""
+    """Targets of the links in a folder; a link that is gone when it is read is skipped."""
     with contextlib.suppress(OSError):
         for entry in os.scandir(folder):
             with contextlib.suppress(OSError):
                 yield str(Path(entry.path).readlink())
 
 
-def network(patient: HostView) -> Iterator[Finding]:
+def network(host: HostView) -> Iterator[Finding]:
     """Is any network there?"""
-    names = [card.parent.name for card in patient.found("/sys/class/net/*/carrier")]
-    cards = [name for name in names if name != "lo" and _is_card(patient, name)]
-    connected = [name for name in cards if patient.text(f"/sys/class/net/{name}/carrier") == "1"]
+    names = [card.parent.name for card in host.found("/sys/class/net/*/carrier")]
+    cards = [name for name in names if name != "lo" and _is_card(host, name)]
+    connected = [name for name in cards if host.text(f"/sys/class/net/{name}/carrier") == "1"]
     if connected:
         yield ok("network", f"{', '.join(connected)}: connected.")
     elif cards:
         yield better(
-            *(
-                "network",
-                f"{', '.join(cards)}: nothing is connected. Sensors by Wi-Fi and receivers miss the box.",
-            ),
+            "network",
+            f"{', '.join(cards)}: nothing is connected. Sensors by Wi-Fi and receivers miss the box.",
             "Plug in the router, and look at the lamps of both sockets.",
         )
 
 
-def _is_card(patient: HostView, name: str) -> bool:
+def _is_card(host: HostView, name: str) -> bool:
     """A real one, and none that a program made."""
-    return patient.at(f"/sys/class/net/{name}/device").exists()
+    return host.at(f"/sys/class/net/{name}/device").exists()
 
 
-def radios(patient: HostView) -> Iterator[Finding]:
+def radios(host: HostView) -> Iterator[Finding]:
     """Wi-Fi that sleeps or is switched off, Bluetooth that disturbs, a Pi's own access point."""
-    for switch in patient.found("/sys/class/rfkill/rfkill*"):
-        kind, name = patient.text(switch / "type"), patient.text(switch / "name")
-        blocked = patient.text(switch / "soft") == "1" or patient.text(switch / "hard") == "1"
+    for switch in host.found("/sys/class/rfkill/rfkill*"):
+        kind, name = host.text(switch / "type"), host.text(switch / "name")
+        blocked = host.text(switch / "soft") == "1" or host.text(switch / "hard") == "1"
         if kind == "bluetooth" and not blocked:
             yield better(
-                *("bluetooth", f"{name} is on. It shares 2.4 GHz with the sensors."),
+                "bluetooth",
+                f"{name} is on. It shares 2.4 GHz with the sensors.",
                 "`sudo rfkill block bluetooth`",
             )
         elif kind == "wlan" and blocked:
             yield ok(
                 "wi-fi", f"{name} is switched off here: the sensors need a router, which is better anyway."
             )
-    for card in (path.parent for path in patient.found("/sys/class/net/*/phy80211")):
-        driver = patient.at(card / "device/driver").resolve().name
-        if driver.startswith("brcmf") and _is_access_point(patient):
+    for card in (path.parent for path in host.found("/sys/class/net/*/phy80211")):
+        driver = host.at(card / "device/driver").resolve().name
+        if driver.startswith("brcmf") and _is_access_point(host):
             yield better(
-                *(
-                    "wi-fi",
-                    f"{card.name} is the access point, on a Pi's own radio: it loses clients after hours.",
-                ),
+                "wi-fi",
+                f"{card.name} is the access point, on a Pi's own radio: it loses clients after hours.",
                 "A router for 2.4 GHz on Ethernet; docs/touring.md.",
             )
-        if patient.is_here and "on" in _asked("iw", "dev", card.name, "get", "power_save").split()[-1:]:
+        if host.is_here and "on" in _output_of("iw", "dev", card.name, "get", "power_save").split()[-1:]:
             yield better(
-                *("wi-fi", f"{card.name} saves power: readings wait for up to 100 ms."),
+                "wi-fi",
+                f"{card.name} saves power: readings wait for up to 100 ms.",
                 f"`sudo iw dev {card.name} set power_save off`, or wifi.powersave=2 for NetworkManager.",
             )
 
 
-def _is_access_point(patient: HostView) -> bool:
+def _is_access_point(host: HostView) -> bool:
     """As `bunraku-access-point` makes it."""
-    return bool(patient.found("/data/network/sensors.nmconnection"))
+    return bool(host.found("/data/network/sensors.nmconnection"))
 
 
-def _asked(*command: str) -> str:
+def _output_of(*command: str) -> str:
     if shutil.which(command[0]) is None:
         return ""
     try:
@@ -133,51 +132,53 @@ def _asked(*command: str) -> str:
     return done.stdout
 
 
-def cables(patient: HostView) -> Iterator[Finding]:
+def cables(host: HostView) -> Iterator[Finding]:
     """Sensors on cables that the box file names."""
-    for cable in patient.box.sensors.serial:
-        yield _device(patient, f"sensor on {cable.device}", cable.device)
-    if patient.found("/run/systemd/units/invocation:ModemManager.service"):
+    for cable in host.box.sensors.serial:
+        yield _device(host, f"sensor on {cable.device}", cable.device)
+    if host.found("/run/systemd/units/invocation:ModemManager.service"):
         yield better(
-            *("cables", "ModemManager runs: it speaks to each new cable first, for seconds."),
+            "cables",
+            "ModemManager runs: it speaks to each new cable first, for seconds.",
             "`sudo systemctl disable --now ModemManager`",
         )
 
 
-def adapters(patient: HostView) -> Iterator[Finding]:
+def adapters(host: HostView) -> Iterator[Finding]:
     """The lights' USB adapters that the box file names."""
-    for wire in patient.box.outputs.dmx:
+    for wire in host.box.outputs.dmx:
         what = f"lights, universe {wire.universe}"
         if wire.wire == "udmx":
-            yield _udmx(patient, what)
+            yield _udmx(host, what)
         elif wire.wire in _KINDS:
-            yield _adapter(patient, what, wire)
+            yield _adapter(host, what, wire)
 
 
-def _udmx(patient: HostView, what: str) -> Finding:
-    for device in patient.found("/sys/bus/usb/devices/*/idVendor"):
-        if (patient.text(device), patient.text(device.with_name("idProduct"))) == _UDMX:
+def _udmx(host: HostView, what: str) -> Finding:
+    for device in host.found("/sys/bus/usb/devices/*/idVendor"):
+        if (host.text(device), host.text(device.with_name("idProduct"))) == _UDMX:
             return ok(what, "The uDMX is plugged in.")
     return wrong(
         what, "No uDMX is plugged in: its lamps stay as they are.", "Plug it in: it is taken by itself."
     )
 
 
-def _adapter(patient: HostView, what: str, wire: DmxConfig) -> Finding:
-    if not patient.is_here:
+def _adapter(host: HostView, what: str, wire: DmxConfig) -> Finding:
+    if not host.is_here:
         return ok(what, "It is looked for on the machine itself.")
     try:
         device = find_device(wire.device, wire.serial, _KINDS[wire.wire])
     except AdapterError as error:
         return wrong(
-            *(what, f"{IN_WORDS[wire.wire]}: {error}. Its lamps stay as they are."),
+            what,
+            f"{IN_WORDS[wire.wire]}: {error}. Its lamps stay as they are.",
             "Plug it in: it is taken by itself.",
         )
-    return _device(patient, what, device)
+    return _device(host, what, device)
 
 
-def _device(patient: HostView, what: str, device: str) -> Finding:
-    there = patient.at(device)
+def _device(host: HostView, what: str, device: str) -> Finding:
+    there = host.at(device)
     if not there.exists():
         return wrong(what, f"{device} is not plugged in.", "Plug it in: it is taken by itself.")
     if not os.access(there, os.R_OK | os.W_OK):
@@ -187,20 +188,22 @@ def _device(patient: HostView, what: str, device: str) -> Finding:
     return ok(what, f"{device} is there.")
 
 
-def display(patient: HostView) -> Iterator[Finding]:
+def display(host: HostView) -> Iterator[Finding]:
     """Is there somewhere to project, and something that draws?"""
-    sockets = patient.found("/sys/class/drm/card*-*/status")
-    connected = [path.parent.name for path in sockets if patient.text(path) == "connected"]
+    sockets = host.found("/sys/class/drm/card*-*/status")
+    connected = [path.parent.name for path in sockets if host.text(path) == "connected"]
     if connected:
         yield ok("display", f"{', '.join(connected)}: connected.")
     else:
         yield better(
-            *("display", "None is connected: no picture. Dance and lights go on."),
+            "display",
+            "None is connected: no picture. Dance and lights go on.",
             "Projector on, cable in; `video=HDMI-A-1:1920x1080M@60D` for one that sleeps "
             "(docs/technician.md).",
         )
-    if not patient.found("/dev/dri/renderD*"):
+    if not host.found("/dev/dri/renderD*"):
         yield better(
-            *("graphics", "No graphics card: the processor draws, in fewer and smaller pictures."),
+            "graphics",
+            "No graphics card: the processor draws, in fewer and smaller pictures.",
             "The card's driver, or a machine with one. A dance without a projector needs none.",
         )

@@ -1,4 +1,4 @@
-"""A pose to model a body in, for skeletons whose rest pose has limbs lying in each other."""
+"""A pose to model a body in, for skeletons whose limbs lie in each other at rest."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.body.anatomy import Anatomy
 
-CROWDED_SHARE = 0.3  # of a limb's points: so many must lie in another part of the body
+CROWDED_SHARE = 0.3  # of a limb's points that lie in another part of the body
 CLEARANCE = 0.01  # of the height, between the surfaces of two limbs
 _UP = np.array([0.0, 1.0, 0.0])
 _DOWNWARDS = 0.35  # how steeply feet point to the floor

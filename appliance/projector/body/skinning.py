@@ -1,9 +1,9 @@
 """Skinning: the surface follows the joints, by dual quaternions, so that twisted limbs keep their volume.
 
 A dual quaternion is 8 numbers: a rotation r (w, x, y, z) and a dual part d = 0.5 * t * r, where t is the
-translation as a quaternion without a real part (Kavan et al. 2007, Skinning with Dual Quaternions). A
-shader does the same as `skin`: take the four (r, d) of a vertex, turn those whose r points away from the
-first one's, sum with the weights, divide both by the length of r; then a point p becomes
+translation as a quaternion without a real part (Kavan et al. 2007, Skinning with Dual Quaternions). The
+vertex shaders (skin.glsl) take the four (r, d) of a vertex, turn those whose r points away from the first
+one's, sum with the weights, and divide both by the length of r; then a point p becomes
 p + 2 * cross(r.xyz, cross(r.xyz, p) + r.w * p) + 2 * (r.w * d.xyz - d.w * r.xyz + cross(r.xyz, d.xyz)).
 """
 
@@ -39,25 +39,13 @@ class BodyMesh:
     bind_world: NDArray[np.float32]
 
 
-def dual_quaternions(mesh: BodyMesh, positions: Array, world: Array) -> NDArray[np.float32]:
-    """(J, 8) float32, r then d: from the pose in which the mesh was modelled to positions (J, 3) in metres
-    and world rotations (J, 4)."""
-    turn = quaternion.multiply(np.asarray(world), quaternion.inverse(mesh.bind_world))
-    shift = np.zeros((len(turn), 4))
-    shift[:, 1:] = positions - quaternion.rotate(turn, mesh.bind_positions)
-    return np.concatenate([turn, 0.5 * quaternion.multiply(shift, turn)], axis=1).astype(np.float32)
-
-
-def skin(mesh: BodyMesh, positions: Array, world: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Vertices and normals (V, 3) for positions (J, 3) in metres and world rotations (J, 4)."""
-    moved_by = dual_quaternions(mesh, positions, world)[mesh.joints]  # (V, 4, 8)
-    agrees = np.sum(moved_by[..., :4] * moved_by[:, :1, :4], axis=-1) >= 0.0
-    blended = np.einsum("vk,vkc->vc", np.where(agrees, mesh.weights, -mesh.weights), moved_by)
-    blended /= np.linalg.norm(blended[:, :4], axis=1, keepdims=True)
-    turn, dual = blended[:, :4], blended[:, 4:]
-    shift = 2.0 * quaternion.multiply(dual, quaternion.inverse(turn))[:, 1:]
-    vertices = quaternion.rotate(turn, mesh.vertices) + shift
-    return vertices.astype(np.float32), quaternion.rotate(turn, mesh.normals).astype(np.float32)
+def dual_quaternions(bind_positions: Array, bind_world: Array, positions: Array, world: Array) -> Array:
+    """(..., J, 8), r then d: from the pose in which a mesh was modelled to positions (..., J, 3) and world
+    rotations (..., J, 4)."""
+    turn = quaternion.multiply(np.asarray(world), quaternion.inverse(bind_world))
+    shift = np.zeros_like(turn)
+    shift[..., 1:] = positions - quaternion.rotate(turn, bind_positions)
+    return np.concatenate([turn, 0.5 * quaternion.multiply(shift, turn)], axis=-1)
 
 
 MOVERS = 4  # joints that move a vertex

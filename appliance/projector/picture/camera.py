@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,8 +54,7 @@ class View:
         return float((0.5 + 0.5 * x / w) * self.slopes[0] / self.slopes[1]), float(0.5 + 0.5 * y / w)
 
 
-@dataclass(frozen=True)
-class _Stand:
+class _Stand(NamedTuple):
     """What a CameraConfig says at one time."""
 
     azimuth: float
@@ -100,17 +100,8 @@ def _stand(config: CameraConfig, time_s: float) -> _Stand:
 def _between(a: _Stand, b: _Stand, share: float) -> _Stand:
     """From one stand to another, the short way round."""
     way = (b.azimuth - a.azimuth + np.pi) % (2 * np.pi) - np.pi
-
-    def mixed(first: float, second: float) -> float:
-        return first + share * (second - first)
-
-    return _Stand(
-        a.azimuth + share * way,
-        mixed(a.elevation, b.elevation),
-        mixed(a.lens, b.lens),
-        mixed(a.figure, b.figure),
-        mixed(a.follow, b.follow),
-    )
+    mixed = [first + share * (second - first) for first, second in zip(a, b, strict=True)]
+    return _Stand(a.azimuth + share * way, *mixed[1:])
 
 
 def _limited(value: float, limit: float) -> float:

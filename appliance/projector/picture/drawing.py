@@ -65,19 +65,19 @@ class Drawing:
     ) -> None:
         """Draw with textures and uniforms by name; the shader takes those that it knows.
 
-        pixels: about how many it will shade; vertices: draw the first so many, not all. Matrices are numpy's,
+        pixels: about how many it will shade; vertices: draw only the first of them. Matrices are numpy's,
         for column vectors.
         """
         for unit, name in enumerate(self._textures):
             texture = inputs[name]
             texture.use(unit)
-            tally.move(texture.width * texture.height * texture.components * _BYTES[texture.dtype])
+            tally.count_bytes(texture.width * texture.height * texture.components * _BYTES[texture.dtype])
         self._send(inputs)
         count = vertices or self._count
         self._array.render(mode, count, instances=instances)
         per_vertex = {moderngl.TRIANGLES: 1 / 3, moderngl.TRIANGLE_STRIP: 1.0, moderngl.POINTS: 2.0}[mode]
         placed = round(self._vertices * count / self._count) if self._vertices else count * instances
-        tally.put_down(Use(*self._names, placed, round(count * instances * per_vertex), pixels))
+        tally.count_draw_call(Use(*self._names, placed, round(count * instances * per_vertex), pixels))
 
     def _send(self, inputs: dict[str, Any]) -> None:
         """The uniforms that have changed."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.looks.palette import Palette
 from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.targets import Target
@@ -21,9 +20,9 @@ class Glow:
 
     def __init__(self, easel: Easel) -> None:
         self._easel = easel
-        self._shrink = Drawing(easel.ctx, "screen", "glow_shrink")
-        self._blur = Drawing(easel.ctx, "screen", "glow_blur")
-        self._air = Drawing(easel.ctx, "air", "light_air")
+        self._shrink = easel.drawing("screen", "glow_shrink")
+        self._blur = easel.drawing("screen", "glow_blur")
+        self._air = easel.drawing("air", "light_air")
 
     def spread(self, picture: Target, name: str, lines: int, gain: float = 1.0) -> Target:
         """A small, soft copy of a picture, `gain` times as bright."""
@@ -34,19 +33,11 @@ class Glow:
         first.start()
         inputs = {"source": picture.texture, "texel": (0.25 / size[0], 0.25 / size[1]), "gain": gain}
         self._shrink.draw(easel.tally, first.pixels, inputs)
-        for source, into, step in ((first, second, (1 / size[0], 0.0)), (second, first, (0.0, 1 / size[1]))):
-            into.start()
-            self._blur.draw(easel.tally, into.pixels, {"source": source.texture, "step_uv": step})
+        easel.blur(self._blur, first, second, (1 / size[0], 1 / size[1]))
         return first
 
     def finish(
-        self,
-        scene: Scene,
-        look: LookConfig,
-        colours: Palette,
-        picture: Target,
-        opacity: float,
-        wall: Wall,
+        self, scene: Scene, look: LookConfig, colours: Palette, picture: Target, opacity: float, wall: Wall
     ) -> None:
         """Lay the picture with its glow onto the wall."""
         easel, view = self._easel, scene.view
@@ -70,7 +61,3 @@ class Glow:
         air.start()
         self._air.draw(easel.tally, air.pixels, inputs)
         easel.lay("light_finish", wall, opacity, inputs)
-
-    def release(self) -> None:
-        for drawing in (self._shrink, self._blur, self._air):
-            drawing.release()

@@ -10,12 +10,7 @@ SIDE = 256
 
 def noise_pixels() -> bytes:
     """(SIDE, SIDE, 4) bytes: red soft clouds, green finer ones, blue fibres along x, alpha fine grain."""
-    layers = [
-        _clouds(1, 1.8, 1.0),
-        _clouds(2, 1.2, 1.0),
-        _clouds(3, 1.0, 12.0),
-        _clouds(4, 0.0, 1.0),
-    ]
+    layers = [_clouds(1, 1.8, 1.0), _clouds(2, 1.2, 1.0), _clouds(3, 1.0, 12.0), _clouds(4, 0.0, 1.0)]
     return np.stack(layers, axis=-1).tobytes()
 
 

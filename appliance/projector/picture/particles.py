@@ -1,41 +1,22 @@
-"""Particles: points spread evenly over the body's surface, each with chances of its own."""
+"""Particles: points on the body's surface, each with chances of its own, as parts of vertices."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from appliance.projector.picture.body_buffers import BodyBuffers
+from appliance.pose.quaternion import Array
+from appliance.pose.skeleton import Skeleton
+from appliance.projector.picture.body_buffers import BodyBuffers, merged
 
-Floats = NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class Particles:
-    """(P, ..): places in figure heights, rest pose; normals; four chances from 0 to 1; what moves them."""
-
-    positions: Floats
-    normals: Floats
-    chances: Floats
-    joints: NDArray[np.uint8]
-    weights: Floats
-
-    def parts(self) -> dict[str, Any]:
-        """As parts of vertices."""
-        return {
-            "position": self.positions,
-            "normal": self.normals,
-            "chance": self.chances,
-            "joints": self.joints,
-            "weights": self.weights,
-        }
+Parts = dict[
+    str, Any
+]  # (P, ..): places in figure heights, rest pose; normals; four chances 0 to 1; what moves them
 
 
-def particles_of(body: BodyBuffers, count: int) -> Particles:
-    """Spread `count` points over a body, always the same ones."""
+def particles_of(body: BodyBuffers, count: int) -> Parts:
+    """Spread `count` points evenly over a body, always the same ones."""
     corners = body.positions[body.faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     random = np.random.RandomState(7)  # its numbers stay the same in every version of numpy
@@ -48,10 +29,35 @@ def particles_of(body: BodyBuffers, count: int) -> Particles:
         (1 - u - v) * values[a] + u * values[b] + v * values[c] for values in (body.positions, body.normals)
     )
     order = random.permutation(count)
-    return Particles(
-        places[order].astype(np.float32),
-        normals[order].astype(np.float32),
-        random.random_sample((count, 4)).astype(np.float32),
-        body.joints[a][order],
-        body.weights[a][order],
-    )
+    return {
+        "position": places[order].astype(np.float32),
+        "normal": normals[order].astype(np.float32),
+        "chance": random.random_sample((count, 4)).astype(np.float32),
+        "joints": body.joints[a][order],
+        "weights": body.weights[a][order],
+    }
+
+
+def traced(body: BodyBuffers, skeleton: Skeleton, bind_positions: Array, count: int) -> Parts:
+    """`count` points that leave trails, most of them far out along the limbs: hands, feet and head.
+
+    bind_positions (J, 3): the joints in the rest pose, figure heights.
+    """
+    reach = np.zeros(len(skeleton))  # how far along the bones each joint is from the root
+    for joint, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            reach[joint] = reach[parent] + np.linalg.norm(bind_positions[joint] - bind_positions[parent])
+    candidates, _ = merged(body.positions, body.faces, 0.02)
+    out = np.sum(reach[body.joints[candidates]] * body.weights[candidates], axis=1)
+    has_limbs = out.max() > 0.0  # a skeleton of one joint has none
+    likely = np.clip(out / out.max() - 0.35, 0.0, None) ** 2 if has_limbs else np.ones(len(out))
+    random = np.random.RandomState(11)
+    count = min(count, int(np.count_nonzero(likely)))
+    chosen = random.choice(candidates, count, replace=False, p=likely / likely.sum())
+    return {
+        "position": body.positions[chosen],
+        "normal": body.normals[chosen],
+        "chance": random.random_sample((len(chosen), 4)).astype(np.float32),
+        "joints": body.joints[chosen],
+        "weights": body.weights[chosen],
+    }

@@ -8,8 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.pose import quaternion
-from appliance.projector.body.skinning import BodyMesh
+from appliance.projector.body.skinning import BodyMesh, dual_quaternions
 from appliance.projector.moment import Moment
 
 ROWS = 48
@@ -60,19 +59,14 @@ class PoseTexture:
     """Dual quaternions of all joints in all rows: joint j in texels 2j (rotation) and 2j + 1 (dual part)."""
 
     def __init__(self, ctx: moderngl.Context, mesh: BodyMesh, joints: int) -> None:
-        self._back = quaternion.inverse(mesh.bind_world)
-        self._bind = mesh.bind_positions / mesh.height
+        self._bind = mesh.bind_positions / mesh.height, mesh.bind_world
         self.texture = ctx.texture((2 * joints, ROWS), 4, dtype="f4")
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
     def write(self, poses: Poses) -> None:
         """Bring the poses onto the GPU."""
-        turn = quaternion.multiply(poses.world, self._back)
-        shift = np.zeros_like(turn)
-        shift[..., 1:] = poses.positions - quaternion.rotate(turn, self._bind)
-        dual = 0.5 * quaternion.multiply(shift, turn)
-        texels = np.stack([turn, dual], axis=2).astype(np.float32)
-        self.texture.write(np.ascontiguousarray(texels))
+        texels = dual_quaternions(*self._bind, poses.positions, poses.world)
+        self.texture.write(np.ascontiguousarray(texels, np.float32))
 
     @property
     def gpu_bytes(self) -> int:

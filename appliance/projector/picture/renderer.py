@@ -23,11 +23,9 @@ from appliance.show.look import LookConfig, Style
 
 
 class _Look(Protocol):
-    """A way of drawing; ends in one pass that lays the picture onto the wall with an opacity."""
+    """A way of drawing; its last pass lays the picture onto the wall with an opacity."""
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None: ...
-
-    def release(self) -> None: ...
 
 
 _LOOKS: dict[Style, Callable[[Easel], _Look]] = {
@@ -88,6 +86,4 @@ class Renderer:
 
     def release(self) -> None:
         """Give the GPU's memory back."""
-        for look in self._styles.values():
-            look.release()
         self._easel.release()

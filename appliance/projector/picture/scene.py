@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -98,6 +98,7 @@ class Easel:
         self.noise.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
         self._canvases: dict[str, Target] = {}
         self._buffers: list[moderngl.Buffer] = []
+        self._drawings: list[Drawing] = []
         self._sheets: dict[tuple[str, ...], Drawing] = {}
 
     def vertices(self, parts: Mapping[str, Any], instanced: bool = False) -> list[tuple[Any, ...]]:
@@ -112,7 +113,7 @@ class Easel:
         return self._buffers[-1]
 
     def canvas(self, name: str, size: tuple[int, int], depth: bool = False) -> Target:
-        """The canvas of that name, made anew when its size has changed."""
+        """The canvas of that name, replaced when its size has changed."""
         known = self._canvases.get(name)
         if known is None or known.size != size:
             if known:
@@ -141,7 +142,7 @@ class Easel:
         else:
             self.ctx.enable_only(moderngl.BLEND)
             self.ctx.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-            self.tally.move(4 * wall.pixels)
+            self.tally.count_bytes(4 * wall.pixels)
         inputs |= {
             "clip_from_picture": wall.clip_from_picture,
             "box": box,
@@ -156,18 +157,36 @@ class Easel:
         if box != WHOLE:
             frame = self._sheet(fragment, *parts, "FRAME")
             frame.draw(self.tally, (1 - inside) * wall.pixels, inputs, strip, 10)
-        self.tally.move(4 * wall.pixels)
+        self.tally.count_bytes(4 * wall.pixels)
 
     def _sheet(self, fragment: str, *parts: str) -> Drawing:
         """Made when it is first needed."""
         key = fragment, *parts
         if key not in self._sheets:
-            self._sheets[key] = Drawing(self.ctx, "laid", fragment, parts=parts)
+            self._sheets[key] = self.drawing("laid", fragment, parts=parts)
         return self._sheets[key]
+
+    def drawing(
+        self,
+        vertex: str,
+        fragment: str,
+        content: Sequence[tuple[Any, ...]] = (),
+        index: moderngl.Buffer | None = None,
+        parts: Sequence[str] = (),
+    ) -> Drawing:
+        """A shader program with what it draws, as Drawing takes them; released with the easel."""
+        self._drawings.append(Drawing(self.ctx, vertex, fragment, content, index, parts))
+        return self._drawings[-1]
 
     def surface(self, vertex: str, fragment: str, coarse: bool = False) -> Drawing:
         """The body's surface, drawn by these shaders."""
-        return Drawing(self.ctx, vertex, fragment, *self.body.content(coarse))
+        return self.drawing(vertex, fragment, *self.body.content(coarse))
+
+    def blur(self, blur: Drawing, picture: Target, other: Target, step_uv: tuple[float, float]) -> None:
+        """Soften a picture across, into another canvas of its size, and upwards, back into its own."""
+        for source, into, step in ((picture, other, (step_uv[0], 0.0)), (other, picture, (0.0, step_uv[1]))):
+            into.start()
+            blur.draw(self.tally, into.pixels, {"source": source.texture, "step_uv": step})
 
     @property
     def gpu_bytes(self) -> int:
@@ -177,15 +196,9 @@ class Easel:
         return canvases + buffers + self.body.gpu_bytes + self.poses.gpu_bytes + SIDE * SIDE * 16 // 3
 
     def release(self) -> None:
-        self.body.release()
-        self.poses.release()
-        self.noise.release()
-        for canvas in self._canvases.values():
-            canvas.release()
-        for buffer in self._buffers:
-            buffer.release()
-        for sheet in self._sheets.values():
-            sheet.release()
+        shared: list[Any] = [self.body, self.poses, self.noise]
+        for owned in (*self._drawings, *self._buffers, *self._canvases.values(), *shared):
+            owned.release()
 
 
 def direction(azimuth: float, elevation_deg: float) -> Array:

@@ -8,7 +8,6 @@ import moderngl
 import numpy as np
 
 from appliance.pose.quaternion import Array
-from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.scene import Easel, Scene
 
 DEPTH_SIDE, CAST_SIDE = 384, 192  # pixels
@@ -25,7 +24,7 @@ class Shadow:
         self._easel = easel
         self._depth = easel.surface("body", "depth", coarse=True)
         self._cast = easel.surface("cast", "cast", coarse=True)
-        self._blur = Drawing(easel.ctx, "screen", "cast_blur")
+        self._blur = easel.drawing("screen", "cast_blur")
 
     def draw(self, scene: Scene, lamp: Array) -> dict[str, Any]:
         """Draw both for a lamp in that direction; returns what shaders that receive shadows need."""
@@ -48,10 +47,7 @@ class Shadow:
         self._cast.draw(easel.tally, BODY_SHARE * first.pixels, poses | on_floor)
         ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         ctx.enable_only(moderngl.NOTHING)
-        step = SPREAD / CAST_SIDE
-        for source, into, step_uv in ((first, second, (step, 0.0)), (second, first, (0.0, step))):
-            into.start()
-            self._blur.draw(easel.tally, into.pixels, {"source": source.texture, "step_uv": step_uv})
+        easel.blur(self._blur, first, second, (SPREAD / CAST_SIDE, SPREAD / CAST_SIDE))
         return {
             "lamp_depth": depth.texture,
             "lamp_projection": lamp_projection,
@@ -59,10 +55,6 @@ class Shadow:
             "middle": middle,
             "reach": REACH,
         }
-
-    def release(self) -> None:
-        for drawing in (self._depth, self._cast, self._blur):
-            drawing.release()
 
 
 def _orthographic(lamp: Array, centre: Array) -> Array:

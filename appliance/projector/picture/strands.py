@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,42 +20,14 @@ TURN = 0.35  # how far a strand turns around its limb, per length that it runs a
 Floats = NDArray[np.float32]
 
 
-@dataclass(frozen=True)
-class Strands:
-    """(S, POINTS + 1, ..): places in figure heights, rest pose, directions and normals there; strengths from
-    0 to 1; what moves them. Any first part of the strands covers the whole body."""
+def ribbons_of(
+    body: BodyBuffers, skeleton: Skeleton, bind_positions: Array
+) -> tuple[dict[str, Any], NDArray[np.int32], int]:
+    """Strands all over a body, any first part of which covers the whole of it: parts of vertices, two for
+    each point of a strand, the indices of the triangles between them, and the number of strands.
 
-    positions: Floats
-    tangents: Floats
-    normals: Floats
-    strengths: Floats
-    joints: NDArray[np.uint8]
-    weights: Floats
-
-    def ribbons(self) -> tuple[dict[str, Any], NDArray[np.int32]]:
-        """Parts of vertices, two for each point, and the indices of the triangles between them."""
-        count, points = self.strengths.shape
-        along = np.zeros((count, points, 2, 3))  # the side, the strength, a chance
-        along[..., 0] = [-1.0, 1.0]
-        along[..., 1] = self.strengths[..., None]
-        along[..., 2] = np.random.RandomState(6).random_sample((count, 1, 1))
-        values: dict[str, Any] = {
-            "position": self.positions,
-            "tangent": self.tangents,
-            "normal": self.normals,
-            "joints": self.joints,
-            "weights": self.weights,
-        }
-        parts = {
-            name: np.repeat(value.reshape(-1, value.shape[-1]), 2, axis=0) for name, value in values.items()
-        }
-        first = (2 * np.arange(count * points).reshape(count, points)[:, :-1]).reshape(-1, 1)
-        indices = (first + np.array([[0, 1, 2, 1, 3, 2]])).astype(np.int32)
-        return {**parts, "along": along.reshape(-1, 3)}, indices
-
-
-def strands_of(body: BodyBuffers, skeleton: Skeleton, bind_positions: Array) -> Strands:
-    """Strands all over a body; bind_positions (J, 3): its joints in the rest pose, figure heights."""
+    bind_positions (J, 3): the joints in the rest pose, figure heights.
+    """
     first, _ = merged(body.positions, body.faces, 0.016)
     places, normals = body.positions[first], body.normals[first]
     along = _along(skeleton, bind_positions)
@@ -78,14 +49,22 @@ def strands_of(body: BodyBuffers, skeleton: Skeleton, bind_positions: Array) -> 
     tangents = np.gradient(positions, axis=1)
     tangents /= np.maximum(np.linalg.norm(tangents, axis=-1, keepdims=True), 1e-6)
     chosen = first[near]
-    return Strands(
-        positions.astype(np.float32),
-        tangents.astype(np.float32),
-        body.normals[chosen],
-        _tapered(runs_on),
-        body.joints[chosen],
-        body.weights[chosen],
-    )
+    count, points = near.shape
+    along = np.zeros((count, points, 2, 3))  # the side, the strength, a chance
+    along[..., 0] = [-1.0, 1.0]
+    along[..., 1] = _tapered(runs_on)[..., None]
+    along[..., 2] = np.random.RandomState(6).random_sample((count, 1, 1))
+    values: dict[str, Any] = {
+        "position": positions.astype(np.float32),
+        "tangent": tangents.astype(np.float32),
+        "normal": body.normals[chosen],
+        "joints": body.joints[chosen],
+        "weights": body.weights[chosen],
+    }
+    parts = {name: np.repeat(value.reshape(-1, value.shape[-1]), 2, axis=0) for name, value in values.items()}
+    corners = (2 * np.arange(count * points).reshape(count, points)[:, :-1]).reshape(-1, 1)
+    indices = (corners + np.array([[0, 1, 2, 1, 3, 2]])).astype(np.int32)
+    return {**parts, "along": along.reshape(-1, 3)}, indices, count
 
 
 _Run = list[tuple[Array, NDArray[np.int64]]]
@@ -122,15 +101,6 @@ def _tapered(runs_on: NDArray[np.bool_]) -> Floats:
     place = np.arange(POINTS + 1)[None]
     from_end = np.minimum(place - first[:, None], last[:, None] - place) / TAPER
     return np.asarray(np.clip(from_end, 0, 1), np.float32)
-
-
-def reach_of(skeleton: Skeleton, bind_positions: Array) -> Array:
-    """(J,) how far along the bones each joint is from the root, figure heights."""
-    reach = np.zeros(len(skeleton))
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            reach[joint] = reach[parent] + np.linalg.norm(bind_positions[joint] - bind_positions[parent])
-    return reach
 
 
 def _along(skeleton: Skeleton, bind_positions: Array) -> Array:

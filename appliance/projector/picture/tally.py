@@ -126,16 +126,16 @@ class Tally:
         self._uses.clear()
         self._moved_bytes = 0.0
 
-    def move(self, count: float) -> None:
+    def count_bytes(self, count: float) -> None:
         """Bytes that are read from memory or written to it."""
         self._moved_bytes += count
 
-    def put_down(self, use: Use) -> None:
-        """Count a draw call."""
+    def count_draw_call(self, use: Use) -> None:
+        """Note one."""
         self._uses.append(use)
 
     def figures(self, picture_pixels: int, gpu_bytes: int) -> Figures:
-        """Sum it up for a picture of so many pixels."""
+        """The sums, for a picture of `picture_pixels` pixels."""
         return Figures(
             draw_calls=len(self._uses),
             triangles=sum(use.triangles for use in self._uses),

@@ -37,7 +37,7 @@ class Target:
         self.buffer.use()
         self.buffer.viewport = (0, 0, *self.size)
         self.buffer.clear(*colour)
-        self._tally.move(4 * self.pixels)
+        self._tally.count_bytes(4 * self.pixels)
 
     def keep(self, channels: str, depth: bool = True) -> None:
         """What is drawn next changes these channels ('r' to 'a') alone, and depth only if wanted."""
@@ -46,7 +46,7 @@ class Target:
         self.buffer.use()
 
     def forget_depth(self) -> None:
-        """Right after the last of what has depth: who draws in tiles then never writes it to memory."""
+        """Right after the last drawing with depth: a GPU that draws in tiles then never stores it."""
         if self._invalidate is not None:
             self._invalidate(_FRAMEBUFFER, 1, ctypes.byref(ctypes.c_uint(_DEPTH)))
 

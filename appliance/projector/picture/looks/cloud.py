@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import moderngl
 
-from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import palette, stored
 from appliance.projector.picture.particles import particles_of
@@ -24,8 +23,8 @@ class Cloud:
 
     def __init__(self, easel: Easel) -> None:
         self._easel = easel
-        grains = easel.vertices(particles_of(easel.body, GRAINS).parts())
-        self._grains = Drawing(easel.ctx, "cloud", "cloud", grains)
+        grains = easel.vertices(particles_of(easel.body, GRAINS))
+        self._grains = easel.drawing("cloud", "cloud", grains)
         self._body = easel.surface("body", "depth", coarse=True)
         self._glow = Glow(easel)
 
@@ -67,7 +66,3 @@ class Cloud:
         picture.keep("rgba")
         picture.forget_depth()
         self._glow.finish(scene, look, colours, picture, opacity, wall)
-
-    def release(self) -> None:
-        for part in (self._grains, self._body, self._glow):
-            part.release()

@@ -7,14 +7,12 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import palette
+from appliance.projector.picture.particles import traced
 from appliance.projector.picture.poses import ROW_S, ROWS
 from appliance.projector.picture.scene import Easel, Scene
-from appliance.projector.picture.strands import reach_of
 from appliance.projector.picture.targets import Target
-from appliance.projector.picture.trails import traced
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
@@ -33,10 +31,10 @@ class Ink:
         self._easel = easel
         self._figure = easel.surface("body", "ink")
         self._echo = easel.surface("body", "ink", coarse=True)
-        strokes = traced(easel.body, reach_of(easel.skeleton, easel.bind_positions), STROKES)
-        self._strokes = Drawing(easel.ctx, "trail", "stroke", easel.vertices(strokes.parts(), instanced=True))
+        strokes = traced(easel.body, easel.skeleton, easel.bind_positions, STROKES)
+        self._strokes = easel.drawing("trail", "stroke", easel.vertices(strokes, instanced=True))
         self._glow = Glow(easel)
-        self._sheet = Drawing(easel.ctx, "screen", "paper")
+        self._sheet = easel.drawing("screen", "paper")
         self._made: dict[str, float] = {}
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
@@ -70,7 +68,7 @@ class Ink:
         easel.lay("ink_finish", wall, opacity, inputs, box)
 
     def _paper(self, look: LookConfig, aspect: float) -> Target:
-        """The sheet; made anew when its shape or the look has changed."""
+        """The sheet; drawn again when its shape or the look has changed."""
         wanted = {"aspect": aspect, "density": look.density, "vignette": look.vignette}
         sheet = self._easel.canvas("paper", (round(PAPER_LINES * aspect), PAPER_LINES))
         if wanted != self._made:
@@ -108,7 +106,3 @@ class Ink:
         pixels = STROKES * length * brush
         self._strokes.draw(easel.tally, pixels, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
         easel.ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
-
-    def release(self) -> None:
-        for part in (self._figure, self._echo, self._strokes, self._glow, self._sheet):
-            part.release()

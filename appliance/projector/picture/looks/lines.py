@@ -6,14 +6,13 @@ from typing import Any
 
 import moderngl
 
-from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.glow import Glow
 from appliance.projector.picture.looks.palette import Palette, palette, stored
+from appliance.projector.picture.particles import traced
 from appliance.projector.picture.poses import ROW_S, ROWS
 from appliance.projector.picture.scene import Easel, Scene
-from appliance.projector.picture.strands import POINTS, STEP, reach_of, strands_of
+from appliance.projector.picture.strands import POINTS, STEP, ribbons_of
 from appliance.projector.picture.targets import Target
-from appliance.projector.picture.trails import traced
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
@@ -29,12 +28,10 @@ class Lines:
 
     def __init__(self, easel: Easel) -> None:
         self._easel = easel
-        strands = strands_of(easel.body, easel.skeleton, easel.bind_positions)
-        parts, indices = strands.ribbons()
-        self._count = len(strands.positions)
-        self._strands = Drawing(easel.ctx, "strand", "strand", easel.vertices(parts), easel.indices(indices))
-        traces = traced(easel.body, reach_of(easel.skeleton, easel.bind_positions), TRACES)
-        self._trails = Drawing(easel.ctx, "trail", "trail", easel.vertices(traces.parts(), instanced=True))
+        parts, indices, self._count = ribbons_of(easel.body, easel.skeleton, easel.bind_positions)
+        self._strands = easel.drawing("strand", "strand", easel.vertices(parts), easel.indices(indices))
+        traces = traced(easel.body, easel.skeleton, easel.bind_positions, TRACES)
+        self._trails = easel.drawing("trail", "trail", easel.vertices(traces, instanced=True))
         self._glow = Glow(easel)
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
@@ -114,7 +111,3 @@ class Lines:
         self._strands.draw(
             self._easel.tally, length * 2 * inputs["width"], inputs, vertices=count * POINTS * 6
         )
-
-    def release(self) -> None:
-        for part in (self._strands, self._trails, self._glow):
-            part.release()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.looks.palette import palette
 from appliance.projector.picture.scene import Easel, Scene, direction
 from appliance.projector.picture.shadow import Shadow
@@ -25,7 +24,7 @@ class Plaster:
         self._easel = easel
         self._shadow = Shadow(easel)
         self._figure = easel.surface("body", "plaster")
-        self._air = Drawing(easel.ctx, "air", "plaster_air")
+        self._air = easel.drawing("air", "plaster_air")
 
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
         """Lay the look onto the wall, over what is there already as far as `opacity` says."""
@@ -69,7 +68,3 @@ class Plaster:
             "texel": (1 / picture.size[0], 1 / picture.size[1]),
         }
         easel.lay("plaster_finish", wall, opacity, inputs, scene.box())
-
-    def release(self) -> None:
-        for part in (self._shadow, self._figure, self._air):
-            part.release()

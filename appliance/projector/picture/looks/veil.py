@@ -50,7 +50,3 @@ class Veil:
             body.draw(easel.tally, 1.6 * scene.body_pixels(picture.size), inputs)
         picture.forget_depth()
         self._glow.finish(scene, look, colours, picture, opacity, wall)
-
-    def release(self) -> None:
-        for part in (self._figure, self._echo, self._glow):
-            part.release()

@@ -1,4 +1,4 @@
-"""Asks the running box about its sensors over its control port, from another process."""
+"""The client of a running box's control port: asks about its sensors from another process."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class ControlClient:
     def ask(self, address: str, *arguments: str) -> Answer:
         """Have one command carried out. Raises NoBoxError.
 
-        That nobody carried it out in time may be corrected by a second reply, which is waited for.
+        After the reply that it was not carried out in time, a second one may follow, and is waited for.
         """
         answer, asked = None, time.monotonic()
         with contextlib.closing(self._replies((address, *arguments))) as replies:
@@ -96,15 +96,15 @@ class ControlClient:
         raise self._nobody()
 
     def _replies(self, message: Message) -> Generator[tuple[str, list[Any]], None, None]:
-        """What the box sends back, until patience ends; nothing when no port is open there.
+        """Replies of the box until the timeout; none when no port is open there.
 
-        To be closed by whoever asks: what is left to the collector would swallow a Ctrl-C in its closing.
+        The caller closes it: left to the garbage collector, its closing would swallow a Ctrl-C.
         """
         if self._control is None:
             return
         until = time.monotonic() + self._patience_s
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asker, contextlib.suppress(OSError):
-            asker.connect(self._control)  # so that a port with nobody behind it is told at once
+            asker.connect(self._control)  # so that a closed port is an error at once
             asker.send(datagram(message))
             while (left_s := until - time.monotonic()) > 0:
                 asker.settimeout(left_s)

@@ -10,7 +10,14 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from appliance.cli.sensors import NOT_TAKEN, Venue, clear_errors, people_console, reload, require_folder
+from appliance.cli.sensors.venue import (
+    NOT_TAKEN,
+    Venue,
+    clear_errors,
+    people_console,
+    reload_keys,
+    require_folder,
+)
 from appliance.sensor.provisioning.provisioning import (
     DEFAULT_PORT,
     Provisioned,
@@ -50,7 +57,7 @@ def provision_sensor(
             settings = replace(settings, password=_read_password(network, password_file))
         device = port or only_wearable(found_ports())
         with clear_errors(place.keys), WearableConsole(device) as cable:
-            if is_asked:  # last of all: nobody likes to type it in vain
+            if is_asked:  # last of all, so that it is not typed in vain
                 settings = replace(settings, password=_ask_password(settings.network))
             with console.status(f"Asking {escape(device)}"):
                 done = provision(cable, place.keys, settings, say, takes_over)
@@ -61,7 +68,7 @@ def provision_sensor(
             f"Stopped half-way: {place.keys} was not changed, and the wearable may have its new key. "
             "Run this again: that mends it."
         ) from None
-    is_well, words = reload(place)
+    is_well, words = reload_keys(place)
     _step(console, "box", words, is_well)
     for hint in _hints(place, done, settings, device):
         console.print(hint, markup=False, soft_wrap=True)
@@ -131,7 +138,7 @@ def _hints(place: Venue, done: Provisioned, settings: Settings, device: str) -> 
         hints.append(
             f"{name} is ready: unplug it, switch it on, and it looks for its box on '{settings.network}'."
         )
-        if place.box_file is not None and (why := out_of_reach(sensors)):
+        if place.box.path is not None and (why := out_of_reach(sensors)):
             hints.append(why)
     else:
         hints.append(f"{name} is ready: it speaks to the box by cable, as long as it is plugged in.")

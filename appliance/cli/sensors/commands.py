@@ -1,4 +1,4 @@
-"""The words of `bunraku provision` and `bunraku sensors ...` on the command line."""
+"""`bunraku provision` and `bunraku sensors ...`: their options, and what each of them changes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from appliance.cli.options import AsJson, ThisBoxFile, command_group, is_for_subcommand
+
 
 class Fusion(StrEnum):
     """How the IMU finds its orientation."""
@@ -16,18 +18,11 @@ class Fusion(StrEnum):
     ndof = "ndof"
 
 
-BoxFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--box", help="box.yaml of the venue: its key file, its control port. Left out: this box's."
-    ),
-]
 KeyFile = Annotated[
     Path | None, typer.Option("--keys", help="Key file, instead of --box; left out: sensors.keys.")
 ]
 Port = Annotated[
-    str | None,
-    typer.Option(help="Serial port of the wearable; left out: the only one that is plugged in."),
+    str | None, typer.Option(help="Serial port of the wearable; left out: the only one that is plugged in.")
 ]
 Network = Annotated[
     str | None, typer.Option(help="Name of the box's Wi-Fi network (2.4 GHz); left out: by cable only.")
@@ -45,17 +40,13 @@ Axes = Annotated[
 ]
 Name = Annotated[str, typer.Argument(help="The sensor's name, as in the key file.")]
 
-sensors = typer.Typer(
-    help="List the sensors as the running box sees them; find, replace, revoke or rename one.",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
+sensors = command_group("List the sensors as the running box sees them; find, replace, revoke or rename one.")
 
 
 def provision(
     name: Annotated[str, typer.Option(help="What shows call it, for instance left-wrist.")],
     port: Port = None,
-    box: BoxFile = None,
+    box: ThisBoxFile = None,
     keys: KeyFile = None,
     network: Network = None,
     password_file: PasswordFile = None,
@@ -63,8 +54,8 @@ def provision(
     axes: Axes = None,
 ) -> None:
     """Give a wearable its name, its network and a fresh key, once, by cable."""
-    from appliance.cli.provision import provision_sensor
-    from appliance.cli.sensors import venue
+    from appliance.cli.sensors.provision import provision_sensor
+    from appliance.cli.sensors.venue import venue
 
     place = venue(box, keys)
     raise typer.Exit(provision_sensor(place, name, port, network, password_file, fusion, axes))
@@ -73,51 +64,50 @@ def provision(
 @sensors.callback(invoke_without_command=True)
 def list_them(
     context: typer.Context,
-    box: BoxFile = None,
+    box: ThisBoxFile = None,
     keys: KeyFile = None,
     watch: Annotated[bool, typer.Option("--watch", help="Look again each second, until Ctrl-C.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """List the sensors as the running box sees them; find, replace, revoke or rename one."""
-    if context.invoked_subcommand is not None:
-        if (box, keys, watch, as_json) != (None, None, False, False):
-            raise typer.BadParameter(f"write options behind '{context.invoked_subcommand}'")
+    if is_for_subcommand(context, box, keys, watch, as_json):
         return
-    from appliance.cli.sensors import list_sensors, venue
+    from appliance.cli.sensors.listing import list_sensors
+    from appliance.cli.sensors.venue import venue
 
     list_sensors(venue(box, keys), watch, as_json)
 
 
 @sensors.command()
-def strobe(name: Name, box: BoxFile = None, keys: KeyFile = None) -> None:
+def strobe(name: Name, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Let a sensor's light flash for 10 s, to find it in a drawer."""
-    from appliance.cli.sensors import tell, venue
+    from appliance.cli.sensors.venue import send_command, venue
 
-    tell(venue(box, keys), "/sensors/strobe", name)
+    send_command(venue(box, keys), "/sensors/strobe", name)
 
 
 @sensors.command()
 def neutral(
     name: Annotated[str | None, typer.Argument(help="Left out: all sensors of the show.")] = None,
-    box: BoxFile = None,
+    box: ThisBoxFile = None,
     keys: KeyFile = None,
 ) -> None:
-    """Take the neutral pose anew: how the sensor sits on the dancer, who stands still now."""
-    from appliance.cli.sensors import tell, venue
+    """Take the neutral pose again: how the sensor sits on the dancer, who stands still now."""
+    from appliance.cli.sensors.venue import send_command, venue
 
-    tell(venue(box, keys), "/sensors/neutral", *([name] if name else []))
+    send_command(venue(box, keys), "/sensors/neutral", name)
 
 
 @sensors.command()
 def heading(
     name: Annotated[str | None, typer.Argument(help="Left out: all sensors of the show.")] = None,
-    box: BoxFile = None,
+    box: ThisBoxFile = None,
     keys: KeyFile = None,
 ) -> None:
     """Reset the heading alone: the dancer faces the front now."""
-    from appliance.cli.sensors import tell, venue
+    from appliance.cli.sensors.venue import send_command, venue
 
-    tell(venue(box, keys), "/sensors/heading", *([name] if name else []))
+    send_command(venue(box, keys), "/sensors/heading", name)
 
 
 @sensors.command()
@@ -133,12 +123,12 @@ def replace(
     password_file: PasswordFile = None,
     fusion: FusionKind = None,
     axes: Axes = None,
-    box: BoxFile = None,
+    box: ThisBoxFile = None,
     keys: KeyFile = None,
 ) -> None:
     """Put a spare, or a new wearable on a cable, in the place of a broken one."""
-    from appliance.cli.provision import provision_sensor
-    from appliance.cli.sensors import replace_by_spare, venue
+    from appliance.cli.sensors.provision import provision_sensor
+    from appliance.cli.sensors.venue import edit_keys, venue
     from appliance.stage.stage_error import StageError
 
     place = venue(box, keys)
@@ -147,36 +137,46 @@ def replace(
             f"Name a spare (bunraku sensors replace {broken} SPARE), or the --port of a new one."
         )
     if spare is not None:
-        raise typer.Exit(replace_by_spare(place, broken, spare))
+        words = (
+            f"{broken} is now the sensor that was {spare}; the broken one is called {spare} from now on. "
+            "Put it on, switch it on, stand still for a breath."
+        )
+        raise typer.Exit(edit_keys(place, lambda change: change.swap(broken, spare), words))
     raise typer.Exit(
         provision_sensor(place, broken, port, network, password_file, fusion, axes, takes_over=True)
     )
 
 
 @sensors.command()
-def revoke(name: Name, box: BoxFile = None, keys: KeyFile = None) -> None:
+def revoke(name: Name, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Let a stolen or lost sensor in no more: its key is removed."""
-    from appliance.cli.sensors import revoke, venue
+    from appliance.cli.sensors.venue import edit_keys, venue
 
-    raise typer.Exit(revoke(venue(box, keys), name))
+    words = f"{name} is revoked: its key opens nothing any more. To use it again, provision it again."
+    raise typer.Exit(edit_keys(venue(box, keys), lambda change: change.remove(name), words))
 
 
 @sensors.command()
 def rename(
     name: Name,
     new: Annotated[str, typer.Argument(help="Its new name.")],
-    box: BoxFile = None,
+    box: ThisBoxFile = None,
     keys: KeyFile = None,
 ) -> None:
     """Give a sensor another name."""
-    from appliance.cli.sensors import rename, venue
+    from appliance.cli.sensors.venue import edit_keys, venue
 
-    raise typer.Exit(rename(venue(box, keys), name, new))
+    words = f"{name} is now {new}. Shows name it by that."
+    raise typer.Exit(edit_keys(venue(box, keys), lambda change: change.rename(name, new), words))
 
 
 @sensors.command("reload")
-def read_again(box: BoxFile = None, keys: KeyFile = None) -> None:
+def read_again(box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Let the running box read the key file that you changed by hand."""
-    from appliance.cli.sensors import read_again, venue
+    from appliance.cli.sensors.venue import clear_errors, reload_and_say, venue
+    from appliance.sensor.keys import load_keys
 
-    raise typer.Exit(read_again(venue(box, keys)))
+    place = venue(box, keys)
+    with clear_errors(place.keys):
+        load_keys(place.keys)
+    raise typer.Exit(reload_and_say(place))

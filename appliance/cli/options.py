@@ -1,0 +1,39 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ShowFolder = Annotated[
+    Path | None, typer.Option("--show", help="Show bundle; left out: the show that comes with the box.")
+]
+BoxFile = Annotated[
+    Path | None, typer.Option("--box", help="box.yaml of the venue; left out: everything on this machine.")
+]
+ThisBoxFile = Annotated[
+    Path | None, typer.Option("--box", help="box.yaml of the venue; left out: this box's.")
+]
+ChosenFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--chosen", help="Show and box file that `bunraku preflight` chose: /run/bunraku/chosen.json."
+    ),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="For programs.")]
+
+
+def command_group(help_text: str, needs_command: bool = False) -> typer.Typer:
+    """The commands below one word, like `bunraku sensors ...`."""
+    return typer.Typer(
+        help=help_text, no_args_is_help=needs_command, add_completion=False, pretty_exceptions_enable=False
+    )
+
+
+def is_for_subcommand(context: typer.Context, *given: object) -> bool:
+    """Whether a command of the group was named; options in front of it, which have no effect, are refused."""
+    if context.invoked_subcommand is not None and any(given):
+        raise typer.BadParameter(f"write options behind '{context.invoked_subcommand}'")
+    return context.invoked_subcommand is not None

@@ -1,0 +1,109 @@
+"""`bunraku sensors`: all sensors as the running box sees them, or as the key file has them."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+
+from rich.console import Group
+from rich.live import Live
+from rich.text import Text
+
+from appliance.cli.sensors.control_client import NoBoxError, Roll
+from appliance.cli.sensors.table import SensorTable, known_table, plain_values, unheard
+from appliance.cli.sensors.venue import THAT_BOX, WHICH_KEYS, Venue, clear_errors, other_file, people_console
+from appliance.sensor.keys import KeyFileError, exposure, load_keys
+from appliance.stage.stage_error import StageError
+
+_OLD_ROLL_S = 3.0
+
+
+def list_sensors(place: Venue, watch: bool, as_json: bool) -> None:
+    """Print all sensors once, or again each second until Ctrl-C."""
+    if as_json:
+        print(json.dumps(_plain(place), indent=2))
+        return
+    console = people_console()
+    if not watch:
+        console.print(_picture(place))
+        return
+    with contextlib.suppress(KeyboardInterrupt):
+        if console.is_terminal:
+            with Live(_picture(place), console=console, auto_refresh=False, screen=False) as live:
+                while True:
+                    time.sleep(1.0)
+                    live.update(_picture(place), refresh=True)
+        while True:  # in a pipe, table after table, each at once: its reader may stop at any time
+            console.print(_picture(place), "")
+            console.file.flush()
+            time.sleep(1.0)
+
+
+def _picture(place: Venue) -> Group:
+    """What should be looked at, and below it the table: a short terminal shows the beginning."""
+    try:
+        roll = place.running.roll()
+    except NoBoxError as error:
+        return _picture_of_file(place, str(error))
+    complaints = [line.complaint for line in roll.lines if line.complaint]
+    complaints += _about_file(place, roll)
+    parts: list[object] = [Text(f"{words}\n", style="yellow") for words in complaints]
+    if roll.age_s > _OLD_ROLL_S:
+        parts.append(Text(f"This is {roll.age_s:.0f} s old: the box hangs, or is very busy.\n", style="red"))
+    if roll.age_s < 0:
+        parts.append(Text("The box is still starting. Ask again in a moment.", style="yellow"))
+    elif roll.lines:
+        parts.append(SensorTable(roll.lines))
+    else:
+        parts.append(
+            Text("The running box knows no sensor. Provision one: bunraku provision --name left-wrist")
+        )
+    return Group(*parts)  # type: ignore[arg-type]
+
+
+def _about_file(place: Venue, roll: Roll) -> list[str]:
+    """What would surprise at the next start: another key file, a damaged one, a changed or an open one."""
+    if roll.age_s < 0 or roll.key_file is None:
+        return []
+    if place.box.path is not None and roll.key_file.resolve() != place.keys.resolve():
+        return [f"{other_file(roll.key_file)}, not {place.keys}. {THAT_BOX}"]
+    try:
+        in_file = {(key.name, f"{key.device_id:08x}") for key in load_keys(roll.key_file).values()}
+        warning = exposure(roll.key_file)
+    except KeyFileError as error:
+        return [
+            f"{error}. The box goes on with the keys that it has; it lets no sensor in when it starts again."
+        ]
+    except OSError:  # another user's file, or another machine's: the box's own matter
+        return []
+    notes = [warning] if warning else []
+    if in_file != {(line.name, line.device_id) for line in roll.lines}:
+        notes.append(f"{roll.key_file} has other sensors than the running box. Run: bunraku sensors reload")
+    return notes
+
+
+def _picture_of_file(place: Venue, why: str) -> Group:
+    with clear_errors(place.keys):
+        try:
+            lines = unheard(load_keys(place.keys))
+        except FileNotFoundError:
+            raise StageError(f"{why} And there is no key file {place.keys}. {WHICH_KEYS}") from None
+        warning = exposure(place.keys)
+    notes = [Text(f"{why} These sensors may come in ({place.keys}):\n", style="yellow")]
+    if not lines:
+        notes = [Text(f"{why} {place.keys} has no sensor yet.", style="yellow")]
+    if warning:
+        notes.insert(0, Text(f"{warning}\n", style="yellow"))
+    return Group(*notes, known_table(lines) if lines else "")
+
+
+def _plain(place: Venue) -> dict[str, object]:
+    try:
+        roll = place.running.roll()
+    except NoBoxError:
+        with clear_errors(place.keys):
+            lines = unheard(load_keys(place.keys))
+        return {"box": False, "age_s": None, "sensors": [plain_values(line) for line in lines]}
+    age_s = round(roll.age_s, 3) if roll.age_s >= 0 else None
+    return {"box": True, "age_s": age_s, "sensors": [plain_values(line) for line in roll.lines]}

@@ -1,0 +1,155 @@
+"""Which box and which key file a command about sensors means, and the box told of a change to it."""
+
+from __future__ import annotations
+
+import errno
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from appliance.cli.doctor.host_view import running_stage
+from appliance.cli.sensors.control_client import ControlClient, NoBoxError
+from appliance.release.installed_box import box_here
+from appliance.sensor.key_editing import KeyEditing, editing
+from appliance.sensor.keys import KeyFileError
+from appliance.show.box import BoxConfig, load_box
+from appliance.stage.stage_error import StageError
+
+DEFAULT_KEYS = Path("sensors.keys")
+NOT_TAKEN = 1
+_RESTART_S = 3.0  # show control that died is back within 1 s, on a machine that is busy
+_AGAIN_S = 0.1
+_PIPE_WIDTH = 160
+WHICH_KEYS = "Name it with --keys, or the box file with --box; the first bunraku provision makes one."
+THAT_BOX = "Give the box file of that box with --box."
+_WHICH_BOX = "Is it running here? Its box file (--box) tells the control port, if it is not the usual one."
+
+
+@dataclass(frozen=True)
+class Venue:
+    """Which box and which key file are meant."""
+
+    box: BoxConfig
+    keys: Path
+
+    @property
+    def running(self) -> ControlClient:
+        return ControlClient.of(self.box)
+
+
+def venue(box_file: Path | None, keys: Path | None) -> Venue:
+    """By the box file, the key file alone, or what lies in this folder. Raises StageError, ConfigError."""
+    if box_file is not None and keys is not None:
+        raise StageError("Give --box or --keys, not both: a box file names its key file.")
+    box = load_box(box_file if keys is not None else box_here(box_file))
+    if box.path is not None and box.sensors.keys is None:
+        raise StageError(
+            f"{box.path} names no key file, so no sensor is let in. "
+            "Write `keys: sensors.keys` under sensors in it."
+        )
+    return Venue(box, box.sensors.keys or keys or DEFAULT_KEYS)
+
+
+def people_console() -> Console:
+    """As wide as the terminal; in a pipe wide enough for the whole table."""
+    console = Console(highlight=False)
+    return console if console.is_terminal else Console(highlight=False, width=_PIPE_WIDTH)
+
+
+def send_command(place: Venue, address: str, name: str | None) -> None:
+    """Have the running box do this for the sensor of that name, or for all, and print its answer.
+
+    Raises StageError when it is not done.
+    """
+    try:
+        answer = place.running.ask(address, *([name] if name else []))
+    except NoBoxError as error:
+        raise StageError(f"{error} {_WHICH_BOX}" if place.running.has_port else str(error)) from None
+    if not answer.done:
+        raise StageError(answer.words)
+    print(answer.words)
+
+
+def edit_keys(place: Venue, change_it: Callable[[KeyEditing], None], words: str) -> int:
+    """Change the key file and have the running box take it. The exit status."""
+    with clear_errors(place.keys):
+        if not place.keys.exists():
+            raise FileNotFoundError
+        with editing(place.keys) as change:
+            change_it(change)
+            change.commit()
+    print(words)
+    return reload_and_say(place)
+
+
+def reload_and_say(place: Venue) -> int:
+    """Have the running box take the key file, and say whether it did. The exit status."""
+    is_well, words = reload_keys(place)
+    print(words)
+    return 0 if is_well else NOT_TAKEN
+
+
+def reload_keys(place: Venue) -> tuple[bool, str]:
+    """Have the running box read the key file again: whether it is as it should be, and a sentence.
+
+    Where a stage lives, silence is no answer: show control may be on its way back, and is asked again.
+    """
+    until = time.monotonic() + _RESTART_S
+    while True:
+        try:
+            return _ask_to_reload(place)
+        except NoBoxError as error:
+            if not place.running.has_port:
+                words = "The box has no control port to be told by: the change counts when it starts again."
+                return True, words
+            if running_stage(place.box) is None:
+                return True, f"{error} The change counts when it starts."
+        if time.monotonic() >= until:
+            return (
+                False,
+                "A box dances here, but its show control did not answer. Run: bunraku sensors reload.",
+            )
+        time.sleep(_AGAIN_S)
+
+
+def _ask_to_reload(place: Venue) -> tuple[bool, str]:
+    """What `reload_keys` gives when a box answers; raises NoBoxError when none does."""
+    roll = place.running.roll()
+    if roll.key_file is not None and roll.key_file.resolve() != place.keys.resolve():
+        return False, f"{other_file(roll.key_file)} and knows nothing of this change. {THAT_BOX}"
+    answer = place.running.ask("/sensors/reload")
+    return answer.done, f"The running box {'took it' if answer.done else 'did not take it'}. {answer.words}"
+
+
+def other_file(key_file: Path) -> str:
+    """Half a sentence."""
+    return f"The running box reads another key file ({key_file})"
+
+
+@contextmanager
+def clear_errors(path: Path) -> Iterator[None]:
+    """Raise StageError, one clear line, for what goes wrong with a key file."""
+    try:
+        yield
+    except KeyFileError as error:
+        raise StageError(f"{error}.") from None
+    except FileNotFoundError:
+        require_folder(path)
+        raise StageError(f"There is no key file {path}. {WHICH_KEYS}") from None
+    except OSError as error:
+        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        cure = "Free some space, then run this again." if is_full else "May this user read and write there?"
+        raise StageError(f"{path}: {error.strerror}. Nothing was changed. {cure}") from None
+
+
+def require_folder(path: Path) -> None:
+    """Raises StageError when the key file's folder is not there."""
+    if not path.parent.is_dir():
+        raise StageError(
+            f"There is no folder {path.parent} for the key file. Nothing was changed. "
+            "Make it, or correct `keys` under sensors in the box file."
+        )
