@@ -85,6 +85,6 @@ def convert(
     ] = None,
 ) -> None:
     """Turn a fixture of the Open Fixture Library into a profile, for the folder `profiles` of a show."""
-    from appliance.lights.convert import convert_file
+    from appliance.fixture_library.convert import convert_file
 
     convert_file(fixture, out)

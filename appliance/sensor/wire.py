@@ -2,7 +2,7 @@
 
 Little-endian, fixed size, one packet a datagram, an 8-byte keyed BLAKE2s tag at the end of each. The tables
 of docs/wire.md, the firmware's wire.h and the golden vectors are made from here by
-`python -m appliance.sensor.generate_wire`.
+`python -m tools.generate_wire`.
 """
 
 from __future__ import annotations

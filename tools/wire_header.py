@@ -7,7 +7,7 @@ from appliance.sensor.wire import Coding, Layout
 
 TOP = """\
 // The packets between a wearable and the box. Made from appliance/sensor/wire.py; do not edit.
-// `python -m appliance.sensor.generate_wire` writes it anew.
+// `python -m tools.generate_wire` writes it anew.
 #pragma once
 
 #include <stdint.h>
