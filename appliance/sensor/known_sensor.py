@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 
 from appliance.sensor import wire
 from appliance.sensor.device_clock import DeviceClock
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.pairing import LOST_S, Pairing
-from appliance.sensor.plausibility import Orientation, PlausibilityGate
-from appliance.sensor.state import Reception, SensorReading, SensorState
+from appliance.sensor.state import Orientation, Reception, SensorReading, SensorState
 from appliance.sensor.transports.transport import Way
 
+NORM_TOLERANCE = 0.01  # Q14 rounding gives 6e-5
 CONTESTED_S = 30.0  # two wearables with one key change places each 3 s
 
 
@@ -27,37 +27,39 @@ class KnownSensor:
         self.arrivals: list[float] = []  # of the believed readings of one drain
         self.strobe_until = -inf
         self._clock = DeviceClock()
-        self._gate = PlausibilityGate()
         self._orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
 
     def follow(self, packet: wire.Reading, way: Way, arrival: float, is_reboot: bool) -> int:
         """Takes an authentic, new reading as the newest; gives how many before it were lost."""
         if is_reboot:
             self._clock.reset()
-            self._gate.reset()
         lost = self.pairing.follow(packet, way, arrival)
         self.reception.received += 1
         self.reception.lost += lost
         return lost
 
     def believe(self, packet: wire.Reading, arrival: float) -> tuple[SensorReading | None, str]:
-        """The reading, if a hand could have made it, and what happened to it."""
+        """The reading, if it holds an orientation, and what happened to it.
+
+        The wearable, which knows when its IMU was read, refuses what no hand can do before it signs. The box
+        checks the length alone: poses are made of it, and a wearable of another maker may have no such gate.
+        """
         sensor_time_us = self._clock.unwrap(packet.sensor_time_us, arrival)
         measured_at = self._clock.observe(sensor_time_us, arrival)
-        unit, fate = self._gate.admit(packet.orientation, sensor_time_us, arrival)
-        if unit is None:
-            return None, fate
-        w, x, y, z = unit
+        w, x, y, z = packet.orientation
+        norm = sqrt(w * w + x * x + y * y + z * z)
+        if abs(norm - 1.0) > NORM_TOLERANCE:
+            return None, "norm"
         a, b, c, d = self._orientation
         if w * a + x * b + y * c + z * d < 0:
-            unit = (-w, -x, -y, -z)
-        self._orientation = unit
+            norm = -norm
+        self._orientation = (w / norm, x / norm, y / norm, z / norm)
         self.believed_arrival = arrival
         self.arrivals.append(arrival)
         return (
             SensorReading(
                 self.key.name,
-                unit,
+                self._orientation,
                 packet.sequence,
                 sensor_time_us,
                 measured_at,
@@ -71,7 +73,7 @@ class KnownSensor:
                 _round_trip_s(packet),
                 self.wearable,
             ),
-            fate,
+            "accepted",
         )
 
     def state(self, now: float) -> SensorState:

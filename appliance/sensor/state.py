@@ -1,4 +1,4 @@
-"""What the link tells of a reading and of a sensor."""
+"""One reading and one sensor, as the link reports them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from appliance.sensor.plausibility import Orientation
+Orientation = tuple[float, float, float, float]
 
 LOW_BATTERY = 15  # percent; below it the sensor's own lamp warns too
 

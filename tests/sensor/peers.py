@@ -41,7 +41,12 @@ class Wearable:
         return self.numbered(self.sequence, degrees, time_us, **fields)
 
     def numbered(
-        self, sequence: int, degrees: float = 0.0, time_us: int | None = None, **fields: int
+        self,
+        sequence: int,
+        degrees: float = 0.0,
+        time_us: int | None = None,
+        length: float = 1.0,
+        **fields: int,
     ) -> bytes:
         half = radians(degrees) / 2
         moment_us = 20_000 * sequence % 2**32 if time_us is None else time_us
@@ -52,7 +57,7 @@ class Wearable:
             self.session,
             sequence,
             moment_us,
-            (cos(half), sin(half), 0.0, 0.0),
+            (length * cos(half), length * sin(half), 0.0, 0.0),
             flags=told.pop("flags", self.flags),
             **told,
         )

@@ -1,12 +1,12 @@
-// Can this be a hand? Zero, torn and impossibly fast orientations are kept from the box; integers only.
+// Refuses orientations that no hand can have: zero, torn on the I2C bus, too fast. Integers only.
 #pragma once
 
 #include <stdint.h>
 
 namespace bunraku {
 
-// The rules of the box (appliance/sensor/plausibility.py), and one more: the first reading after a reset
-// or a long silence is believed only when the next one agrees with it.
+// The only such check: what reaches the box is signed, and so is what left this gate. The first reading after a
+// reset or a long silence is believed only when the next one agrees with it.
 class ImuGate {
  public:
   enum class Verdict : uint8_t { kAccepted, kRelocated, kZero, kNorm, kTorn, kRate, kUnconfirmed };
