@@ -77,7 +77,7 @@ class Tick:
             self._stand()
             ends[FIGURE] = now()
 
-        cast.outputs.send(frame)
+        cast.outputs.publish_frame(frame)
         ends[SEND] = now()
 
     def warm_up(self) -> None:

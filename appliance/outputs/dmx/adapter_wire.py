@@ -68,15 +68,15 @@ class AdapterWire:
             "It is tried again every 2 seconds: plug it in, or check device and serial in the box file."
         )
 
-    def send(self, data: bytes | bytearray, now: float) -> None:
+    def send_universe(self, levels: bytes | bytearray, now: float) -> None:
         """Leave one universe for the thread; never waits for the device."""
         with self._changed:
             if self._newest is not None:
                 self.dropped += 1
-            self._newest = bytes(data)
+            self._newest = bytes(levels)
             self._changed.notify()
 
-    def close(self, now: float) -> None:
+    def close(self) -> None:
         """What was sent last leaves, then the device is given back; one that hangs is left to itself."""
         with self._changed:
             self._closing = True

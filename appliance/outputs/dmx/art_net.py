@@ -49,10 +49,6 @@ class ArtNetWire(NetworkWire):
         )
         self._packets = ArtDmx(config.number_on_wire, config.channels)
 
-    def send(self, data: bytes | bytearray, now: float) -> None:
-        """One universe, 512 levels."""
-        self._sender.send(self._packets.pack(data), now)
-
-    def close(self, now: float) -> None:
-        """Close the socket; Art-Net has no word for goodbye."""
-        self._sender.close()
+    def send_universe(self, levels: bytes | bytearray, now: float) -> None:
+        """Send one universe, 512 levels."""
+        self.send_datagrams((self._packets.pack(levels),), now)

@@ -44,7 +44,7 @@ class Universe:
         """What was offered last leaves, then the wire is closed."""
         if self._changed:
             self._leave(now)
-        self.wire.close(now)
+        self.wire.close()
 
     def _is_repeated(self, now: float) -> bool:
         return self._same < REPEATS or now - self._sent_at >= KEEP_ALIVE_S
@@ -54,4 +54,4 @@ class Universe:
         self._changed = False
         self._sent_at = now
         self._due = max(self._due, now) + self._period_s
-        self.wire.send(self._newest, now)
+        self.wire.send_universe(self._newest, now)
