@@ -15,7 +15,7 @@ import typer
 
 from hw_sim import motions
 from hw_sim.casting import MOST_SENSORS, MotionKind, cast_sensors, choose_keys, name_and_motion, parse_axis
-from hw_sim.device import Way
+from hw_sim.device import Lane
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.emulator import Emulator, Sender
 from hw_sim.firmware import firmware_maker
@@ -102,7 +102,7 @@ def emulate(
 ) -> None:
     """Be one to eight wearable sensors: they pair with the box, then send signed readings, 50 a second each.
 
-    Both ways over a lifelike network, each sensor from an address of its own.
+    Both senders over a lifelike network, each sensor from an address of its own.
 
     \b
     Try the box without a sensor (it must read the same key file):
@@ -145,10 +145,10 @@ def emulate(
             reboot_every_s=reboot_every,
             make=firmware_maker() if firmware else EmulatedSensor,
         )
-        ways: list[dict[Way, Sender]] = [
-            {Way.NETWORK: UdpSender(host, port)}
+        senders: list[dict[Lane, Sender]] = [
+            {Lane.NETWORK: UdpSender(host, port)}
             if serial is None
-            else {Way.CABLE: SerialSender(str(serial), baud)}
+            else {Lane.CABLE: SerialSender(str(serial), baud)}
             for _ in sensors
         ]
     except (ValueError, OSError) as error:
@@ -159,7 +159,7 @@ def emulate(
         with (
             _stopped_by_signals() as should_stop,
             SendLog(log) if log is not None else nullcontext() as on_sent,
-            closing(Emulator(sensors, ways, network=on_air, on_sent=on_sent)) as emulator,
+            closing(Emulator(sensors, senders, network=on_air, on_sent=on_sent)) as emulator,
             StatusLine(where) as status,
         ):
             emulator.run(seconds, should_stop, lambda: status.show(emulator, time.monotonic()))

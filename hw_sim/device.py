@@ -10,7 +10,7 @@ from hw_sim.motions import Quaternion
 from hw_sim.wearer import Wearer
 
 
-class Way(IntEnum):
+class Lane(IntEnum):
     """How a wearable reaches the box."""
 
     NETWORK = 0
@@ -32,7 +32,7 @@ class Outgoing(NamedTuple):
     """A packet that leaves a wearable: signed, whole, without the framing of a cable."""
 
     data: bytes
-    way: Way
+    lane: Lane
     at: float  # when it left, seconds of the emulator's clock, not after the step that gave it
     sample: Sample | None = None  # of a reading; None for every other packet
 
@@ -57,13 +57,13 @@ class Device(Protocol):
     def start(self, now: float) -> None:
         """Switched on at `now`, for the first time."""
 
-    def connect(self, way: Way, is_up: bool, now: float) -> None:
+    def connect(self, lane: Lane, is_up: bool, now: float) -> None:
         """The network is joined or lost, the cable plugged in or pulled out. Only said when it changes."""
 
     def step(self, now: float) -> list[Outgoing]:
         """What left since the last step. After a long sleep of the machine readings are left out."""
 
-    def receive(self, data: bytes, now: float, way: Way) -> None:
+    def receive_packet(self, data: bytes, now: float, lane: Lane) -> None:
         """A packet that came from the box, perhaps damaged, repeated, or another sensor's. Never raises."""
 
     def close(self) -> None:

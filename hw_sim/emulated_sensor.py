@@ -8,7 +8,7 @@ from hashlib import blake2s
 
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
-from hw_sim.device import Outgoing, Sample, Way
+from hw_sim.device import Lane, Outgoing, Sample
 from hw_sim.motions import Quaternion
 from hw_sim.pairing import Pairing
 from hw_sim.wearer import Wearer
@@ -76,7 +76,7 @@ class EmulatedSensor:
         self._reboot_every_s = reboot_every_s
         self._device_time_us = device_time_us
         self._draw_nonce = boot_nonce
-        self._ways_up: set[Way] = set()
+        self._lanes_up: set[Lane] = set()
         self._pairing: Pairing | None = None  # None: switched off
         self._power_on_at = 0.0
         self._power_change_at = float("inf")
@@ -93,7 +93,7 @@ class EmulatedSensor:
 
     @property
     def is_linked(self) -> bool:
-        return self._pairing is not None and self._pairing.way is not None
+        return self._pairing is not None and self._pairing.lane is not None
 
     @property
     def light(self) -> str:
@@ -118,8 +118,8 @@ class EmulatedSensor:
     def switch_on(self, now: float) -> None:
         """Power-on: nothing is left of the power-on before but its calibration."""
         self._pairing = pairing = Pairing(self._draw_nonce())
-        for way in self._ways_up:
-            pairing.connect(way, True, now)
+        for lane in self._lanes_up:
+            pairing.connect(lane, True, now)
         self._power_on_at = now
         self._power_change_at = now + self._reboot_every_s if self._reboot_every_s else float("inf")
         self._grid_us = IMU_START_US
@@ -130,10 +130,10 @@ class EmulatedSensor:
         self._pairing = None
         self._power_change_at = now + seconds
 
-    def connect(self, way: Way, is_up: bool, now: float) -> None:
-        (self._ways_up.add if is_up else self._ways_up.discard)(way)
+    def connect(self, lane: Lane, is_up: bool, now: float) -> None:
+        (self._lanes_up.add if is_up else self._lanes_up.discard)(lane)
         if self._pairing is not None:
-            self._pairing.connect(way, is_up, now)
+            self._pairing.connect(lane, is_up, now)
 
     def save_profile(self, offsets: bytes, now: float) -> None:
         """As after a calibration: the 22 bytes are in use, and told to the box once linked."""
@@ -155,7 +155,7 @@ class EmulatedSensor:
         left += self._tell_profile(self._pairing, now)
         return left
 
-    def receive(self, data: bytes, now: float, way: Way) -> None:
+    def receive_packet(self, data: bytes, now: float, lane: Lane) -> None:
         pairing = self._pairing
         if pairing is None:
             return
@@ -167,11 +167,11 @@ class EmulatedSensor:
             return
         match packet:
             case wire.Assignment():
-                pairing.take_assignment(packet, now, way)
+                pairing.take_assignment(packet, now, lane)
             case wire.Heartbeat():
                 pairing.take_heartbeat(packet, now)
             case wire.Call():
-                pairing.take_call(now, way)
+                pairing.take_call(now, lane)
             case wire.Restore() if packet.imu_id == self.imu_id and pairing.may_restore(now):
                 self.profile = self.profile or packet.offsets
 
@@ -188,10 +188,10 @@ class EmulatedSensor:
 
     def _hellos(self, pairing: Pairing, now: float) -> list[Outgoing]:
         left = []
-        for at, way, sequence in pairing.due_hellos(now):
+        for at, lane, sequence in pairing.due_hellos(now):
             head = self._device_id, pairing.boot_nonce, pairing.session, sequence
             hello = wire.Hello(*head, self.wire_hash, *FIRMWARE, self.battery, self._flags, self.imu_id)
-            left.append(Outgoing(wire.pack(hello, self._tagger), way, at))
+            left.append(Outgoing(wire.pack(hello, self._tagger), lane, at))
         return left
 
     def _measure(self, pairing: Pairing, now: float) -> list[Outgoing]:
@@ -200,16 +200,16 @@ class EmulatedSensor:
         if now - self._reading_at > ASLEEP_S:
             missed = int((now - self._reading_at) * 1e6 * self._clock_rate / period_us)
             self._grid_us += missed * period_us
-            self._readings += missed if pairing.way is not None else 0
+            self._readings += missed if pairing.lane is not None else 0
         left = []
         while (at := self._reading_at) <= now:
-            if pairing.way is not None:
-                left.append(self._reading(pairing, pairing.way, at))
+            if pairing.lane is not None:
+                left.append(self._reading(pairing, pairing.lane, at))
             self._grid_us += period_us
         return left
 
-    def _reading(self, pairing: Pairing, way: Way, at: float) -> Outgoing:
-        self._wearer.heard(at)
+    def _reading(self, pairing: Pairing, lane: Lane, at: float) -> Outgoing:
+        self._wearer.reading_sent(at)
         orientation = self._wearer.orientation(at)
         sequence, self._readings = self._readings, self._readings + 1
         reading = wire.Reading(
@@ -227,10 +227,10 @@ class EmulatedSensor:
         )
         pairing.reading_sent(sequence, at)
         sample = Sample(self.name, pairing.boot_nonce, sequence, at, orientation, self._power_on_at)
-        return Outgoing(wire.pack(reading, self._tagger), way, at, sample)
+        return Outgoing(wire.pack(reading, self._tagger), lane, at, sample)
 
     def _tell_profile(self, pairing: Pairing, now: float) -> list[Outgoing]:
-        if self.profile is None or pairing.way is None or not self._profiles_due or self._profile_at > now:
+        if self.profile is None or pairing.lane is None or not self._profiles_due or self._profile_at > now:
             return []
         self._profiles_due -= 1
         self._profile_at = now + PROFILE_EVERY_S
@@ -239,4 +239,4 @@ class EmulatedSensor:
             *(self.imu_id, self.profile),
         )
         self._profiles += 1
-        return [Outgoing(wire.pack(packet, self._tagger), pairing.way, now)]
+        return [Outgoing(wire.pack(packet, self._tagger), pairing.lane, now)]

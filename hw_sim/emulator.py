@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 from typing import NamedTuple, Protocol
 
-from hw_sim.device import Device, Outgoing, Sample, Way
+from hw_sim.device import Device, Lane, Outgoing, Sample
 from hw_sim.network import PERFECT, VenueNetwork
 
 LONGEST_SLEEP_S = 0.05  # a signal to stop is seen within this
@@ -28,10 +28,10 @@ class Sender(Protocol):
     def descriptor(self) -> int | None:
         """What to wait on for packets from the box; None when there is nothing to wait on."""
 
-    def send(self, data: bytes) -> bool:
+    def send_packet(self, data: bytes) -> bool:
         """One packet; whether it could be sent."""
 
-    def receive(self) -> bytes | None:
+    def receive_packet(self) -> bytes | None:
         """The next packet from the box; None when none waits."""
 
     def close(self) -> None: ...
@@ -46,7 +46,7 @@ class Sent(NamedTuple):
 
 
 class Emulator:
-    """One to eight wearables on one network, each with ways of its own to the box.
+    """One to eight wearables on one network, each with senders of its own to the box.
 
     `clock` and `sleep` stand in for the monotonic clock in tests; without `sleep` it listens while it waits.
     For a thread or a process of its own use `run`; in step with something else use `start` and `step`.
@@ -56,7 +56,7 @@ class Emulator:
     def __init__(
         self,
         devices: Sequence[Device],
-        ways: Sequence[Mapping[Way, Sender]],
+        senders: Sequence[Mapping[Lane, Sender]],
         *,
         network: VenueNetwork | None = None,
         on_sent: Callable[[Sent], None] | None = None,
@@ -65,14 +65,14 @@ class Emulator:
     ) -> None:
         self.devices = tuple(devices)
         self.counts: Counter[str] = Counter()
-        self._ways = tuple(ways)
-        self._is_up = [dict.fromkeys(senders, False) for senders in ways]
+        self._senders = tuple(senders)
+        self._is_up = [dict.fromkeys(senders, False) for senders in senders]
         self._network = network or VenueNetwork(PERFECT, 0)
         self._on_sent = on_sent
         self._clock = clock
         self._sleep = sleep or self._listen
         self._to_the_box: list[tuple[float, int, int, Outgoing, str]] = []
-        self._to_the_devices: list[tuple[float, int, int, Way, bytes]] = []
+        self._to_the_devices: list[tuple[float, int, int, Lane, bytes]] = []
         self._order = count()
 
     def start(self, now: float) -> None:
@@ -85,8 +85,8 @@ class Emulator:
         for number in range(len(self.devices)):
             self._look_at_ways(number, now)
         while self._to_the_devices and self._to_the_devices[0][0] <= now:
-            _, _, number, way, data = heapq.heappop(self._to_the_devices)
-            self.devices[number].receive(data, now, way)
+            _, _, number, lane, data = heapq.heappop(self._to_the_devices)
+            self.devices[number].receive_packet(data, now, lane)
         for number, device in enumerate(self.devices):
             for outgoing in device.step(now):
                 self._put_on_the_way(number, outgoing)
@@ -120,21 +120,21 @@ class Emulator:
         """Devices and their ways."""
         for device in self.devices:
             device.close()
-        for senders in self._ways:
+        for senders in self._senders:
             for sender in senders.values():
                 sender.close()
 
     def _look_at_ways(self, number: int, now: float) -> None:
         """What the box sent to one device is on its way; a cable may have come or gone."""
-        for way, sender in self._ways[number].items():
-            while (data := sender.receive()) is not None:
+        for lane, sender in self._senders[number].items():
+            while (data := sender.receive_packet()) is not None:
                 for delivery in self._network.carry(data, now, number, to_box=False):
                     if delivery.note != "lost":
-                        arrival = delivery.at, next(self._order), number, way, delivery.data
+                        arrival = delivery.at, next(self._order), number, lane, delivery.data
                         heapq.heappush(self._to_the_devices, arrival)
-            if sender.is_up != self._is_up[number][way]:
-                self._is_up[number][way] = sender.is_up
-                self.devices[number].connect(way, sender.is_up, now)
+            if sender.is_up != self._is_up[number][lane]:
+                self._is_up[number][lane] = sender.is_up
+                self.devices[number].connect(lane, sender.is_up, now)
 
     def _put_on_the_way(self, number: int, outgoing: Outgoing) -> None:
         for delivery in self._network.carry(outgoing.data, outgoing.at, number):
@@ -145,9 +145,9 @@ class Emulator:
             heapq.heappush(self._to_the_box, (delivery.at, next(self._order), number, carried, delivery.note))
 
     def _send(self, number: int, outgoing: Outgoing, note: str) -> None:
-        sender = self._ways[number].get(outgoing.way)
+        sender = self._senders[number].get(outgoing.lane)
         sent_at = self._clock()
-        if sender is None or not sender.send(outgoing.data):
+        if sender is None or not sender.send_packet(outgoing.data):
             self.counts["unsent"] += 1
             return
         self.counts["sent"] += 1
@@ -160,5 +160,5 @@ class Emulator:
 
     def _listen(self, seconds: float) -> None:
         """Waits, but not longer than until a packet comes: the box's answers shall not wait for a reading."""
-        descriptors = (sender.descriptor for senders in self._ways for sender in senders.values())
+        descriptors = (sender.descriptor for senders in self._senders for sender in senders.values())
         select.select([one for one in descriptors if one is not None], [], [], seconds)

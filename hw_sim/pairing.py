@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from appliance.sensor import wire
-from hw_sim.device import Way
+from hw_sim.device import Lane
 
 HELLO_EVERY_S = 0.5
 HELLO_AFTER_CALL_S = 0.2  # at most one so often, whoever calls
@@ -17,18 +17,18 @@ LONGEST_ROUND_TRIP = wire.ROUND_TRIP_UNKNOWN - 1  # 0.1 ms
 class Pairing:
     """One power-on: from the first hello to the last heartbeat. Time is an argument, in seconds.
 
-    way: the link's, None while it is looking for the box. session, led: as the box said last.
+    lane: the link's, None while it is looking for the box. session, led: as the box said last.
     """
 
     def __init__(self, boot_nonce: int) -> None:
         self.boot_nonce = boot_nonce
-        self.way: Way | None = None
+        self.lane: Lane | None = None
         self.session = 0
         self.led = wire.LED_OFF
         self.rate_hz = 50
         self.round_trip = wire.ROUND_TRIP_UNKNOWN
-        self._ways_up: set[Way] = set()
-        self._hello_at: dict[Way, float] = {}  # when the next one is due, for each way that needs one
+        self._lanes_up: set[Lane] = set()
+        self._hello_at: dict[Lane, float] = {}  # when the next one is due, for each lane that needs one
         self._hellos = 0
         self._answered_hello = -1
         self._hello_after_call = -HELLO_AFTER_CALL_S
@@ -41,37 +41,37 @@ class Pairing:
     def next_at(self) -> float:
         """When a hello is due, or the box counts as lost."""
         due = list(self._hello_at.values())
-        if self.way is not None:
+        if self.lane is not None:
             due.append(self._heard + LOST_S)
         return min(due, default=float("inf"))
 
-    def connect(self, way: Way, is_up: bool, now: float) -> None:
-        """A way to the box has come up, or is gone."""
+    def connect(self, lane: Lane, is_up: bool, now: float) -> None:
+        """A lane to the box has come up, or is gone."""
         if is_up:
-            self._ways_up.add(way)
-            if self.way is None or way > self.way:
-                self._hello_at[way] = now
+            self._lanes_up.add(lane)
+            if self.lane is None or lane > self.lane:
+                self._hello_at[lane] = now
         else:
-            self._ways_up.discard(way)
-            self._hello_at.pop(way, None)
-            if self.way == way:
+            self._lanes_up.discard(lane)
+            self._hello_at.pop(lane, None)
+            if self.lane == lane:
                 self._look_for_the_box(now)
 
-    def due_hellos(self, now: float) -> list[tuple[float, Way, int]]:
+    def due_hellos(self, now: float) -> list[tuple[float, Lane, int]]:
         """The hellos to say now: when each was due, its way, its sequence number."""
-        if self.way is not None and now - self._heard >= LOST_S:
+        if self.lane is not None and now - self._heard >= LOST_S:
             self._look_for_the_box(self._heard + LOST_S)
         hellos = []
-        for way, at in sorted(self._hello_at.items()):
+        for lane, at in sorted(self._hello_at.items()):
             if at > now:
                 continue
-            hellos.append((at, way, self._hellos))
+            hellos.append((at, lane, self._hellos))
             self._hellos += 1
-            if self.way is None or way > self.way:
+            if self.lane is None or lane > self.lane:
                 missed = int((now - at) / HELLO_EVERY_S)
-                self._hello_at[way] = at + (missed + 1) * HELLO_EVERY_S
+                self._hello_at[lane] = at + (missed + 1) * HELLO_EVERY_S
             else:
-                del self._hello_at[way]  # the box had called; one hello is the answer
+                del self._hello_at[lane]  # the box had called; one hello is the answer
         return hellos
 
     def reading_sent(self, sequence: int, at: float) -> None:
@@ -79,24 +79,24 @@ class Pairing:
         self._sent_at[sequence] = at
         self._sent_at.pop(sequence - REMEMBERED_READINGS, None)
 
-    def take_assignment(self, packet: wire.Assignment, now: float, way: Way) -> bool:
-        """Follow it, if it answers one of the newest hellos. The way on which it came becomes the link's."""
+    def take_assignment(self, packet: wire.Assignment, now: float, lane: Lane) -> bool:
+        """Follow it, if it answers one of the newest hellos. The lane on which it came becomes the link's."""
         newest = self._hellos - 1
         is_answer = max(newest - ANSWERED_HELLOS, self._answered_hello) < packet.hello_sequence <= newest
-        if not is_answer or not packet.session or way not in self._ways_up:
+        if not is_answer or not packet.session or lane not in self._lanes_up:
             return False
         self._answered_hello = packet.hello_sequence
         if packet.session != self.session:
             self.session = packet.session
             self._heartbeats = -1
-        self.way, self.led, self.rate_hz = way, packet.led, packet.rate_hz
+        self.lane, self.led, self.rate_hz = lane, packet.led, packet.rate_hz
         self._heard = self._assigned = now
-        self._hello_at = {other: at for other, at in self._hello_at.items() if other > way}
+        self._hello_at = {other: at for other, at in self._hello_at.items() if other > lane}
         return True
 
     def take_heartbeat(self, packet: wire.Heartbeat, now: float) -> None:
         """The box is there; believed in the link's session and in rising order only."""
-        if self.way is None or packet.session != self.session or packet.sequence <= self._heartbeats:
+        if self.lane is None or packet.session != self.session or packet.sequence <= self._heartbeats:
             return
         self._heartbeats = packet.sequence
         self._heard = now
@@ -106,16 +106,16 @@ class Pairing:
             round_trip = round(1e4 * (now - sent_at - packet.echo_held_us * 1e-6))
             self.round_trip = min(max(round_trip, 0), LONGEST_ROUND_TRIP)
 
-    def take_call(self, now: float, way: Way) -> None:
+    def take_call(self, now: float, lane: Lane) -> None:
         """The box was started anew and does not know the session: hello at once, streaming goes on."""
-        if way in self._ways_up and now - self._hello_after_call >= HELLO_AFTER_CALL_S:
+        if lane in self._lanes_up and now - self._hello_after_call >= HELLO_AFTER_CALL_S:
             self._hello_after_call = now
-            self._hello_at[way] = now
+            self._hello_at[lane] = now
 
     def may_restore(self, now: float) -> bool:
         """Whether a calibration from the box still counts."""
-        return self.way is not None and now - self._assigned < RESTORE_S
+        return self.lane is not None and now - self._assigned < RESTORE_S
 
     def _look_for_the_box(self, now: float) -> None:
-        self.way = None
-        self._hello_at = dict.fromkeys(self._ways_up, now)
+        self.lane = None
+        self._hello_at = dict.fromkeys(self._lanes_up, now)

@@ -32,7 +32,7 @@ def draw_report(path: Path, evidence: Evidence) -> Path:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    way, free = evidence.ways
+    way, free = evidence.transports
     with matplotlib.rc_context(LOOK):
         figure, axes = pyplot.subplots(4, 1, figsize=(11, 14), layout="constrained")
         _histogram(axes[0], way, free)

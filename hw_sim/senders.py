@@ -39,14 +39,14 @@ class UdpSender:
     def descriptor(self) -> int | None:
         return self._socket.fileno()
 
-    def send(self, data: bytes) -> bool:
+    def send_packet(self, data: bytes) -> bool:
         try:
             self._socket.sendto(data, self._address)
         except OSError:
             return False
         return True
 
-    def receive(self) -> bytes | None:
+    def receive_packet(self) -> bytes | None:
         try:
             return self._socket.recv(2 * wire.LARGEST)
         except OSError:
@@ -75,7 +75,7 @@ class SerialSender:
     def descriptor(self) -> int | None:
         return self._port.fileno() if self._port is not None else None
 
-    def send(self, data: bytes) -> bool:
+    def send_packet(self, data: bytes) -> bool:
         if self._port is None:
             return False
         try:
@@ -85,7 +85,7 @@ class SerialSender:
             return False
         return True
 
-    def receive(self) -> bytes | None:
+    def receive_packet(self) -> bytes | None:
         try:
             if self._port is None:
                 self._open()

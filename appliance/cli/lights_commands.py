@@ -38,9 +38,9 @@ def light(
         if (show, box, chosen) != (None, None, None):
             raise typer.BadParameter(f"write options behind '{context.invoked_subcommand}'")
         return
-    from appliance.lights.run import light_up
+    from appliance.lights.run import run_lights
 
-    light_up(show, box_of(box, chosen))
+    run_lights(show, box_of(box, chosen))
 
 
 @lights.command("test")

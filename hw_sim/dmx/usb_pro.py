@@ -70,7 +70,7 @@ class UsbProWidget:
         """Take nothing more in, until told otherwise; the line fills up."""
         (self._hangs.set if hangs else self._hangs.clear)()
 
-    def say(self, garbage: bytes) -> None:
+    def send_message(self, garbage: bytes) -> None:
         """Send this to whoever has the device open, as a widget with a loose cable does."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, garbage)

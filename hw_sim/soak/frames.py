@@ -45,7 +45,7 @@ class FrameWatch:
         self._no_room = self._overflowed = 0
         self._wall_ahead_s = time.time() - time.monotonic()
 
-    def begin(self, now: float) -> None:
+    def start(self, now: float) -> None:
         """What was heard before does not count; seconds of the run count from here."""
         self.heard = self.late = self.missing = self.unheard = self.stage_starts = 0
         self.longest_gap_s = 0.0

@@ -49,7 +49,7 @@ class Unit:
         """None while it is not running."""
         return None if self._process is None else self._process.pid
 
-    def look(self, now: float) -> None:
+    def update(self, now: float) -> None:
         """Notice its end; start it when it is time to."""
         if self._process is not None and (status := self._process.poll()) is not None:
             self._process = None

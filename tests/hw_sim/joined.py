@@ -9,7 +9,7 @@ from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, SensorReading
 from appliance.sensor.transports.transport import Origin
-from hw_sim.device import Device, Way
+from hw_sim.device import Device, Lane
 from hw_sim.emulator import Emulator, Sent
 from hw_sim.motions import Quaternion
 from hw_sim.network import VenueNetwork
@@ -53,8 +53,10 @@ class Show:
         self.sent: dict[tuple[str, int, int], Sent] = {}
         self.made: dict[tuple[str, int], set[Quaternion]] = defaultdict(set)
         self.now = 1000.0
-        ways = [{Way.NETWORK: _Antenna(self, number)} for number in range(len(devices))]
-        self.emulator = Emulator(devices, ways, network=network, on_sent=self._note, clock=lambda: self.now)
+        senders = [{Lane.NETWORK: _Antenna(self, number)} for number in range(len(devices))]
+        self.emulator = Emulator(
+            devices, senders, network=network, on_sent=self._note, clock=lambda: self.now
+        )
         self.emulator.start(self.now)
         self._tick = 0
         self._due = self.now
@@ -70,7 +72,7 @@ class Show:
                 self._due = max(self.emulator.step(self.now), self.now + 1e-6)
             self.now = tick_at
             readings += self.link.drain(tick_at)
-            self.link.tend(tick_at)
+            self.link.send_due(tick_at)
             self._due = max(self.emulator.step(tick_at), tick_at + 1e-6)
         return readings
 

@@ -110,7 +110,7 @@ def test_the_same_seed_sends_the_same_but_never_the_same_power_on() -> None:
 
 def test_what_cannot_be_sent_is_counted_and_not_logged() -> None:
     class Torn:
-        """A way that never takes anything."""
+        """A sender that never takes anything."""
 
         is_up, descriptor = True, None
 

@@ -8,7 +8,7 @@ from itertools import count
 
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
-from hw_sim.device import Way
+from hw_sim.device import Lane
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.emulator import Emulator, Sender, Sent
 from hw_sim.network import VenueNetwork
@@ -142,11 +142,11 @@ class Pair:
         self.cable = Line(self.box, self.clock)
         self.cable.is_up = False
         self.sent: list[Sent] = []
-        ways: dict[Way, Sender] = {Way.NETWORK: self.line, Way.CABLE: self.cable}
+        senders: dict[Lane, Sender] = {Lane.NETWORK: self.line, Lane.CABLE: self.cable}
         self.device = device
         self.emulator = Emulator(
             [device],
-            [ways],
+            [senders],
             network=network,
             on_sent=self.sent.append,
             clock=self.clock,

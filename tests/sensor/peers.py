@@ -87,14 +87,14 @@ class Wires:
         self.sent: list[tuple[bytes, Origin]] = []
         self.attended: set[Origin] = set()
 
-    def receive(self, now: float) -> Iterator[tuple[bytes, float, Origin]]:
+    def receive_packets(self, now: float) -> Iterator[tuple[bytes, float, Origin]]:
         while self.waiting:
             yield self.waiting.popleft()
 
-    def send(self, packet: bytes, origin: Origin) -> None:
+    def send_packet(self, packet: bytes, origin: Origin) -> None:
         self.sent.append((packet, origin))
 
-    def attend(self, origins: Collection[Origin]) -> None:
+    def reserve_sockets(self, origins: Collection[Origin]) -> None:
         self.attended = set(origins)
 
     def describe(self, origin: Origin) -> str:
@@ -126,7 +126,7 @@ class Box:
 
     def answers(self, wires: Wires | None = None) -> list[tuple[bytes, Origin]]:
         """What the box sends now, and where to."""
-        self.link.tend(self.now)
+        self.link.send_due(self.now)
         wires = wires or self.wires
         sent, wires.sent = wires.sent, []
         return sent

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 
 from appliance.sensor.keys import SensorKey
-from hw_sim.device import Way
+from hw_sim.device import Lane
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.emulator import Emulator, Sender, Sent
 from hw_sim.motions import Motion, dance
@@ -24,7 +24,7 @@ HOST = "127.0.0.1"
 
 
 class Radio(UdpSender):
-    """A way by the network that can be lost, both directions at once, without the sensor being told."""
+    """A lane by the network that can be lost, both directions at once, without the sensor being told."""
 
     in_reach = True
 
@@ -56,10 +56,10 @@ class Wearables:
         self._wearers = [Wearer(motion(number), math.inf) for number in range(len(keys))]
         self.sensors = [EmulatedSensor(key, wearer) for key, wearer in zip(keys, self._wearers, strict=True)]
         self.radios = [Radio(HOST, port) for _ in keys]
-        ways: list[dict[Way, Sender]] = [{Way.NETWORK: radio} for radio in self.radios]
+        senders: list[dict[Lane, Sender]] = [{Lane.NETWORK: radio} for radio in self.radios]
         if cable is not None:
-            ways[0][Way.CABLE] = SerialSender(str(cable))
-        self.emulator = Emulator(self.sensors, ways, network=VenueNetwork(VENUE, 1), on_sent=on_sent)
+            senders[0][Lane.CABLE] = SerialSender(str(cable))
+        self.emulator = Emulator(self.sensors, senders, network=VenueNetwork(VENUE, 1), on_sent=on_sent)
         self._wishes: queue.SimpleQueue[Callable[[float], None]] = queue.SimpleQueue()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)

@@ -9,10 +9,10 @@ import serial
 from appliance.outputs.dmx.adapter_wire import AdapterError, AdapterWire
 from appliance.outputs.dmx.serial_port import (
     close_port,
+    discard_output,
     find_device,
     is_bare_ftdi,
     open_port,
-    throw_away,
     write,
 )
 from appliance.show.dmx import DmxConfig
@@ -43,7 +43,7 @@ class OpenDmx:
         try:
             write(self._port, _START_CODE + data[: self._channels])
         except AdapterError:
-            throw_away(self._port)  # else it would follow the next break, which waits for nothing
+            discard_output(self._port)  # else it would follow the next break, which waits for nothing
             raise
         finally:
             time.sleep(self._lasts_s)

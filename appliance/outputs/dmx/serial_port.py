@@ -65,7 +65,7 @@ def write(port: serial.Serial, data: bytes) -> None:
         raise AdapterError("it was unplugged") from None
 
 
-def throw_away(port: serial.Serial) -> None:
+def discard_output(port: serial.Serial) -> None:
     """What it was given and has not taken yet. Raises nothing."""
     with contextlib.suppress(OSError, termios.error):
         port.reset_output_buffer()

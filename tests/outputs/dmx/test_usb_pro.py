@@ -101,7 +101,7 @@ def test_garbage_from_the_widget_changes_nothing(widget: UsbProWidget, until: Un
     with widget:
         wire = wire_to(widget)
         for tick in range(40):
-            widget.say(bytes(range(256)) * 8 + b"\x7e\x05\xff\xff")
+            widget.send_message(bytes(range(256)) * 8 + b"\x7e\x05\xff\xff")
             wire.send_universe(universe(tick), 0.0)
             until(lambda tick=tick: widget.levels == universe(tick))
         until(lambda: wire.sent == 40)

@@ -54,7 +54,7 @@ void get(const uint8_t*& at, Value (&values)[count]) {
   for (Value& value : values) get(at, value);
 }
 
-// The sensor is on and looks for its box: each 500 ms on every way that is up, broadcast on Wi-Fi.
+// The sensor is on and looks for its box: every 500 ms on network and cable, broadcast on Wi-Fi.
 // Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Hello {
   static constexpr uint8_t kKind = 1;
@@ -64,7 +64,7 @@ struct Hello {
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
   uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
   uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
-  uint32_t wire_hash;  // hash of this declaration; a mismatch says which side to update
+  uint32_t wire_hash;  // hash of this declaration; a mismatch means that one side needs an update
   uint8_t firmware_major;  // firmware version
   uint8_t firmware_minor;
   uint8_t firmware_patch;
@@ -102,7 +102,7 @@ struct Hello {
   }
 };
 
-// The box takes the sensor: stream to the sender of this packet. Bound to the hello that it answers.
+// The box takes the sensor, which then streams to the sender of this packet. Bound to one hello.
 // Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Assignment {
   static constexpr uint8_t kKind = 2;
@@ -112,7 +112,7 @@ struct Assignment {
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
   uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
   uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
-  uint32_t hello_sequence;  // sequence of the hello that is answered
+  uint32_t hello_sequence;  // sequence of the hello that it answers
   uint8_t hand;  // which hand of the show, from 0; 255 none
   uint8_t rate_hz;  // readings a second
   uint8_t led;  // 0 off, 1 on, 2 slow, 3 fast, 4 strobe
@@ -141,7 +141,7 @@ struct Assignment {
   }
 };
 
-// One orientation of the sensor, as often a second as the assignment says: 50 times.
+// One orientation of the sensor, at the rate of the assignment: 50 a second.
 // Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Reading {
   static constexpr uint8_t kKind = 3;
@@ -192,7 +192,7 @@ struct Reading {
   }
 };
 
-// The box is there: each second, and at once when the light changes. Three seconds without it and the sensor says hello again.
+// The box is there: every second, and at once when the light changes. After three seconds without it the sensor sends hellos again.
 // Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Heartbeat {
   static constexpr uint8_t kKind = 4;
@@ -228,7 +228,7 @@ struct Heartbeat {
   }
 };
 
-// The box does not know the session of a reading, because it was started anew: say hello at once.
+// The box does not know the session of a reading, because it was restarted: send a hello at once.
 // Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Call {
   static constexpr uint8_t kKind = 5;
@@ -255,7 +255,7 @@ struct Call {
   }
 };
 
-// A calibration that the sensor has learned, for the box to keep: an update erases the sensor's own.
+// A calibration that the sensor has learned, for the box to keep: an update erases the sensor's copy.
 // Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Profile {
   static constexpr uint8_t kKind = 6;
@@ -288,7 +288,7 @@ struct Profile {
   }
 };
 
-// A calibration that the box has kept, for a sensor that has none. With the first five heartbeats.
+// A kept calibration for a sensor that has none, with the first five heartbeats.
 // Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
 struct Restore {
   static constexpr uint8_t kKind = 7;
@@ -298,7 +298,7 @@ struct Restore {
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
   uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
   uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
-  uint8_t imu_id[16];  // unique id of the BNO055; another one ignores it
+  uint8_t imu_id[16];  // unique id of the BNO055 that it is for
   uint8_t offsets[22];  // BNO055 registers 0x55 to 0x6A
 
   void write(uint8_t* at) const {
