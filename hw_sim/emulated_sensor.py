@@ -14,10 +14,10 @@ from hw_sim.pairing import Pairing
 from hw_sim.wearer import Wearer
 
 PERIOD_US = 20_000
-RATES_US = ((100, 10_000), (50, PERIOD_US), (0, 40_000))  # at least so many a second asked for -> period
-IMU_START_US = 700_000  # the BNO055 gives nothing earlier after power-on
-REBOOT_S = 1.5  # off so long between two power-ons
-ASLEEP_S = 0.5  # further behind than this and readings are left out instead of sent in a burst
+RATES_US = ((100, 10_000), (50, PERIOD_US), (0, 40_000))  # lowest rate asked for -> period
+IMU_START_US = 700_000  # the BNO055's first reading after power-on
+REBOOT_S = 1.5  # off between two power-ons
+ASLEEP_S = 0.5  # further behind than this, readings are skipped instead of sent in a burst
 PROFILE_TIMES, PROFILE_EVERY_S = 3, 1.0
 CALIBRATED = 0xFF
 FIRMWARE = (1, 0, 0)
@@ -31,7 +31,7 @@ LIGHTS = {
 
 
 def fresh_boot_nonce() -> int:
-    """Not from the seed: a box that runs on would take a repeated power-on for a replay, and rightly so."""
+    """Not from the seed: a running box rightly takes a repeated power-on for a replay."""
     return secrets.randbits(32)
 
 
@@ -45,8 +45,8 @@ class EmulatedSensor:
     """A Device that speaks the whole protocol. Time is an argument: seconds on the emulator's clock.
 
     phase_s: when in the 20 ms grid it measures. drift_ppm: how much too fast its clock is. device_time_us:
-    what its clock says at power-on. reboot_every_s: switched off and on again that often; None: never.
-    profile: the calibration that it has, the BNO055's 22 offset bytes. taps: double taps since power-on.
+    its clock at power-on. reboot_every_s: time between power cycles; None: never. profile: its calibration,
+    the BNO055's 22 offset bytes. taps: double taps since power-on.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class EmulatedSensor:
 
     @property
     def light(self) -> str:
-        """What the lamp says: off, looking, or what the box wants."""
+        """The lamp: off, looking, or as the box sets it."""
         if self._pairing is None:
             return "off"
         return LIGHTS.get(self._pairing.led, "on") if self.is_linked else "looking"
@@ -116,7 +116,7 @@ class EmulatedSensor:
         self.switch_on(now)
 
     def switch_on(self, now: float) -> None:
-        """Power-on: nothing is left of the power-on before but its calibration."""
+        """Power on: only the calibration is left of the power-on before."""
         self._pairing = pairing = Pairing(self._draw_nonce())
         for lane in self._lanes_up:
             pairing.connect(lane, True, now)
@@ -136,7 +136,7 @@ class EmulatedSensor:
             self._pairing.connect(lane, is_up, now)
 
     def save_profile(self, offsets: bytes, now: float) -> None:
-        """As after a calibration: the 22 bytes are in use, and told to the box once linked."""
+        """As after a calibration: use the 22 bytes, and send them to the box once linked."""
         self.profile, self._profiles_due, self._profile_at = offsets, PROFILE_TIMES, now
 
     def step(self, now: float) -> list[Outgoing]:
@@ -152,7 +152,7 @@ class EmulatedSensor:
             return []
         left = self._hellos(self._pairing, now)
         left += self._measure(self._pairing, now)
-        left += self._tell_profile(self._pairing, now)
+        left += self._due_profiles(self._pairing, now)
         return left
 
     def receive_packet(self, data: bytes, now: float, lane: Lane) -> None:
@@ -176,7 +176,7 @@ class EmulatedSensor:
                 self.profile = self.profile or packet.offsets
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to free."""
 
     @property
     def _reading_at(self) -> float:
@@ -195,7 +195,7 @@ class EmulatedSensor:
         return left
 
     def _measure(self, pairing: Pairing, now: float) -> list[Outgoing]:
-        """The readings that are due; the grid goes on while there is nobody to send them to."""
+        """Readings that are due; the grid continues without a link."""
         period_us = next(period for rate, period in RATES_US if pairing.rate_hz >= rate)
         if now - self._reading_at > ASLEEP_S:
             missed = int((now - self._reading_at) * 1e6 * self._clock_rate / period_us)
@@ -229,7 +229,7 @@ class EmulatedSensor:
         sample = Sample(self.name, pairing.boot_nonce, sequence, at, orientation, self._power_on_at)
         return Outgoing(wire.pack(reading, self._tagger), lane, at, sample)
 
-    def _tell_profile(self, pairing: Pairing, now: float) -> list[Outgoing]:
+    def _due_profiles(self, pairing: Pairing, now: float) -> list[Outgoing]:
         if self.profile is None or pairing.lane is None or not self._profiles_due or self._profile_at > now:
             return []
         self._profiles_due -= 1

@@ -33,7 +33,7 @@ FEW = {"p50": 50.0, "max": 100.0}
 @dataclass(frozen=True)
 class Evidence:
     """Everything that was measured: in phase, running free, with a sensor that is switched off and on, and
-    with a box that is killed and started anew."""
+    with a box that is killed and restarted."""
 
     locked: Run
     free: Run

@@ -25,13 +25,13 @@ LIGHTS = ((0.15, "strobe"), (0.5, "fast"), (1.6, "slow"), (4.0, "on"))
 
 
 class ProvisioningError(ValueError):
-    """The firmware's console refused what a box would tell it; the message has its answer."""
+    """The firmware's console refused a command; the message has its answer."""
 
 
 def provision(
     key: SensorKey, *, port: int = BOX[1], network: str = NETWORK, password: str = PASSWORD, seed: int = 1
 ) -> bytes:
-    """The flash of a wearable after `bunraku provision`, by lane of the console on its simulated cable.
+    """The flash of a wearable after `bunraku provision`, through the console on its simulated cable.
 
     Raises FirmwareMissingError, ProvisioningError.
     """
@@ -58,7 +58,7 @@ def provision(
 
 
 def ask(wearable: CompiledWearable, line: str) -> str:
-    """Types a line into the console and gives its answer; "" when there is none within a second."""
+    """Type a line into the console. Returns its answer, or "" after a second without one."""
     wearable.put_serial(line.encode() + b"\n")
     received = b""
     now_us = wearable.status.now_us
@@ -73,9 +73,9 @@ def ask(wearable: CompiledWearable, line: str) -> str:
 
 
 def firmware_maker(seed: int | None = None) -> DeviceMaker:
-    """Makes wearables for the emulator. The same seed gives the same bytes; None: each run is another one.
+    """Makes wearables for the emulator. The same seed gives the same bytes; None: each run differs.
 
-    A box that runs on would take a power-on with the same bytes for a replay, and rightly so.
+    A running box rightly takes a power-on with the same bytes for a replay.
     """
 
     def make(
@@ -92,7 +92,7 @@ def firmware_maker(seed: int | None = None) -> DeviceMaker:
 class FirmwareSensor:
     """A Device around one CompiledWearable; the emulator's seconds are its virtual time.
 
-    phase_s: how much later than the others it is switched on. seed: of all chance in its world.
+    phase_s: its delay at power-on. seed: of all randomness in its world.
     Raises FirmwareMissingError, ProvisioningError.
     """
 
@@ -114,7 +114,7 @@ class FirmwareSensor:
         self._reboot_every_s = reboot_every_s
         self._seed = seed
         self._flash = provision(key, seed=seed + 1)
-        self._wearable: CompiledWearable | None = None  # None: before the first power-on
+        self._wearable: CompiledWearable | None = None  # None before the first power-on
         self._now = 0.0
         self._power_on_at = 0.0
         self._power_change_at = float("inf")
@@ -130,7 +130,7 @@ class FirmwareSensor:
 
     @property
     def light(self) -> str:
-        """off; looking for its network or its box; else what the lamp itself shows."""
+        """off; looking (for network or box); else what the lamp shows."""
         status = self.wearable.status
         if not status.is_on:
             return "off"
@@ -205,7 +205,7 @@ class FirmwareSensor:
         self._power_change_at = at + self._reboot_every_s if self._reboot_every_s else float("inf")
 
     def _collect(self) -> None:
-        """What left: packets by both ways, and flashes of the lamp."""
+        """Collect what left: packets on both lanes, and flashes of the lamp."""
         for at_us, _, data in self.wearable.take_datagrams():
             self._leave(data, Lane.NETWORK, at_us * 1e-6)
         for data in self._deframer.feed(self.wearable.take_serial()):
@@ -221,7 +221,7 @@ class FirmwareSensor:
         self._to_leave.append(Outgoing(data, lane, at, sample))
 
     def _sample(self, data: bytes) -> Sample:
-        """The reading in a packet, with how the hand really stood when the device clock says it measured."""
+        """The reading in a packet, with the hand's true orientation at its device time."""
         _, _, _, _, boot_nonce, _, sequence = wire.HEAD.unpack_from(data)
         device_s = int.from_bytes(data[wire.HEAD.size : wire.HEAD.size + 4], "little") * 1e-6
         booted_at = self.wearable.status.booted_at_us * 1e-6

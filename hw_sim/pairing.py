@@ -1,4 +1,4 @@
-"""The wearable's side of pairing, as the firmware does it: when to say hello, and whom to believe."""
+"""The wearable's side of pairing, as in the firmware: when to send hellos, which answers count."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from appliance.sensor import wire
 from hw_sim.device import Lane
 
 HELLO_EVERY_S = 0.5
-HELLO_AFTER_CALL_S = 0.2  # at most one so often, whoever calls
-LOST_S = 3.0  # nothing from the box for so long: look for it again
+HELLO_AFTER_CALL_S = 0.2  # shortest time between two answers to calls
+LOST_S = 3.0  # without a packet from the box for this long, look for it again
 ANSWERED_HELLOS = 4  # an assignment answers the newest hello or one of the three before
-RESTORE_S = 10.0  # a calibration from the box counts for so long after the assignment
+RESTORE_S = 10.0  # how long after the assignment a calibration from the box counts
 REMEMBERED_READINGS = 64
 LONGEST_ROUND_TRIP = wire.ROUND_TRIP_UNKNOWN - 1  # 0.1 ms
 
@@ -17,7 +17,7 @@ LONGEST_ROUND_TRIP = wire.ROUND_TRIP_UNKNOWN - 1  # 0.1 ms
 class Pairing:
     """One power-on: from the first hello to the last heartbeat. Time is an argument, in seconds.
 
-    lane: the link's, None while it is looking for the box. session, led: as the box said last.
+    lane: the link's; None while looking for the box. session, led: the newest from the box.
     """
 
     def __init__(self, boot_nonce: int) -> None:
@@ -46,7 +46,7 @@ class Pairing:
         return min(due, default=float("inf"))
 
     def connect(self, lane: Lane, is_up: bool, now: float) -> None:
-        """A lane to the box has come up, or is gone."""
+        """A lane to the box came up or went down."""
         if is_up:
             self._lanes_up.add(lane)
             if self.lane is None or lane > self.lane:
@@ -58,7 +58,7 @@ class Pairing:
                 self._look_for_the_box(now)
 
     def due_hellos(self, now: float) -> list[tuple[float, Lane, int]]:
-        """The hellos to say now: when each was due, its way, its sequence number."""
+        """The hellos that are due: time, lane, sequence number."""
         if self.lane is not None and now - self._heard >= LOST_S:
             self._look_for_the_box(self._heard + LOST_S)
         hellos = []
@@ -71,16 +71,16 @@ class Pairing:
                 missed = int((now - at) / HELLO_EVERY_S)
                 self._hello_at[lane] = at + (missed + 1) * HELLO_EVERY_S
             else:
-                del self._hello_at[lane]  # the box had called; one hello is the answer
+                del self._hello_at[lane]  # one hello answers a call
         return hellos
 
     def reading_sent(self, sequence: int, at: float) -> None:
-        """Remembered for the round trip."""
+        """Note when a reading left, for the round trip."""
         self._sent_at[sequence] = at
         self._sent_at.pop(sequence - REMEMBERED_READINGS, None)
 
     def take_assignment(self, packet: wire.Assignment, now: float, lane: Lane) -> bool:
-        """Follow it, if it answers one of the newest hellos. The lane on which it came becomes the link's."""
+        """Accept it if it answers one of the newest hellos. Its lane becomes the link's."""
         newest = self._hellos - 1
         is_answer = max(newest - ANSWERED_HELLOS, self._answered_hello) < packet.hello_sequence <= newest
         if not is_answer or not packet.session or lane not in self._lanes_up:
@@ -95,7 +95,7 @@ class Pairing:
         return True
 
     def take_heartbeat(self, packet: wire.Heartbeat, now: float) -> None:
-        """The box is there; believed in the link's session and in rising order only."""
+        """Accept it in the link's session and in rising order only."""
         if self.lane is None or packet.session != self.session or packet.sequence <= self._heartbeats:
             return
         self._heartbeats = packet.sequence
@@ -107,7 +107,7 @@ class Pairing:
             self.round_trip = min(max(round_trip, 0), LONGEST_ROUND_TRIP)
 
     def take_call(self, now: float, lane: Lane) -> None:
-        """The box was started anew and does not know the session: hello at once, streaming goes on."""
+        """The restarted box does not know the session: hello at once, streaming continues."""
         if lane in self._lanes_up and now - self._hello_after_call >= HELLO_AFTER_CALL_S:
             self._hello_after_call = now
             self._hello_at[lane] = now

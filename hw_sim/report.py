@@ -85,7 +85,7 @@ def _first_readings(axes: Any, evidence: Evidence) -> None:
             evidence.power_on_s,
             POWER_ON_AND_JOIN_S if evidence.firmware else POWER_ON_S,
         ),
-        ("box started anew", evidence.restart_s, RESTART_S),
+        ("box restarted", evidence.restart_s, RESTART_S),
         ("box killed", evidence.kill_s, RESTART_S),
     )
     for place, (_, seconds, limit) in enumerate(rows):

@@ -1,6 +1,6 @@
 """Writes what is made from the wire's declaration: wire.h, the tables in docs/wire.md, the golden vectors.
 
-`python -m tools.generate_wire` in the repository writes them anew; a test fails when one is stale.
+`python -m tools.generate_wire` in the repository regenerates them; a test fails when one is stale.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ class DatagramPath:
     hops: int = 1  # of multicast, IP_MULTICAST_TTL
 
     def open(self) -> socket.socket:
-        """A connected socket: only on those does Linux report that nobody listens. Raises OSError."""
+        """A connected socket: only on those does Linux report refused datagrams. Raises OSError."""
         opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             opened.setblocking(False)

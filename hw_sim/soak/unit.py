@@ -19,7 +19,7 @@ _libc = ctypes.CDLL(None)
 
 
 class Unit:
-    """`deaths`: nobody killed it, and it ended. `history`: (monotonic seconds, what it held), this life only.
+    """`deaths`: ends without a kill. `history`: (monotonic seconds, resources) of this life only.
     `longest`: the same of the longest life before this one.
 
     `is_away`: it says that what it needs is not here. `priority`: real-time, where it can be had.

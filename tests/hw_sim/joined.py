@@ -25,14 +25,14 @@ class Air:
         self.waiting: deque[tuple[bytes, float, Origin]] = deque()
         self.answers: dict[Origin, deque[bytes]] = defaultdict(deque)
 
-    def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
+    def receive_packets(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
         while self.waiting:
             yield self.waiting.popleft()
 
-    def send(self, packet: bytes, origin: Origin) -> None:
+    def send_packet(self, packet: bytes, origin: Origin) -> None:
         self.answers[origin].append(packet)
 
-    def attend(self, origins: Collection[Origin]) -> None: ...
+    def reserve_sockets(self, origins: Collection[Origin]) -> None: ...
 
     def describe(self, origin: Origin) -> str:
         return str(origin)
@@ -95,11 +95,11 @@ class _Antenna:
     def __init__(self, show: Show, number: int) -> None:
         self._show, self._number = show, number
 
-    def send(self, data: bytes) -> bool:
+    def send_packet(self, data: bytes) -> bool:
         self._show.air.waiting.append((data, self._show.now, self._number))
         return True
 
-    def receive(self) -> bytes | None:
+    def receive_packet(self) -> bytes | None:
         answers = self._show.air.answers[self._number]
         return answers.popleft() if answers else None
 

@@ -19,17 +19,17 @@ class PairedSensor:
 
     def __init__(self, key: SensorKey, port: int, motion: Motion, now: float) -> None:
         self.sensor = EmulatedSensor(key, Wearer(motion), phase_s=TICK_S / 2)
-        self._way = UdpSender("127.0.0.1", port)
+        self._sender = UdpSender("127.0.0.1", port)
         self.sensor.start(now)
         self.sensor.connect(Lane.NETWORK, True, now)
 
     def advance(self, now: float) -> list[Sample]:
         """Hears what the box has sent, then sends what is due; the readings among it."""
-        while (data := self._way.receive()) is not None:
-            self.sensor.receive(data, now, Lane.NETWORK)
+        while (data := self._sender.receive_packet()) is not None:
+            self.sensor.receive_packet(data, now, Lane.NETWORK)
         left = self.sensor.step(now)
         for outgoing in left:
-            assert self._way.send(outgoing.data)
+            assert self._sender.send_packet(outgoing.data)
         return [outgoing.sample for outgoing in left if outgoing.sample is not None]
 
     def pair(self, link: SensorLink, now: float) -> float:
@@ -44,4 +44,4 @@ class PairedSensor:
         raise AssertionError("the box does not take the sensor")
 
     def close(self) -> None:
-        self._way.close()
+        self._sender.close()

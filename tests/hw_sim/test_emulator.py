@@ -114,10 +114,10 @@ def test_what_cannot_be_sent_is_counted_and_not_logged() -> None:
 
         is_up, descriptor = True, None
 
-        def send(self, data: bytes) -> bool:
+        def send_packet(self, data: bytes) -> bool:
             return False
 
-        def receive(self) -> bytes | None:
+        def receive_packet(self) -> bytes | None:
             return None
 
         def close(self) -> None: ...

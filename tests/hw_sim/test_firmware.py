@@ -130,9 +130,9 @@ def course(seed: int, lane: Lane = Lane.NETWORK, seconds: int = 12) -> tuple[Fir
             sent.append(packet)
             answer = box.answer(packet)
             if answer is not None:
-                one.receive(answer, now, lane)
+                one.receive_packet(answer, now, lane)
         if step % 100 == 0:
-            one.receive(box.heartbeat(), now, lane)
+            one.receive_packet(box.heartbeat(), now, lane)
     return one, sent
 
 

@@ -88,14 +88,14 @@ class Line:
         self._clock = clock
         self._waiting: deque[bytes] = deque()
 
-    def send(self, data: bytes) -> bool:
+    def send_packet(self, data: bytes) -> bool:
         if not self.is_up:
             return False
         self.passing_on(data)
         self._waiting.extend(self.box.hear(data, self._clock()))
         return True
 
-    def receive(self) -> bytes | None:
+    def receive_packet(self) -> bytes | None:
         if not self.is_up:
             self._waiting.clear()
             return None

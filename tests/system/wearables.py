@@ -28,11 +28,11 @@ class Radio(UdpSender):
 
     in_reach = True
 
-    def send(self, data: bytes) -> bool:
-        return super().send(data) if self.in_reach else True
+    def send_packet(self, data: bytes) -> bool:
+        return super().send_packet(data) if self.in_reach else True
 
-    def receive(self) -> bytes | None:
-        while (data := super().receive()) is not None and not self.in_reach:
+    def receive_packet(self) -> bytes | None:
+        while (data := super().receive_packet()) is not None and not self.in_reach:
             pass
         return data
 
@@ -77,7 +77,7 @@ class Wearables:
     def dance(self) -> None:
         """All of them, from the next moment on."""
         for wearer in self._wearers:
-            self.do(wearer.begin)
+            self.do(wearer.start_moving)
 
     def do(self, wish: Callable[[float], None]) -> None:
         """In the sensors' own thread, with the time of the moment."""

@@ -31,7 +31,7 @@ class ArtDmx:
 
     def pack(self, data: bytes | bytearray) -> bytearray:
         """The next packet; valid until the next call."""
-        self._sequence = self._sequence % 255 + 1  # 1..255; 0 would mean that nobody counts
+        self._sequence = self._sequence % 255 + 1  # 1..255; 0 would mean unnumbered
         self._packet[_SEQUENCE] = self._sequence
         self._packet[_DATA : _DATA + self._channels] = data[: self._channels]
         return self._packet

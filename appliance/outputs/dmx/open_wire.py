@@ -22,9 +22,9 @@ from appliance.show.dmx import DmxConfig
 def open_universes(
     configs: Sequence[DmxConfig], state: Path | None = None, usb_backend: Any = None
 ) -> tuple[Universe, ...]:
-    """All universes of a box, in the order of its box file. Never raises: a wire that is not there says so.
+    """All universes of a box, in the order of its box file. Never raises: see `Wire.trouble`.
 
-    state: the box's state folder; it keeps the identity by which sACN receivers know this box again.
+    state: the box's state folder, which keeps its sACN identity.
     usb_backend: pyusb's; None for the machine's libusb.
     """
     sources = _sources(configs, state)

@@ -1,4 +1,4 @@
-"""sACN: one universe by multicast or to one address; what a box says about itself as a source."""
+"""sACN: one universe by multicast or unicast; the source's list of universes."""
 
 from __future__ import annotations
 

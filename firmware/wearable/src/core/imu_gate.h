@@ -11,7 +11,7 @@ class ImuGate {
  public:
   enum class Verdict : uint8_t { kAccepted, kRelocated, kZero, kNorm, kTorn, kRate, kUnconfirmed };
 
-  void reset() { has_believed_ = has_refused_ = false; }  // fusion was started anew: forget what came before
+  void reset() { has_believed_ = has_refused_ = false; }  // after a restart of fusion
 
   // `orientation` w, x, y, z with 16384 for 1, as read at `now_us`. Every rule costs 0.5 s at most.
   Verdict admit(const int16_t (&orientation)[4], uint32_t now_us);
