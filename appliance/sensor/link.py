@@ -164,18 +164,12 @@ class SensorLink:
 
     def _judge(self, data: wire.Buffer, arrival: float, route: Route) -> str:
         """The fate of one packet, in one word. Cheap checks come before the tag."""
-        if len(data) < wire.HEAD.size:
-            return "length"
-        magic, version, kind, device_id, boot_nonce, session, sequence = wire.HEAD.unpack_from(data)
-        if magic != wire.MAGIC:
-            return "magic"
-        if version != wire.VERSION:
-            return "version"
-        layout = wire.LAYOUTS.get(kind)
-        if layout is None or layout.direction != "sensor to box":
+        found = wire.read_head(data)
+        if isinstance(found, str):
+            return found
+        layout, (device_id, boot_nonce, session, sequence) = found
+        if layout.direction != "sensor to box":
             return "kind"
-        if len(data) != layout.size:
-            return "length"
         sensor = self._by_device.get(device_id)
         if sensor is None:
             return "device"

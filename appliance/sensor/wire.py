@@ -230,24 +230,32 @@ def pack(packet: Packet, tagger: Tagger) -> bytes:
     return signed + tagger.tag(signed)
 
 
+def read_head(data: Buffer) -> tuple[Layout, tuple[int, int, int, int]] | str:
+    """Layout, and device id, boot nonce, session, sequence; or in one word why this is no packet."""
+    if len(data) < HEAD.size:
+        return "length"
+    magic, version, kind, *head = HEAD.unpack_from(data)
+    if magic != MAGIC:
+        return "magic"
+    if version != VERSION:
+        return "version"
+    layout = LAYOUTS.get(kind)
+    if layout is None:
+        return "kind"
+    device_id, boot_nonce, session, sequence = head
+    return (layout, (device_id, boot_nonce, session, sequence)) if len(data) == layout.size else "length"
+
+
 def unpack(data: Buffer, tagger_of: Callable[[int], Tagger | None]) -> Packet:
     """The packet in one datagram; `tagger_of` gives a device's key, or None for an unknown device.
 
     Raises WireError with the reason length, magic, version, kind, device or tag, and nothing else.
     """
-    if len(data) < HEAD.size:
-        raise WireError("length")
-    magic, version, kind, device_id, *_ = HEAD.unpack_from(data)
-    if magic != MAGIC:
-        raise WireError("magic")
-    if version != VERSION:
-        raise WireError("version")
-    layout = LAYOUTS.get(kind)
-    if layout is None:
-        raise WireError("kind")
-    if len(data) != layout.size:
-        raise WireError("length")
-    tagger = tagger_of(device_id)
+    found = read_head(data)
+    if isinstance(found, str):
+        raise WireError(found)
+    layout, head = found
+    tagger = tagger_of(head[0])
     if tagger is None:
         raise WireError("device")
     if not tagger.is_authentic(data):
