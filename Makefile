@@ -103,7 +103,7 @@ soak: $(VENV)/.ready-to-run debian-for-soak ## the whole box under load and trou
 lint: $(VENV)/.ready-to-test ## style, types and import contracts alone
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
-	@$(BIN)/mypy --strict -p appliance -p hw_sim
+	@$(BIN)/mypy --strict -p appliance -p hw_sim -p tools
 	@$(BIN)/lint-imports
 
 bench: $(VENV)/.ready-to-test ## the speed of everything that a tick does, as ratios in one run

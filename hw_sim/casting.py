@@ -1,4 +1,4 @@
-"""Who to be and how to move: sensors from the words of the command line."""
+"""Which sensors to emulate and how they move, from the command line."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class MotionKind(StrEnum):
 def choose_keys(
     path: Path, names: Sequence[str], count: int | None, say: Callable[[str], None]
 ) -> list[SensorKey]:
-    """The keys of the sensors to be: the named ones, the first `count`, or all.
+    """The keys of the emulated sensors: the named ones, the first `count`, or all.
 
-    Writes a new key file if there is none, and says so. Raises ValueError, KeyFileError, OSError.
+    Writes a new key file if there is none, and reports it. Raises ValueError, KeyFileError, OSError.
     """
     if names and count is not None:
         raise ValueError("give either --sensor or --count")
@@ -80,7 +80,7 @@ def cast_sensors(
 
 
 def name_and_motion(sensor: str) -> tuple[str, MotionKind | None]:
-    """NAME or NAME=MOTION. Raises ValueError for a motion that there is not."""
+    """NAME or NAME=MOTION. Raises ValueError for an unknown motion."""
     name, equals, kind = sensor.partition("=")
     if equals and kind not in list(MotionKind):
         raise ValueError(f"there is no motion {kind!r}; there are: {', '.join(MotionKind)}")

@@ -15,7 +15,7 @@ import typer
 
 from hw_sim import motions
 from hw_sim.casting import MOST_SENSORS, MotionKind, cast_sensors, choose_keys, name_and_motion, parse_axis
-from hw_sim.device import Way
+from hw_sim.device import Lane
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.emulator import Emulator, Sender
 from hw_sim.firmware import firmware_maker
@@ -44,16 +44,20 @@ def emulate(
     sensor: Annotated[
         list[str] | None,
         typer.Option(
-            help="Sensor to be, by its name; repeat for more. NAME=MOTION gives it a motion of its own."
+            help="Sensor to emulate, by name; repeat for more. NAME=MOTION gives it a motion of its own."
         ),
     ] = None,
     count: Annotated[
         int | None,
-        typer.Option(min=1, max=MOST_SENSORS, help="Be the first so many sensors of the key file; else all."),
+        typer.Option(
+            min=1, max=MOST_SENSORS, help="Emulate the first COUNT sensors of the key file; else all."
+        ),
     ] = None,
     motion: Annotated[MotionKind, typer.Option(help="How the sensors move.")] = MotionKind.turning,
     axis: Annotated[str, typer.Option(help="Axis x,y,z of turning and step.")] = "0,1,0",
-    seconds_per_turn: Annotated[float, typer.Option(help="Pace of turning; negative: the other way.")] = 5.0,
+    seconds_per_turn: Annotated[
+        float, typer.Option(help="Pace of turning; negative: the other direction.")
+    ] = 5.0,
     step_degrees: Annotated[float, typer.Option(help="How far a step jumps, at most 40.")] = 30.0,
     step_every: Annotated[float, typer.Option(min=0.04, help="Seconds from step to step.")] = 1.0,
     trace: Annotated[
@@ -68,7 +72,7 @@ def emulate(
         float,
         typer.Option(
             min=0.0,
-            help="Seconds that the dancer stands still once the sensor is heard: the box takes the neutral "
+            help="Seconds that the dancer stands still after the first reading: the box takes the neutral "
             "pose. 0: dances at once.",
         ),
     ] = 2.0,
@@ -89,7 +93,7 @@ def emulate(
         float, typer.Option(min=-5000, max=5000, help="How much too fast the sensors' clocks are.")
     ] = 0.0,
     seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="End after so long; else Ctrl-C ends it.")
+        float | None, typer.Option(min=0.0, help="End after this time; else Ctrl-C ends it.")
     ] = None,
     firmware: Annotated[
         bool,
@@ -100,9 +104,9 @@ def emulate(
         Path | None, typer.Option(help="Write a CSV line for each reading as it was sent.")
     ] = None,
 ) -> None:
-    """Be one to eight wearable sensors: they pair with the box, then send signed readings, 50 a second each.
+    """Emulate one to eight wearable sensors: they pair with the box, then send signed readings at 50 Hz each.
 
-    Both ways over a lifelike network, each sensor from an address of its own.
+    Packets cross a lifelike network in both directions, each sensor from an address of its own.
 
     \b
     Try the box without a sensor (it must read the same key file):
@@ -145,10 +149,10 @@ def emulate(
             reboot_every_s=reboot_every,
             make=firmware_maker() if firmware else EmulatedSensor,
         )
-        ways: list[dict[Way, Sender]] = [
-            {Way.NETWORK: UdpSender(host, port)}
+        senders: list[dict[Lane, Sender]] = [
+            {Lane.NETWORK: UdpSender(host, port)}
             if serial is None
-            else {Way.CABLE: SerialSender(str(serial), baud)}
+            else {Lane.CABLE: SerialSender(str(serial), baud)}
             for _ in sensors
         ]
     except (ValueError, OSError) as error:
@@ -159,7 +163,7 @@ def emulate(
         with (
             _stopped_by_signals() as should_stop,
             SendLog(log) if log is not None else nullcontext() as on_sent,
-            closing(Emulator(sensors, ways, network=on_air, on_sent=on_sent)) as emulator,
+            closing(Emulator(sensors, senders, network=on_air, on_sent=on_sent)) as emulator,
             StatusLine(where) as status,
         ):
             emulator.run(seconds, should_stop, lambda: status.show(emulator, time.monotonic()))
@@ -170,7 +174,7 @@ def emulate(
 
 @contextmanager
 def _stopped_by_signals() -> Iterator[Callable[[], bool]]:
-    """SIGTERM and Ctrl-C end the run after the datagram that is being sent."""
+    """SIGTERM and Ctrl-C end the run after the current datagram."""
     stopped: list[int] = []
     before = {
         number: signal.signal(number, lambda number, _: stopped.append(number))

@@ -1,4 +1,4 @@
-"""One wearable as the emulator runs it: what the emulated sensor and the compiled firmware have in common."""
+"""One wearable in the emulator: what emulated sensor and compiled firmware have in common."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hw_sim.motions import Quaternion
 from hw_sim.wearer import Wearer
 
 
-class Way(IntEnum):
+class Lane(IntEnum):
     """How a wearable reaches the box."""
 
     NETWORK = 0
@@ -24,7 +24,7 @@ class Sample(NamedTuple):
     boot_nonce: int
     sequence: int
     sampled_at: float
-    orientation: Quaternion  # how the hand really stood, stage axes
+    orientation: Quaternion  # of the hand itself, stage axes
     power_on_at: float  # of this boot
 
 
@@ -32,8 +32,8 @@ class Outgoing(NamedTuple):
     """A packet that leaves a wearable: signed, whole, without the framing of a cable."""
 
     data: bytes
-    way: Way
-    at: float  # when it left, seconds of the emulator's clock, not after the step that gave it
+    lane: Lane
+    at: float  # when it left, seconds of the emulator's clock, at most the time of its step
     sample: Sample | None = None  # of a reading; None for every other packet
 
 
@@ -41,7 +41,7 @@ class Device(Protocol):
     """A wearable. Time is an argument: seconds on the emulator's clock, never going back.
 
     name: as in the key file. reboots: power-ons after the first. light: what its lamp says, one word.
-    A new device is off and both its ways are down.
+    A new device is off and both its lanes are down.
     """
 
     name: str
@@ -55,16 +55,16 @@ class Device(Protocol):
         """When `step` has something to do next."""
 
     def start(self, now: float) -> None:
-        """Switched on at `now`, for the first time."""
+        """Switch on for the first time."""
 
-    def connect(self, way: Way, is_up: bool, now: float) -> None:
-        """The network is joined or lost, the cable plugged in or pulled out. Only said when it changes."""
+    def connect(self, lane: Lane, is_up: bool, now: float) -> None:
+        """The network is joined or lost, the cable plugged in or pulled out. Only called on a change."""
 
     def step(self, now: float) -> list[Outgoing]:
-        """What left since the last step. After a long sleep of the machine readings are left out."""
+        """What left since the last step. After a long sleep of the machine readings are skipped."""
 
-    def receive(self, data: bytes, now: float, way: Way) -> None:
-        """A packet that came from the box, perhaps damaged, repeated, or another sensor's. Never raises."""
+    def receive_packet(self, data: bytes, now: float, lane: Lane) -> None:
+        """Take a packet from the box, perhaps damaged, repeated or for another sensor. Never raises."""
 
     def close(self) -> None:
         """Free what it holds."""

@@ -8,16 +8,16 @@ from hashlib import blake2s
 
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
-from hw_sim.device import Outgoing, Sample, Way
+from hw_sim.device import Lane, Outgoing, Sample
 from hw_sim.motions import Quaternion
 from hw_sim.pairing import Pairing
 from hw_sim.wearer import Wearer
 
 PERIOD_US = 20_000
-RATES_US = ((100, 10_000), (50, PERIOD_US), (0, 40_000))  # at least so many a second asked for -> period
-IMU_START_US = 700_000  # the BNO055 gives nothing earlier after power-on
-REBOOT_S = 1.5  # off so long between two power-ons
-ASLEEP_S = 0.5  # further behind than this and readings are left out instead of sent in a burst
+RATES_US = ((100, 10_000), (50, PERIOD_US), (0, 40_000))  # lowest rate asked for -> period
+IMU_START_US = 700_000  # the BNO055's first reading after power-on
+REBOOT_S = 1.5  # off between two power-ons
+ASLEEP_S = 0.5  # further behind than this, readings are skipped instead of sent in a burst
 PROFILE_TIMES, PROFILE_EVERY_S = 3, 1.0
 CALIBRATED = 0xFF
 FIRMWARE = (1, 0, 0)
@@ -31,7 +31,7 @@ LIGHTS = {
 
 
 def fresh_boot_nonce() -> int:
-    """Not from the seed: a box that runs on would take a repeated power-on for a replay, and rightly so."""
+    """Not from the seed: a running box rightly takes a repeated power-on for a replay."""
     return secrets.randbits(32)
 
 
@@ -45,8 +45,8 @@ class EmulatedSensor:
     """A Device that speaks the whole protocol. Time is an argument: seconds on the emulator's clock.
 
     phase_s: when in the 20 ms grid it measures. drift_ppm: how much too fast its clock is. device_time_us:
-    what its clock says at power-on. reboot_every_s: switched off and on again that often; None: never.
-    profile: the calibration that it has, the BNO055's 22 offset bytes. taps: double taps since power-on.
+    its clock at power-on. reboot_every_s: time between power cycles; None: never. profile: its calibration,
+    the BNO055's 22 offset bytes. taps: double taps since power-on.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class EmulatedSensor:
         self._reboot_every_s = reboot_every_s
         self._device_time_us = device_time_us
         self._draw_nonce = boot_nonce
-        self._ways_up: set[Way] = set()
+        self._lanes_up: set[Lane] = set()
         self._pairing: Pairing | None = None  # None: switched off
         self._power_on_at = 0.0
         self._power_change_at = float("inf")
@@ -93,11 +93,11 @@ class EmulatedSensor:
 
     @property
     def is_linked(self) -> bool:
-        return self._pairing is not None and self._pairing.way is not None
+        return self._pairing is not None and self._pairing.lane is not None
 
     @property
     def light(self) -> str:
-        """What the lamp says: off, looking, or what the box wants."""
+        """The lamp: off, looking, or as the box sets it."""
         if self._pairing is None:
             return "off"
         return LIGHTS.get(self._pairing.led, "on") if self.is_linked else "looking"
@@ -116,10 +116,10 @@ class EmulatedSensor:
         self.switch_on(now)
 
     def switch_on(self, now: float) -> None:
-        """Power-on: nothing is left of the power-on before but its calibration."""
+        """Power on: only the calibration is left of the power-on before."""
         self._pairing = pairing = Pairing(self._draw_nonce())
-        for way in self._ways_up:
-            pairing.connect(way, True, now)
+        for lane in self._lanes_up:
+            pairing.connect(lane, True, now)
         self._power_on_at = now
         self._power_change_at = now + self._reboot_every_s if self._reboot_every_s else float("inf")
         self._grid_us = IMU_START_US
@@ -130,13 +130,13 @@ class EmulatedSensor:
         self._pairing = None
         self._power_change_at = now + seconds
 
-    def connect(self, way: Way, is_up: bool, now: float) -> None:
-        (self._ways_up.add if is_up else self._ways_up.discard)(way)
+    def connect(self, lane: Lane, is_up: bool, now: float) -> None:
+        (self._lanes_up.add if is_up else self._lanes_up.discard)(lane)
         if self._pairing is not None:
-            self._pairing.connect(way, is_up, now)
+            self._pairing.connect(lane, is_up, now)
 
     def save_profile(self, offsets: bytes, now: float) -> None:
-        """As after a calibration: the 22 bytes are in use, and told to the box once linked."""
+        """As after a calibration: use the 22 bytes, and send them to the box once linked."""
         self.profile, self._profiles_due, self._profile_at = offsets, PROFILE_TIMES, now
 
     def step(self, now: float) -> list[Outgoing]:
@@ -152,10 +152,10 @@ class EmulatedSensor:
             return []
         left = self._hellos(self._pairing, now)
         left += self._measure(self._pairing, now)
-        left += self._tell_profile(self._pairing, now)
+        left += self._due_profiles(self._pairing, now)
         return left
 
-    def receive(self, data: bytes, now: float, way: Way) -> None:
+    def receive_packet(self, data: bytes, now: float, lane: Lane) -> None:
         pairing = self._pairing
         if pairing is None:
             return
@@ -167,16 +167,16 @@ class EmulatedSensor:
             return
         match packet:
             case wire.Assignment():
-                pairing.take_assignment(packet, now, way)
+                pairing.take_assignment(packet, now, lane)
             case wire.Heartbeat():
                 pairing.take_heartbeat(packet, now)
             case wire.Call():
-                pairing.take_call(now, way)
+                pairing.take_call(now, lane)
             case wire.Restore() if packet.imu_id == self.imu_id and pairing.may_restore(now):
                 self.profile = self.profile or packet.offsets
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to free."""
 
     @property
     def _reading_at(self) -> float:
@@ -188,28 +188,28 @@ class EmulatedSensor:
 
     def _hellos(self, pairing: Pairing, now: float) -> list[Outgoing]:
         left = []
-        for at, way, sequence in pairing.due_hellos(now):
+        for at, lane, sequence in pairing.due_hellos(now):
             head = self._device_id, pairing.boot_nonce, pairing.session, sequence
             hello = wire.Hello(*head, self.wire_hash, *FIRMWARE, self.battery, self._flags, self.imu_id)
-            left.append(Outgoing(wire.pack(hello, self._tagger), way, at))
+            left.append(Outgoing(wire.pack(hello, self._tagger), lane, at))
         return left
 
     def _measure(self, pairing: Pairing, now: float) -> list[Outgoing]:
-        """The readings that are due; the grid goes on while there is nobody to send them to."""
+        """Readings that are due; the grid continues without a link."""
         period_us = next(period for rate, period in RATES_US if pairing.rate_hz >= rate)
         if now - self._reading_at > ASLEEP_S:
             missed = int((now - self._reading_at) * 1e6 * self._clock_rate / period_us)
             self._grid_us += missed * period_us
-            self._readings += missed if pairing.way is not None else 0
+            self._readings += missed if pairing.lane is not None else 0
         left = []
         while (at := self._reading_at) <= now:
-            if pairing.way is not None:
-                left.append(self._reading(pairing, pairing.way, at))
+            if pairing.lane is not None:
+                left.append(self._reading(pairing, pairing.lane, at))
             self._grid_us += period_us
         return left
 
-    def _reading(self, pairing: Pairing, way: Way, at: float) -> Outgoing:
-        self._wearer.heard(at)
+    def _reading(self, pairing: Pairing, lane: Lane, at: float) -> Outgoing:
+        self._wearer.reading_sent(at)
         orientation = self._wearer.orientation(at)
         sequence, self._readings = self._readings, self._readings + 1
         reading = wire.Reading(
@@ -227,10 +227,10 @@ class EmulatedSensor:
         )
         pairing.reading_sent(sequence, at)
         sample = Sample(self.name, pairing.boot_nonce, sequence, at, orientation, self._power_on_at)
-        return Outgoing(wire.pack(reading, self._tagger), way, at, sample)
+        return Outgoing(wire.pack(reading, self._tagger), lane, at, sample)
 
-    def _tell_profile(self, pairing: Pairing, now: float) -> list[Outgoing]:
-        if self.profile is None or pairing.way is None or not self._profiles_due or self._profile_at > now:
+    def _due_profiles(self, pairing: Pairing, now: float) -> list[Outgoing]:
+        if self.profile is None or pairing.lane is None or not self._profiles_due or self._profile_at > now:
             return []
         self._profiles_due -= 1
         self._profile_at = now + PROFILE_EVERY_S
@@ -239,4 +239,4 @@ class EmulatedSensor:
             *(self.imu_id, self.profile),
         )
         self._profiles += 1
-        return [Outgoing(wire.pack(packet, self._tagger), pairing.way, now)]
+        return [Outgoing(wire.pack(packet, self._tagger), pairing.lane, now)]

@@ -1,4 +1,4 @@
-"""Wearables and the network between them and the box: packets are made, carried, and handed over when due."""
+"""Wearables and the network between them and the box: makes packets, carries them, delivers them when due."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 from typing import NamedTuple, Protocol
 
-from hw_sim.device import Device, Outgoing, Sample, Way
+from hw_sim.device import Device, Lane, Outgoing, Sample
 from hw_sim.network import PERFECT, VenueNetwork
 
 LONGEST_SLEEP_S = 0.05  # a signal to stop is seen within this
-IDLE_S = 0.006  # what is not urgent, such as a status line, is done when so much time is left
+IDLE_S = 0.006  # time that must be left for what is not urgent, such as a status line
 
 
 class Sender(Protocol):
-    """One device's own way to the box, in both directions. Never waits, never raises."""
+    """One lane of one device to the box, in both directions. Never waits, never raises."""
 
     @property
     def is_up(self) -> bool:
-        """The network is there, the cable is plugged in."""
+        """Whether the network is there, or the cable plugged in."""
 
     @property
     def descriptor(self) -> int | None:
-        """What to wait on for packets from the box; None when there is nothing to wait on."""
+        """File descriptor for select; None without one."""
 
-    def send(self, data: bytes) -> bool:
-        """One packet; whether it could be sent."""
+    def send_packet(self, data: bytes) -> bool:
+        """Send one packet. Returns whether it left."""
 
-    def receive(self) -> bytes | None:
-        """The next packet from the box; None when none waits."""
+    def receive_packet(self) -> bytes | None:
+        """The next packet from the box; None without one."""
 
     def close(self) -> None: ...
 
 
 class Sent(NamedTuple):
-    """A reading as it was really sent, for whoever follows it."""
+    """A reading as it was sent."""
 
     sample: Sample
     sent_at: float  # read from the clock just before sending
@@ -46,17 +46,17 @@ class Sent(NamedTuple):
 
 
 class Emulator:
-    """One to eight wearables on one network, each with ways of its own to the box.
+    """One to eight wearables on one network, each with its own senders to the box.
 
-    `clock` and `sleep` stand in for the monotonic clock in tests; without `sleep` it listens while it waits.
-    For a thread or a process of its own use `run`; in step with something else use `start` and `step`.
+    `clock` and `sleep` replace the monotonic clock in tests; without `sleep` it receives while it waits.
+    Use `run` in a thread or process of its own, `start` and `step` in lockstep with something else.
     counts: packets sent, readings among them, unsent, and what the network did to them.
     """
 
     def __init__(
         self,
         devices: Sequence[Device],
-        ways: Sequence[Mapping[Way, Sender]],
+        senders: Sequence[Mapping[Lane, Sender]],
         *,
         network: VenueNetwork | None = None,
         on_sent: Callable[[Sent], None] | None = None,
@@ -65,31 +65,31 @@ class Emulator:
     ) -> None:
         self.devices = tuple(devices)
         self.counts: Counter[str] = Counter()
-        self._ways = tuple(ways)
-        self._is_up = [dict.fromkeys(senders, False) for senders in ways]
+        self._senders = tuple(senders)
+        self._is_up = [dict.fromkeys(own, False) for own in senders]
         self._network = network or VenueNetwork(PERFECT, 0)
         self._on_sent = on_sent
         self._clock = clock
         self._sleep = sleep or self._listen
         self._to_the_box: list[tuple[float, int, int, Outgoing, str]] = []
-        self._to_the_devices: list[tuple[float, int, int, Way, bytes]] = []
+        self._to_the_devices: list[tuple[float, int, int, Lane, bytes]] = []
         self._order = count()
 
     def start(self, now: float) -> None:
-        """All devices are switched on at `now`."""
+        """Switch all devices on."""
         for device in self.devices:
             device.start(now)
 
     def step(self, now: float) -> float:
-        """Makes, carries and hands over all that is due at `now`; gives when something is due next."""
+        """Make, carry and deliver all that is due at `now`. Returns when the next is due."""
         for number in range(len(self.devices)):
-            self._look_at_ways(number, now)
+            self._receive_from_box(number, now)
         while self._to_the_devices and self._to_the_devices[0][0] <= now:
-            _, _, number, way, data = heapq.heappop(self._to_the_devices)
-            self.devices[number].receive(data, now, way)
+            _, _, number, lane, data = heapq.heappop(self._to_the_devices)
+            self.devices[number].receive_packet(data, now, lane)
         for number, device in enumerate(self.devices):
             for outgoing in device.step(now):
-                self._put_on_the_way(number, outgoing)
+                self._carry(number, outgoing)
         while self._to_the_box and self._to_the_box[0][0] <= now:
             _, _, number, outgoing, note = heapq.heappop(self._to_the_box)
             self._send(number, outgoing, note)
@@ -103,7 +103,7 @@ class Emulator:
         should_stop: Callable[[], bool] = lambda: False,
         when_idle: Callable[[], None] = lambda: None,
     ) -> None:
-        """Runs in real time, on absolute deadlines, for `seconds` or until `should_stop`."""
+        """Run in real time, on absolute deadlines, for `seconds` or until `should_stop`."""
         now = self._clock()
         end = now + seconds if seconds is not None else float("inf")
         self.start(now)
@@ -117,26 +117,26 @@ class Emulator:
             now = self._clock()
 
     def close(self) -> None:
-        """Devices and their ways."""
+        """Close devices and senders."""
         for device in self.devices:
             device.close()
-        for senders in self._ways:
+        for senders in self._senders:
             for sender in senders.values():
                 sender.close()
 
-    def _look_at_ways(self, number: int, now: float) -> None:
-        """What the box sent to one device is on its way; a cable may have come or gone."""
-        for way, sender in self._ways[number].items():
-            while (data := sender.receive()) is not None:
+    def _receive_from_box(self, number: int, now: float) -> None:
+        """Carry what the box sent to one device; note a cable that came or went."""
+        for lane, sender in self._senders[number].items():
+            while (data := sender.receive_packet()) is not None:
                 for delivery in self._network.carry(data, now, number, to_box=False):
                     if delivery.note != "lost":
-                        arrival = delivery.at, next(self._order), number, way, delivery.data
+                        arrival = delivery.at, next(self._order), number, lane, delivery.data
                         heapq.heappush(self._to_the_devices, arrival)
-            if sender.is_up != self._is_up[number][way]:
-                self._is_up[number][way] = sender.is_up
-                self.devices[number].connect(way, sender.is_up, now)
+            if sender.is_up != self._is_up[number][lane]:
+                self._is_up[number][lane] = sender.is_up
+                self.devices[number].connect(lane, sender.is_up, now)
 
-    def _put_on_the_way(self, number: int, outgoing: Outgoing) -> None:
+    def _carry(self, number: int, outgoing: Outgoing) -> None:
         for delivery in self._network.carry(outgoing.data, outgoing.at, number):
             if delivery.note == "lost":
                 self.counts["lost"] += 1
@@ -145,9 +145,9 @@ class Emulator:
             heapq.heappush(self._to_the_box, (delivery.at, next(self._order), number, carried, delivery.note))
 
     def _send(self, number: int, outgoing: Outgoing, note: str) -> None:
-        sender = self._ways[number].get(outgoing.way)
+        sender = self._senders[number].get(outgoing.lane)
         sent_at = self._clock()
-        if sender is None or not sender.send(outgoing.data):
+        if sender is None or not sender.send_packet(outgoing.data):
             self.counts["unsent"] += 1
             return
         self.counts["sent"] += 1
@@ -159,6 +159,6 @@ class Emulator:
                 self._on_sent(Sent(outgoing.sample, sent_at, note))
 
     def _listen(self, seconds: float) -> None:
-        """Waits, but not longer than until a packet comes: the box's answers shall not wait for a reading."""
-        descriptors = (sender.descriptor for senders in self._ways for sender in senders.values())
+        """Wait, but wake for a packet: the box's answers must not wait for a reading."""
+        descriptors = (sender.descriptor for senders in self._senders for sender in senders.values())
         select.select([one for one in descriptors if one is not None], [], [], seconds)

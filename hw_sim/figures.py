@@ -33,7 +33,7 @@ FEW = {"p50": 50.0, "max": 100.0}
 @dataclass(frozen=True)
 class Evidence:
     """Everything that was measured: in phase, running free, with a sensor that is switched off and on, and
-    with a box that is killed and started anew."""
+    with a box that is killed and restarted."""
 
     locked: Run
     free: Run
@@ -42,7 +42,7 @@ class Evidence:
     firmware: bool = False  # the compiled firmware was the sensor, and joined a simulated Wi-Fi each time
 
     @property
-    def ways(self) -> tuple[Transport, Transport]:
+    def transports(self) -> tuple[Transport, Transport]:
         """The transport of the phase-locked and of the free run."""
         return _transport(self.locked, _settling_s(self.locked)), _transport(self.free, FREE_SETTLING_S)
 
@@ -76,7 +76,7 @@ class Limit(NamedTuple):
 
 def figures_of(evidence: Evidence) -> dict[str, Any]:
     """All figures; milliseconds, seconds and megabytes as their names say, None where nothing came."""
-    locked, (way, free_way) = evidence.locked, evidence.ways
+    locked, (way, free_way) = evidence.locked, evidence.transports
     standing = [moment for moment in steps(locked.readings) if moment >= locked.stood_from + 0.5]
     response = response_ms(standing, locked.frames)
     costs_ms: Floats = locked.ticks["sections_ms"].sum(axis=1).astype(np.float64)

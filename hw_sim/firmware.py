@@ -9,7 +9,7 @@ from collections import Counter
 from appliance.sensor import wire
 from appliance.sensor.framing import Deframer, frame
 from appliance.sensor.keys import SensorKey
-from hw_sim.device import DeviceMaker, Outgoing, Sample, Way
+from hw_sim.device import DeviceMaker, Lane, Outgoing, Sample
 from hw_sim.emulated_sensor import ASLEEP_S, REBOOT_S, sensor_axes
 from hw_sim.firmware_library import CompiledWearable, State
 from hw_sim.wearer import Wearer
@@ -19,19 +19,19 @@ BOX = (0x7F000001, 9750)  # where the box is, as the simulated radio sees it
 STEP_S = 0.002
 ANSWER_WITHIN_US = 1_000_000
 POLL_US = 5_000
-LANES = {0: Way.NETWORK, 1: Way.CABLE}
+LANES = {0: Lane.NETWORK, 1: Lane.CABLE}
 # The lamp by the seconds from flash to flash, see docs/dancer.md.
 LIGHTS = ((0.15, "strobe"), (0.5, "fast"), (1.6, "slow"), (4.0, "on"))
 
 
 class ProvisioningError(ValueError):
-    """The firmware's console refused what a box would tell it; the message has its answer."""
+    """The firmware's console refused a command; the message has its answer."""
 
 
 def provision(
     key: SensorKey, *, port: int = BOX[1], network: str = NETWORK, password: str = PASSWORD, seed: int = 1
 ) -> bytes:
-    """The flash of a wearable after `bunraku provision`, by way of the console on its simulated cable.
+    """The flash of a wearable after `bunraku provision`, through the console on its simulated cable.
 
     Raises FirmwareMissingError, ProvisioningError.
     """
@@ -58,7 +58,7 @@ def provision(
 
 
 def ask(wearable: CompiledWearable, line: str) -> str:
-    """Types a line into the console and gives its answer; "" when there is none within a second."""
+    """Type a line into the console. Returns its answer, or "" after a second without one."""
     wearable.put_serial(line.encode() + b"\n")
     received = b""
     now_us = wearable.status.now_us
@@ -73,9 +73,9 @@ def ask(wearable: CompiledWearable, line: str) -> str:
 
 
 def firmware_maker(seed: int | None = None) -> DeviceMaker:
-    """Makes wearables for the emulator. The same seed gives the same bytes; None: each run is another one.
+    """Makes wearables for the emulator. The same seed gives the same bytes; None: each run differs.
 
-    A box that runs on would take a power-on with the same bytes for a replay, and rightly so.
+    A running box rightly takes a power-on with the same bytes for a replay.
     """
 
     def make(
@@ -92,7 +92,7 @@ def firmware_maker(seed: int | None = None) -> DeviceMaker:
 class FirmwareSensor:
     """A Device around one CompiledWearable; the emulator's seconds are its virtual time.
 
-    phase_s: how much later than the others it is switched on. seed: of all chance in its world.
+    phase_s: its delay at power-on. seed: of all randomness in its world.
     Raises FirmwareMissingError, ProvisioningError.
     """
 
@@ -114,11 +114,11 @@ class FirmwareSensor:
         self._reboot_every_s = reboot_every_s
         self._seed = seed
         self._flash = provision(key, seed=seed + 1)
-        self._wearable: CompiledWearable | None = None  # None: before the first power-on
+        self._wearable: CompiledWearable | None = None  # None before the first power-on
         self._now = 0.0
         self._power_on_at = 0.0
         self._power_change_at = float("inf")
-        self._ways_up: set[Way] = set()
+        self._lanes_up: set[Lane] = set()
         self._deframer = Deframer(Counter())
         self._to_leave: list[Outgoing] = []
         self._flashes: tuple[float, float] = (float("-inf"), float("-inf"))  # the newest two
@@ -130,7 +130,7 @@ class FirmwareSensor:
 
     @property
     def light(self) -> str:
-        """off; looking for its network or its box; else what the lamp itself shows."""
+        """off; looking (for network or box); else what the lamp shows."""
         status = self.wearable.status
         if not status.is_on:
             return "off"
@@ -151,8 +151,8 @@ class FirmwareSensor:
             self._flash, seed=self._seed, start_us=_us(now), drift_ppm=self._drift_ppm
         )
         self._wearable.set_network(NETWORK, PASSWORD)
-        for way in self._ways_up:
-            self._connect(way, True, now)
+        for lane in self._lanes_up:
+            self._connect(lane, True, now)
         self._power_change_at = now + self._phase_s
 
     def switch_off(self, now: float, seconds: float = float("inf")) -> None:
@@ -160,10 +160,10 @@ class FirmwareSensor:
         self.wearable.power(False)
         self._power_change_at = now + seconds
 
-    def connect(self, way: Way, is_up: bool, now: float) -> None:
-        (self._ways_up.add if is_up else self._ways_up.discard)(way)
+    def connect(self, lane: Lane, is_up: bool, now: float) -> None:
+        (self._lanes_up.add if is_up else self._lanes_up.discard)(lane)
         if self._wearable is not None:
-            self._connect(way, is_up, now)
+            self._connect(lane, is_up, now)
 
     def step(self, now: float) -> list[Outgoing]:
         while self._now < now:
@@ -177,8 +177,8 @@ class FirmwareSensor:
         self._to_leave = [one for one in self._to_leave if one.at > now]
         return left
 
-    def receive(self, data: bytes, now: float, way: Way) -> None:
-        if way == Way.CABLE:
+    def receive_packet(self, data: bytes, now: float, lane: Lane) -> None:
+        if lane == Lane.CABLE:
             self.wearable.put_serial(b"\0" + frame(data))
         else:
             self.wearable.put_datagram(BOX, data)
@@ -187,8 +187,8 @@ class FirmwareSensor:
         if self._wearable is not None:
             self._wearable.close()
 
-    def _connect(self, way: Way, is_up: bool, now: float) -> None:
-        if way == Way.CABLE:
+    def _connect(self, lane: Lane, is_up: bool, now: float) -> None:
+        if lane == Lane.CABLE:
             self.wearable.connect_cable(is_up)
         else:
             self.wearable.set_access_point(is_up, _us(now))
@@ -205,23 +205,23 @@ class FirmwareSensor:
         self._power_change_at = at + self._reboot_every_s if self._reboot_every_s else float("inf")
 
     def _collect(self) -> None:
-        """What left: packets by both ways, and flashes of the lamp."""
+        """Collect what left: packets on both lanes, and flashes of the lamp."""
         for at_us, _, data in self.wearable.take_datagrams():
-            self._leave(data, Way.NETWORK, at_us * 1e-6)
+            self._leave(data, Lane.NETWORK, at_us * 1e-6)
         for data in self._deframer.feed(self.wearable.take_serial()):
-            self._leave(data, Way.CABLE, self.wearable.status.now_us * 1e-6)
+            self._leave(data, Lane.CABLE, self.wearable.status.now_us * 1e-6)
         for at_us, is_on in self.wearable.take_light():
             if is_on:
                 self._flashes = self._flashes[1], at_us * 1e-6
 
-    def _leave(self, data: bytes, way: Way, at: float) -> None:
+    def _leave(self, data: bytes, lane: Lane, at: float) -> None:
         sample = self._sample(data) if len(data) == wire.READING.size else None
         if sample is not None:
-            self._wearer.heard(at)
-        self._to_leave.append(Outgoing(data, way, at, sample))
+            self._wearer.reading_sent(at)
+        self._to_leave.append(Outgoing(data, lane, at, sample))
 
     def _sample(self, data: bytes) -> Sample:
-        """The reading in a packet, with how the hand really stood when the device clock says it measured."""
+        """The reading in a packet, with the hand's true orientation at its device time."""
         _, _, _, _, boot_nonce, _, sequence = wire.HEAD.unpack_from(data)
         device_s = int.from_bytes(data[wire.HEAD.size : wire.HEAD.size + 4], "little") * 1e-6
         booted_at = self.wearable.status.booted_at_us * 1e-6

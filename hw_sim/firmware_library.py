@@ -23,7 +23,7 @@ SERIAL_ROOM = 4096
 
 
 class FirmwareMissingError(OSError):
-    """The firmware was not compiled; the message is for the person who wants it."""
+    """The firmware was not compiled; the message says how to."""
 
 
 class State(IntEnum):
@@ -85,7 +85,7 @@ Status._fields_ = [
 
 
 class SentDatagram(NamedTuple):
-    """What the wearable handed to its radio, and to whom: (IPv4 address as a number, port)."""
+    """A datagram from the wearable's radio, and its destination: (IPv4 address as a number, port)."""
 
     at_us: int
     address: tuple[int, int]
@@ -143,7 +143,7 @@ class CompiledWearable:
         self._library.wearable_set_network(self._world, name.encode(), password.encode())
 
     def set_access_point(self, is_on: bool, at_us: int) -> None:
-        """From then on; may be told before it comes, which matters to a join that blocks meanwhile."""
+        """From that time on; announce it ahead for the sake of a join that blocks meanwhile."""
         self._library.wearable_set_access_point(self._world, is_on, at_us)
 
     def set_stale(self, least_s: float, most_s: float) -> None:
@@ -190,12 +190,12 @@ class CompiledWearable:
         self._library.wearable_double_tap(self._world)
 
     def inject(self, fault: str, times: int = 1) -> None:
-        """A fault of the IMU strikes so often, from now on; the names are in firmware/host/trouble.cpp."""
+        """Inject this many faults into the IMU; their names are in firmware/host/trouble.cpp."""
         if not self._library.wearable_inject(self._world, fault.encode(), times):
             raise ValueError(f"the simulated IMU has no fault {fault!r}")
 
     def set_trouble(self, trouble: str, amount: float) -> None:
-        """How bad something is until set anew: a share, a rate, 1 and 0. Names as for `inject`, and more."""
+        """Set how bad something is: a share, a rate, 1 and 0. Names as for `inject`, and more."""
         if not self._library.wearable_set_trouble(self._world, trouble.encode(), amount):
             raise ValueError(f"the simulated wearable has no trouble {trouble!r}")
 

@@ -36,7 +36,7 @@ class Frame(NamedTuple):
 
 
 class Restart(NamedTuple):
-    """The box killed and started anew while a sensor runs on; monotonic seconds."""
+    """The box killed and restarted while a sensor keeps running; monotonic seconds."""
 
     killed_at: float
     started_at: float
@@ -44,7 +44,7 @@ class Restart(NamedTuple):
 
 
 class Transport(NamedTuple):
-    """Each reading's way: when it was sent (s), how long until a frame knew it (ms)."""
+    """Each reading's transport: when it was sent (s), how long until a frame used it (ms)."""
 
     sent_at: Floats
     latency_ms: Floats

@@ -48,7 +48,7 @@ def measure(
 
     Two runs: the tick in phase with the sensor, then running free while the sensor's clock drifts through one
     whole beat, so that every offset between the two counts alike. Then how soon a reading is used after the
-    sensor's power-on, and after the box was killed and started anew. Exit status 0 when all limits hold, else
+    sensor's power-on, and after the box was killed and restarted. Exit status 0 when all limits hold, else
     1.
     """
     try:

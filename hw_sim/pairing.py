@@ -1,15 +1,15 @@
-"""The wearable's side of pairing, as the firmware does it: when to say hello, and whom to believe."""
+"""The wearable's side of pairing, as in the firmware: when to send hellos, which answers count."""
 
 from __future__ import annotations
 
 from appliance.sensor import wire
-from hw_sim.device import Way
+from hw_sim.device import Lane
 
 HELLO_EVERY_S = 0.5
-HELLO_AFTER_CALL_S = 0.2  # at most one so often, whoever calls
-LOST_S = 3.0  # nothing from the box for so long: look for it again
+HELLO_AFTER_CALL_S = 0.2  # shortest time between two answers to calls
+LOST_S = 3.0  # without a packet from the box for this long, look for it again
 ANSWERED_HELLOS = 4  # an assignment answers the newest hello or one of the three before
-RESTORE_S = 10.0  # a calibration from the box counts for so long after the assignment
+RESTORE_S = 10.0  # how long after the assignment a calibration from the box counts
 REMEMBERED_READINGS = 64
 LONGEST_ROUND_TRIP = wire.ROUND_TRIP_UNKNOWN - 1  # 0.1 ms
 
@@ -17,18 +17,18 @@ LONGEST_ROUND_TRIP = wire.ROUND_TRIP_UNKNOWN - 1  # 0.1 ms
 class Pairing:
     """One power-on: from the first hello to the last heartbeat. Time is an argument, in seconds.
 
-    way: the link's, None while it is looking for the box. session, led: as the box said last.
+    lane: the link's; None while looking for the box. session, led: the newest from the box.
     """
 
     def __init__(self, boot_nonce: int) -> None:
         self.boot_nonce = boot_nonce
-        self.way: Way | None = None
+        self.lane: Lane | None = None
         self.session = 0
         self.led = wire.LED_OFF
         self.rate_hz = 50
         self.round_trip = wire.ROUND_TRIP_UNKNOWN
-        self._ways_up: set[Way] = set()
-        self._hello_at: dict[Way, float] = {}  # when the next one is due, for each way that needs one
+        self._lanes_up: set[Lane] = set()
+        self._hello_at: dict[Lane, float] = {}  # when the next one is due, for each lane that needs one
         self._hellos = 0
         self._answered_hello = -1
         self._hello_after_call = -HELLO_AFTER_CALL_S
@@ -41,62 +41,62 @@ class Pairing:
     def next_at(self) -> float:
         """When a hello is due, or the box counts as lost."""
         due = list(self._hello_at.values())
-        if self.way is not None:
+        if self.lane is not None:
             due.append(self._heard + LOST_S)
         return min(due, default=float("inf"))
 
-    def connect(self, way: Way, is_up: bool, now: float) -> None:
-        """A way to the box has come up, or is gone."""
+    def connect(self, lane: Lane, is_up: bool, now: float) -> None:
+        """A lane to the box came up or went down."""
         if is_up:
-            self._ways_up.add(way)
-            if self.way is None or way > self.way:
-                self._hello_at[way] = now
+            self._lanes_up.add(lane)
+            if self.lane is None or lane > self.lane:
+                self._hello_at[lane] = now
         else:
-            self._ways_up.discard(way)
-            self._hello_at.pop(way, None)
-            if self.way == way:
+            self._lanes_up.discard(lane)
+            self._hello_at.pop(lane, None)
+            if self.lane == lane:
                 self._look_for_the_box(now)
 
-    def due_hellos(self, now: float) -> list[tuple[float, Way, int]]:
-        """The hellos to say now: when each was due, its way, its sequence number."""
-        if self.way is not None and now - self._heard >= LOST_S:
+    def due_hellos(self, now: float) -> list[tuple[float, Lane, int]]:
+        """The hellos that are due: time, lane, sequence number."""
+        if self.lane is not None and now - self._heard >= LOST_S:
             self._look_for_the_box(self._heard + LOST_S)
         hellos = []
-        for way, at in sorted(self._hello_at.items()):
+        for lane, at in sorted(self._hello_at.items()):
             if at > now:
                 continue
-            hellos.append((at, way, self._hellos))
+            hellos.append((at, lane, self._hellos))
             self._hellos += 1
-            if self.way is None or way > self.way:
+            if self.lane is None or lane > self.lane:
                 missed = int((now - at) / HELLO_EVERY_S)
-                self._hello_at[way] = at + (missed + 1) * HELLO_EVERY_S
+                self._hello_at[lane] = at + (missed + 1) * HELLO_EVERY_S
             else:
-                del self._hello_at[way]  # the box had called; one hello is the answer
+                del self._hello_at[lane]  # one hello answers a call
         return hellos
 
     def reading_sent(self, sequence: int, at: float) -> None:
-        """Remembered for the round trip."""
+        """Note when a reading left, for the round trip."""
         self._sent_at[sequence] = at
         self._sent_at.pop(sequence - REMEMBERED_READINGS, None)
 
-    def take_assignment(self, packet: wire.Assignment, now: float, way: Way) -> bool:
-        """Follow it, if it answers one of the newest hellos. The way on which it came becomes the link's."""
+    def take_assignment(self, packet: wire.Assignment, now: float, lane: Lane) -> bool:
+        """Accept it if it answers one of the newest hellos. Its lane becomes the link's."""
         newest = self._hellos - 1
         is_answer = max(newest - ANSWERED_HELLOS, self._answered_hello) < packet.hello_sequence <= newest
-        if not is_answer or not packet.session or way not in self._ways_up:
+        if not is_answer or not packet.session or lane not in self._lanes_up:
             return False
         self._answered_hello = packet.hello_sequence
         if packet.session != self.session:
             self.session = packet.session
             self._heartbeats = -1
-        self.way, self.led, self.rate_hz = way, packet.led, packet.rate_hz
+        self.lane, self.led, self.rate_hz = lane, packet.led, packet.rate_hz
         self._heard = self._assigned = now
-        self._hello_at = {other: at for other, at in self._hello_at.items() if other > way}
+        self._hello_at = {other: at for other, at in self._hello_at.items() if other > lane}
         return True
 
     def take_heartbeat(self, packet: wire.Heartbeat, now: float) -> None:
-        """The box is there; believed in the link's session and in rising order only."""
-        if self.way is None or packet.session != self.session or packet.sequence <= self._heartbeats:
+        """Accept it in the link's session and in rising order only."""
+        if self.lane is None or packet.session != self.session or packet.sequence <= self._heartbeats:
             return
         self._heartbeats = packet.sequence
         self._heard = now
@@ -106,16 +106,16 @@ class Pairing:
             round_trip = round(1e4 * (now - sent_at - packet.echo_held_us * 1e-6))
             self.round_trip = min(max(round_trip, 0), LONGEST_ROUND_TRIP)
 
-    def take_call(self, now: float, way: Way) -> None:
-        """The box was started anew and does not know the session: hello at once, streaming goes on."""
-        if way in self._ways_up and now - self._hello_after_call >= HELLO_AFTER_CALL_S:
+    def take_call(self, now: float, lane: Lane) -> None:
+        """The restarted box does not know the session: hello at once, streaming continues."""
+        if lane in self._lanes_up and now - self._hello_after_call >= HELLO_AFTER_CALL_S:
             self._hello_after_call = now
-            self._hello_at[way] = now
+            self._hello_at[lane] = now
 
     def may_restore(self, now: float) -> bool:
         """Whether a calibration from the box still counts."""
-        return self.way is not None and now - self._assigned < RESTORE_S
+        return self.lane is not None and now - self._assigned < RESTORE_S
 
     def _look_for_the_box(self, now: float) -> None:
-        self.way = None
-        self._hello_at = dict.fromkeys(self._ways_up, now)
+        self.lane = None
+        self._hello_at = dict.fromkeys(self._lanes_up, now)

@@ -1,4 +1,4 @@
-"""Box and emulator as the real processes that a measurement runs: how they are started, heard and stopped."""
+"""Box and emulator as the real processes of a measurement: start, receive, stop."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ ENDS_WITHIN_S = 10.0
 FRAME = b"/bunraku/frame\0"
 PRIORITY = 50  # below the box's: the receiver's clock readings matter, the box's ticks matter more
 _PORTS = range(20000, 32000)  # below Linux' net.ipv4.ip_local_port_range
-_CHANCE = random.SystemRandom()  # whoever sets a seed, two runs beside each other do not choose the same
+_CHANCE = random.SystemRandom()  # unseeded, so that two runs at once choose different ports
 STEP_EVERY_S = 0.6
 STEP_DEGREES = 40.0
 
@@ -36,9 +36,9 @@ class ProbeError(RuntimeError):
 
 @dataclass(frozen=True)
 class Setting:
-    """What is measured: a show, settings of the venue's box file, the key file, whose way is followed.
+    """What is measured: a show, settings of the venue's box file, keys, the followed sensor and its joint.
 
-    firmware: the compiled firmware is the sensor, instead of the one in Python.
+    firmware: the sensor runs the compiled firmware instead of the one in Python.
     """
 
     show: Path
@@ -56,7 +56,7 @@ def play_command(setting: Setting, box: Path) -> list[str]:
 
 
 def emulate_command(setting: Setting, port: int, log: Path, *options: str) -> list[str]:
-    """The sensor that is followed, on a venue's network."""
+    """The followed sensor, on a venue's network."""
     return [
         *(sys.executable, "-m", "hw_sim", "emulate", "--sensor", setting.sensor, "--keys", str(setting.keys)),
         *("--motion", "step", "--step-degrees", str(STEP_DEGREES), "--step-every", str(STEP_EVERY_S)),
@@ -81,20 +81,26 @@ def write_box_file(setting: Setting, folder: Path, ports: tuple[int, int, int], 
     return path
 
 
-def first_frame(receiver: OscReceiver, stage: subprocess.Popen[bytes], words: Path) -> float:
-    """Wait for it; when it arrived, monotonic seconds."""
+def first_frame(
+    receiver: OscReceiver,
+    stage: subprocess.Popen[bytes],
+    words: Path,
+    is_awaited: Callable[[bytes], bool] = lambda frame: True,
+    what: str = "frame came",
+) -> float:
+    """Wait for the first frame that `is_awaited`. Returns its arrival, monotonic seconds."""
     until = time.monotonic() + STARTS_WITHIN_S
     while time.monotonic() < until:
         for arrival, datagram in receiver.poll_datagrams(0.02):
-            if datagram.startswith(FRAME):
+            if datagram.startswith(FRAME) and is_awaited(datagram):
                 return arrival
         if stage.poll() is not None:
             raise ProbeError(f"The box does not dance:\n{words.read_text().strip()}")
-    raise ProbeError(f"No frame came within {STARTS_WITHIN_S:g} s:\n{words.read_text().strip()}")
+    raise ProbeError(f"No {what} within {STARTS_WITHIN_S:g} s:\n{words.read_text().strip()}")
 
 
 def first_reading(emulator: subprocess.Popen[bytes], log: Path, words: Path) -> None:
-    """Wait for it; then the emulator stands for what it emulates: hardware that waits for no processor."""
+    """Wait for it; then give the emulator real-time priority, as hardware waits for no processor."""
     until = time.monotonic() + STARTS_WITHIN_S
     while not (log.exists() and log.read_bytes().count(b"\n") > 1):
         if emulator.poll() is not None or time.monotonic() > until:
@@ -105,20 +111,20 @@ def first_reading(emulator: subprocess.Popen[bytes], log: Path, words: Path) -> 
 
 
 def stop(stage: subprocess.Popen[bytes], words: Path) -> None:
-    """Ask the box to end. Raises ProbeError when it does not, or not well."""
+    """Stop the box. Raises ProbeError when it does not end, or ends with an error."""
     with contextlib.suppress(ProcessLookupError):
         stage.send_signal(signal.SIGTERM)
     try:
         status = stage.wait(ENDS_WITHIN_S)
     except subprocess.TimeoutExpired:
-        raise ProbeError("The box does not end when it is asked to.") from None
+        raise ProbeError("The box does not end after SIGTERM.") from None
     if status != 0:
         raise ProbeError(f"The box ended with status {status}:\n{words.read_text().strip()}")
 
 
 @contextlib.contextmanager
 def process(command: Sequence[str], words: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Runs inside; what it says goes into the file `words`."""
+    """Runs inside the context; its output goes into the file `words`."""
     with words.open("ab") as out:
         running = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
         try:
@@ -134,7 +140,7 @@ def process(command: Sequence[str], words: Path) -> Iterator[subprocess.Popen[by
 
 @contextlib.contextmanager
 def listening_closely() -> Iterator[None]:
-    """Real-time priority for the receiver, where it can be had; processes that it starts are ordinary."""
+    """Real-time priority for the receiver, if allowed; its child processes stay ordinary."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
     except OSError:
@@ -147,13 +153,13 @@ def listening_closely() -> Iterator[None]:
 
 
 def free_ports(count: int, kind: socket.SocketKind = socket.SOCK_DGRAM) -> list[int]:
-    """Ports that nobody uses just now, UDP ones as a rule; none that the kernel gives to who asks for any."""
+    """Free ports, UDP by default, outside the range from which the kernel assigns."""
     with contextlib.ExitStack() as opened:
         ports: list[int] = []
         while len(ports) < count:
             port = _CHANCE.choice(_PORTS)
             one = opened.enter_context(socket.socket(socket.AF_INET, kind))
-            with contextlib.suppress(OSError):  # somebody has it
+            with contextlib.suppress(OSError):  # in use
                 one.bind(("0.0.0.0", port))
                 ports.append(port)
         return ports

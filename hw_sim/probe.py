@@ -1,4 +1,4 @@
-"""Measured runs: the emulator and the box as real processes, and a receiver that listens closely."""
+"""Measured runs: emulator and box as real processes, and a receiver with precise time stamps."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from hw_sim.osc_receiver import OscReceiver, decode
 from hw_sim.peers import (
     FRAME,
     HOST,
-    STARTS_WITHIN_S,
-    ProbeError,
     Setting,
     emulate_command,
     first_frame,
@@ -37,12 +35,12 @@ from hw_sim.peers import (
 
 PLAYER_STOP = b"/player/stop\0\0\0\0,\0\0\0"
 POSE = b"/mocap/0/joint/rot_local\0"
-STEADY_S = 1.0  # the box dances with the sensor for so long before it is killed
+STEADY_S = 1.0  # how long the box dances with the sensor before it is killed
 
 
 @dataclass(frozen=True)
 class Course:
-    """How one run goes. In its last `standing_s` the phrase stands still, so that steps show alone."""
+    """Plan of one run. In its last `standing_s` the phrase stands still, so that only steps show."""
 
     name: str
     seconds: float
@@ -55,7 +53,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Run:
-    """What one run left behind; times in monotonic seconds."""
+    """The record of one run; times in monotonic seconds."""
 
     frames: list[Frame]
     readings: list[Reading]
@@ -67,7 +65,7 @@ class Run:
 
 
 def run(setting: Setting, course: Course) -> Run:
-    """Start box and emulator, watch, stop both. Raises ProbeError when the box does not dance."""
+    """Start box and emulator, record, stop both. Raises ProbeError when the box does not dance."""
     folder = setting.scratch / course.name
     folder.mkdir()
     sensors, control = free_ports(2)
@@ -99,7 +97,7 @@ def run(setting: Setting, course: Course) -> Run:
 
 
 def run_restarts(setting: Setting, times: int) -> list[Restart]:
-    """Kill the box and start it anew, so often, while the sensor runs on. Raises ProbeError."""
+    """Kill and restart the box `times` times while the sensor keeps running. Raises ProbeError."""
     folder = setting.scratch / "restarts"
     folder.mkdir()
     sensors, control = free_ports(2)
@@ -113,7 +111,7 @@ def run_restarts(setting: Setting, times: int) -> list[Restart]:
                 receiver.poll_datagrams()  # the last frames of the box before
                 started_at = time.monotonic()
                 with process(play_command(setting, box), words) as stage:
-                    used_at = _first_frame_with_reading(receiver, stage, words)
+                    used_at = first_frame(receiver, stage, words, _has_reading, "reading was used")
                     if killed_at is not None:
                         restarts.append(Restart(killed_at, started_at, used_at))
                     else:
@@ -129,22 +127,10 @@ def _options(course: Course) -> list[str]:
     return options + (["--reboot-every", str(course.reboot_every_s)] if course.reboot_every_s else [])
 
 
-def _first_frame_with_reading(receiver: OscReceiver, stage: subprocess.Popen[bytes], words: Path) -> float:
-    """When the first frame came that carries a reading of the sensor, monotonic seconds."""
-    until = time.monotonic() + STARTS_WITHIN_S
-    while time.monotonic() < until:
-        for arrival, datagram in receiver.poll_datagrams(0.02):
-            if datagram.startswith(FRAME) and _mark(datagram)[2] >= 0:
-                return arrival
-        if stage.poll() is not None:
-            raise ProbeError(f"The box does not dance:\n{words.read_text().strip()}")
-    raise ProbeError(f"No reading was used within {STARTS_WITHIN_S:g} s:\n{words.read_text().strip()}")
-
-
 def _watch(
     receiver: OscReceiver, stage: subprocess.Popen[bytes], course: Course, control: int
 ) -> tuple[list[tuple[float, bytes]], float, float]:
-    """Collect datagrams for the course's time; the box's memory (MB); since when the phrase stands."""
+    """Collect datagrams for the course. Returns them, the box's memory (MB) and when the phrase stopped."""
     datagrams: list[tuple[float, bytes]] = []
     rss_mb, end = 0.0, time.monotonic() + course.seconds
     stand_at, look_at, stood_from = end - course.standing_s, 0.0, float("inf")
@@ -172,6 +158,10 @@ def _frames(datagrams: Sequence[tuple[float, bytes]], joint: int) -> list[Frame]
             frames.append(Frame(at, int(tick), int(sequence), bool(late), np.array(numbers, float)))
             mark = None
     return frames
+
+
+def _has_reading(datagram: bytes) -> bool:
+    return bool(_mark(datagram)[2] >= 0)
 
 
 def _mark(datagram: bytes) -> list[Any]:

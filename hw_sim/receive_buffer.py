@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import socket
 
-_SO_RCVBUFFORCE = 33  # Linux, asm-generic/socket.h: beyond what net.core.rmem_max allows everybody
+_SO_RCVBUFFORCE = 33  # Linux, asm-generic/socket.h: beyond net.core.rmem_max
 
 
 def widen(one: socket.socket, size: int) -> None:
-    """Give a socket a buffer of so many bytes, or as many as it may have without the right to force it."""
+    """Give a socket a buffer of `size` bytes, or as many as it may have unprivileged."""
     try:
         one.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, size)
     except PermissionError:

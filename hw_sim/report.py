@@ -32,7 +32,7 @@ def draw_report(path: Path, evidence: Evidence) -> Path:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    way, free = evidence.ways
+    way, free = evidence.transports
     with matplotlib.rc_context(LOOK):
         figure, axes = pyplot.subplots(4, 1, figsize=(11, 14), layout="constrained")
         _histogram(axes[0], way, free)
@@ -85,7 +85,7 @@ def _first_readings(axes: Any, evidence: Evidence) -> None:
             evidence.power_on_s,
             POWER_ON_AND_JOIN_S if evidence.firmware else POWER_ON_S,
         ),
-        ("box started anew", evidence.restart_s, RESTART_S),
+        ("box restarted", evidence.restart_s, RESTART_S),
         ("box killed", evidence.kill_s, RESTART_S),
     )
     for place, (_, seconds, limit) in enumerate(rows):

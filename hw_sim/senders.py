@@ -1,4 +1,4 @@
-"""A wearable's ways to the box: a UDP socket of its own, or a serial device; and the log of what was sent."""
+"""A wearable's lanes to the box: a UDP socket of its own or a serial device; and the log of readings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LOG_HEADER = "sensor,boot_nonce,sequence,sent_s,sampled_s,power_on_s,w,x,y,z,not
 class UdpSender:
     """Datagrams to `host`:`port` from an address of its own. Raises OSError when the host is unknown.
 
-    What comes back is believed by its tag, not by its address, as in the firmware.
+    Answers are checked by tag, not by address, as in the firmware.
     """
 
     def __init__(self, host: str, port: int) -> None:
@@ -39,14 +39,14 @@ class UdpSender:
     def descriptor(self) -> int | None:
         return self._socket.fileno()
 
-    def send(self, data: bytes) -> bool:
+    def send_packet(self, data: bytes) -> bool:
         try:
             self._socket.sendto(data, self._address)
         except OSError:
             return False
         return True
 
-    def receive(self) -> bytes | None:
+    def receive_packet(self) -> bytes | None:
         try:
             return self._socket.recv(2 * wire.LARGEST)
         except OSError:
@@ -57,7 +57,7 @@ class UdpSender:
 
 
 class SerialSender:
-    """Framed packets over a serial device, opened anew when it was unplugged."""
+    """Framed packets over a serial device, reopened after it was unplugged."""
 
     def __init__(self, device: str, baud: int = 115200) -> None:
         self._device = device
@@ -75,7 +75,7 @@ class SerialSender:
     def descriptor(self) -> int | None:
         return self._port.fileno() if self._port is not None else None
 
-    def send(self, data: bytes) -> bool:
+    def send_packet(self, data: bytes) -> bool:
         if self._port is None:
             return False
         try:
@@ -85,7 +85,7 @@ class SerialSender:
             return False
         return True
 
-    def receive(self) -> bytes | None:
+    def receive_packet(self) -> bytes | None:
         try:
             if self._port is None:
                 self._open()
@@ -109,7 +109,7 @@ class SerialSender:
 
 
 class SendLog:
-    """A CSV with a line for each reading as it was really sent: stage axes, seconds of time.monotonic()."""
+    """A CSV line for each reading as it was sent: stage axes, seconds of time.monotonic()."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("w", encoding="utf-8", buffering=1)

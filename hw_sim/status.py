@@ -14,7 +14,7 @@ NOTED = ("lost", "reordered", "duplicated", "corrupted", "unsent")
 
 
 class StatusLine:
-    """A context. The running line is drawn once a second and on a terminal only; `end` prints in any case."""
+    """A context. The running line is drawn once a second, on a terminal only; `end` prints in any case."""
 
     def __init__(self, where: str, console: Console | None = None) -> None:
         self._where = where
@@ -35,7 +35,7 @@ class StatusLine:
         self._live.stop()
 
     def show(self, emulator: Emulator, now: float) -> None:
-        """Draws the line if it is a second old. `now` in seconds."""
+        """Draw the line once a second. `now` in seconds."""
         if not self._console.is_terminal or now < self._next_at:
             return
         sent = emulator.counts["readings"]
@@ -47,7 +47,7 @@ class StatusLine:
         self._next_at, self._sent, self._shown_at = now + 1.0, sent, now
 
     def end(self, emulator: Emulator) -> None:
-        """Says what was sent; and, when nothing could be, what to look at."""
+        """Print what was sent; when nothing was, what to check."""
         self._live.stop()
         self._console.print(
             f"{len(emulator.devices)} sensor(s) -> {self._where}: {_totals(emulator)}", soft_wrap=True

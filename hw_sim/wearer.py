@@ -1,18 +1,17 @@
-"""Who wears an emulated sensor: stands still until the box had time for the neutral pose, then dances."""
+"""The wearer of an emulated sensor: stands still while the box takes the neutral pose, then dances."""
 
 from __future__ import annotations
 
 from hw_sim.motions import IDENTITY, Motion, Quaternion, inverse, multiply, part_of
 
-EASE_S = 1.0  # from standing into the motion
+EASE_S = 1.0  # from the rest pose into the motion
 
 
 class Wearer:
     """A hand that moves; its orientation is in stage axes.
 
-    Stands as in the rest pose until the sensor has been heard for `stand_still_s` (infinite: until it is told
-    to `begin`), and then goes over into the motion. With 0 it follows the motion from the start and does not
-    wait to be heard.
+    Stands in the rest pose for `stand_still_s` after the first reading left (infinite: until `start_moving`),
+    then eases into the motion. With 0 it follows the motion from the start.
     """
 
     def __init__(self, motion: Motion, stand_still_s: float = 0.0) -> None:
@@ -26,13 +25,13 @@ class Wearer:
         if not self._stand_still_s and self._begun is None:
             self._begun = now
 
-    def heard(self, at: float) -> None:
-        """A reading leaves for the box: only the first one counts."""
+    def reading_sent(self, at: float) -> None:
+        """Called for each reading that leaves for the box; the first one starts the clock."""
         if self._begun is None:
             self._begun = at + self._stand_still_s
 
-    def begin(self, now: float) -> None:
-        """Whoever stands dances from now on."""
+    def start_moving(self, now: float) -> None:
+        """Dance from now on."""
         self._begun = now
 
     def orientation(self, at: float) -> Quaternion:

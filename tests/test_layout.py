@@ -15,10 +15,10 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
 BIN = Path(sys.executable).parent
-PACKAGES = ("appliance", "hw_sim")
+PACKAGES = ("appliance", "hw_sim", "tools")
 LOCKS = ("requirements.txt", "requirements-test.txt")
 TOP_LEVEL = {
-    *("appliance", "firmware", "hw_sim", "deploy", "tests", "docs", ".ci"),
+    *("appliance", "firmware", "hw_sim", "tools", "deploy", "tests", "docs", ".ci"),
     *("pyproject.toml", "README.md", "Makefile", "LICENSE", "CHANGELOG.md", ".gitignore", *LOCKS),
 }
 

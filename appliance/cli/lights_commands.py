@@ -25,9 +25,9 @@ def light(
     """Light the rig by the dance that `bunraku play` dances, until Ctrl-C; `play` starts this by itself."""
     if is_for_subcommand(context, show, box, chosen):
         return
-    from appliance.lights.run import light_up
+    from appliance.lights.run import run_lights
 
-    light_up(show, box_of(box, chosen))
+    run_lights(show, box_of(box, chosen))
 
 
 @lights.command("test")
@@ -72,6 +72,6 @@ def convert(
     ] = None,
 ) -> None:
     """Turn a fixture of the Open Fixture Library into a profile, for the folder `profiles` of a show."""
-    from appliance.lights.convert import convert_file
+    from appliance.fixture_library.convert import convert_file
 
     convert_file(fixture, out)

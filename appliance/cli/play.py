@@ -30,7 +30,7 @@ PICTURED_MINUTES = 0.5  # a journal that only serves the picture at the end keep
 _REHEARSAL = (
     "A rehearsal with emulated sensors: the box's own place, journal and sensor memory stay as they are."
 )
-_NO_REFUSAL = ("accepted", "relocated", "hello", "profile", "lost", "reboot", "drain_limit")
+_NO_REFUSAL = ("accepted", "hello", "profile", "lost", "reboot", "drain_limit")
 # In a technician's words; what is not here goes by its name in docs/wire.md.
 _REFUSALS = {
     "no packets of ours": ("length", "magic", "version", "kind"),
@@ -38,7 +38,7 @@ _REFUSALS = {
     "forged or damaged": ("tag",),
     "of an earlier link": ("old_session", "old_hello"),
     "doubled or too late": ("duplicate", "reordered", "old"),
-    "no orientation that a hand could have": ("zero", "norm", "torn", "rate"),
+    "without an orientation": ("norm",),
     "damaged on the cable": ("frame_length", "frame_stuffing", "frame_crc"),
 }
 
@@ -277,7 +277,6 @@ def _conclusion(stage: Stage) -> list[str]:
 
 def _readings(counts: dict[str, int]) -> str:
     """What became of the sensors' packets, refusals by reason."""
-    accepted = counts["accepted"] + counts["relocated"]
     words = {reason: words for words, reasons in _REFUSALS.items() for reason in reasons}
     refused: dict[str, int] = {}
     for reason, count in counts.items():
@@ -286,4 +285,4 @@ def _readings(counts: dict[str, int]) -> str:
             refused[said] = refused.get(said, 0) + count
     lost = f", {counts['lost']} lost on the way" if counts["lost"] else ""
     reasons = ", ".join(f"{count} {said}" for said, count in refused.items())
-    return f"Readings: {accepted} accepted{lost}" + (f"; refused: {reasons}." if refused else ".")
+    return f"Readings: {counts['accepted']} accepted{lost}" + (f"; refused: {reasons}." if refused else ".")

@@ -1,4 +1,4 @@
-"""The bill: which show the stage dances, as the shared frame says, and whether it is another one by now."""
+"""Which show the stage dances, by the shared frame, and whether it has changed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from appliance.show.show import Show, load_show
 
 
 class ActiveShow:
-    """Follows the stage from show to show."""
+    """The show of the stage, from one to the next."""
 
     def __init__(self, stage: FrameReader) -> None:
         self._stage = stage
@@ -16,21 +16,21 @@ class ActiveShow:
         self._is_new = False
 
     def is_new(self, now: float) -> bool:
-        """Whether the stage dances another show than the one taken last, or that one after a change."""
+        """Whether the stage dances another show than the one loaded last, or an edited one."""
         self._stage.newest(now)
         if self._stage.facts is not None and self._stage.generation != self._generation:
             self._generation = self._stage.generation
             self._is_new = self._written() != self._taken
         return self._is_new
 
-    def take(self) -> Show:
-        """The show of the stage; raises ConfigError when its folder is not in order any more."""
+    def load(self) -> Show:
+        """The show of the stage. Raises ConfigError when its folder is broken by now."""
         self._taken, self._is_new = self._written(), False
-        assert self._stage.facts is not None, "a bill is taken when it is new"
+        assert self._stage.facts is not None, "only a new show is loaded"
         return load_show(self._stage.facts.show_directory)
 
     def _written(self) -> tuple[str, bytes] | None:
-        """What tells a show from another: its folder and what stands in show.yaml."""
+        """What identifies a show: its folder and the text of show.yaml."""
         if self._stage.facts is None:
             return None
         folder = self._stage.facts.show_directory

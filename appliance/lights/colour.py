@@ -1,4 +1,4 @@
-"""Colour: what red, green and blue mean for lamps that add white, or mix with cyan, magenta, yellow."""
+"""Colour: red, green and blue for lamps that add white, or mix cyan, magenta and yellow."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from appliance.show.fixture_profile import base
 
-# What a channel can show of a colour; 'red of rgbw' is what the white lamp leaves for the red one.
+# The share of a colour that a channel shows; 'red of rgbw' is what the white lamp leaves to the red one.
 COMPONENTS = (
     *("red", "green", "blue"),
     *("red of rgbw", "green of rgbw", "blue of rgbw", "white"),
@@ -27,7 +27,7 @@ def mixed(rgb: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def components_of(attributes: Sequence[str]) -> dict[str, int]:
-    """Place in COMPONENTS of each attribute that shows colour; a lamp with white leaves white to it."""
+    """Index in COMPONENTS of each attribute that shows colour; a white lamp takes the white part."""
     bases = {base(name) for name in attributes}
     found = {}
     for name in attributes:
@@ -40,7 +40,7 @@ def components_of(attributes: Sequence[str]) -> dict[str, int]:
 
 
 def between(colours: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    """The colour at a share 0..1 of the way through colours (N, 3)."""
+    """The colour at a share 0..1 through colours (N, 3)."""
     at = share * (len(colours) - 1)
     first = min(int(at), len(colours) - 1)
     second = min(first + 1, len(colours) - 1)

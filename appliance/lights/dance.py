@@ -1,4 +1,4 @@
-"""What the lights read from the dance: places, heights, speeds and orientations of joints."""
+"""What the lights read from the dance: positions, speeds and orientations of joints."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.show.light_rules import RuleConfig
 
 SMOOTHING_S = 0.06  # of speeds: three ticks, so that one late frame is no step
-PAUSE_S = 0.2  # after so long without a new frame nothing moves any more
+PAUSE_S = 0.2  # without a new frame for this long, nothing moves
 FASTEST_M_S = 15.0  # no joint of a dancer is faster; a phrase that jumps is
 ROOT = 0
 _COORDINATE = {"across": 0, "height": 1, "depth": 2}
@@ -33,8 +33,8 @@ class Dance:
         self._time = -math.inf
         self._tick: tuple[int, int] | None = None
 
-    def see(self, frame: SeenFrame, generation: int, now: float) -> None:
-        """The newest frame, perhaps the same one again; `generation` is that of the stage."""
+    def take_frame(self, frame: SeenFrame, generation: int, now: float) -> None:
+        """Take the newest frame, perhaps the same one again; `generation`: the stage's."""
         tick = (generation, frame.tick)
         if tick == self._tick:
             if now - self._time > PAUSE_S:
@@ -55,7 +55,7 @@ class Dance:
         return turn(turned, rule.axis) if rule.reads == "turn" else lean(turned, rule.axis)
 
     def place(self, joint: str | None) -> NDArray[np.float64]:
-        """Where a joint is, (3,) metres; None: the root."""
+        """Position of a joint (None: the root), (3,) metres."""
         where: NDArray[np.float64] = self.positions[ROOT if joint is None else self.skeleton.index(joint)]
         return where
 
@@ -84,6 +84,6 @@ def turn(q: NDArray[np.float64], axis: tuple[float, float, float]) -> float:
 
 
 def lean(q: NDArray[np.float64], axis: tuple[float, float, float]) -> float:
-    """Degrees, 0..180, by which an orientation (w, x, y, z) tips an axis away from where it rests."""
+    """Degrees, 0..180, by which an orientation (w, x, y, z) tips an axis from its rest."""
     tipped = quaternion.rotate(q, np.array(axis))
     return math.degrees(math.acos(min(max(float(tipped @ np.array(axis)), -1.0), 1.0)))

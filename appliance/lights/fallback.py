@@ -1,4 +1,4 @@
-"""The lights' fallbacks: what they do when a wire or the stage is away."""
+"""The lights' fallbacks: when a wire or the stage is away."""
 
 from __future__ import annotations
 
@@ -12,6 +12,6 @@ DMX_AWAY = Fallback(
 STAGE_UNSEEN = Fallback(
     "lights-safe",
     "No frame came from the stage for a second: the lights fade to their safe look, and dance again as soon "
-    "as the stage does. Look what the stage says.",
+    "as the stage does. See what the stage says.",
 )
 OF_THE_LIGHTS = (DMX_AWAY, STAGE_UNSEEN)

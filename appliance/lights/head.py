@@ -1,9 +1,9 @@
 """Moving heads: from a point on the stage to pan and tilt, without a flip and no faster than the head moves.
 
-A head's own axes while it stands: y from its base upwards, z to its front, x to the left of one who looks
-along z. At pan 0 and tilt 0 its beam goes along y; tilt leans it towards z, pan turns it from z towards x.
-Each direction can be had in two ways, tilt to the one side or to the other with pan half a turn away, and
-each pan again a whole turn further where the range allows.
+A standing head's own axes: y up from its base, z to its front, x to the left when looking along z. At pan 0
+and tilt 0 its beam goes along y; tilt leans it towards z, pan turns it from z towards x. Each direction has
+two solutions, tilt to either side with pan half a turn apart; each pan repeats after a whole turn, where the
+range allows.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ Array = NDArray[np.float64]
 USUAL_DEGREES = {PAN: 540.0, TILT: 270.0}
 USUAL_SLEW = 180.0  # degrees a second
 TURNS = np.arange(-2.0, 3.0) * 360.0  # enough for ranges of two whole turns to either side
-OTHER_WAY = 5.0  # degrees of pan that the other of the two ways must save before a head takes it
-# Whom a dancer passes close under needs more pan than it has, or the other way of tilt. A way is chosen by
-# where pan will be in LOOK_AHEAD_S: at 1.5 m/s, 3 m below a head, the beam is 4.9 degrees off at worst, else
-# 8.2. Closer to the head's own axis than QUIET_CONE pan hardly moves the beam, so it moves slower.
+FLIP_GAIN = 5.0  # degrees of pan that the other solution must save before a head takes it
+# A dancer who passes close below a head demands more pan speed than it has, or the other tilt. The solution
+# is chosen by where pan will be in LOOK_AHEAD_S: at 1.5 m/s, 3 m below, the beam is at most 4.9 degrees off
+# instead of 8.2. Closer to the head's own axis than QUIET_CONE pan hardly moves the beam, so it moves slower.
 LOOK_AHEAD_S, MOST_AHEAD, JUMP = 0.1, 90.0, 45.0  # degrees; a heading that jumps in one pass is no motion
 QUIET_CONE = np.sin(np.radians(3.0))
-LONGEST_STEP_S = 0.1  # after a pause heads go on from where they were, no faster than ever
+LONGEST_STEP_S = 0.1  # after a pause heads continue from where they were, at their usual speed
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Heads:
         self.places = np.array([head.fixture.place for head in heads], float).reshape(-1, 3)
         self.local_from_world = np.array([own_axes(head.fixture) for head in heads]).reshape(-1, 3, 3)
         self.angles = np.clip(np.zeros(len(axes.slots)), axes.low, axes.high)
-        self._ways = np.ones(len(heads))  # 1: tilt towards the front, -1: to the other side
+        self._tilt_signs = np.ones(len(heads))  # 1: tilt towards the front, -1: to the other side
         self._headings = np.zeros(len(heads))
 
     def follow(self, wanted: Array, aims: Array, aimed: NDArray[np.bool_], seconds: float) -> None:
@@ -83,9 +83,9 @@ class Heads:
         axes, wanted = self.axes, wanted.copy()
         reach = axes.slew * min(seconds, LONGEST_STEP_S)
         heading, polar, sideways = self._directions(aims)
-        pan, way = self._nearest(heading, polar, self._ahead(heading, seconds))
+        pan, sign = self._nearest(heading, polar, self._ahead(heading, seconds))
         pans, tilts = self.pans[aimed], self.tilts[aimed]
-        self._ways[aimed] = way[aimed]
+        self._tilt_signs[aimed] = sign[aimed]
         wanted[pans] = np.clip(pan[aimed], axes.low[pans], axes.high[pans])
         quiet = np.where(polar < 90.0, sideways / QUIET_CONE, 1.0)
         reach[pans] *= np.minimum(1.0, quiet[aimed])
@@ -103,8 +103,8 @@ class Heads:
         return world
 
     def _step(self, which: NDArray[np.intp] | slice, wanted: Array, reach: Array) -> None:
-        way = wanted[which] - self.angles[which]
-        self.angles[which] += np.clip(way, -reach[which], reach[which])
+        step = wanted[which] - self.angles[which]
+        self.angles[which] += np.clip(step, -reach[which], reach[which])
 
     def _directions(self, aims: Array) -> tuple[Array, Array, Array]:
         """Heading from the front, angle from the head's axis, both in degrees; its sine; each (H,)."""
@@ -115,23 +115,25 @@ class Heads:
         return heading, np.degrees(np.arctan2(aside, own[:, 1])), aside / far
 
     def _ahead(self, heading: Array, seconds: float) -> Array:
-        """How far headings will have moved in LOOK_AHEAD_S, degrees (H,)."""
+        """How far headings move within LOOK_AHEAD_S, degrees (H,)."""
         step = (heading - self._headings + 180.0) % 360.0 - 180.0
         self._headings = heading
         ahead = step * (LOOK_AHEAD_S / max(seconds, 1e-3))
         return np.where(np.abs(step) < JUMP, np.clip(ahead, -MOST_AHEAD, MOST_AHEAD), 0.0)
 
     def _nearest(self, heading: Array, polar: Array, ahead: Array) -> tuple[Array, Array]:
-        """The pan (H,) that is the shortest way from here among all that show the direction; 1 or -1 (H,)."""
+        """The nearest pan (H,) among all that point there, and the sign of its tilt (H,)."""
         axes, pans, tilts = self.axes, self.pans, self.tilts
         pan = np.concatenate([heading[:, None] + TURNS, heading[:, None] + 180.0 + TURNS], axis=1)
-        way = np.repeat([1.0, -1.0], len(TURNS))
-        tilt = way * polar[:, None]
+        sign = np.repeat([1.0, -1.0], len(TURNS))
+        tilt = sign * polar[:, None]
         out = np.maximum(axes.low[pans][:, None] - pan, pan - axes.high[pans][:, None]).clip(0.0)
         out += np.maximum(axes.low[tilts][:, None] - tilt, tilt - axes.high[tilts][:, None]).clip(0.0)
-        cost = np.abs(pan + (ahead - self.angles[pans])[:, None]) + OTHER_WAY * (way != self._ways[:, None])
+        cost = np.abs(pan + (ahead - self.angles[pans])[:, None]) + FLIP_GAIN * (
+            sign != self._tilt_signs[:, None]
+        )
         best = np.argmin(cost + 1000.0 * out, axis=1)
-        return pan[np.arange(len(best)), best], way[best]
+        return pan[np.arange(len(best)), best], sign[best]
 
 
 def own_axes(fixture: FixtureConfig) -> Array:

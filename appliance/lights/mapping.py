@@ -1,4 +1,4 @@
-"""A mapping at work: its rules read the dance and write wishes, which fade into those of the next mapping."""
+"""A mapping at work: its rules turn the dance into values, which fade into those of the next mapping."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """What a mapping wants: slots (S,) 0..1, points to aim at (H, 3) metres; what of the heads it moves."""
+class MappingOutput:
+    """What a mapping sets: slots (S,) 0..1; points to aim at (H, 3), metres; which heads it moves."""
 
     values: Values
     aims: NDArray[np.float64]
@@ -28,7 +28,7 @@ class Wishes:
 
 
 class Mapping:
-    """A set of rules. What no rule drives rests at its default; heads that none moves stay where they are."""
+    """A set of rules. Slots that no rule drives rest at their defaults; heads that none moves hold."""
 
     def __init__(self, config: MappingConfig, patch: Patch) -> None:
         self.name = config.name
@@ -51,26 +51,26 @@ class Mapping:
             aimed &= ~(axes[patch.heads.pans] | axes[patch.heads.tilts])  # the later rule counts
         self._aimed, self._steered = aimed, steered
 
-    def begin(self) -> None:
-        """It comes into force: the first pass takes readings as they are, without attack and release."""
+    def restart(self) -> None:
+        """Comes into force: the first pass takes readings as they are, without attack and release."""
         for rule in self._rules:
-            rule.begin()
+            rule.restart()
 
-    def wishes(self, dance: Dance, seconds: float) -> Wishes:
-        """What its rules want now, `seconds` after the pass before."""
-        wishes = Wishes(
+    def evaluate(self, dance: Dance, seconds: float) -> MappingOutput:
+        """The rules' output now, `seconds` after the pass before."""
+        output = MappingOutput(
             self._patch.defaults.copy(),
             np.zeros((len(self._aimed), 3)),
             self._aimed,
             self._steered,
         )
         for rule in self._rules:
-            rule.apply(dance, seconds, wishes)
-        return wishes
+            rule.apply(dance, seconds, output)
+        return output
 
 
-def faded(before: Wishes, after: Wishes, part: float, snaps: Mask) -> Wishes:
-    """Between two mappings, `part` 0..1 of the way; `snaps` (S,) jump in the middle.
+def faded(before: MappingOutput, after: MappingOutput, part: float, snaps: Mask) -> MappingOutput:
+    """Crossfade of two mappings at `part` 0..1; slots in `snaps` (S,) jump halfway.
 
     Points to aim at slide across the stage; a head that only one of them moves follows that one.
     """
@@ -83,7 +83,7 @@ def faded(before: Wishes, after: Wishes, part: float, snaps: Mask) -> Wishes:
     aims[~before.aimed] = after.aims[~before.aimed]
     newest = after if part >= 0.5 else before
     aimed = np.where(before.aimed & after.aimed, True, newest.aimed)
-    return Wishes(values, aims, aimed, newest.steered)
+    return MappingOutput(values, aims, aimed, newest.steered)
 
 
 class _Rule:
@@ -97,10 +97,10 @@ class _Rule:
         self._again = driven[self.slots] if config.mix != "last" else np.zeros(len(self.slots), bool)
         self._level: float | None = None
 
-    def begin(self) -> None:
+    def restart(self) -> None:
         self._level = None
 
-    def apply(self, dance: Dance, seconds: float, wishes: Wishes) -> None:
+    def apply(self, dance: Dance, seconds: float, output: MappingOutput) -> None:
         config = self._config
         if config.reads == "steady":
             wanted = config.value
@@ -114,8 +114,8 @@ class _Rule:
         shown = np.full(len(self.slots), level)
         if self._components is not None:
             shown = mixed(between(self._colours, level))[self._components]
-        earlier = wishes.values[self.slots]
-        wishes.values[self.slots] = np.where(self._again, _MIXES[config.mix](earlier, shown), shown)
+        earlier = output.values[self.slots]
+        output.values[self.slots] = np.where(self._again, _MIXES[config.mix](earlier, shown), shown)
 
 
 class _Aim:
@@ -131,12 +131,12 @@ class _Aim:
         self._point = None if config.reads == "place" else np.array(config.at)
         self._offset = np.array(config.offset)
 
-    def begin(self) -> None:
-        """It has no memory: the heads' own speed is the limit."""
+    def restart(self) -> None:
+        """Nothing to reset: only the heads' own speed limits an aim."""
 
-    def apply(self, dance: Dance, seconds: float, wishes: Wishes) -> None:
+    def apply(self, dance: Dance, seconds: float, output: MappingOutput) -> None:
         point = dance.place(self._joint) if self._point is None else self._point
-        wishes.aims[self.heads] = point + self._offset
+        output.aims[self.heads] = point + self._offset
 
 
 _MIXES: dict[str, Callable[[Values, Values], Values]] = {
@@ -148,5 +148,5 @@ _MIXES: dict[str, Callable[[Values, Values], Values]] = {
 
 
 def mappings_of(configs: Sequence[MappingConfig], patch: Patch) -> dict[str, Mapping]:
-    """All mappings of a show by name, the first one first; one without rules where the show has none."""
+    """All mappings of a show by name, in order; one without rules where the show has none."""
     return {config.name: Mapping(config, patch) for config in configs or [MappingConfig(name="none")]}

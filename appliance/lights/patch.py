@@ -1,4 +1,4 @@
-"""The patch: all attributes of all fixtures in one row of numbers, and the channels that they leave by."""
+"""The patch: all attributes of all fixtures as one array, and the channels that they map to."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Places = NDArray[np.intp]
 
 
 class Patch:
-    """Slots (S) of a rig: a value 0..1 each, where it rests, which channels it leaves by."""
+    """Slots (S) of a rig: for each its value 0..1, its default, its channels."""
 
     def __init__(self, fixtures: Sequence[FixtureConfig], show: Path | None) -> None:
         self.fixtures = tuple(fixtures)
@@ -69,7 +69,7 @@ class Patch:
         return shown
 
     def rest(self) -> Values:
-        """Zero (S,), and dark where that would be light: cyan, magenta, yellow of a lamp without dimmer."""
+        """Zero (S,), and full cyan, magenta, yellow on lamps without dimmer, which would shine at zero."""
         return self.dimmed(np.zeros(len(self.slots)), 0.0)
 
     def encode(self, values: Values) -> dict[int, bytes]:
@@ -106,7 +106,7 @@ class Patch:
         if slot.base in (PAN, TILT):
             return 0.5
         own = [self.slots[place] for place in self._own[slot.fixture.name]]
-        if slot.is_lamp:  # amber beside red, green and blue waits for a rule; warm and cold white alone shine
+        if slot.is_lamp:  # amber beside red, green, blue waits for a rule; warm and cold white shine
             return float(all(other.component < 0 for other in own))
         return float(slot.base == DIMMER and slot.name != DIMMER and self._has_dimmer(slot.fixture))
 
@@ -132,7 +132,7 @@ class Patch:
         return scaled, scales
 
     def _prepare_channels(self) -> None:
-        """Where each byte of each slot goes, for all universes at once."""
+        """Precompute the channel of each byte of each slot, for all universes."""
         slots = self.slots
         self._inverted = np.array([slot.is_inverted for slot in slots], bool)
         scale = np.array([256.0 ** max(len(slot.channels) - 1, 0) for slot in slots])

@@ -71,7 +71,7 @@ class _View:
             self._fixture(fixture)
 
     def _frame(self, dancer: Array) -> None:
-        """Room for everything, a metre's grid, and where the audience sits."""
+        """Limits around everything, a 1 m grid, and the audience."""
         axes = self._axes
         places = np.array([fixture.place for fixture in self._patch.fixtures])
         points = self._flat(np.concatenate([places, dancer, [[-2, 0, -2], [2, 0, 2]]]))
@@ -106,7 +106,7 @@ class _View:
             axes.axhline(0, color=AUDIENCE, lw=1.5, zorder=1)
 
     def _beams(self) -> None:
-        """Each head's beam down to the floor, or as long as fits."""
+        """Each head's beam down to the floor, at most LONGEST_BEAM_M."""
         heads = self._patch.heads
         for place, beam in zip(heads.places, heads.beams(), strict=True):
             end = place + beam * _length(place, beam)

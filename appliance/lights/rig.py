@@ -1,4 +1,4 @@
-"""The rig: one pass from the newest frame and the show state to the levels of all universes."""
+"""The rig: from the newest frame and the show state to the levels of all universes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from appliance.box.show_state import ShowState
 from appliance.lights.colour import mixed
 from appliance.lights.dance import Dance
 from appliance.lights.head import LONGEST_STEP_S
-from appliance.lights.mapping import Mapping, Wishes, faded, mappings_of
+from appliance.lights.mapping import Mapping, MappingOutput, faded, mappings_of
 from appliance.lights.patch import Patch, Values
 from appliance.outputs.frame_reader import SeenFrame
 from appliance.pose.skeleton import Skeleton
@@ -19,16 +19,15 @@ from appliance.show.lights import LightsConfig, SafeConfig
 SAFE_FADE_S = 1.0  # into the safe look and back; panic is at once
 LEAVING_FADE_S = 0.7
 USUAL_RATE_HZ = 40.0
-LOST_S = 1.0  # without a fresh frame for so long the stage counts as lost
-MOST_LAYERS = 4  # mappings that fade into each other when the next one is called before the last is there
+LOST_S = 1.0  # without a fresh frame for this long the stage counts as lost
+MOST_LAYERS = 4  # mappings that fade into each other when cues come faster than fades end
 
 
 class Rig:
-    """Fixtures, mappings and the safe look. It begins in the safe look and fades in with the first frame.
+    """Fixtures, mappings and the safe look. Starts in the safe look and fades in with the first frame.
 
-    rate_hz: how often passes are meant to come. One that comes much later than those before was held up, most
-    often with the whole machine: it goes on by LONGEST_STEP_S, and no more counts against a stage that was
-    held up as well.
+    rate_hz: the nominal rate of passes. A pass that comes much later was held up, most often with the whole
+    machine: it advances by LONGEST_STEP_S alone, and no more counts against a stage that was held up too.
     """
 
     def __init__(
@@ -47,38 +46,38 @@ class Rig:
         self._pace = Pace(LONGEST_STEP_S, rate_hz)
         self._leaving = False
 
-    def leave(self) -> None:
-        """From now on passes fade to the safe look, whatever dances."""
+    def fade_out(self) -> None:
+        """Fade to the safe look from now on, whatever dances."""
         self._leaving = True
 
     @property
     def is_lost(self) -> bool:
-        """Whether the stage has shown nothing for LOST_S."""
+        """Whether no frame came from the stage for LOST_S."""
         return self._unseen_s > LOST_S
 
-    def pass_(
+    def render(
         self, frame: SeenFrame | None, generation: int, show_state: ShowState, now: float
     ) -> dict[int, bytes]:
-        """512 levels for each universe at `now`, monotonic seconds; `generation` is that of the stage."""
+        """512 levels for each universe at `now` (monotonic seconds); `generation`: the stage's."""
         seconds = self._pace.step_s(now)
         self._unseen_s += seconds
         if frame is not None:
-            self.dance.see(frame, generation, now)
+            self.dance.take_frame(frame, generation, now)
             self._unseen_s = min(self._unseen_s, now - frame.frame_time)
-        self._secure(show_state, now, seconds)
-        wishes = self._wishes(show_state, now, seconds)
+        self._update_safety(show_state, now, seconds)
+        output = self._blend_mappings(show_state, now, seconds)
         safety = self.safety
-        danced = self.patch.dimmed(wishes.values, show_state.level(now)) if safety < 1.0 else wishes.values
+        danced = self.patch.dimmed(output.values, show_state.level(now)) if safety < 1.0 else output.values
         safe = self.patch.dimmed(self._safe, _safe_level(show_state))
         self.values = danced + (safe - danced) * np.where(self.patch.snaps, float(safety >= 0.5), safety)
-        self._turn_heads(wishes, seconds)
+        self._turn_heads(output, seconds)
         return self.patch.encode(self.values)
 
     def last_levels(self, show_state: ShowState) -> dict[int, bytes]:
-        """What is left on the wires at the end: the safe look where it has light in it, else zeros.
+        """The last levels on the wires: the safe look if it is lit, else zeros.
 
-        Blackout takes the light out of it, as in each pass. Heads stay where they point: at zero they would
-        swing to the end of their range.
+        Blackout darkens it, as in each pass. Heads stay where they point: at zero they would swing to the end
+        of their range.
         """
         heads = self.patch.heads
         is_dark = self._is_dark or not _safe_level(show_state)
@@ -86,8 +85,8 @@ class Rig:
         values[heads.axes.slots] = heads.axes.shares(heads.angles)
         return self.patch.encode(values)
 
-    def _secure(self, show_state: ShowState, now: float, seconds: float) -> None:
-        """How much of the safe look is there: at once on panic, faded else."""
+    def _update_safety(self, show_state: ShowState, now: float, seconds: float) -> None:
+        """Update how far the safe look is in: at once on panic, else by a fade."""
         if show_state.panic:
             self.safety = 1.0
         elif self._leaving:
@@ -97,32 +96,32 @@ class Rig:
         else:
             self.safety = max(self.safety - seconds / SAFE_FADE_S, 0.0)
 
-    def _turn_heads(self, wishes: Wishes, seconds: float) -> None:
-        """Heads follow; in the safe look they hold, or go home."""
+    def _turn_heads(self, output: MappingOutput, seconds: float) -> None:
+        """Move the heads: towards the dance, or in the safe look hold or go home."""
         heads = self.patch.heads
-        wanted, aimed = heads.angles, wishes.aimed
+        wanted, aimed = heads.angles, output.aimed
         if self.safety < 1.0:
-            wanted = np.where(wishes.steered, heads.axes.angles(wishes.values), heads.angles)
+            wanted = np.where(output.steered, heads.axes.angles(output.values), heads.angles)
         else:
             aimed = np.zeros_like(aimed)
             wanted = heads.axes.angles(self._safe) if self._homes else heads.angles
-        heads.follow(wanted, wishes.aims, aimed, seconds)
+        heads.follow(wanted, output.aims, aimed, seconds)
         self.values[heads.axes.slots] = heads.axes.shares(heads.angles)
 
-    def _wishes(self, show_state: ShowState, now: float, seconds: float) -> Wishes:
-        """What the mapping in force wants, faded in from those before it."""
+    def _blend_mappings(self, show_state: ShowState, now: float, seconds: float) -> MappingOutput:
+        """The output of the mapping in force, faded in over those before it."""
         self._call(show_state)
-        mappings = {layer.mapping for layer in self._layers}  # each once, though it may fade out and in again
-        wanted = {mapping: mapping.wishes(self.dance, seconds) for mapping in mappings}
-        wishes = wanted[self._layers[0].mapping]
+        mappings = {layer.mapping for layer in self._layers}  # each once, even if it fades out and in again
+        wanted = {mapping: mapping.evaluate(self.dance, seconds) for mapping in mappings}
+        output = wanted[self._layers[0].mapping]
         for layer in self._layers[1:]:
-            wishes = faded(wishes, wanted[layer.mapping], layer.part(now), self.patch.snaps)
+            output = faded(output, wanted[layer.mapping], layer.part(now), self.patch.snaps)
         done = [place for place, layer in enumerate(self._layers) if layer.part(now) >= 1.0]
         self._layers = self._layers[done[-1] :]
-        return wishes
+        return output
 
     def _call(self, show_state: ShowState) -> None:
-        """Lay the mapping that show control has called over those that are still fading."""
+        """Lay the mapping that show control called over those that still fade."""
         called = (show_state.lights, show_state.lights_since)
         if called == self._called:
             return
@@ -132,7 +131,7 @@ class Rig:
         mapping = self._mapping(show_state.lights)
         if mapping is self._layers[-1].mapping:
             return
-        mapping.begin()
+        mapping.restart()
         self._layers.append(_Layer(mapping, show_state.lights_since, show_state.lights_fade_s))
         self._layers = self._layers[-MOST_LAYERS:]
 
@@ -141,25 +140,25 @@ class Rig:
 
 
 class _Layer:
-    """A mapping that fades in over what was there before."""
+    """A mapping that fades in over those below."""
 
     def __init__(self, mapping: Mapping, since: float, fade_s: float) -> None:
         self.mapping, self._since, self._fade_s = mapping, since, fade_s
 
     def part(self, now: float) -> float:
-        """0..1: how much of it is there."""
+        """How far it is in, 0..1."""
         if self._fade_s <= 0.0:
             return 1.0
         return min(max((now - self._since) / self._fade_s, 0.0), 1.0)
 
 
 def _safe_level(show_state: ShowState) -> float:
-    """0 or 1: what the safe look is multiplied with. Blackout darkens it; panic shows it all the same."""
+    """0 or 1, the factor of the safe look: blackout darkens it, panic shows it all the same."""
     return 0.0 if show_state.blackout and not show_state.panic else 1.0
 
 
 def _safe_look(config: SafeConfig, patch: Patch) -> Values:
-    """Slots (S,) of the safe look: defaults, everything dark but the dimmers of those that shine in it."""
+    """Slots (S,) of the safe look: defaults, and all dimmers dark except those of its fixtures."""
     values = patch.defaults.copy()
     values[patch.dims] = 0.0
     colours = patch.select(config.fixtures, "colour")

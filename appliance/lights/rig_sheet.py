@@ -88,7 +88,7 @@ def _draw(config: LightsConfig, show: Show, out: Path, mapping: str, at_s: float
     rig = Rig(config, patch, show.skeleton)
     rig.safety = 0.0
     for number in range(_SETTLING_PASSES):
-        rig.pass_(frame, 1, ShowState(lights=mapping, lights_before=mapping), number * _PASS_S)
+        rig.render(frame, 1, ShowState(lights=mapping, lights_before=mapping), number * _PASS_S)
     named = mapping or next((one.name for one in config.mappings), "none")
     scene = f"{place / phrase.fps:.1f} s into the phrase, mapping {named}"
     dancer = frame.positions.astype(float)

@@ -1,4 +1,4 @@
-"""`bunraku lights test`: the walk through the rig on the wires of a box, while no show runs."""
+"""`bunraku lights test`: a walk through the rig on the wires of a box, while no show runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from appliance.show.venue_rig import unwired
 def walk_rig(
     directory: Path | None, box_file: Path | None, fixtures: list[str], attribute: str | None, step_s: float
 ) -> None:
-    """Take every step; zeros at the end. Raises ConfigError, or AlreadyHereError while the lights run."""
+    """Take every step, then send zeros. Raises ConfigError, or AlreadyHereError while the lights run."""
     show, box = load_show(directory or default_show_path()), load_box(box_file)
     require_wires(box, box_file)
     config = rig_here(show, box, box_file)
@@ -36,7 +36,7 @@ def walk_rig(
         for universe in universes:
             opened.callback(lambda one: one.close(time.monotonic()), universe)
 
-        def send(levels: dict[int, bytes]) -> float:
+        def send_levels(levels: dict[int, bytes]) -> float:
             for universe in universes:
                 universe.offer(levels[universe.number], time.monotonic())
             time.sleep(1.0 / box.lights.rate_hz)
@@ -45,7 +45,7 @@ def walk_rig(
         for sentence in unwired(show, box):
             say(sentence)
         say(f"{len(to_see)} steps of {step_s:g} s or more; Ctrl-C ends the walk, and all goes dark.")
-        walk(patch, to_see, step_s, box.lights.rate_hz, send, say, stopped)
+        walk(patch, to_see, step_s, box.lights.rate_hz, send_levels, say, stopped)
         for universe in universes:
             if universe.wire.trouble:
                 say(universe.wire.trouble)

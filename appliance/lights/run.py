@@ -1,4 +1,4 @@
-"""The lights' process: shared frame and show state in, levels of all universes out, 40 times a second."""
+"""The lights' process: shared frame and show state in, 40 times a second the levels of all universes out."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import at_venue, misplaced, unwired
 
 _REPORT_S = 1.0
-_LOOK_S = 0.1  # how often the stage is looked for
-_GIVE_UP_S = 1.2  # at the end: a machine too busy to fade within this time goes to its last levels at once
+_POLL_S = 0.1  # how often the stage is looked for
+_GIVE_UP_S = 1.2  # at the end: a machine too busy to fade within this time jumps to its last levels
 
 
 class Lights:
-    """The rig of one show on the wires of one box. Raises ConfigError before there is light."""
+    """The rig of one show on the wires of one box. Raises ConfigError before it sends anything."""
 
     def __init__(
         self,
@@ -52,13 +52,13 @@ class Lights:
         self.show, self.box = show, box
         self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz)
         self.universes = wired(patch, box)
-        self._stage, self._house, self._say, self._fallbacks = stage, show_state, say, fallbacks
-        self._stranger: int | None = None
+        self._stage, self._show_state, self._say, self._fallbacks = stage, show_state, say, fallbacks
+        self._foreign: int | None = None
         self._was_lost = True
         self._troubles: dict[str, str] = {}
 
-    def introduce(self) -> None:
-        """Say what is lit by which wires, and what stays dark."""
+    def log_setup(self) -> None:
+        """Log which fixtures are lit by which wires, and what stays dark."""
         mappings = [mapping.name for mapping in self.show.config.lights.mappings]
         wires = " and ".join(universe.wire.name for universe in self.universes)
         rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: they rest at their defaults"
@@ -66,10 +66,10 @@ class Lights:
         for sentence in unwired(self.show, self.box):
             self._say(sentence)
 
-    def shine(self, stopped: Callable[[], bool], pulse: Callable[[float], None]) -> None:
-        """Pass after pass on a grid of absolute deadlines until `stopped`; then fade to the safe look.
+    def run(self, stopped: Callable[[], bool], pulse: Callable[[float], None]) -> None:
+        """Render and send on a grid of absolute deadlines until `stopped`; then fade to the safe look.
 
-        `pulse`: called in each, that it is well; monotonic seconds.
+        `pulse` is called in each pass, with monotonic seconds.
         """
         period_s = 1.0 / self.box.lights.rate_hz
         deadline = time.monotonic()
@@ -81,34 +81,34 @@ class Lights:
                 report_at = now + _REPORT_S
                 self._report()
             deadline = _wait_for(deadline, period_s)
-        self.rig.leave()
+        self.rig.fade_out()
         give_up = time.monotonic() + _GIVE_UP_S
         while self._next_pass() < give_up and self.rig.safety < 1.0:
             deadline = _wait_for(deadline, period_s)
 
     def close(self) -> None:
-        """Leave the safe look, or zeros, on all wires, and say goodbye on them."""
-        levels, now = self.rig.last_levels(self._house.read()), time.monotonic()
+        """Send the safe look, or zeros, on all wires and close them."""
+        levels, now = self.rig.last_levels(self._show_state.read()), time.monotonic()
         for universe in self.universes:
             universe.offer(levels[universe.number], now)
             universe.close(now)
 
     def _next_pass(self) -> float:
         now = time.monotonic()
-        levels = self.rig.pass_(self._frame(now), self._stage.generation, self._house.read(), now)
+        levels = self.rig.render(self._frame(now), self._stage.generation, self._show_state.read(), now)
         for universe in self.universes:
             universe.offer(levels[universe.number], now)
         return now
 
     def _frame(self, now: float) -> SeenFrame | None:
-        """The newest frame, if it is of the skeleton that these lights know."""
+        """The newest frame, if it has the skeleton that these lights know."""
         frame, facts = self._stage.newest(now), self._stage.facts
         if frame is None or facts is None:
             return None
         if facts.skeleton.same_joints(self.show.skeleton):
             return frame
-        if self._stranger != self._stage.generation:
-            self._stranger = self._stage.generation
+        if self._foreign != self._stage.generation:
+            self._foreign = self._stage.generation
             self._say(
                 f"The stage dances '{facts.show_name}' with another skeleton. The lights stay in their safe "
                 f"look. Start them with --show {facts.show_directory}."
@@ -116,13 +116,13 @@ class Lights:
         return None
 
     def _report(self) -> None:
-        """Once a second: what has changed with the stage and the wires."""
+        """Once a second: log what has changed on the stage and the wires."""
         lost = self.rig.is_lost
         if lost and not self._was_lost:
             self._fallbacks.set(STAGE_UNSEEN.name, True)
             self._say(
                 f"No frame from the stage for {LOST_S:g} s. The lights fade to their safe look; they dance "
-                "again as soon as the stage does. Look what `bunraku play` says."
+                "again as soon as the stage does. See what `bunraku play` says."
             )
         elif self._was_lost and not lost:
             self._fallbacks.set(STAGE_UNSEEN.name, False)
@@ -138,7 +138,7 @@ class Lights:
 
 
 def rig_problems(show: Show, box: BoxConfig, box_file: Path | None) -> list[Problem]:
-    """Why a show's lights cannot hang in this venue."""
+    """Why a show's lights do not fit this venue."""
     problems = misplaced(show, box)
     if not show.config.lights.fixtures:
         cure = "Add them under lights: (docs/lights.md tells how)."
@@ -147,14 +147,14 @@ def rig_problems(show: Show, box: BoxConfig, box_file: Path | None) -> list[Prob
 
 
 def rig_here(show: Show, box: BoxConfig, box_file: Path | None) -> LightsConfig:
-    """A show's lights as they hang in this venue; raises ConfigError when there is nothing to light."""
+    """A show's lights as they hang in this venue. Raises ConfigError when there is nothing to light."""
     if problems := rig_problems(show, box, box_file):
         raise ConfigError(problems)
     return at_venue(show.config.lights, box.lights)
 
 
 def require_wires(box: BoxConfig, box_file: Path | None) -> None:
-    """Refuse a box file from which no wire leads to lights, with a NotAskedForError."""
+    """Refuse a box file without any wire to lights, with a NotAskedForError."""
     if not box.outputs.dmx:
         cure = "Add one under outputs: dmx:, for instance {universe: 1, wire: artnet, host: 192.168.0.30}."
         file = box_file or Path("box.yaml")
@@ -162,72 +162,72 @@ def require_wires(box: BoxConfig, box_file: Path | None) -> None:
 
 
 def wired(patch: Patch, box: BoxConfig) -> tuple[Universe, ...]:
-    """The universes of this rig on open wires; nothing is sent to universes without a fixture."""
+    """The universes of this rig on open wires; universes without a fixture get none."""
     used = [config for config in box.outputs.dmx if config.universe in patch.universes]
     return open_universes(used, box.state_folder)
 
 
-def light_up(directory: Path | None, box_file: Path | None) -> None:
-    """Light a show's rig until a signal comes; without a folder: that of the show which the stage dances.
+def run_lights(directory: Path | None, box_file: Path | None) -> None:
+    """Light a show's rig until a signal comes; without a folder, the rig of the show that the stage dances.
 
     Raises ConfigError for a show or box file that cannot be lit, RuntimeFolderError without a place to meet.
     """
     box = load_box(box_file)
     require_wires(box, box_file)
     with stop_signals() as stopped, ExitStack() as opened:
-        speaker = LogWriter()  # a terminal that stands still must not hold up the lights
+        speaker = LogWriter()  # a terminal that blocks must not hold up the lights
         opened.callback(speaker.close)
         folder = runtime_folder(box)
         opened.callback(Claim(folder, "lights").close)
         notifier, stage, show_state = Notifier(), FrameReader(folder), ShowStateReader(folder)
         opened.callback(notifier.close)
         fallbacks = Fallbacks(OF_THE_LIGHTS)
-        company = ProcessHealthWriter(folder, "lights", fallbacks)
-        opened.callback(company.close)
+        process_health = ProcessHealthWriter(folder, "lights", fallbacks)
+        opened.callback(process_health.close)
         opened.callback(stage.close)
         opened.callback(show_state.close)
 
         def pulse(now: float) -> None:
             notifier.ping(now)
-            company.tell(now)
+            process_health.tell(now)
 
         if directory is not None:
             lights = Lights(load_show(directory), box, box_file, stage, show_state, speaker.say, fallbacks)
             notifier.ready("The lights dance.")
             _light(lights, stopped, pulse)
-            company.end(time.monotonic())
+            process_health.end(time.monotonic())
             return
         notifier.ready("The lights follow the stage.")
-        bill = ActiveShow(stage)
+        active = ActiveShow(stage)
         while not stopped():
-            if bill.is_new(time.monotonic()):
+            if active.is_new(time.monotonic()):
                 try:
-                    lights = Lights(bill.take(), box, box_file, stage, show_state, speaker.say, fallbacks)
+                    lights = Lights(active.load(), box, box_file, stage, show_state, speaker.say, fallbacks)
                 except ConfigError as error:
                     speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
                 else:
-                    _light(lights, lambda: stopped() or bill.is_new(time.monotonic()), pulse)
+                    _light(lights, lambda: stopped() or active.is_new(time.monotonic()), pulse)
             pulse(time.monotonic())
-            time.sleep(_LOOK_S)
-        company.end(time.monotonic())
+            time.sleep(_POLL_S)
+        process_health.end(time.monotonic())
 
 
 def _light(lights: Lights, stopped: Callable[[], bool], pulse: Callable[[float], None]) -> None:
     try:
-        lights.introduce()
-        lights.shine(stopped, pulse)
+        lights.log_setup()
+        lights.run(stopped, pulse)
     finally:
         lights.close()
 
 
 def say(words: str) -> None:
-    """A line for a person who walks through the rig; light matters more than a terminal that is gone."""
+    """Print a line, as far as there is still a terminal: light matters more."""
     with contextlib.suppress(OSError, ValueError):
         print(words, flush=True)
 
 
 def _wait_for(deadline: float, period_s: float) -> float:
-    """Sleep until the deadline's successor on its grid; passes that were missed are left out."""
+    """Sleep until the next deadline on the grid; missed passes are skipped."""
     now = time.monotonic()
     deadline += period_s * max(1, math.ceil((now - deadline) / period_s))
     time.sleep(max(deadline - now, 0.0))

@@ -1,4 +1,4 @@
-"""A slot: one attribute of one fixture, and the channels that it leaves by."""
+"""A slot: one attribute of one fixture, and its channels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Slot:
     name: str
     config: AttributeConfig
     component: int  # which colour component it shows (colour.COMPONENTS); -1: none
-    channels: tuple[int, ...]  # empty: a dimmer that the fixture does not have and its colours stand in for
+    channels: tuple[int, ...]  # empty: a missing dimmer, replaced by scaling the colours
 
     @property
     def base(self) -> str:

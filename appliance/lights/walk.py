@@ -1,4 +1,4 @@
-"""A walk through the rig: fixture by fixture, attribute by attribute, each with words to look for."""
+"""A walk through the rig: fixture by fixture, attribute by attribute, each with what to look for."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from appliance.show.fixture_profile import DIMMER, PAN, TILT
 from appliance.show.light_rules import AIM
 from appliance.show.lights import UNIVERSE_CHANNELS
 
-LONGEST_STEP_S = 0.04  # of a pass; one that was held up goes on from where it was, past no peak
-_ROOM = 2.2  # ways from end to end that a head has time for, of which it goes two
-CHEST_M = 1.2  # where heads are told to point at the end: over the stage's origin, as high as a chest
+LONGEST_STEP_S = 0.04  # of a pass; a late one continues where it was, so that no peak is skipped
+_ROOM = 2.2  # sweeps from end to end that a head has time for; it makes two
+CHEST_M = 1.2  # heads point here at the end: above the stage's origin, at chest height
 
 
 @dataclass(frozen=True)
 class Step:
-    """One thing to look at. `place` is the slot that moves, -1: all of the fixture's heads aim."""
+    """One thing to look at. `place`: the slot that moves; -1: all heads of the fixture aim."""
 
     fixture: str
     attribute: str
@@ -30,7 +30,7 @@ class Step:
 
 
 def steps(patch: Patch, fixtures: Sequence[str] = (), attribute: str | None = None) -> Iterator[Step]:
-    """What to look at, in the order of the patch; `fixtures` empty: all of them, `attribute` None: all."""
+    """What to look at, in patch order; empty `fixtures` or None for `attribute`: all."""
     for fixture in patch.fixtures:
         if fixtures and fixture.name not in fixtures:
             continue
@@ -43,7 +43,7 @@ def steps(patch: Patch, fixtures: Sequence[str] = (), attribute: str | None = No
 
 
 def introduction(patch: Patch, fixture: str) -> str:
-    """A fixture in a line: what it is and where it listens."""
+    """A fixture in one line: profile, universe, channels."""
     own = next(one for one in patch.fixtures if one.name == fixture)
     channels = [channel for slot in patch.slots if slot.fixture is own for channel in slot.channels]
     first, last = min(channels) % UNIVERSE_CHANNELS + 1, max(channels) % UNIVERSE_CHANNELS + 1
@@ -51,7 +51,7 @@ def introduction(patch: Patch, fixture: str) -> str:
 
 
 class Walk:
-    """Levels while a step is looked at: its fixture alone is lit, and what the step names moves."""
+    """Levels during a step: only its fixture is lit, and its attribute moves."""
 
     def __init__(self, patch: Patch) -> None:
         self._patch = patch
@@ -84,7 +84,7 @@ class Walk:
         return values
 
     def duration_s(self, step: Step, at_least_s: float) -> float:
-        """How long a step takes: a head needs its time from one end of its range to the other and back."""
+        """How long a step takes; a head needs time for its whole range and back."""
         axes = self._patch.heads.axes
         place = np.flatnonzero(axes.slots == step.place)
         needed_s: list[float] = (_ROOM * axes.degrees[place] / axes.slew[place]).tolist()

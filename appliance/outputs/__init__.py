@@ -1,1 +1,1 @@
-"""What leaves the box: the joint frame and the receivers that get it."""
+"""What leaves the box: the joint frame and its receivers."""

@@ -1,4 +1,4 @@
-"""The readers' end of the shared frame: the newest frames, whole or not at all, whatever the stage does."""
+"""The readers' end of the shared frame: the newest frames, whole or not at all."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from appliance.pose.foreign_file import plain_json
 
 State = Literal["absent", "fresh", "stale"]
 STALE_S = 0.5
-_LOOK_S = 0.1  # how often the file system is asked for a new stage
-_AHEAD_S = 1.0  # no reader's clock is so far behind the stage's
+_POLL_S = 0.1  # how often the file system is checked for a new stage
+_AHEAD_S = 1.0  # no reader's clock is this far behind the stage's
 
 
 @dataclass(frozen=True, slots=True)
 class SeenFrame:
-    """A joint frame as it was; the arrays are this reader's own and cannot be written."""
+    """A copy of a joint frame; its arrays are read-only."""
 
     tick: int
     frame_time: float  # seconds on the monotonic clock
@@ -51,17 +51,16 @@ class SeenFrame:
 
 
 class FrameReader:
-    """Reads the shared frame of whichever stage runs; never waits, never raises, never disturbs the stage.
+    """Reads the shared frame of the running stage; never waits, never raises, never disturbs the stage.
 
-    facts: of the newest stage, None before the first one. generation: a number that changes with each new
-    stage. Frames and facts of a stage that is gone stay until there is another one. `now` may be long ago: a
-    reader can be held up between its clock and its look.
+    facts: of the newest stage, None before the first. generation: changes with each new stage. Frames and
+    facts of a stage that is gone stay until the next one. `now` may be old, if the reader was held up.
     """
 
     def __init__(self, folder: Path, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._monotonic = monotonic
         self._file = RingFileReader(folder / FILE, KIND, FORMAT, WRITER)
-        self._looked_at = -math.inf
+        self._followed_at = -math.inf
         self._writer_lives = False
         self._layout = FrameLayout(0)
         self.facts: Facts | None = None
@@ -70,20 +69,20 @@ class FrameReader:
 
     @property
     def complaint(self) -> str:
-        """Why a file that is there cannot be read, in a sentence; else empty."""
+        """Why an existing file cannot be read, a sentence; else empty."""
         return self._file.complaint
 
     def newest(self, now: float) -> SeenFrame | None:
         """The newest whole frame, however old it is; None before the first one."""
-        self._look(now)
+        self._follow(now)
         if not self._file.rings:
             return None
         found = self._file.rings[FRAMES].newest()
         return self._frame(found[1], now) if found else None
 
     def frames(self, count: int, now: float) -> list[SeenFrame]:
-        """The newest frames of this stage, at most `count`, newest last; torn ones are left out."""
-        self._look(now)
+        """At most `count` of the newest frames of this stage, newest last; torn ones are skipped."""
+        self._follow(now)
         if not self._file.rings:
             return []
         ring = self._file.rings[FRAMES]
@@ -93,7 +92,7 @@ class FrameReader:
         return [frame for frame in seen if frame is not None]
 
     def health(self) -> dict[str, Any] | None:
-        """What the stage last said about itself; None before it did."""
+        """The newest health report of the stage; None before the first."""
         found = self._file.rings[HEALTH].newest() if self._file.rings else None
         if found is None:
             return None
@@ -111,27 +110,27 @@ class FrameReader:
         return "fresh" if self._writer_lives and now - newest.frame_time <= STALE_S else "stale"
 
     def is_alive(self, now: float) -> bool:
-        """Whether the process that writes the frames lives; it may hang, then `state` says stale."""
-        self._look(now)
+        """Whether the writing process lives; if it hangs, `state` is stale."""
+        self._follow(now)
         return self._writer_lives
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._file.close()
 
-    def _look(self, now: float) -> None:
-        if abs(now - self._looked_at) >= _LOOK_S:
-            self._looked_at = now
+    def _follow(self, now: float) -> None:
+        if abs(now - self._followed_at) >= _POLL_S:
+            self._followed_at = now
             self._open()
 
     def _open(self) -> None:
-        """Follow the path to the newest stage's file, and look whether that stage lives."""
+        """Open the newest stage's file and check whether that stage lives."""
         if self._file.look():
-            self._understand()
+            self._take_facts()
         self._writer_lives = self._file.is_there and self._file.writer_lives()
 
-    def _understand(self) -> None:
-        """Take the facts of another file than before."""
+    def _take_facts(self) -> None:
+        """Take the facts of a new file."""
         rings = self._file.rings
         if not rings:
             return
@@ -145,7 +144,7 @@ class FrameReader:
         self.generation += 1
 
     def _frame(self, payload: bytes, now: float) -> SeenFrame | None:
-        """None for what nobody may show: not a number, or left from before this machine was started anew."""
+        """None for frames that must not be shown: not finite, or from before this machine's restart."""
         layout, joints = self._layout, self._layout.joints
         if len(payload) != layout.bytes:
             return None

@@ -1,4 +1,4 @@
-"""Joint frame: the one message that every output gets; made once, filled anew in every tick."""
+"""Joint frame: the one message for every output, made once and filled in every tick."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 class JointFrame:
     """Where the dancer stands at one tick, J joints in the skeleton's order.
 
-    Write into the arrays (`frame.pose[:] = ...`); outputs read them during `send` and keep nothing.
+    Write into the arrays (`frame.pose[:] = ...`); outputs read them while they publish and keep nothing.
     """
 
     joints: int
     tick: int = 0
     frame_time: float = 0.0  # seconds on the monotonic clock
-    late: bool = False  # the last pose once more, because the tick did not get done
+    late: bool = False  # the last pose again, because the tick was not done in time
     sensor_sequence: int = -1  # of the primary sensor's newest reading in this frame; -1 without one
     sensor_arrival: float = 0.0  # when that reading came in, seconds on the monotonic clock
     pose: NDArray[np.float32] = field(init=False)  # (J, 4) w, x, y, z local to the parent joint

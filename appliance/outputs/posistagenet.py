@@ -18,13 +18,17 @@ INFO_PERIOD_S = 1.0
 _AXES = {"x": 0, "y": 1, "z": 2}
 
 
-class PosiStageNet:
-    """One output: a frame of data packets for every n-th joint frame, and once a second the names.
+class PosiStageNet(DatagramSender):
+    """One receiver: data packets for every n-th joint frame, and the names once a second.
 
-    A frame that is late repeats positions and speeds: the dancer did not stop, the box did.
+    A late frame repeats positions and speeds: the box stopped, not the dancer.
     """
 
     def __init__(self, config: PosiStageNetConfig, skeleton: Skeleton) -> None:
+        # Only multicast needs its interface named: the kernel knows the route to a single receiver.
+        interface = config.interface if ipaddress.IPv4Address(config.host).is_multicast else None
+        path = DatagramPath(config.host, config.port, interface)
+        super().__init__(f"{config.host}:{config.port} (posistagenet)", path)
         names = tuple(config.joints) or skeleton.names
         self._joints = np.array([skeleton.names.index(name) for name in names])
         numbers = range(config.first_tracker, config.first_tracker + len(names))
@@ -37,31 +41,13 @@ class PosiStageNet:
         self._every, self._frames = config.every, 0
         self._started: float | None = None
         self._time_before = self._next_info = 0.0
-        self._sender = DatagramSender(DatagramPath(config.host, config.port, _way_out(config)))
-        self.name = f"{config.host}:{config.port} (posistagenet)"
 
-    @property
-    def sent(self) -> int:
-        """Datagrams handed to the network."""
-        return self._sender.sent
-
-    @property
-    def dropped(self) -> int:
-        """Datagrams that were not."""
-        return self._sender.dropped
-
-    @property
-    def last_error(self) -> str:
-        """Why the last one was dropped; stays after all is well again."""
-        return self._sender.last_error
-
-    def send(self, frame: JointFrame) -> None:
-        """This frame, if it is its turn. Never waits, never raises."""
-        is_its_turn = self._frames % self._every == 0
+    def send_frame(self, frame: JointFrame) -> None:
+        """Send this frame, if it is an n-th one. Never waits, never raises."""
+        is_due = self._frames % self._every == 0
         self._frames += 1
-        if is_its_turn:
-            for packet in self.encode(frame):
-                self._sender.send(packet, frame.frame_time)
+        if is_due:
+            self.send_datagrams(self.encode(frame), frame.frame_time)
 
     def encode(self, frame: JointFrame) -> Sequence[memoryview]:
         """Datagrams of this frame, the same buffers each time; once a second those with the names first."""
@@ -77,10 +63,6 @@ class PosiStageNet:
             return self._data.stamped(time_us)
         self._next_info = frame.frame_time + INFO_PERIOD_S
         return (*self._info.stamped(time_us), *self._data.stamped(time_us))
-
-    def close(self) -> None:
-        """Close the socket."""
-        self._sender.close()
 
     def _place(self, frame: JointFrame, out: NDArray[np.float32]) -> None:
         """Positions of the trackers, (T, 3), in the receiver's axes and units."""
@@ -105,8 +87,3 @@ def _turn(axes: Sequence[str]) -> NDArray[np.float32]:
     for column, axis in enumerate(axes):
         turn[_AXES[axis[-1]], column] = -1.0 if axis.startswith("-") else 1.0
     return turn
-
-
-def _way_out(config: PosiStageNetConfig) -> str | None:
-    """The interface that multicast leaves by; to one receiver the kernel knows the way."""
-    return config.interface if ipaddress.IPv4Address(config.host).is_multicast else None

@@ -90,7 +90,7 @@ def _parent(number: int, chunks: bytes) -> bytes:
 
 
 def _split(list_number: int, trackers: Sequence[bytes], before: bytes) -> list[bytes]:
-    """The trackers in as few lists as fit a packet each, in their order; `before` stands in front of each."""
+    """The trackers, in order, in as few lists as fit one packet each; `before` precedes each list."""
     room = MAX_PACKET - _STAMP_AT - _STAMP.size - len(before) - _CHUNK.size
     lists = [b""]
     for tracker in trackers:

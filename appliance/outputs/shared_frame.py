@@ -1,4 +1,4 @@
-"""The shared frame: each joint frame and once a second the box's health, in memory that others may read."""
+"""The shared frame: each joint frame, and once a second the box's health, in shared memory."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from appliance.pose.skeleton import Skeleton
 
 FILE, KIND, FORMAT, WRITER = "frame", "frame", 1, "the stage (bunraku play)"
 FACTS, HEALTH, FRAMES = range(3)  # the file's rings
-FRAME_SLOTS = 64  # 1.28 s: a reader has that long to copy the newest one
+FRAME_SLOTS = 64  # a reader has 1.28 s to copy the newest frame
 HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
 LATE = 1  # flag
 # Tick, frame time, when it left the stage, the sensor's sequence and its arrival, flags, joints.
@@ -28,14 +28,14 @@ FRAME_HEAD = struct.Struct("<qddqdII")
 
 @dataclass(frozen=True)
 class Facts:
-    """What does not change while a stage runs: what its readers need to know about the show."""
+    """What readers need to know about the show and what stays the same while a stage runs."""
 
     show_directory: Path
     box_file: Path | None
     show_name: str
     skeleton: Skeleton
     held: tuple[int, ...]  # joints that hands hold
-    hands: tuple[str, ...]  # who holds them
+    hands: tuple[str, ...]  # that hold them
     phrases: tuple[str, ...]
     cues: tuple[dict[str, Any], ...]
     looks: tuple[str, ...]
@@ -45,7 +45,7 @@ class Facts:
     most_iterations: int
     pid: int
     started: float  # seconds on the monotonic clock
-    rehearsal: bool = False  # its sensors are emulated: nothing of it is kept
+    rehearsal: bool = False  # its sensors are emulated: nothing is kept
 
     def packed(self) -> bytes:
         """As JSON."""
@@ -64,7 +64,7 @@ class Facts:
 
     @classmethod
     def unpacked(cls, packed: bytes) -> Facts:
-        """From JSON; raises ValueError, KeyError or TypeError where that is none of ours."""
+        """From JSON. Raises ValueError, KeyError or TypeError for foreign data."""
         facts = plain_json(packed)
         skeleton, box_file = facts["skeleton"], facts["box_file"]
         names = ("held", "hands", "phrases", "cues", "looks", "lights")
@@ -138,7 +138,7 @@ class FrameWriter:
         self._ring.publish()
 
     def write_health(self, health: Mapping[str, Any]) -> None:
-        """Publish how the box is, after the frame has left; a list that is too long loses its end."""
+        """Publish the box's health, after the frame has left; a list that is too long loses its end."""
         said = dict(health)
         packed = json.dumps(said).encode()
         while len(packed) > HEALTH_BYTES:
@@ -148,5 +148,5 @@ class FrameWriter:
         self._file.rings[HEALTH].write(packed)
 
     def close(self) -> None:
-        """The show is over: readers find no stage any more."""
+        """Remove the file: readers find no stage."""
         self._file.close(remove=True)

@@ -1,10 +1,10 @@
-"""A sensor's clock in the box's time: when was this measured, whatever the network did to it on the way.
+"""A sensor's clock on the box's time: when a reading was measured, whatever delay the network added.
 
 arrival = time on the sensor's clock + offset + delay, and delays are never negative, but often small. So the
-line under all points (sensor time, arrival - sensor time) is the clock, and what lies above it is delay: the
+line under all points (sensor time, arrival - sensor time) is the clock, and all above it is delay: the
 lower hull of each second's smallest offset (S. B. Moon, P. Skelly, D. Towsley: Estimation and removal of
 clock skew from network delay measurements, INFOCOM 1999). The smallest delay itself, 1 to 3 ms of Wi-Fi,
-cannot be seen from one side: measured times are late by it.
+cannot be measured one way: measured times are late by it.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ BUCKET_S = 1.0
 WINDOW_S = 60.0
 SHORTEST_SPAN_S = 10.0  # with less, a millisecond of jitter would read as 100 ppm: no drift is assumed
 LARGEST_DRIFT = 1e-3  # crystals are within 1e-4; a line steeper than this is a network that fills up
-LARGEST_DELAY_S = 0.6  # a second whose fastest reading was later than this: the sensor's clock jumped
-EARLIEST_S = 0.1  # a reading that much earlier than possible: the clock jumped, or all before it were held up
+LARGEST_DELAY_S = 0.6  # when even the fastest reading of a second is later, the sensor's clock jumped
+EARLIEST_S = 0.1  # a reading this much too early: the clock jumped, or all before it were held up
 
 
 class DeviceClock:
@@ -35,7 +35,7 @@ class DeviceClock:
         self._slope = 0.0
 
     def reset(self) -> None:
-        """Forget the mapping and the wraps: the sensor was switched on again."""
+        """Forget mapping and wraps, for a sensor that was switched on again."""
         self._raw_us = None
         self._forget_line()
 
@@ -45,7 +45,7 @@ class DeviceClock:
         return self._slope * 1e6
 
     def unwrap(self, sensor_time_us: int, arrival: float) -> int:
-        """The device's microseconds without wraps; `arrival` tells how many were missed in a long silence."""
+        """The device's microseconds without wraps; `arrival` shows how many a long silence hid."""
         if self._raw_us is None:
             self._unwrapped_us = sensor_time_us
         else:
@@ -57,7 +57,7 @@ class DeviceClock:
         return self._unwrapped_us
 
     def observe(self, unwrapped_us: int, arrival: float) -> float:
-        """One reading's times; gives when it was measured, on the box's clock, never after arrival."""
+        """When a reading was measured, on the box's clock, never after its arrival."""
         sensor_s = unwrapped_us * 1e-6
         offset = arrival - sensor_s
         if self._bucket_start is not None and sensor_s < self._bucket_start - BUCKET_S:  # it was set back

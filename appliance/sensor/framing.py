@@ -1,8 +1,8 @@
 """Packets on a serial line: COBS, a CRC-16, and a zero byte between frames.
 
 COBS: S. Cheshire and M. Baker, Consistent Overhead Byte Stuffing, 1999. The checksum is CRC-16/XMODEM
-(polynomial 0x1021, start 0), little-endian, behind the packet and inside the stuffing: it tells a damaged
-line from a wrong key.
+(polynomial 0x1021, start 0), little-endian, behind the packet and inside the stuffing: it distinguishes a
+damaged line from a wrong key.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ def frame(packet: bytes) -> bytes:
 
 
 class Deframer:
-    """Finds the packets in a stream that starts anywhere and may be damaged; keeps at most one frame.
+    """Finds packets in a stream that may start anywhere and be damaged; keeps at most one frame.
 
-    What is damaged is counted in `counts`: frame_length, frame_stuffing, frame_crc.
+    Damage is counted in `counts`: frame_length, frame_stuffing, frame_crc.
     """
 
     def __init__(self, counts: Counter[str]) -> None:
@@ -80,7 +80,7 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def cobs_decode(stuffed: bytes) -> bytes | None:
-    """What `cobs_encode` was given, or None when this cannot have come from it."""
+    """The inverse of `cobs_encode`; None for bytes that it cannot have made."""
     data = bytearray()
     at = 0
     while at < len(stuffed):

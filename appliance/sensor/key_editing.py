@@ -1,4 +1,4 @@
-"""Changes to the key file: one writer at a time, comments stay, and a power cut leaves the old or the new."""
+"""Changes to the key file: one writer at a time, comments stay, a power cut leaves a whole file."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from appliance.sensor.keys import (
     unknown_sensor,
 )
 
-_PATIENCE_S = 2.0  # another change of the file takes milliseconds; a provisioning, as long as its cable
+_PATIENCE_S = 2.0  # another change takes milliseconds, a provisioning as long as its cable
 
 
 class KeyEditing:
-    """One change of a key file, made in memory; `prepare` and `commit` make it the file's.
+    """One change of a key file in memory; `prepare` and `commit` write it.
 
-    A comment stays where it is, beside or above the same sensor. Only a file whose entries cannot be edited
-    in place (one line in braces, anchors) is written anew, without its comments.
+    Comments stay beside or above their sensor. Only a file that cannot be edited in place (one line in
+    braces, anchors) is rewritten without its comments.
     """
 
     def __init__(self, path: Path) -> None:
@@ -57,7 +57,7 @@ class KeyEditing:
             )
 
     def remove(self, name: str) -> None:
-        """Take a sensor out. Raises KeyFileError when there is none of this name."""
+        """Remove a sensor. Raises KeyFileError when there is none of this name."""
         self._require(name)
         self._change(
             {other: key for other, key in self.keys.items() if other != name},
@@ -65,7 +65,7 @@ class KeyEditing:
         )
 
     def rename(self, name: str, new: str) -> None:
-        """Give a sensor another name. Raises KeyFileError when it is taken or no name."""
+        """Rename a sensor. Raises KeyFileError when the name is taken or invalid."""
         self._require(name)
         self._require_good_name(new)
         if new in self.keys:
@@ -73,17 +73,17 @@ class KeyEditing:
         self._rename({name: new})
 
     def swap(self, name: str, other: str) -> None:
-        """Exchange the names of two sensors. Raises KeyFileError when one of them is not there."""
+        """Swap the names of two sensors. Raises KeyFileError when one of them does not exist."""
         self._require(name)
         self._require(other)
         self._rename({name: other, other: name})
 
     def prepare(self) -> None:
-        """Write the changed file beside the old one, so that what can fail fails now. Raises OSError."""
+        """Write the changed file beside the old one, so that errors happen now. Raises OSError."""
         self._beside = write_beside(self.path, self._text)
 
     def commit(self) -> None:
-        """Let the changed file take the old one's place. Raises OSError."""
+        """Replace the old file with the changed one. Raises OSError."""
         if self._beside is None:
             self.prepare()
         assert self._beside is not None
@@ -91,7 +91,7 @@ class KeyEditing:
         self._beside = None
 
     def discard(self) -> None:
-        """Remove what was prepared and not committed."""
+        """Remove a prepared file that was not committed."""
         if self._beside is not None:
             self._beside.unlink(missing_ok=True)
             self._beside = None
@@ -103,7 +103,7 @@ class KeyEditing:
         self._change(renamed, lambda text: _renamed(text, names))
 
     def _change(self, wanted: Mapping[str, SensorKey], edit: Callable[[str], str]) -> None:
-        """Take the edited text if it reads as wanted; else write the file anew."""
+        """Take the edited text if it parses as wanted; else rewrite the file."""
         try:
             edited = edit(self._text)
             as_wanted = parse_keys(self.path, edited) == wanted
@@ -124,12 +124,12 @@ class KeyEditing:
 
 @contextmanager
 def editing(path: Path) -> Iterator[KeyEditing]:
-    """The key file's content, to be changed by one writer alone; what is not committed in here is discarded.
+    """The key file's content for one writer; changes that are not committed inside are discarded.
 
-    A file that does not exist yet has no sensors. Raises KeyFileError when another writer is at work or the
-    file is none, OSError when its folder cannot be written.
+    A file that does not exist yet has no sensors. Raises KeyFileError for another writer or a broken file,
+    OSError when its folder cannot be written.
     """
-    path = path.resolve()  # a link stays one
+    path = path.resolve()  # a symbolic link stays one
     folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
     try:
         _lock(folder, path)
@@ -139,11 +139,11 @@ def editing(path: Path) -> Iterator[KeyEditing]:
         finally:
             change.discard()
     finally:
-        os.close(folder)  # and so the lock
+        os.close(folder)  # releases the lock
 
 
 def _lock(folder: int, path: Path) -> None:
-    """Lock the folder: the file itself gives way to another one at each change."""
+    """Lock the folder: the file itself is replaced at each change."""
     until = time.monotonic() + _PATIENCE_S
     while True:
         try:
@@ -158,7 +158,7 @@ def _lock(folder: int, path: Path) -> None:
 
 
 class _Place(NamedTuple):
-    """Where an entry stands in the text: its name from `begin` to `name_end`, all of it to `end`."""
+    """Span of an entry in the text: its name from `begin` to `name_end`, all of it to `end`."""
 
     begin: int
     name_end: int
@@ -175,7 +175,7 @@ def _places(text: str) -> dict[str, _Place]:
 
 
 def _end(node: yaml.Node) -> int:
-    """Where a value ends; a block's own mark lies behind the comments that follow it."""
+    """Where a value ends; the mark of a block lies behind the comments that follow it."""
     if isinstance(node, yaml.MappingNode) and not node.flow_style and node.value:
         return _end(node.value[-1][1])
     return int(node.end_mark.index)
@@ -191,7 +191,7 @@ def _added(text: str, sensor: SensorKey) -> str:
 
 
 def _removed(text: str, name: str) -> str:
-    """Without the lines of this entry; the comment behind it goes with it."""
+    """Without the lines of this entry and the comment behind it."""
     place = _places(text)[name]
     begin, end = text.rfind("\n", 0, place.begin) + 1, text.find("\n", place.end)
     return text[:begin] + (text[end + 1 :] if end >= 0 else "")

@@ -1,4 +1,4 @@
-"""The key file that both sides read: which sensors there are, and the secret that each one signs with."""
+"""The key file: the sensors of a box and the secret that each signs with."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ import yaml
 from appliance.pose.foreign_file import content
 from appliance.sensor.wire import KEY_BYTES
 
-HEADER = "# Sensors of this box and their secret keys. Whoever has this file can move the puppet: keep it.\n"
+HEADER = "# Sensors of this box and their secret keys. With this file anyone can move the puppet.\n"
 LARGEST_FILE = 64 * 1024
-LONGEST_NAME = 24  # shorter than a key, so that no key out of place is ever shown as a name
+LONGEST_NAME = 24  # shorter than a key, so that a misplaced key is never shown as a name
 ENTRY = "one entry looks like: 'left-wrist: {device: 0x1a2b3c4d, key: 32 hexadecimal digits}'"
 
 
 class KeyFileError(ValueError):
-    """A key file that cannot be used: which line, what is wrong, what to do. Never contains a key."""
+    """An unusable key file: which line, what is wrong, what to do. Never contains a key."""
 
     def __init__(self, path: Path, line: int | None, message: str) -> None:
         super().__init__(f"{path}: {message}" if line is None else f"{path}:{line}: {message}")
@@ -43,7 +43,7 @@ class SensorKey:
 
     @property
     def wearable(self) -> int:
-        """Which wearable this entry lets in, 32 bits. Each provisioning makes another one of it."""
+        """Identifies the wearable that this entry lets in, 32 bits; changes at each provisioning."""
         tag = blake2s(self.device_id.to_bytes(4, "little"), key=self.key, digest_size=4, person=b"wearable")
         return int.from_bytes(tag.digest(), "little")
 
@@ -54,7 +54,7 @@ def load_keys(path: Path) -> dict[str, SensorKey]:
 
 
 def read_text(path: Path) -> str:
-    """A key file's text. Raises KeyFileError when it cannot be one, OSError when there is no file."""
+    """A key file's text. Raises KeyFileError for anything else, OSError when there is no file."""
     if path.stat().st_size > LARGEST_FILE:
         raise KeyFileError(path, 1, f"is larger than {LARGEST_FILE // 1024} KiB, so it is no key file")
     try:
@@ -82,7 +82,7 @@ def parse_keys(path: Path, text: str) -> dict[str, SensorKey]:
         sensor = _sensor(path, name_node, entry_node)
         if sensor.name in keys:
             raise KeyFileError(
-                path, _line(name_node), f"sensor {sensor.name!r} stands here twice; remove one entry"
+                path, _line(name_node), f"sensor {sensor.name!r} is here twice; remove one entry"
             )
         for other in keys.values():
             if other.device_id == sensor.device_id:
@@ -96,9 +96,9 @@ def parse_keys(path: Path, text: str) -> dict[str, SensorKey]:
 
 
 def create_keys(path: Path, names: Iterable[str]) -> dict[str, SensorKey]:
-    """Writes a new key file with a fresh random key for each name, readable by its owner alone.
+    """Write a new key file with a random key for each name, readable by its owner alone.
 
-    Raises FileExistsError rather than replace a file: the sensors out there hold the keys that are in it.
+    Raises FileExistsError rather than replace a file: provisioned sensors hold its keys.
     """
     keys: dict[str, SensorKey] = {}
     for name in names:
@@ -113,7 +113,7 @@ def create_keys(path: Path, names: Iterable[str]) -> dict[str, SensorKey]:
 
 
 def fresh_key(name: str, others: Iterable[SensorKey]) -> SensorKey:
-    """A sensor with a new random key and a device id that none of the others has."""
+    """A sensor with a new random key and an unused device id."""
     taken = {0, *(other.device_id for other in others)}
     device_id = 0
     while device_id in taken:
@@ -127,7 +127,7 @@ def entry(sensor: SensorKey) -> str:
 
 
 def name_fault(name: str) -> str | None:
-    """What is wrong with a new sensor's name, for people; None when it will do, here and in the sensor."""
+    """What is wrong with a new sensor's name, as a clause; None when box and sensor accept it."""
     if not 0 < len(name) <= LONGEST_NAME or not all("!" <= letter <= "~" for letter in name):
         return (
             f"a sensor's name has 1 to {LONGEST_NAME} letters, digits or signs, "
@@ -144,7 +144,7 @@ def exposure(path: Path) -> str | None:
 
 
 def unknown_sensor(name: str, keys: dict[str, SensorKey]) -> str:
-    """What to tell a person who named a sensor that the key file does not have."""
+    """The message for a sensor name that the key file does not have."""
     known = ", ".join(sorted(keys)) or "none"
     nearest = get_close_matches(name, keys, n=1)
     meant = f" Did you mean {nearest[0]!r}?" if nearest else ""
@@ -167,7 +167,7 @@ def _sensor(path: Path, name_node: yaml.Node, entry_node: yaml.Node) -> SensorKe
     for field_node, value_node in entry_node.value:
         field_name = _text(path, field_node, "a field's name")
         if field_name not in ("device", "key"):
-            shown = f" {field_name!r}" if len(field_name) < 12 else ""  # it might be a key out of place
+            shown = f" {field_name!r}" if len(field_name) < 12 else ""  # it might be a misplaced key
             raise KeyFileError(
                 path, _line(field_node), f"sensor {name!r} has an unknown field{shown}; {ENTRY}"
             )

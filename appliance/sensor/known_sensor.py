@@ -1,63 +1,65 @@
-"""One sensor of the key file: its pairing, its clock, its last orientation, how it is."""
+"""One sensor of the key file: its pairing, clock, last orientation and state."""
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 
 from appliance.sensor import wire
 from appliance.sensor.device_clock import DeviceClock
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.pairing import LOST_S, Pairing
-from appliance.sensor.plausibility import Orientation, PlausibilityGate
-from appliance.sensor.state import Reception, SensorReading, SensorState
-from appliance.sensor.transports.transport import Way
+from appliance.sensor.state import Orientation, Reception, SensorReading, SensorState
+from appliance.sensor.transports.transport import Route
 
+NORM_TOLERANCE = 0.01  # Q14 rounding gives 6e-5
 CONTESTED_S = 30.0  # two wearables with one key change places each 3 s
 
 
 class KnownSensor:
-    """Turns authentic, new readings into believed ones."""
+    """Turns authentic, new packets into readings."""
 
     def __init__(self, key: SensorKey, pairing: Pairing) -> None:
         self.key = key
         self.wearable = key.wearable
         self.pairing = pairing
         self.reception = Reception()
-        self.believed_arrival: float | None = None
-        self.arrivals: list[float] = []  # of the believed readings of one drain
+        self.accepted_arrival: float | None = None
+        self.arrivals: list[float] = []  # of the accepted readings of one drain
         self.strobe_until = -inf
         self._clock = DeviceClock()
-        self._gate = PlausibilityGate()
         self._orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
 
-    def follow(self, packet: wire.Reading, way: Way, arrival: float, is_reboot: bool) -> int:
-        """Takes an authentic, new reading as the newest; gives how many before it were lost."""
+    def take_reading(self, packet: wire.Reading, route: Route, arrival: float, is_reboot: bool) -> int:
+        """Take an authentic, new reading as the newest. Returns how many before it were lost."""
         if is_reboot:
             self._clock.reset()
-            self._gate.reset()
-        lost = self.pairing.follow(packet, way, arrival)
+        lost = self.pairing.take_reading(packet, route, arrival)
         self.reception.received += 1
         self.reception.lost += lost
         return lost
 
-    def believe(self, packet: wire.Reading, arrival: float) -> tuple[SensorReading | None, str]:
-        """The reading, if a hand could have made it, and what happened to it."""
+    def to_reading(self, packet: wire.Reading, arrival: float) -> tuple[SensorReading | None, str]:
+        """The reading, if it holds an orientation, and its fate.
+
+        The wearable, which knows when its IMU was read, refuses what no hand can do before it signs. The box
+        checks the length alone: poses are made of it, and a wearable of another maker may have no such gate.
+        """
         sensor_time_us = self._clock.unwrap(packet.sensor_time_us, arrival)
         measured_at = self._clock.observe(sensor_time_us, arrival)
-        unit, fate = self._gate.admit(packet.orientation, sensor_time_us, arrival)
-        if unit is None:
-            return None, fate
-        w, x, y, z = unit
+        w, x, y, z = packet.orientation
+        norm = sqrt(w * w + x * x + y * y + z * z)
+        if abs(norm - 1.0) > NORM_TOLERANCE:
+            return None, "norm"
         a, b, c, d = self._orientation
         if w * a + x * b + y * c + z * d < 0:
-            unit = (-w, -x, -y, -z)
-        self._orientation = unit
-        self.believed_arrival = arrival
+            norm = -norm
+        self._orientation = (w / norm, x / norm, y / norm, z / norm)
+        self.accepted_arrival = arrival
         self.arrivals.append(arrival)
         return (
             SensorReading(
                 self.key.name,
-                unit,
+                self._orientation,
                 packet.sequence,
                 sensor_time_us,
                 measured_at,
@@ -71,36 +73,36 @@ class KnownSensor:
                 _round_trip_s(packet),
                 self.wearable,
             ),
-            fate,
+            "accepted",
         )
 
     def state(self, now: float) -> SensorState:
-        """How it is, for people."""
+        """Its state, for people."""
         session, hello = self.pairing.session, self.pairing.hello
         newest = session.newest if session is not None else None
-        told = newest or hello
-        age_s = None if self.believed_arrival is None else max(0.0, now - self.believed_arrival)
+        last = newest or hello
+        age_s = None if self.accepted_arrival is None else max(0.0, now - self.accepted_arrival)
         return SensorState(
             name=self.key.name,
             device_id=self.key.device_id,
             state=self._word(now),
-            way="" if session is None else session.way[0].describe(session.way[1]),
+            way="" if session is None else session.route[0].describe(session.route[1]),
             rate_hz=self.reception.rate_hz(now),
             loss=self.reception.loss(),
             round_trip_s=None if newest is None else _round_trip_s(newest),
             age_s=age_s,
-            battery=wire.BATTERY_UNKNOWN if told is None else told.battery,
+            battery=wire.BATTERY_UNKNOWN if last is None else last.battery,
             calibration=0 if newest is None else newest.calibration,
             firmware="" if hello is None else _firmware(hello),
             imu_id="" if hello is None else hello.imu_id.hex(),
-            flags=0 if told is None else told.flags,
-            boot_nonce=0 if told is None else told.boot_nonce,
+            flags=0 if last is None else last.flags,
+            boot_nonce=0 if last is None else last.boot_nonce,
             complaint=self._complaint(now),
         )
 
     def _word(self, now: float) -> str:
         pairing = self.pairing
-        if pairing.way(now) is not None:
+        if pairing.route(now) is not None:
             return "linked"
         if now - pairing.greeted_at < LOST_S:
             return "greeted"
@@ -110,11 +112,11 @@ class KnownSensor:
         if now - self.pairing.contested_at < CONTESTED_S:
             name = self.key.name
             return (
-                f"Two wearables are on with the key of {name}, and take its place from each other: its joint "
+                f"Two wearables are on with the key of {name} and take its place from each other: its joint "
                 "jumps between them. Switch one of them off, and provision it under a name of its own. "
                 f"Is there only one? Its key was copied: bunraku provision --name {name} gives it another."
             )
-        if self.pairing.way(now) is not None:
+        if self.pairing.route(now) is not None:
             return ""
         hello = self.pairing.newest_hello
         if hello is None or hello.wire_hash == wire.WIRE_HASH:

@@ -1,4 +1,4 @@
-"""The box's ear and mouth: lets sensors in, believes what is authentic, new and plausible, counts all."""
+"""All sensors of the box: lets them in, uses readings that are authentic and new, counts every packet."""
 
 from __future__ import annotations
 
@@ -17,19 +17,18 @@ from appliance.sensor.pairing import NO_HAND, Pairing
 from appliance.sensor.state import SensorReading as SensorReading
 from appliance.sensor.state import SensorState as SensorState
 from appliance.sensor.transports.serial import SerialIntake
-from appliance.sensor.transports.transport import Intake, Way
+from appliance.sensor.transports.transport import Intake, Route
 from appliance.sensor.transports.udp import UdpIntake
 
-ATTEND_S = 1.0
-HEARTBEATS_APART = 8  # sensors in the key file's order get theirs at different eighths of a second
+RESERVE_EACH_S = 1.0
+HEARTBEATS_APART = 8  # sensors get their heartbeats at different eighths of a second, in key file order
 REASONS = (
     "accepted",
-    "relocated",  # accepted: refused at first, then several readings agreed
     *("hello", "profile"),  # authentic, new, of use
     *("length", "magic", "version", "kind", "device", "tag", "other_wire"),
     *("duplicate", "reordered", "old", "ahead", "old_session", "old_hello"),
-    *("zero", "norm", "torn", "rate"),
-    "lost",  # never came, by the gaps in the sequence
+    "norm",
+    "lost",  # by the gaps in the sequence
     "reboot",
 )
 
@@ -41,10 +40,10 @@ def open_link(
     profiles: Mapping[bytes, bytes] = MappingProxyType({}),
     hands: Sequence[str] = (),
 ) -> SensorLink:
-    """A link over a UDP (host, port) and serial (device, baud)s.
+    """A link over a UDP (host, port) and serial (device, baud) pairs.
 
     `profiles`: kept calibrations by the IMU's unique id. `hands`: sensors in the order of the show's hands.
-    Raises PortError when the UDP port cannot be opened; an absent serial device is waited for.
+    Raises PortError when the UDP port cannot be opened; an absent serial device may come later.
     """
     intakes: list[Intake] = [UdpIntake(*udp)] if udp is not None else []
     intakes += (SerialIntake(device, baud) for device, baud in serial)
@@ -62,7 +61,7 @@ class SensorLink:
         hands: Sequence[str] = (),
     ) -> None:
         self.intakes = tuple(intakes)
-        self.wants_neutral: set[str] = set()  # names of sensors that should stand still: their light says so
+        self.wants_neutral: set[str] = set()  # sensors whose wearers should stand still: their light shows it
         self.light = True  # whether a linked sensor's light flashes now and then
         self.sent: Counter[str] = Counter()  # packets to sensors by kind
         self._hands = tuple(hands)
@@ -72,48 +71,52 @@ class SensorLink:
         self._by_name: dict[str, KnownSensor] = {}
         self._counts = dict.fromkeys(REASONS, 0)
         self._newest: dict[str, SensorReading] = {}
-        self._attend_at = -inf
-        self.admit(keys)
+        self._reserve_at = -inf
+        self.set_keys(keys)
 
     def drain(self, now: float) -> Sequence[SensorReading]:
-        """What came since the last drain: the newest believed reading of each sensor that has one."""
+        """The newest accepted reading of each sensor since the last drain."""
         newest = self._newest
         newest.clear()
         for sensor in self._by_device.values():
             sensor.arrivals.clear()
         counts = self._counts
         for intake in self.intakes:
-            for packet, arrival, origin in intake.receive(now):
-                counts[self._take(packet, arrival, (intake, origin))] += 1
+            for packet, arrival, origin in intake.receive_packets(now):
+                counts[self._judge(packet, arrival, (intake, origin))] += 1
         return tuple(newest.values())
 
-    def tend(self, now: float) -> None:
-        """Send what is due: assignments, calls, heartbeats, calibrations. Once a tick, after the frame.
+    def send_due(self, now: float) -> None:
+        """Send assignments, calls, heartbeats and calibrations that are due. Once a tick, after the frame.
 
-        `now` is the moment of this call: it goes into the echo from which a sensor takes its round trip.
+        `now` is the time of this call: sensors work out their round trip from its echo.
         """
         for sensor in self._by_device.values():
-            for (intake, origin), packet in sensor.pairing.due(now, self._led(sensor, now), self._profiles):
-                intake.send(wire.pack(packet, sensor.pairing.tagger), origin)
+            for (intake, origin), packet in sensor.pairing.due_packets(
+                now, self._led(sensor, now), self._profiles
+            ):
+                intake.send_packet(wire.pack(packet, sensor.pairing.tagger), origin)
                 self.sent[type(packet).__name__.lower()] += 1
             sensor.reception.mark(now)
-        if now >= self._attend_at:
-            self._attend_at = now + ATTEND_S
-            ways = [sensor.pairing.way(now) for sensor in self._by_device.values()]
+        if now >= self._reserve_at:
+            self._reserve_at = now + RESERVE_EACH_S
+            routes = [sensor.pairing.route(now) for sensor in self._by_device.values()]
             for intake in self.intakes:
-                intake.attend({way[1] for way in ways if way is not None and way[0] is intake})
+                intake.reserve_sockets(
+                    {route[1] for route in routes if route is not None and route[0] is intake}
+                )
 
     def states(self, now: float) -> list[SensorState]:
-        """How each known sensor is, in the order of the key file."""
+        """The state of each sensor of the key file, in its order."""
         return [sensor.state(now) for sensor in self._by_name.values()]
 
     def strobe(self, sensor: str, now: float, seconds: float = 10.0) -> None:
-        """Let this sensor's light flash brightly, so that a person finds it. A stranger is ignored."""
+        """Flash this sensor's light so that a person finds it. Unknown names are ignored."""
         if sensor in self._by_name:
             self._by_name[sensor].strobe_until = now + seconds
 
-    def admit(self, keys: Mapping[str, SensorKey]) -> None:
-        """Only these sensors from now on. Who keeps device id and key goes on, also under another name."""
+    def set_keys(self, keys: Mapping[str, SensorKey]) -> None:
+        """Let in these sensors only. One that keeps device id and key stays linked, even under a new name."""
         before, self._by_device, self._by_name = self._by_device, {}, {}
         for place, key in enumerate(keys.values()):
             sensor = before.get(key.device_id)
@@ -125,13 +128,13 @@ class SensorLink:
             self._by_device[key.device_id] = self._by_name[key.name] = sensor
 
     def take_profiles(self) -> list[tuple[bytes, bytes]]:
-        """Calibrations that sensors have sent since the last call: (the IMU's unique id, offsets)."""
+        """Calibrations from sensors since the last call: (unique id of the IMU, offsets)."""
         taken, self._new_profiles = self._new_profiles, {}
         return list(taken.items())
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many packets met each fate since the start, with what the intakes counted themselves."""
+        """Packets by fate since the start, with the intakes' own counters."""
         counts = dict(self._counts)
         for intake in self.intakes:
             for reason, count in intake.counts.items():
@@ -139,12 +142,12 @@ class SensorLink:
         return counts
 
     def newest_arrival(self, sensor: str) -> float | None:
-        """When this sensor's newest believed reading arrived, in monotonic seconds; None before the first."""
+        """Arrival of this sensor's newest accepted reading, monotonic seconds; None before the first."""
         known = self._by_name.get(sensor)
-        return known.believed_arrival if known is not None else None
+        return known.accepted_arrival if known is not None else None
 
     def arrivals(self, sensor: str) -> Sequence[float]:
-        """When each believed reading of the last drain arrived, not only the newest; none for a stranger."""
+        """Arrivals of all accepted readings of the last drain; none for an unknown sensor."""
         known = self._by_name.get(sensor)
         return known.arrivals if known is not None else ()
 
@@ -159,20 +162,14 @@ class SensorLink:
             return wire.LED_SLOW
         return wire.LED_ON if self.light else wire.LED_OFF
 
-    def _take(self, data: wire.Buffer, arrival: float, way: Way) -> str:
-        """What becomes of one packet, in one word. What is cheap to see is looked at before the tag."""
-        if len(data) < wire.HEAD.size:
-            return "length"
-        magic, version, kind, device_id, boot_nonce, session, sequence = wire.HEAD.unpack_from(data)
-        if magic != wire.MAGIC:
-            return "magic"
-        if version != wire.VERSION:
-            return "version"
-        layout = wire.LAYOUTS.get(kind)
-        if layout is None or layout.direction != "sensor to box":
+    def _judge(self, data: wire.Buffer, arrival: float, route: Route) -> str:
+        """The fate of one packet, in one word. Cheap checks come before the tag."""
+        found = wire.read_head(data)
+        if isinstance(found, str):
+            return found
+        layout, (device_id, boot_nonce, session, sequence) = found
+        if layout.direction != "sensor to box":
             return "kind"
-        if len(data) != layout.size:
-            return "length"
         sensor = self._by_device.get(device_id)
         if sensor is None:
             return "device"
@@ -185,38 +182,36 @@ class SensorLink:
             stale = pairing.profile_staleness(boot_nonce, session, sequence)
         if stale is not None:
             is_of_use = (
-                stale == "old_session"
-                and layout is wire.READING
-                and pairing.is_to_be_called(boot_nonce, arrival)
+                stale == "old_session" and layout is wire.READING and pairing.may_call(boot_nonce, arrival)
             )
             if is_of_use and pairing.tagger.is_authentic(data):
-                pairing.call(boot_nonce, way)
+                pairing.queue_call(boot_nonce, route)
             return stale
         if not pairing.tagger.is_authentic(data):
             return "tag"
         packet = layout.decode(data)
         if isinstance(packet, wire.Reading):
-            return self._hear(sensor, packet, arrival, way)
+            return self._take_reading(sensor, packet, arrival, route)
         if isinstance(packet, wire.Hello):
-            return pairing.greet(packet, way, arrival)
-        return self._keep(sensor, cast(wire.Profile, packet))
+            return pairing.take_hello(packet, route, arrival)
+        return self._take_profile(sensor, cast(wire.Profile, packet))
 
-    def _hear(self, sensor: KnownSensor, packet: wire.Reading, arrival: float, way: Way) -> str:
+    def _take_reading(self, sensor: KnownSensor, packet: wire.Reading, arrival: float, route: Route) -> str:
         """An authentic, new reading."""
         session = sensor.pairing.session
-        if session is None or session.way != way:
-            self._attend_at = -inf
+        if session is None or session.route != route:
+            self._reserve_at = -inf
         is_reboot = session is not None and session.boot_nonce != packet.boot_nonce
         self._counts["reboot"] += is_reboot
-        self._counts["lost"] += sensor.follow(packet, way, arrival, is_reboot)
-        reading, fate = sensor.believe(packet, arrival)
+        self._counts["lost"] += sensor.take_reading(packet, route, arrival, is_reboot)
+        reading, fate = sensor.to_reading(packet, arrival)
         if reading is not None:
             self._newest[reading.sensor] = reading
         return fate
 
-    def _keep(self, sensor: KnownSensor, profile: wire.Profile) -> str:
+    def _take_profile(self, sensor: KnownSensor, profile: wire.Profile) -> str:
         """An authentic, new calibration."""
-        sensor.pairing.keep(profile)
+        sensor.pairing.take_profile(profile)
         if self._profiles.get(profile.imu_id) != profile.offsets:
             self._profiles = with_profile(self._profiles, profile.imu_id, profile.offsets)
             self._new_profiles = with_profile(self._new_profiles, profile.imu_id, profile.offsets)

@@ -1,8 +1,8 @@
-"""The neutral pose: from a sensor's readings to its joint, however it is worn and wherever its north lies.
+"""The neutral pose: from a sensor's readings to its joint, for any mounting and any heading.
 
 Sensor axes are those of the BNO055: z up, heading arbitrary. Stage axes: y up, the dancer faces +z and has x
-on the left. A permutation turns the ones into the others, world and body alike, so that a sensor whose x axis
-(the arrow on its case) points to the front, z up, reads the identity in both.
+on the left. A permutation maps one to the other, world and body alike: a sensor with its x axis (the arrow on
+its case) to the front and z up reads the identity in both.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from appliance.pose import quaternion
 Quaternion = tuple[float, float, float, float]
 Vector = tuple[float, float, float]
 
-NO_BOOT = -1  # boot_nonce of a pose that no power-on gave
-STILL_S = 1.5  # so long must a dancer stand still after switching on
-_STILL_COSINE = math.cos(math.radians(3.0) / 2)  # of half the angle, as the product of two quaternions has it
-_GAP_S = 0.25  # after a longer silence nobody knows whether the sensor was still
-_LEVEL = math.sin(math.radians(15.0))  # an axis nearer to the vertical has no heading worth the name
+NO_BOOT = -1  # boot_nonce of an assumed pose
+STILL_S = 1.5  # how long a dancer stands still after switching on
+_STILL_COSINE = math.cos(math.radians(3.0) / 2)  # of half the angle, as in a product of quaternions
+_GAP_S = 0.25  # after a longer silence stillness starts again
+_LEVEL = math.sin(math.radians(15.0))  # an axis nearer to the vertical has no usable heading
 _ARROW, _LID = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)  # axes of the case: along its arrow, out of its lid
 _STAGE_FROM_SENSOR = [0, 2, 3, 1]  # places of w, x, y, z
 
@@ -33,8 +33,8 @@ _STAGE_FROM_SENSOR = [0, 2, 3, 1]  # places of w, x, y, z
 class NeutralPose:
     """How a sensor read while its dancer stood still.
 
-    orientation: unit (w, x, y, z) as read, sensor axes. heading: radians about the vertical that the sensor's
-    heading has moved by since (drift, a restart of its IMU); taken out. boot_nonce: of that power-on.
+    orientation: unit (w, x, y, z) as read, sensor axes. heading: how far the sensor's heading has moved since
+    (drift, a restart of its IMU), radians about the vertical; taken out. boot_nonce: of that power-on.
     """
 
     orientation: Quaternion
@@ -44,10 +44,10 @@ class NeutralPose:
 
 @dataclass(frozen=True)
 class Mounting:
-    """How one hand's sensor is worn.
+    """How the sensor of one hand is mounted.
 
     facing: unit sensor axis that points to the front in the neutral pose. at_neutral: the joint's local
-    orientation then, stage axes. assumed: the neutral orientation, sensor axes, until one was taken.
+    orientation then, stage axes. assumed: the neutral orientation, sensor axes, until one is taken.
     """
 
     facing: Vector = _ARROW
@@ -56,7 +56,7 @@ class Mounting:
 
     @property
     def assumed_pose(self) -> NeutralPose:
-        """The neutral pose until one was taken."""
+        """The neutral pose until one is taken."""
         return NeutralPose(self.assumed, 0.0, NO_BOOT)
 
 
@@ -64,16 +64,21 @@ class Stillness:
     """Whether a sensor stays within 3 degrees of where it was; time is an argument, in seconds."""
 
     def __init__(self) -> None:
-        self._anchor: Quaternion = (0.0, 0.0, 0.0, 0.0)  # far from everything: the first reading begins
+        self._anchor: Quaternion = (
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )  # far from every orientation: the first reading starts
         self._since = self._heard = -math.inf
 
     @property
     def still_s(self) -> float:
-        """For how long the sensor had not moved when it was last heard."""
+        """How long the sensor had been still at its last reading."""
         return self._heard - self._since if self._since > -math.inf else 0.0
 
-    def hear(self, orientation: Quaternion, now: float) -> None:
-        """Take the next reading, a unit quaternion of either sign, in any axes."""
+    def add_reading(self, orientation: Quaternion, now: float) -> None:
+        """Add the next reading, a unit quaternion of either sign, in any axes."""
         a, b = self._anchor, orientation
         cosine = abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3])
         if cosine < _STILL_COSINE or now - self._heard > _GAP_S:
@@ -81,22 +86,22 @@ class Stillness:
         self._heard = now
 
     def state(self) -> tuple[Quaternion, float, float]:
-        """What it remembers, for `restore`."""
+        """Its state, for `restore`."""
         return self._anchor, self._since, self._heard
 
     def restore(self, state: Sequence[Any]) -> None:
-        """Go on as the one did that gave this state."""
+        """Continue from a state."""
         (w, x, y, z), self._since, self._heard = state
         self._anchor = (w, x, y, z)
 
     def restart(self) -> None:
-        """What was before does not count any more."""
+        """Start again: earlier readings no longer count."""
         self._anchor = (0.0, 0.0, 0.0, 0.0)
         self._since = -math.inf
 
 
 def to_stage(orientation: Sequence[float] | NDArray[np.floating]) -> NDArray[np.float64]:
-    """A quaternion (4,) in sensor axes as the same rotation in stage axes."""
+    """A rotation as a quaternion (4,), from sensor axes to stage axes."""
     return np.asarray(orientation, dtype=np.float64)[_STAGE_FROM_SENSOR]
 
 
@@ -112,10 +117,10 @@ def facing_heading(orientation: Quaternion, facing: Vector) -> float | None:
 
 
 def front(orientation: Quaternion, facing: Vector) -> tuple[float, Vector]:
-    """Heading of the dancer's front (radians, as facing_heading) and the sensor axis that told it.
+    """Heading of the dancer's front (radians, as facing_heading) and the sensor axis that it comes from.
 
-    That is `facing`, or where it stands upright the arrow on the case, or the normal of its lid: one of them
-    lies level.
+    The axis is `facing`, or where that stands upright the arrow on the case or the normal of its lid: one of
+    them is level.
     """
     for axis in (facing, _ARROW, _LID):
         heading = facing_heading(orientation, axis)
@@ -136,14 +141,14 @@ def joint_from_reading(pose: NeutralPose, mounting: Mounting) -> NDArray[np.floa
     back = quaternion.multiply(back, np.array(mounting.at_neutral, dtype=np.float64))
     units = np.eye(4)[:, _STAGE_FROM_SENSOR]  # row k: what a 1 in place k of a reading is in stage axes
     images = quaternion.multiply(quaternion.multiply(to_front, units), back)
-    return np.ascontiguousarray(images.T, np.float32)  # as a keyframe gives it back: products to the last bit
+    return np.ascontiguousarray(images.T, np.float32)  # as keyframes store it: products equal to the last bit
 
 
 def turned(before: Quaternion, after: Quaternion) -> float | None:
-    """By how much the heading differs between two readings in sensor axes, radians in -pi..pi.
+    """Difference in heading between two readings in sensor axes, radians in -pi..pi.
 
-    Turning `after` back by it about the vertical brings it as near to `before` as that can; a difference in
-    tilt alone is none. None where one hangs upside down against the other: then no heading can be told.
+    Turning `after` back by it about the vertical brings it as near to `before` as possible; tilt alone counts
+    as none. None when one is upside down against the other: the heading is then undefined.
     """
     w, _, _, z = quaternion.multiply(np.array(after), quaternion.inverse(np.array(before)))
     if math.hypot(w, z) < _LEVEL:
@@ -152,13 +157,13 @@ def turned(before: Quaternion, after: Quaternion) -> float | None:
 
 
 def with_heading_reset(pose: NeutralPose, reading: Quaternion) -> NeutralPose | None:
-    """The pose for a dancer who faces the front again: drift is out, tilt as it was. None: cannot be told."""
+    """The pose for a dancer who faces the front again: without drift, same tilt. None: undefined."""
     drift = turned(pose.orientation, reading)
     return None if drift is None else replace(pose, heading=drift)
 
 
 def carried(pose: NeutralPose, before: Quaternion, reading: Quaternion, boot_nonce: int) -> NeutralPose:
-    """The pose for a sensor that lost its heading: tilt by the new reading, heading as `before` had it."""
+    """The pose for a sensor that lost its heading: tilt from the new reading, heading as in `before`."""
     lost = turned(before, reading) or 0.0
     return NeutralPose(pose.orientation, _wrapped(pose.heading + lost), boot_nonce)
 

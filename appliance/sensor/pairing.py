@@ -1,9 +1,9 @@
-"""One sensor's pairing: who is let in, from where it speaks, and what it is owed by the box.
+"""One sensor's pairing: which power-on is let in, over which route, and which packets the box owes it.
 
-A sensor that was switched on says hello; the assignment that answers gives it a session; its first reading
-with that session puts the session in force. A session is a keyed hash of device, boot nonce and how many
-sessions came into force before: so it needs no memory, a boot that another one has followed can never come
-back, and whatever was recorded before a session began is worth nothing after it.
+A sensor that was switched on sends a hello; the assignment in answer gives it a session; its first reading
+with that session puts the session in force. A session is a keyed hash of device, boot nonce and the number of
+sessions in force before. So it needs no memory, an earlier boot can never come back after a later one, and
+recordings from before a session are worthless after it.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from hashlib import blake2s
 from math import inf
 
 from appliance.sensor import wire
-from appliance.sensor.answering import REMEMBERED_BOOTS, Answering
+from appliance.sensor.answer_queue import REMEMBERED_BOOTS, AnswerQueue
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.sequence import REMEMBERED, SequenceWindow
-from appliance.sensor.transports.transport import Way
+from appliance.sensor.transports.transport import Route
 
 RATE_HZ = 50
 HEARTBEAT_S = 1.0
-LOST_S = 3.0  # silent for longer: no more heartbeats; the sensor, which gets none, says hello
-SILENT_S = 0.5  # a linked sensor heard within this is there: nobody else with an old session is called
+LOST_S = 3.0  # after this silence heartbeats stop; without them the sensor sends hellos
+SILENT_S = 0.5  # while a linked sensor was heard within this, no other power-on is called
 ASSIGNMENT_INTERVAL_S = 0.1
 CALL_INTERVAL_S = 0.2
 RESTORES = 5
-MOST_AHEAD_HZ = 2 * RATE_HZ  # faster than this no sensor counts its readings, whatever was lost
+MOST_AHEAD_HZ = 2 * RATE_HZ  # no sensor counts its readings faster, whatever was lost
 NO_HAND = 255
 
 
 @dataclass(slots=True)
 class Session:
-    """What is in force: since when, with whom, from where."""
+    """The session in force."""
 
     boot_nonce: int
     number: int
-    way: Way
+    route: Route
     newest: wire.Reading  # the newest authentic reading
     heard: float  # its arrival
     readings: SequenceWindow
@@ -46,27 +46,27 @@ class Session:
 
 
 class Pairing:
-    """State of one sensor. Time is an argument; packets come in authentic, and go out with `due`."""
+    """State of one sensor. Time is an argument; packets come in authentic and leave by `due_packets`."""
 
     def __init__(self, key: SensorKey, secret: bytes, phase_s: float, hand: int = NO_HAND) -> None:
         self.tagger = wire.Tagger(key.key)
         self.hand = hand
         self.session: Session | None = None
         self.greeted_at = -inf
-        self.contested_at = -inf  # a power-on that another one had ended came back: no sensor does that alone
+        self.contested_at = -inf  # an ended power-on came back: one sensor alone cannot do that
         self._device_id = key.device_id
         self._secret = secret
         self._phase_s = phase_s
         self._sessions_before = 0
         self._ended: dict[int, None] = {}  # boot nonces that were in force; the newest is the last
         self._hellos: dict[int, wire.Hello] = {}  # boot nonce -> its newest; the newest boot is the last
-        self._unanswered: Answering[tuple[wire.Hello, Way]] = Answering(ASSIGNMENT_INTERVAL_S)
-        self._uncalled: Answering[Way] = Answering(CALL_INTERVAL_S)
+        self._unanswered: AnswerQueue[tuple[wire.Hello, Route]] = AnswerQueue(ASSIGNMENT_INTERVAL_S)
+        self._uncalled: AnswerQueue[Route] = AnswerQueue(CALL_INTERVAL_S)
         self._next_heartbeat = -inf
         self._led: int | None = None
         self._sent: dict[type[wire.Packet], int] = {}
 
-    # What is cheap to see, before anyone looks at the tag: why a packet is not new, or None when it may be.
+    # Cheap checks before the tag: why a packet is not new, or None when it may be.
 
     def hello_staleness(self, boot_nonce: int, sequence: int) -> str | None:
         before = self._hellos.get(boot_nonce)
@@ -88,18 +88,18 @@ class Pairing:
             return "old_session"
         return "duplicate" if sequence <= session.profile_sequence else None
 
-    def is_to_be_called(self, boot_nonce: int, now: float) -> bool:
-        """Whether an authentic reading of an unknown session would be answered: no one else is heard."""
+    def may_call(self, boot_nonce: int, now: float) -> bool:
+        """Whether an authentic reading of an unknown session gets a call: no linked sensor is heard."""
         if self.session is not None and now - self.session.heard < SILENT_S:
             return False
-        return self._uncalled.may_ask(boot_nonce, now)
+        return self._uncalled.has_turn(boot_nonce, now)
 
-    # What is authentic and new.
+    # Authentic, new packets.
 
-    def greet(self, hello: wire.Hello, way: Way, now: float) -> str:
-        """A hello, and what becomes of it: hello, or other_wire when it is answered by words alone.
+    def take_hello(self, hello: wire.Hello, route: Route, now: float) -> str:
+        """Take a hello. Returns its fate: hello, or other_wire when it gets no assignment.
 
-        It changes nothing in force: only a reading with the new session does.
+        The session in force stays until a reading with the new session comes.
         """
         self._hellos.pop(hello.boot_nonce, None)
         self._hellos[hello.boot_nonce] = hello
@@ -109,11 +109,11 @@ class Pairing:
         self.greeted_at = now
         if hello.wire_hash != wire.WIRE_HASH:
             return "other_wire"
-        self._unanswered.ask(hello.boot_nonce, (hello, way))
+        self._unanswered.put(hello.boot_nonce, (hello, route))
         return "hello"
 
-    def follow(self, reading: wire.Reading, way: Way, arrival: float) -> int:
-        """A reading: where it came from is where its sensor is. Gives how many before it never came."""
+    def take_reading(self, reading: wire.Reading, route: Route, arrival: float) -> int:
+        """Take a reading; its route becomes the sensor's. Returns how many before it are missing."""
         session = self.session
         if session is None or reading.boot_nonce != session.boot_nonce:
             if reading.boot_nonce in self._ended:
@@ -123,51 +123,53 @@ class Pairing:
             if len(self._ended) > REMEMBERED_BOOTS:
                 del self._ended[next(iter(self._ended))]
             session = self.session = Session(
-                reading.boot_nonce, reading.session, way, reading, arrival, SequenceWindow()
+                reading.boot_nonce, reading.session, route, reading, arrival, SequenceWindow()
             )
             self._sessions_before += 1
             self._next_heartbeat = -inf
         was_lost = arrival - session.heard >= LOST_S
-        session.newest, session.heard, session.way = reading, arrival, way
+        session.newest, session.heard, session.route = reading, arrival, route
         missing = session.readings.advance(reading.sequence)
-        return 0 if was_lost else missing  # without a link a sensor streams to nobody
+        return 0 if was_lost else missing  # without a link a sensor does not stream
 
-    def keep(self, profile: wire.Profile) -> None:
-        """A calibration of the session in force."""
+    def take_profile(self, profile: wire.Profile) -> None:
+        """Take a calibration of the session in force."""
         if self.session is not None:
             self.session.profile_sequence = profile.sequence
 
-    def call(self, boot_nonce: int, way: Way) -> None:
-        """A reading of an unknown session: its sensor shall say hello."""
-        self._uncalled.ask(boot_nonce, way)
+    def queue_call(self, boot_nonce: int, route: Route) -> None:
+        """Ask the sensor of an unknown session for a hello."""
+        self._uncalled.put(boot_nonce, route)
 
-    # What follows from it.
+    # Packets to the sensor.
 
-    def due(self, now: float, led: int, profiles: Mapping[bytes, bytes]) -> Iterator[tuple[Way, wire.Packet]]:
+    def due_packets(
+        self, now: float, led: int, profiles: Mapping[bytes, bytes]
+    ) -> Iterator[tuple[Route, wire.Packet]]:
         """What is to be sent now, and where to: assignments, calls, a heartbeat, a calibration."""
-        for boot_nonce, (hello, way) in self._unanswered.due(now):
+        for boot_nonce, (hello, route) in self._unanswered.take_due(now):
             head = self._head(wire.Assignment, boot_nonce, self._number_for(boot_nonce))
-            yield way, wire.Assignment(*head, hello.sequence, self.hand, RATE_HZ, led)
-        for boot_nonce, way in self._uncalled.due(now):
-            yield way, wire.Call(*self._head(wire.Call, boot_nonce, 0))
+            yield route, wire.Assignment(*head, hello.sequence, self.hand, RATE_HZ, led)
+        for boot_nonce, route in self._uncalled.take_due(now):
+            yield route, wire.Call(*self._head(wire.Call, boot_nonce, 0))
         session = self.session
         is_due = now >= self._next_heartbeat or led != self._led
-        if session is not None and self.way(now) is not None and is_due:
+        if session is not None and self.route(now) is not None and is_due:
             self._led = led
             self._next_heartbeat = now + HEARTBEAT_S - (now - self._phase_s) % HEARTBEAT_S
-            yield session.way, self._heartbeat(session, now, led)
+            yield session.route, self._heartbeat(session, now, led)
             restore = self._restore(session, profiles)
             if restore is not None:
-                yield session.way, restore
+                yield session.route, restore
 
-    def way(self, now: float) -> Way | None:
-        """Where the sensor is, while it is linked."""
+    def route(self, now: float) -> Route | None:
+        """The route to the sensor while it is linked."""
         session = self.session
-        return session.way if session is not None and now - session.heard < LOST_S else None
+        return session.route if session is not None and now - session.heard < LOST_S else None
 
     @property
     def hello(self) -> wire.Hello | None:
-        """The newest hello of the boot in force; before any is, the newest at all."""
+        """The newest hello of the boot in force; without one in force, the newest of all."""
         return self.newest_hello if self.session is None else self._hellos.get(self.session.boot_nonce)
 
     @property
@@ -175,7 +177,7 @@ class Pairing:
         return next(reversed(self._hellos.values()), None)
 
     def _number_for(self, boot_nonce: int) -> int:
-        """The session that this boot has, or would get: 32 bits, never 0."""
+        """The session that this boot has or would get: 32 bits, never 0."""
         if self.session is not None and boot_nonce == self.session.boot_nonce:
             return self.session.number
         drawn = struct.pack("<III", self._device_id, boot_nonce, self._sessions_before)
@@ -187,7 +189,7 @@ class Pairing:
         return wire.Heartbeat(*head, session.readings.newest, held_us, led)
 
     def _restore(self, session: Session, profiles: Mapping[bytes, bytes]) -> wire.Restore | None:
-        """The calibration that this sensor's IMU should have and has not."""
+        """The calibration that this sensor's IMU lacks."""
         offsets = profiles.get(self.hello.imu_id) if self.hello is not None else None
         has_profile = session.newest.flags & wire.HAS_PROFILE
         if self.hello is None or offsets is None or has_profile or session.restores >= RESTORES:

@@ -1,4 +1,4 @@
-"""Which packets have come before, by their sequence numbers."""
+"""Which packets have come, by sequence number."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ REMEMBERED = 64
 
 
 class SequenceWindow:
-    """The newest number and which of the 64 up to it have come (as in RFC 4303, section 3.4.3)."""
+    """The newest number, and which of the 64 up to it have come (RFC 4303, section 3.4.3)."""
 
     def __init__(self) -> None:
         self.newest = -1
@@ -22,7 +22,7 @@ class SequenceWindow:
         return "duplicate" if self._seen >> age & 1 else "reordered"
 
     def advance(self, sequence: int) -> int:
-        """Takes a new number as the newest; gives how many before it are missing."""
+        """Take a number as the newest. Returns how many before it are missing."""
         step = sequence - self.newest
         lost = step - 1 if self._seen else 0
         self._seen = (self._seen << step | 1) & (1 << REMEMBERED) - 1 if step < REMEMBERED else 1

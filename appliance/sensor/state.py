@@ -1,4 +1,4 @@
-"""What the link tells of a reading and of a sensor."""
+"""One reading and one sensor, as the link reports them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from appliance.sensor.plausibility import Orientation
+Orientation = tuple[float, float, float, float]
 
 LOW_BATTERY = 15  # percent; below it the sensor's own lamp warns too
 
 
 class SensorReading(NamedTuple):
-    """One believed reading. `measured_at` and `arrival` are monotonic seconds of the box."""
+    """One accepted reading. `measured_at` and `arrival` are monotonic seconds of the box."""
 
     sensor: str
     orientation: Orientation  # w, x, y, z, unit, sensor axes, sign continuous from reading to reading
@@ -22,16 +22,16 @@ class SensorReading(NamedTuple):
     arrival: float
     battery: int  # percent; 255 unknown
     calibration: int  # BNO055 register 0x35
-    boot_nonce: int = 0  # another one: the sensor was switched on again
+    boot_nonce: int = 0  # changes at each power-on
     taps: int = 0  # double taps since power-on; wraps at 256
     recoveries: int = 0  # restarts of the IMU since power-on; wraps at 256; its heading is lost
     flags: int = 0  # wire.HAS_PROFILE, wire.IS_NDOF
     round_trip_s: float | None = None  # by the newest heartbeat's echo
-    wearable: int = 0  # SensorKey.wearable; another one: the name has gone to another wearable
+    wearable: int = 0  # SensorKey.wearable; changes when another wearable gets the name
 
 
 def restored_reading(fields: Sequence[Any] | None) -> SensorReading | None:
-    """A reading from its fields in order, as a file gives them; None for none."""
+    """A reading from its fields in order, as a file holds them; None stays None."""
     if fields is None:
         return None
     sensor, (w, x, y, z), *others = fields
@@ -48,7 +48,7 @@ class SensorState(NamedTuple):
     rate_hz: float  # readings a second, last 2 s
     loss: float  # share of readings that never came, last 10 s
     round_trip_s: float | None
-    age_s: float | None  # since the newest believed reading
+    age_s: float | None  # since the newest accepted reading
     battery: int  # percent; 255 unknown
     calibration: int  # BNO055 register 0x35
     firmware: str  # "1.0.0", or "" before the first hello
@@ -59,7 +59,7 @@ class SensorState(NamedTuple):
 
 
 class Reception:
-    """How many readings a second come, and what share is lost on the way."""
+    """Readings a second, and the share that is lost."""
 
     LOSS_S = 10.0
 
@@ -69,7 +69,7 @@ class Reception:
         self._marks: deque[tuple[float, int, int]] = deque()  # a second apart: time, received, lost
 
     def mark(self, now: float) -> None:
-        """Remember where things stand; to be called often, kept once a second."""
+        """Note the counts; call it often, it keeps one mark a second."""
         if self._marks and now - self._marks[-1][0] < 1.0:
             return
         self._marks.append((now, self.received, self.lost))
@@ -84,7 +84,7 @@ class Reception:
         return (self.received - received) / (now - since) if now > since else 0.0
 
     def loss(self) -> float:
-        """The share that is missing of the last 10 s; 0 when there was nothing."""
+        """The share of the last 10 s that is missing; 0 without any."""
         if not self._marks:
             return 0.0
         _, received, lost = self._marks[0]

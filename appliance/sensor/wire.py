@@ -1,8 +1,7 @@
-"""The packets between a wearable and the box: the one declaration from which everything else is made.
+"""The packets between wearable and box: the one declaration that everything else is generated from.
 
 Little-endian, fixed size, one packet a datagram, an 8-byte keyed BLAKE2s tag at the end of each. The tables
-of docs/wire.md, the firmware's wire.h and the golden vectors are made from here by
-`python -m appliance.sensor.generate_wire`.
+of docs/wire.md, the firmware's wire.h and the golden vectors come from `python -m tools.generate_wire`.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ class WireError(ValueError):
 
 @dataclass(frozen=True)
 class Coding:
-    """How one field travels: its struct code, its C type, how many values, and what one unit stands for."""
+    """Encoding of one field: struct code, C type, number of values, and the value of 1.0."""
 
     code: str
     c_type: str
@@ -70,9 +69,9 @@ class Packet:
 
 @dataclass(slots=True)
 class Hello(Packet):
-    """The sensor is on and looks for its box: each 500 ms on every way that is up, broadcast on Wi-Fi."""
+    """The sensor is on and looks for its box: every 500 ms on network and cable, broadcast on Wi-Fi."""
 
-    wire_hash: Annotated[int, U32, "hash of this declaration; a mismatch says which side to update"]
+    wire_hash: Annotated[int, U32, "hash of this declaration; a mismatch means that one side needs an update"]
     firmware_major: Annotated[int, U8, "firmware version"]
     firmware_minor: Annotated[int, U8, ""]
     firmware_patch: Annotated[int, U8, ""]
@@ -83,9 +82,9 @@ class Hello(Packet):
 
 @dataclass(slots=True)
 class Assignment(Packet):
-    """The box takes the sensor: stream to the sender of this packet. Bound to the hello that it answers."""
+    """The box takes the sensor, which then streams to the sender of this packet. Bound to one hello."""
 
-    hello_sequence: Annotated[int, U32, "sequence of the hello that is answered"]
+    hello_sequence: Annotated[int, U32, "sequence of the hello that it answers"]
     hand: Annotated[int, U8, "which hand of the show, from 0; 255 none"]
     rate_hz: Annotated[int, U8, "readings a second"]
     led: Annotated[int, U8, LEDS]
@@ -93,7 +92,7 @@ class Assignment(Packet):
 
 @dataclass(slots=True)
 class Reading(Packet):
-    """One orientation of the sensor, as often a second as the assignment says: 50 times."""
+    """One orientation of the sensor, at the rate of the assignment: 50 a second."""
 
     sensor_time_us: Annotated[int, U32, "device clock at the measurement; wraps after 71.6 minutes"]
     orientation: Annotated[
@@ -113,8 +112,8 @@ class Reading(Packet):
 
 @dataclass(slots=True)
 class Heartbeat(Packet):
-    """The box is there: each second, and at once when the light changes. Three seconds without it and the
-    sensor says hello again.
+    """The box is there: every second, and at once when the light changes. After three seconds without it the
+    sensor sends hellos again.
     """
 
     echo_sequence: Annotated[int, U32, "sequence of the newest reading that arrived"]
@@ -124,12 +123,12 @@ class Heartbeat(Packet):
 
 @dataclass(slots=True)
 class Call(Packet):
-    """The box does not know the session of a reading, because it was started anew: say hello at once."""
+    """The box does not know the session of a reading, because it was restarted: send a hello at once."""
 
 
 @dataclass(slots=True)
 class Profile(Packet):
-    """A calibration that the sensor has learned, for the box to keep: an update erases the sensor's own."""
+    """A calibration that the sensor has learned, for the box to keep: an update erases the sensor's copy."""
 
     imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055"]
     offsets: Annotated[bytes, OFFSETS22, "BNO055 registers 0x55 to 0x6A"]
@@ -137,9 +136,9 @@ class Profile(Packet):
 
 @dataclass(slots=True)
 class Restore(Packet):
-    """A calibration that the box has kept, for a sensor that has none. With the first five heartbeats."""
+    """A kept calibration for a sensor that has none, with the first five heartbeats."""
 
-    imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055; another one ignores it"]
+    imu_id: Annotated[bytes, IDENTITY16, "unique id of the BNO055 that it is for"]
     offsets: Annotated[bytes, OFFSETS22, "BNO055 registers 0x55 to 0x6A"]
 
 
@@ -176,7 +175,7 @@ class Layout:
         return self._struct.pack(*values)
 
     def decode(self, data: Buffer) -> Packet:
-        """The packet in `data`, which was checked before: length, magic, kind and tag are not looked at."""
+        """The packet in `data`; length, magic, kind and tag were checked before."""
         values = self._struct.unpack_from(data)
         arguments: list[Any] = []
         at = 3
@@ -208,7 +207,7 @@ HEAD = struct.Struct("<HBBIIII")  # magic, version, kind and the fields of Packe
 
 
 class Tagger:
-    """Signs and checks with one sensor's key: BLAKE2s, keyed, 8 bytes of output, no salt, no person."""
+    """Signs and verifies with one sensor's key: BLAKE2s, keyed, 8 bytes of output, no salt, no person."""
 
     def __init__(self, key: bytes) -> None:
         if len(key) != KEY_BYTES:
@@ -231,24 +230,32 @@ def pack(packet: Packet, tagger: Tagger) -> bytes:
     return signed + tagger.tag(signed)
 
 
+def read_head(data: Buffer) -> tuple[Layout, tuple[int, int, int, int]] | str:
+    """Layout, and device id, boot nonce, session, sequence; or in one word why this is no packet."""
+    if len(data) < HEAD.size:
+        return "length"
+    magic, version, kind, *head = HEAD.unpack_from(data)
+    if magic != MAGIC:
+        return "magic"
+    if version != VERSION:
+        return "version"
+    layout = LAYOUTS.get(kind)
+    if layout is None:
+        return "kind"
+    device_id, boot_nonce, session, sequence = head
+    return (layout, (device_id, boot_nonce, session, sequence)) if len(data) == layout.size else "length"
+
+
 def unpack(data: Buffer, tagger_of: Callable[[int], Tagger | None]) -> Packet:
     """The packet in one datagram; `tagger_of` gives a device's key, or None for an unknown device.
 
     Raises WireError with the reason length, magic, version, kind, device or tag, and nothing else.
     """
-    if len(data) < HEAD.size:
-        raise WireError("length")
-    magic, version, kind, device_id, *_ = HEAD.unpack_from(data)
-    if magic != MAGIC:
-        raise WireError("magic")
-    if version != VERSION:
-        raise WireError("version")
-    layout = LAYOUTS.get(kind)
-    if layout is None:
-        raise WireError("kind")
-    if len(data) != layout.size:
-        raise WireError("length")
-    tagger = tagger_of(device_id)
+    found = read_head(data)
+    if isinstance(found, str):
+        raise WireError(found)
+    layout, head = found
+    tagger = tagger_of(head[0])
     if tagger is None:
         raise WireError("device")
     if not tagger.is_authentic(data):
@@ -257,7 +264,7 @@ def unpack(data: Buffer, tagger_of: Callable[[int], Tagger | None]) -> Packet:
 
 
 def declaration() -> str:
-    """Everything that both sides must agree on, as text: order, names, types, scales, kinds, tag."""
+    """What both sides must agree on, as text: order, names, types, scales, kinds, tag."""
     lines = [f"magic={MAGIC:#06x} version={VERSION} tag=blake2s-{TAG_BYTES} key={KEY_BYTES}"]
     for layout in LAYOUTS.values():
         lines.append(f"{layout.kind} {layout.name} {layout.direction} {layout.size}")

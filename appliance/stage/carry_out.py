@@ -92,7 +92,7 @@ def obey_for_sensors(order: Order, cast: StageParts, wearing: SensorFit, now: fl
 
 
 def _admit(order: Order, cast: StageParts) -> str:
-    cast.link.admit(order.keys)
+    cast.link.set_keys(order.keys)
     known = f"The box knows {len(order.keys)} sensor{'' if len(order.keys) == 1 else 's'} now"
     missing = [name for name in cast.worn if name not in order.keys]
     if not missing:

@@ -18,8 +18,8 @@ SENSOR_SILENT = Fallback(
 )
 READING_REFUSED = Fallback(
     "reading-refused",
-    "Readings that no hand could have (too fast, zero, torn) were dropped. The audience sees nothing of it. "
-    "If it goes on, look at that sensor's cable or IMU: bunraku sensors.",
+    "Readings without an orientation were dropped. The audience sees nothing of it. Our firmware sends none: "
+    "if it goes on, flash that wearable with the firmware of this version.",
 )
 PACKET_REFUSED = Fallback(
     "packet-refused",
@@ -99,7 +99,6 @@ OF_THE_STAGE = (
     *(RECEIVER_GONE, NOT_REALTIME, NOT_SHARED, NOT_RECORDED, PLACE_NOT_NOTED, STAGE_RESTARTED, POWER_CUT),
 )
 
-_IMPLAUSIBLE = ("zero", "norm", "torn", "rate")
 _FOREIGN = ("length", "magic", "version", "kind", "device", "tag", "old_session", "old_hello")
 
 
@@ -143,7 +142,7 @@ class StageFallbacks:
         """Once a second: what others have counted."""
         counts, every = self._cast.link.counts, self.all
         every.hold(SENSOR_SILENT.name, any(self._silent))
-        every.follow(READING_REFUSED.name, sum(counts.get(one, 0) for one in _IMPLAUSIBLE), now)
+        every.follow(READING_REFUSED.name, counts.get("norm", 0), now)
         every.follow(PACKET_REFUSED.name, sum(counts.get(one, 0) for one in _FOREIGN), now)
         every.follow(TICK_LATE.name, health.late, now)
         every.follow(TICK_SKIPPED.name, health.skipped, now)

@@ -64,7 +64,7 @@ class SensorFit:
         elif reading.taps != before.taps:
             wearer.stillness.restart()
             self._wait_for(wearer, ASKED_STILL_S, reading.arrival + ASKED_WITHIN_S)
-        wearer.stillness.hear(reading.orientation, reading.arrival)
+        wearer.stillness.add_reading(reading.orientation, reading.arrival)
 
     def look(self, now: float) -> None:
         """After the frame: take the neutral poses of those who stand still, and say what happened."""

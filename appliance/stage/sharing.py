@@ -114,7 +114,7 @@ class Sharing:
             "complaints": cast.complaints,
             "fallbacks": fallbacks,
         }
-        cast.outputs.tell(told)
+        cast.outputs.publish_health(told)
 
     def close(self) -> None:
         """Give the place back, after the outputs were closed."""

@@ -77,7 +77,7 @@ class Tick:
             self._stand()
             ends[FIGURE] = now()
 
-        cast.outputs.send(frame)
+        cast.outputs.publish_frame(frame)
         ends[SEND] = now()
 
     def warm_up(self) -> None:
@@ -98,7 +98,7 @@ class Tick:
         if not self.frame.late:
             self.cast.motion.advance()
             self.iterations.advance()
-        self.cast.link.tend(self._monotonic())
+        self.cast.link.send_due(self._monotonic())
         self.wearing.look(slot.started)
         begin = slot.started
         for section, end in enumerate(self._section_ends):

@@ -4,7 +4,7 @@ Usage: budget.py ELF FOLDER. ELF is the linked core; FOLDER holds the call graph
 objects (`-fcallgraph-info=su`).
 
 The stack is the deepest path of calls from the entry point, each function with its frame. A call through a
-pointer may reach every function that nobody calls by name. What comes from the C library counts LIBRARY_STACK
+pointer may reach every function without a direct caller. What comes from the C library counts LIBRARY_STACK
 bytes; the ports' own code is outside, and so is what the linker threw away.
 """
 
@@ -29,12 +29,12 @@ FRAME = re.compile(r"(?P<bytes>\d+) bytes \((?P<kind>[a-z, ]+)\)")
 
 
 class UnboundedStackError(Exception):
-    """The stack has no bound that can be told from the call graph."""
+    """The call graph gives no bound on the stack."""
 
 
 @dataclass
 class CallGraph:
-    """Frames in bytes by function, and who calls whom."""
+    """Frames in bytes by function, and the call graph."""
 
     frames: dict[str, int] = field(default_factory=dict)
     calls: dict[str, set[str]] = field(default_factory=dict)

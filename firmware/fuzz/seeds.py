@@ -1,6 +1,6 @@
 """Writes the seeds of the fuzzing corpus from the golden vectors and from the console's commands.
 
-`python firmware/fuzz/seeds.py` in the repository writes them anew; what fuzzing has found lies beside them.
+`python firmware/fuzz/seeds.py` in the repository regenerates them; inputs found by fuzzing lie beside them.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ enum class ImuFault : uint8_t {
   kFlippedBit,    // the top bit of one 16-bit value
   kBrownOut,      // back at power-on values; answers after 400 ms
   kSilentConfig,  // CONFIG mode, the settings kept
-  kFrozen,        // fusion says the same for ever, until it is started anew
+  kFrozen,        // fusion repeats its output until it is restarted
   kFusionError,   // system status 1, until a reset
 };
 constexpr size_t kImuFaults = 9;

@@ -10,7 +10,7 @@
 
 namespace bunraku {
 
-// The board's own clock: starts anew at each power-on, and runs a little fast or slow.
+// The board's own clock: starts at zero at each power-on, and runs a little fast or slow.
 class BoardClock : public Clock {
  public:
   explicit BoardClock(VirtualClock& world) : world_(world) {}

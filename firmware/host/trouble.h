@@ -7,10 +7,10 @@
 
 namespace bunraku {
 
-// A fault of the IMU strikes so many times from now on. False: there is no such fault.
+// The next `times` accesses to the IMU fail. False: there is no such fault.
 bool inject(World& world, const std::string& fault, uint32_t times);
 
-// How bad something is until it is set anew. False: there is no such trouble.
+// Sets how bad something is. False: there is no such trouble.
 bool set_trouble(World& world, const std::string& trouble, double amount);
 
 }  // namespace bunraku

@@ -41,7 +41,7 @@ uint64_t wearable_step_until(wearable_world* world, uint64_t us);
 /* As at the time that was asked for, also when a call blocks beyond it. */
 void wearable_read_status(const wearable_world* world, wearable_status* status);
 
-/* Wi-Fi. A change of the access point may be told before it comes; times never go back. */
+/* Wi-Fi. A change of the access point may be announced ahead; times never go back. */
 void wearable_set_network(wearable_world* world, const char* name, const char* password);
 void wearable_set_access_point(wearable_world* world, int is_on, uint64_t at_us);
 /* How long the driver calls itself joined after the access point went. */
@@ -63,8 +63,8 @@ void wearable_go_to(wearable_world* world, uint64_t at_us, double w, double x, d
 /* A double tap with a finger, now. */
 void wearable_double_tap(wearable_world* world);
 
-/* Trouble by its name in trouble.cpp. `inject` lets a fault of the IMU happen so many times, from now on;
-   `set_trouble` sets how bad something is until it is set anew: a probability, a rate, or 1 and 0.
+/* Trouble by its name in trouble.cpp. `inject` makes a fault of the IMU happen the next `times` times;
+   `set_trouble` sets how bad something is: a probability, a rate, or 1 and 0.
    0: there is no such name. */
 int wearable_inject(wearable_world* world, const char* fault, uint32_t times);
 int wearable_set_trouble(wearable_world* world, const char* trouble, double amount);

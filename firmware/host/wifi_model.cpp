@@ -1,4 +1,4 @@
-// What happens on the air: who is joined, what gets through, how long each call keeps the wearable waiting.
+// The air: association, delivery, and how long each call blocks the wearable.
 #include "wifi_model.h"
 
 #include <algorithm>
@@ -144,7 +144,7 @@ bool WifiModel::emit(const Address& to, const uint8_t* data, uint16_t count) {
   ++counts.sent;
   if (!is_carrying() || random_.happens(conditions.loss)) {
     ++counts.lost;
-    return true;  // the driver has taken it; nobody tells that it never arrived
+    return true;  // the driver has taken it; its loss goes unreported
   }
   if (leaving_.size() >= kMostUntaken) leaving_.pop_front();
   leaving_.push_back({clock_.now_us(), to, std::vector<uint8_t>(data, data + count)});

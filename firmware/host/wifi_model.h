@@ -15,18 +15,18 @@ constexpr uint32_t kBroadcast = 0xFFFFFFFFu;
 
 struct Datagram {
   uint64_t at_us = 0;          // virtual time at which it was sent
-  Address address{0, 0};       // to whom the wearable sends (ip kBroadcast: to all), or who sent it
+  Address address{0, 0};       // destination (ip kBroadcast: all) or sender
   std::vector<uint8_t> data;
 };
 
 struct WifiConditions {
   uint32_t join_us[2] = {800'000, 2'500'000};    // how long joining takes, least and most
-  uint32_t join_timeout_us = 10'000'000;         // how long it blocks when there is nobody to join
+  uint32_t join_timeout_us = 10'000'000;         // how long it blocks without an access point
   uint32_t open_us[2] = {2'000, 60'000};         // how long opening the socket blocks
   uint32_t stale_us[2] = {2'000'000, 8'000'000};  // how long is_up() goes on after the access point went
   uint32_t send_us = 250;                        // one datagram over SPI to the radio
   uint32_t receive_us = 150;
-  bool is_dead = false;      // the radio: whoever starts it waits for ever, which the watchdog ends
+  bool is_dead = false;      // the radio: starting it hangs until the watchdog bites
   double join_failures = 0;  // share of joins that block to the end and fail
   double send_failures = 0;  // share of datagrams that the driver refuses
   double loss = 0;           // share lost on the air, either way
@@ -39,7 +39,7 @@ struct WifiCounts {
   uint32_t sent = 0;           // handed to the driver, lost ones among them
   uint32_t refused = 0;        // send without a socket, or refused by the driver
   uint32_t lost = 0;           // either way
-  uint32_t unheard = 0;        // came while nobody listened, or while the radio's buffer was full
+  uint32_t unheard = 0;        // came without a listener, or while the radio's buffer was full
 };
 
 class WifiModel : public DatagramLink {
@@ -55,12 +55,12 @@ class WifiModel : public DatagramLink {
   bool broadcast(uint16_t port, const uint8_t* data, uint16_t count) override;
   uint16_t receive(uint8_t* data, uint16_t room, Address& from) override;
 
-  // The world's side. The access point: times never go back; a change may be told before it comes, which
+  // The world's side. The access point: times never go back; a change may be announced ahead, which
   // matters for a join that blocks meanwhile.
   void set_network(const std::string& name, const std::string& password);
   void set_access_point(bool is_on, uint64_t at_us);
   void power_off() { leave(); }
-  bool deliver(const Datagram& datagram);  // false: nobody there hears it
+  bool deliver(const Datagram& datagram);  // false: no receiver
   bool take(Datagram& datagram);           // the oldest that was sent and not lost
   void forget_after(uint64_t at_us);       // what was sent later
   bool is_carrying() const;                // whether what is sent now gets through

@@ -25,7 +25,7 @@ class World {
  public:
   World(uint64_t seed, uint64_t start_us);
 
-  void power(bool is_on);        // the switch: the flash is kept, all else begins anew
+  void power(bool is_on);        // the switch: only the flash is kept
   void step_until(uint64_t us);  // runs on; a call that blocks may end later than asked for
   bool is_on() const { return wearable_ != nullptr; }
   Status status() const;  // at the time that was asked for, also when a call blocks beyond it; while on

@@ -21,7 +21,7 @@ constexpr uint8_t kKey[wire::kKeyBytes] = {15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5
 constexpr char kProvisioning[] =
     "set device 1a2b3c4d\nset key 0f0e0d0c0b0a09080706050403020100\nset name left-wrist\n"
     "set network stage\nset password break-a-leg\nsave\n";
-constexpr uint32_t kClockHz = 48000000, kCyclesPerInstruction = 2;  // docs/firmware.md says why 2
+constexpr uint32_t kClockHz = 48000000, kCyclesPerInstruction = 2;  // 2: see docs/firmware.md
 constexpr uint32_t kMostShare = 20;                                 // percent of the processor
 
 Instructions core_work;  // counts while the core runs, not while a port does
@@ -197,7 +197,7 @@ void check_count() {
   check(counted >= 3 * kRounds && counted < 3 * kRounds + 30, "instructions counted right");
 }
 
-// Turns until it is so, at most for so long; milliseconds that it took.
+// Runs until the condition holds or the time is over. Returns the milliseconds that it took.
 template <typename Condition>
 uint32_t turn_until(Condition is_so, uint32_t seconds, const char* what) {
   const uint32_t since_us = now_us;

@@ -1,4 +1,4 @@
-// What the emulated board says to the machine that runs it (Arm semihosting, release 3).
+// Output of the emulated board to its host (Arm semihosting, release 3).
 #include "semihosting.h"
 
 namespace {

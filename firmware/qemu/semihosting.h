@@ -1,4 +1,4 @@
-// What the emulated board says to the machine that runs it: text, an exit code (Arm semihosting).
+// Output of the emulated board to its host: text, an exit code (Arm semihosting).
 #pragma once
 
 #include <stdint.h>

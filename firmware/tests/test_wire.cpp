@@ -14,67 +14,17 @@ using namespace bunraku;
 namespace {
 
 // Every field of every packet by its name; `visit` checks or fills it.
-template <typename Packet, typename Visit>
-void head(Packet& packet, Visit& visit) {
-  visit("device_id", packet.device_id);
-  visit("boot_nonce", packet.boot_nonce);
-  visit("session", packet.session);
-  visit("sequence", packet.sequence);
-}
-template <typename Visit>
-void fields(wire::Hello& packet, Visit& visit) {
-  head(packet, visit);
-  visit("wire_hash", packet.wire_hash);
-  visit("firmware_major", packet.firmware_major);
-  visit("firmware_minor", packet.firmware_minor);
-  visit("firmware_patch", packet.firmware_patch);
-  visit("battery", packet.battery);
-  visit("flags", packet.flags);
-  visit("imu_id", packet.imu_id);
-}
-template <typename Visit>
-void fields(wire::Assignment& packet, Visit& visit) {
-  head(packet, visit);
-  visit("hello_sequence", packet.hello_sequence);
-  visit("hand", packet.hand);
-  visit("rate_hz", packet.rate_hz);
-  visit("led", packet.led);
-}
-template <typename Visit>
-void fields(wire::Reading& packet, Visit& visit) {
-  head(packet, visit);
-  visit("sensor_time_us", packet.sensor_time_us);
-  visit("orientation", packet.orientation);
-  visit("calibration", packet.calibration);
-  visit("battery", packet.battery);
-  visit("round_trip", packet.round_trip);
-  visit("taps", packet.taps);
-  visit("recoveries", packet.recoveries);
-  visit("flags", packet.flags);
-}
-template <typename Visit>
-void fields(wire::Heartbeat& packet, Visit& visit) {
-  head(packet, visit);
-  visit("echo_sequence", packet.echo_sequence);
-  visit("echo_held_us", packet.echo_held_us);
-  visit("led", packet.led);
-}
-template <typename Visit>
-void fields(wire::Call& packet, Visit& visit) {
-  head(packet, visit);
-}
-template <typename Visit>
-void fields(wire::Profile& packet, Visit& visit) {
-  head(packet, visit);
-  visit("imu_id", packet.imu_id);
-  visit("offsets", packet.offsets);
-}
-template <typename Visit>
-void fields(wire::Restore& packet, Visit& visit) {
-  head(packet, visit);
-  visit("imu_id", packet.imu_id);
-  visit("offsets", packet.offsets);
-}
+#define VISIT(field) visit(#field, packet.field);
+#define FIELDS(Packet, LIST) \
+  template <typename Visit>  \
+  void fields(wire::Packet& packet, Visit& visit) { LIST(VISIT) }
+FIELDS(Hello, BUNRAKU_HELLO)
+FIELDS(Assignment, BUNRAKU_ASSIGNMENT)
+FIELDS(Reading, BUNRAKU_READING)
+FIELDS(Heartbeat, BUNRAKU_HEARTBEAT)
+FIELDS(Call, BUNRAKU_CALL)
+FIELDS(Profile, BUNRAKU_PROFILE)
+FIELDS(Restore, BUNRAKU_RESTORE)
 
 int16_t q14(double value) { return static_cast<int16_t>(std::lround(value * 16384)); }
 

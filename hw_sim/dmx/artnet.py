@@ -19,7 +19,7 @@ class MalformedArtNetError(ValueError):
 
 @dataclass(frozen=True)
 class ArtDmx:
-    """One ArtDmx packet: sequence 1..255 (0: nobody counts), port address in 15 bits, levels."""
+    """One ArtDmx packet: sequence 1..255 (0: unnumbered), port address in 15 bits, levels."""
 
     sequence: int
     physical: int

@@ -1,4 +1,4 @@
-"""A UDP socket whose datagrams are decoded as they come, each with its arrival."""
+"""A UDP socket that decodes datagrams as they come, each with its arrival."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ class MalformedSacnError(ValueError):
 
 @dataclass(frozen=True)
 class Data:
-    """One data packet: who sends, how important, what, and whether it is the source's farewell."""
+    """One data packet: source, priority, levels, and whether it terminates the stream."""
 
     cid: UUID
     source_name: str

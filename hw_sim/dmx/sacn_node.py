@@ -42,7 +42,7 @@ class SacnNode:
         self._sources: dict[tuple[int, UUID], Source] = {}
         self.out_of_order = 0
 
-    def hear(self, packet: sacn.Data, now: float) -> None:
+    def receive(self, packet: sacn.Data, now: float) -> None:
         """One packet; `now` in monotonic seconds."""
         key = (packet.universe, packet.cid)
         if packet.terminated:

@@ -30,7 +30,7 @@ class Plug:
 class UdmxBackend(usb.backend.IBackend):  # type: ignore[misc]
     """What pyusb asks. `levels` is what the lights get; `ranges` each transfer as (first, count).
 
-    pull_out_after: the device goes after so many more transfers of levels, in the middle of a universe.
+    pull_out_after: the device disappears after this many more transfers, in the middle of a universe.
     """
 
     def __init__(self, product: str = "uDMX", serial_number: str | None = "ilLUTZminator001") -> None:
@@ -49,7 +49,7 @@ class UdmxBackend(usb.backend.IBackend):  # type: ignore[misc]
         self._is_in = True
 
     def pull_out(self) -> None:
-        """It forgets its levels; who has it open gets ENODEV."""
+        """It forgets its levels; an open handle gets ENODEV."""
         self._is_in = False
         self.levels = bytearray(CHANNELS)
 

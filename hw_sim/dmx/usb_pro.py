@@ -45,7 +45,7 @@ class UsbProWidget:
         return self.universes[-1][1][1:] if self.universes else None
 
     def plug_in(self) -> None:
-        """The device appears, readable for everybody."""
+        """The device appears, readable for all users."""
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -56,7 +56,7 @@ class UsbProWidget:
         self.path.symlink_to(os.ttyname(self._slave))
 
     def pull_out(self) -> None:
-        """The device is gone, whoever has it open; what was on its way is lost."""
+        """The device disappears, even while open; data in transit is lost."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
@@ -70,8 +70,8 @@ class UsbProWidget:
         """Take nothing more in, until told otherwise; the line fills up."""
         (self._hangs.set if hangs else self._hangs.clear)()
 
-    def say(self, garbage: bytes) -> None:
-        """Send this to whoever has the device open, as a widget with a loose cable does."""
+    def send_message(self, garbage: bytes) -> None:
+        """Send this to the program that has the device open, as a widget with a loose cable does."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, garbage)
 

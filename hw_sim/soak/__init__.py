@@ -1,1 +1,1 @@
-"""Soak: an evening, or a week, of load and trouble for the whole box; does it stay as even and as small?"""
+"""Soak: hours of load and faults for the whole box; its timing and memory must stay the same."""

@@ -1,4 +1,4 @@
-"""`python -m hw_sim.soak --minutes 60`: soak the whole box, say each second how it goes, and judge it."""
+"""`python -m hw_sim.soak --minutes 60`: soak the whole box, report each second, and judge it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hw_sim.soak.run import Soak, soak
 
 REFUSED, FAILED = 2, 1
 WRITE_EACH_S = 60.0
-LINE_EACH_S = 30.0  # where nobody sees a line that changes
+LINE_EACH_S = 30.0  # without a terminal
 
 
 def main(
@@ -58,7 +58,7 @@ def main(
     for line in table(seen):
         print(line)
     write(out, seen, is_over=True)
-    print(f"Written: {out}/soak.json, soak.csv, {_picture(out, seen)}; what the box said: {out}/box/words")
+    print(f"Written: {out}/soak.json, soak.csv, {_picture(out, seen)}; output of the box: {out}/box/words")
     raise typer.Exit(0 if all(limit.holds for limit in limits_of(seen)) else FAILED)
 
 

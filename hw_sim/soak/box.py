@@ -23,7 +23,7 @@ _PICTURE = "320x180"  # the projector's: without a graphics card the processor d
 
 
 class Ears(NamedTuple):
-    """Ports of this machine at which the soak hears the box."""
+    """Ports of this machine on which the soak receives from the box."""
 
     frames: int
     heartbeat: int

@@ -1,4 +1,4 @@
-"""How late things came: counted in steps of 0.1 ms, for a run of any length in the same memory."""
+"""Histogram of delays in steps of 0.1 ms: constant memory for a run of any length."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Delays:
         self.worst_ms = 0.0
 
     def add(self, delay_ms: float) -> None:
-        """One more; what came early came in time."""
+        """Add one; early counts as in time."""
         self._counts[round(min(max(delay_ms, 0.0), LONGEST_MS) / STEP_MS)] += 1
         self.worst_ms = max(self.worst_ms, delay_ms)
 
@@ -34,7 +34,7 @@ class Delays:
         return int(self._counts[int(limit_ms / STEP_MS) + 1 :].sum())
 
     def whole_slots(self) -> int:
-        """How many slots of 20 ms went by while somebody waited for those that came later than one."""
+        """How many whole slots of 20 ms passed while late ones were awaited."""
         slots = (np.arange(len(self._counts)) * STEP_MS / SLOT_MS).astype(np.int64)
         return int((slots * self._counts).sum())
 

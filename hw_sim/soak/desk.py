@@ -1,4 +1,4 @@
-"""A desk that commands the box all evening, and hears what comes back; now and then it sends nonsense."""
+"""A desk that sends commands to the box and takes the replies; now and then it sends nonsense."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NONSENSE_EACH = 8
 
 
 class Said(NamedTuple):
-    """What the stage counts itself, from its own heartbeat."""
+    """The stage's own counts, from its heartbeat."""
 
     late: int
     skipped: int
@@ -48,7 +48,7 @@ class Desk:
         self.port: int = self._socket.getsockname()[1]
 
     def command(self, port: int) -> str:
-        """Send the next one to this port of the box; what it was."""
+        """Send the next command to this port of the box. Returns what it was."""
         self.counts["sent"] += 1
         if self.counts["sent"] % _NONSENSE_EACH == 0:
             return self._nonsense(port)
@@ -58,12 +58,12 @@ class Desk:
         return address
 
     def calm(self, port: int) -> None:
-        """The show goes on: nothing that was commanded darkens it."""
+        """Undo whatever darkens the show."""
         for address, arguments in (("/go", ()), ("/blackout", (0,)), ("/master", (1.0,))):
             self._send(_message(address, arguments), port)
 
     def poll(self) -> None:
-        """Take what came back."""
+        """Take the replies."""
         while True:
             try:
                 datagram = self._socket.recv(65536)
@@ -73,13 +73,13 @@ class Desk:
                 continue  # show control was away when something was sent
             with contextlib.suppress(MalformedOscError):
                 for address, arguments in decode(datagram):
-                    self._hear(address, arguments)
+                    self._take(address, arguments)
 
     def close(self) -> None:
-        """Go home."""
+        """Close the socket."""
         self._socket.close()
 
-    def _hear(self, address: str, arguments: list[Argument]) -> None:
+    def _take(self, address: str, arguments: list[Argument]) -> None:
         if address in ("/reply", "/sensors/reply"):
             self.counts["done" if arguments[1] else "refused"] += 1
         elif address == _STATUS:

@@ -1,4 +1,4 @@
-"""What a soak has shown, in figures, and whether that is good: pure functions of what was seen."""
+"""The figures of a soak and their limits: pure functions of the record."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def figures_of(soak: Soak) -> dict[str, Any]:
 
 
 def limits_of(soak: Soak) -> list[Limit]:
-    """What has to hold."""
+    """The limits."""
     figures = figures_of(soak)
     machine, box = figures["cyclictest"], figures["spoilt_share"]
     beyond = box - machine["late_share"]
@@ -111,7 +111,7 @@ def limits_of(soak: Soak) -> list[Limit]:
         Limit(
             "processes",
             ", ".join(f"{name} ended {count} times" for name, count in died.items()) or "all lived",
-            "nobody ends who was not killed",
+            "no process ends unless it is killed",
             not died,
         )
     )
@@ -148,7 +148,7 @@ def table(soak: Soak) -> list[str]:
     lines += [
         f"Warmest: {temperature['max']:.0f} degrees C."
         if temperature
-        else "This machine tells no temperature.",
+        else "This machine reports no temperature.",
         f"Sensors: {soak.outages} outages, {soak.box.sensors.starts} power-ons. Receivers came or went "
         f"{soak.guest_changes} times. Commands: {soak.desk.counts['sent']} sent, {soak.desk.counts['done']} "
         f"done, {soak.desk.counts['refused']} refused. Universes of light: {soak.universes}.",

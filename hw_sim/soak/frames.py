@@ -1,4 +1,4 @@
-"""Hears each frame of the box and says how late it left: counted outside, by the kernel's own time stamps."""
+"""Receives each frame of the box and measures its lateness from outside, by the kernel's time stamps."""
 
 from __future__ import annotations
 
@@ -45,15 +45,15 @@ class FrameWatch:
         self._no_room = self._overflowed = 0
         self._wall_ahead_s = time.time() - time.monotonic()
 
-    def begin(self, now: float) -> None:
-        """What was heard before does not count; seconds of the run count from here."""
+    def start(self, now: float) -> None:
+        """Reset all counts; seconds of the run count from here."""
         self.heard = self.late = self.missing = self.unheard = self.stage_starts = 0
         self.longest_gap_s = 0.0
         self.delays, self.seconds = Delays(), Seconds()
         self._begun = now
 
     def poll(self, timeout_s: float) -> None:
-        """Wait so long at most, then take all that is there."""
+        """Wait up to `timeout_s`, then take all that is there."""
         select.select([self._socket], [], [], timeout_s)
         self._compare_clocks()
         while True:
@@ -123,7 +123,7 @@ class FrameWatch:
         return at
 
     def _compare_clocks(self) -> None:
-        """The stamps are wall-clock times; somebody may set that clock at any moment."""
+        """The stamps are wall-clock times, and that clock may be set at any moment."""
         before, wall, after = time.monotonic(), time.time(), time.monotonic()
         if after - before < _CLOSE_ENOUGH_S:
             self._wall_ahead_s = wall - (before + after) / 2.0

@@ -9,7 +9,7 @@ from hw_sim.soak.unit import Unit
 from hw_sim.soak.vitals import Vitals
 
 FIRST_MINUTE_S = 60.0
-WINDOW_S = 10.0  # figures of memory are medians over so long
+WINDOW_S = 10.0  # figures of memory are medians over this window
 _SHORTEST_LIFE_S = 3.0
 
 

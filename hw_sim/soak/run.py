@@ -115,8 +115,8 @@ def _dance(
 ) -> None:
     """Until its time is over. Everything that was before is forgotten: it was the start."""
     soak.begun = now = time.monotonic()
-    soak.frames.begin(now)
-    soak.wakeups.begin(now)
+    soak.frames.start(now)
+    soak.wakeups.start(now)
     look_at, happened = now + 1.0, 0
     while soak.seconds < soak.planned_s and not stopped():
         soak.frames.poll(_LOOK_S)
@@ -142,7 +142,7 @@ def _dance(
 
 def _look_after(soak: Soak, now: float) -> None:
     for unit in soak.box.everything:
-        unit.look(now)
+        unit.update(now)
 
 
 def _happen(soak: Soak, act: Act, ports: tuple[int, ...]) -> None:

@@ -16,11 +16,11 @@ LOADS: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 COMPRESSED_BELOW_S = 300.0  # shorter runs have the same acts, sooner
 LOAD_S, SENSORS_S, GUESTS_S, COMMAND_S, KILL_S = 60.0, 40.0, 9.0, 3.0, 100.0
-KILLS_UNTIL = 0.5  # of the run: in the second half nobody is killed, and memory can be compared
+KILLS_UNTIL = 0.5  # of the run: no kills in the second half, so that memory can be compared
 
 
 class Act(NamedTuple):
-    """At so many seconds of the run this happens, to this one where there is a choice."""
+    """An event at a second of the run, with its target where there is a choice."""
 
     at: float
     kind: str  # load, network, outage, back, guest, command, kill
@@ -28,7 +28,7 @@ class Act(NamedTuple):
 
 
 def script(seconds: float, companions: list[str], guests: int, seed: int, load: bool) -> list[Act]:
-    """All acts of a run of so many seconds, in their order. The same seed gives the same evening."""
+    """All acts of a run of `seconds`, in order. The same seed gives the same run."""
     pace = min(1.0, seconds / COMPRESSED_BELOW_S)
     chance = random.Random(f"soak {seed}")
     acts = [*_sensors(seconds, pace, chance), *_guests(seconds, pace, guests, chance)]

@@ -19,7 +19,7 @@ _libc = ctypes.CDLL(None)
 
 
 class Unit:
-    """`deaths`: nobody killed it, and it ended. `history`: (monotonic seconds, what it held), this life only.
+    """`deaths`: ends without a kill. `history`: (monotonic seconds, resources) of this life only.
     `longest`: the same of the longest life before this one.
 
     `is_away`: it says that what it needs is not here. `priority`: real-time, where it can be had.
@@ -49,7 +49,7 @@ class Unit:
         """None while it is not running."""
         return None if self._process is None else self._process.pid
 
-    def look(self, now: float) -> None:
+    def update(self, now: float) -> None:
         """Notice its end; start it when it is time to."""
         if self._process is not None and (status := self._process.poll()) is not None:
             self._process = None

@@ -27,7 +27,7 @@ class Wakeups:
         if shutil.which("cyclictest") is None:
             self.complaint = "cyclictest is not there. Install it: sudo apt-get install -y rt-tests"
 
-    def begin(self, now: float) -> None:
+    def start(self, now: float) -> None:
         """Start it; seconds of the run count from `now`, monotonic."""
         self._begun = now
         if self.complaint:

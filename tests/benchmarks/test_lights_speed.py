@@ -58,7 +58,7 @@ def test_pass(measured: Callable[..., Any], fading: bool, request: pytest.Fixtur
     clock = itertools.count()
 
     def one_pass() -> dict[int, bytes]:
-        return rig.pass_(dance[next(frames)], 1, show_state, next(clock) * 0.025)
+        return rig.render(dance[next(frames)], 1, show_state, next(clock) * 0.025)
 
     levels = measured(request.node.callspec.id, GROUP)(one_pass)
     assert set(levels) == {1, 2}

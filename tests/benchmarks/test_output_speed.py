@@ -207,5 +207,5 @@ def test_all_outputs_of_one_tick(
     measured: Callable[..., Any], everybody: Outputs, full_frame: JointFrame
 ) -> None:
     """Three receivers by OSC, 8 trackers by PosiStageNet, the shared frame: 0.3 ms is the limit."""
-    measured("OSC to three, PosiStageNet, shared frame", OUTPUTS_GROUP)(everybody.send, full_frame)
+    measured("OSC to three, PosiStageNet, shared frame", OUTPUTS_GROUP)(everybody.publish_frame, full_frame)
     assert all(receiver.sent and not receiver.dropped for receiver in everybody.receivers)

@@ -59,7 +59,7 @@ class Hall:
 
     def tick(self) -> None:
         self.link.drain(self.now)
-        self.link.tend(self.now)
+        self.link.send_due(self.now)
 
     def close(self) -> None:
         for radio in self.radios:
@@ -110,7 +110,7 @@ def test_ten_seconds_of_flood(
 
     def tick() -> None:
         used.extend(reading.sequence for reading in link.drain(hall.now))
-        link.tend(hall.now)
+        link.send_due(hall.now)
 
     benchmark.pedantic(tick, setup=next_tick, rounds=500)
     stranger.kill()

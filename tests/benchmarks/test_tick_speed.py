@@ -72,7 +72,7 @@ def test_the_whole_tick(measured: Callable[..., Any], cast: StageParts, key: Sen
         ran += 1
         slot.tick, slot.deadline = ran, now + ran * TICK_S
         slot.started = slot.deadline
-        cast.link.tend(slot.deadline)
+        cast.link.send_due(slot.deadline)
         sensor.advance(slot.deadline)
         return (slot,), {}
 

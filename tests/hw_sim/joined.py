@@ -9,7 +9,7 @@ from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, SensorReading
 from appliance.sensor.transports.transport import Origin
-from hw_sim.device import Device, Way
+from hw_sim.device import Device, Lane
 from hw_sim.emulator import Emulator, Sent
 from hw_sim.motions import Quaternion
 from hw_sim.network import VenueNetwork
@@ -25,14 +25,14 @@ class Air:
         self.waiting: deque[tuple[bytes, float, Origin]] = deque()
         self.answers: dict[Origin, deque[bytes]] = defaultdict(deque)
 
-    def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
+    def receive_packets(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
         while self.waiting:
             yield self.waiting.popleft()
 
-    def send(self, packet: bytes, origin: Origin) -> None:
+    def send_packet(self, packet: bytes, origin: Origin) -> None:
         self.answers[origin].append(packet)
 
-    def attend(self, origins: Collection[Origin]) -> None: ...
+    def reserve_sockets(self, origins: Collection[Origin]) -> None: ...
 
     def describe(self, origin: Origin) -> str:
         return str(origin)
@@ -53,8 +53,10 @@ class Show:
         self.sent: dict[tuple[str, int, int], Sent] = {}
         self.made: dict[tuple[str, int], set[Quaternion]] = defaultdict(set)
         self.now = 1000.0
-        ways = [{Way.NETWORK: _Antenna(self, number)} for number in range(len(devices))]
-        self.emulator = Emulator(devices, ways, network=network, on_sent=self._note, clock=lambda: self.now)
+        senders = [{Lane.NETWORK: _Antenna(self, number)} for number in range(len(devices))]
+        self.emulator = Emulator(
+            devices, senders, network=network, on_sent=self._note, clock=lambda: self.now
+        )
         self.emulator.start(self.now)
         self._tick = 0
         self._due = self.now
@@ -70,7 +72,7 @@ class Show:
                 self._due = max(self.emulator.step(self.now), self.now + 1e-6)
             self.now = tick_at
             readings += self.link.drain(tick_at)
-            self.link.tend(tick_at)
+            self.link.send_due(tick_at)
             self._due = max(self.emulator.step(tick_at), tick_at + 1e-6)
         return readings
 
@@ -93,11 +95,11 @@ class _Antenna:
     def __init__(self, show: Show, number: int) -> None:
         self._show, self._number = show, number
 
-    def send(self, data: bytes) -> bool:
+    def send_packet(self, data: bytes) -> bool:
         self._show.air.waiting.append((data, self._show.now, self._number))
         return True
 
-    def receive(self) -> bytes | None:
+    def receive_packet(self) -> bytes | None:
         answers = self._show.air.answers[self._number]
         return answers.popleft() if answers else None
 

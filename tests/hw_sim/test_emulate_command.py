@@ -47,7 +47,7 @@ def port_of(link: SensorLink) -> int:
 def tick(link: SensorLink) -> list[SensorReading]:
     """What a box does with its sensors, without its dance."""
     readings = list(link.drain(time.monotonic()))
-    link.tend(time.monotonic())
+    link.send_due(time.monotonic())
     time.sleep(0.004)
     return readings
 
@@ -97,10 +97,10 @@ def test_each_sensor_speaks_from_an_address_of_its_own(
 ) -> None:
     process = emulate("--keys", keys_path, "--port", port_of(link))
     hear_until(link, lambda readings: len({reading.sensor for reading in readings}) == 2)
-    ways = [state.way for state in link.states(time.monotonic())]
+    senders = [state.way for state in link.states(time.monotonic())]
     process.terminate()
     assert process.wait(timeout=20) == 0
-    assert len(set(ways)) == 2
+    assert len(set(senders)) == 2
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

@@ -15,7 +15,7 @@ from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey, create_keys, load_keys
 from appliance.sensor.link import open_link
 from hw_sim import motions
-from hw_sim.device import Outgoing, Way
+from hw_sim.device import Lane, Outgoing
 from hw_sim.firmware import BOX, NETWORK, PASSWORD, FirmwareSensor, ask, provision
 from hw_sim.firmware_library import CompiledWearable, FirmwareMissingError, State, load_library
 from hw_sim.network import VENUE, VenueNetwork
@@ -119,20 +119,20 @@ class ScriptedBox:
         return wire.pack(wire.Heartbeat(*head, 0, 0, wire.LED_SLOW), self._tagger)
 
 
-def course(seed: int, way: Way = Way.NETWORK, seconds: int = 12) -> tuple[FirmwareSensor, list[Outgoing]]:
+def course(seed: int, lane: Lane = Lane.NETWORK, seconds: int = 12) -> tuple[FirmwareSensor, list[Outgoing]]:
     """A device alone with a scripted box, and all that it sent."""
     one, box, sent = device(seed=seed), ScriptedBox(), []
     one.start(50.0)
-    one.connect(way, True, 50.0)
+    one.connect(lane, True, 50.0)
     for step in range(1, 100 * seconds):
         now = 50.0 + 0.01 * step
         for packet in one.step(now):
             sent.append(packet)
             answer = box.answer(packet)
             if answer is not None:
-                one.receive(answer, now, way)
+                one.receive_packet(answer, now, lane)
         if step % 100 == 0:
-            one.receive(box.heartbeat(), now, way)
+            one.receive_packet(box.heartbeat(), now, lane)
     return one, sent
 
 
@@ -144,8 +144,8 @@ def test_the_same_seed_gives_the_same_bytes_at_the_same_times() -> None:
 
 
 def test_over_a_cable_it_is_there_at_once_and_the_lamp_does_what_the_box_wants() -> None:
-    one, sent = course(3, Way.CABLE, seconds=8)
-    assert {packet.way for packet in sent} == {Way.CABLE}
+    one, sent = course(3, Lane.CABLE, seconds=8)
+    assert {packet.lane for packet in sent} == {Lane.CABLE}
     readings = [packet for packet in sent if packet.sample is not None]
     assert readings[0].at < 53.0
     assert one.light == "slow"
@@ -158,7 +158,7 @@ def test_over_a_cable_it_is_there_at_once_and_the_lamp_does_what_the_box_wants()
 def test_the_emulators_switch_gives_a_new_boot_each_time_and_never_the_same() -> None:
     one = device(reboot_every_s=6.0)
     one.start(50.0)
-    one.connect(Way.NETWORK, True, 50.0)
+    one.connect(Lane.NETWORK, True, 50.0)
     nonces: list[int] = []
     for step in range(1, 430):
         nonces += (wire.HEAD.unpack_from(packet.data)[4] for packet in one.step(50.0 + 0.1 * step))
@@ -222,7 +222,7 @@ def test_the_clock_wraps_in_the_middle_of_a_dance() -> None:
         for sent in wearable.take_datagrams():
             if sent.data[3] == wire.READING.kind:
                 times.append(int.from_bytes(sent.data[20:24], "little"))
-            answer = box.answer(Outgoing(sent.data, Way.NETWORK, 0.0))
+            answer = box.answer(Outgoing(sent.data, Lane.NETWORK, 0.0))
             if answer is not None:
                 wearable.put_datagram(BOX, answer)
         if step % 100 == 0:

@@ -92,18 +92,18 @@ def test_transport_is_from_sending_to_the_first_frame_with_the_reading() -> None
     sent = readings(100)
     received = frames(sent)
     received.insert(50, received[49]._replace(arrived_at=received[49].arrived_at + 0.02, tick=999))
-    way = transport(sent, received)
-    np.testing.assert_allclose(way.latency_ms, 2.5, atol=1e-6)
-    assert way.overtaken == 0
+    transported = transport(sent, received)
+    np.testing.assert_allclose(transported.latency_ms, 2.5, atol=1e-6)
+    assert transported.overtaken == 0
 
 
 def test_an_overtaken_reading_counts_with_the_frame_of_the_newer_one_and_the_end_does_not() -> None:
     sent = readings(100)
     received = [frame for frame in frames(sent) if frame.sensor_sequence not in (40, 41, 98, 99)]
-    way = transport(sent, received)
-    assert way.overtaken == 2
-    assert len(way.latency_ms) == 98
-    np.testing.assert_allclose(way.latency_ms[[39, 40, 41, 42]], [2.5, 42.5, 22.5, 2.5], atol=1e-6)
+    transported = transport(sent, received)
+    assert transported.overtaken == 2
+    assert len(transported.latency_ms) == 98
+    np.testing.assert_allclose(transported.latency_ms[[39, 40, 41, 42]], [2.5, 42.5, 22.5, 2.5], atol=1e-6)
 
 
 def test_frames_before_the_first_reading_carry_nothing() -> None:

@@ -59,7 +59,7 @@ def watch() -> Iterator[FrameWatch]:
         stage, until = Stage(other), time.monotonic() + PATIENCE_S
         while not other.heard or other.delays.worst_ms > 10.0:
             assert time.monotonic() < until, "the kernel stamps nothing"
-            other.begin(time.monotonic())
+            other.start(time.monotonic())
             stage.send(1)
             time.sleep(0.02)  # nobody reads
             other.poll(1.0)
@@ -86,7 +86,7 @@ def test_delays_are_counted_in_steps_and_long_ones_cost_whole_slots() -> None:
 
 
 def test_frames_are_counted_by_their_ticks_and_their_deadlines(watch: FrameWatch, stage: Stage) -> None:
-    watch.begin(time.monotonic())
+    watch.start(time.monotonic())
     took_ms = {}
     for tick, before_s, late in ((10, 0.0, False), (11, 0.016, False), (12, 0.0, True), (15, 0.002, False)):
         took_ms[tick] = stage.send(tick, before_s, late)
@@ -98,7 +98,7 @@ def test_frames_are_counted_by_their_ticks_and_their_deadlines(watch: FrameWatch
 
 
 def test_a_frame_s_arrival_is_the_kernel_s_and_not_the_reader_s(watch: FrameWatch, stage: Stage) -> None:
-    watch.begin(time.monotonic())
+    watch.start(time.monotonic())
     took_ms = stage.send(1)
     time.sleep(0.1)  # nobody reads
     watch.poll(1.0)
@@ -107,7 +107,7 @@ def test_a_frame_s_arrival_is_the_kernel_s_and_not_the_reader_s(watch: FrameWatc
 
 
 def test_a_stage_that_stopped_is_missing_at_the_end(watch: FrameWatch, stage: Stage) -> None:
-    watch.begin(time.monotonic())
+    watch.start(time.monotonic())
     took_s = stage.send(1) / 1000.0
     now = time.monotonic()
     watch.poll(1.0)
@@ -118,7 +118,7 @@ def test_a_stage_that_stopped_is_missing_at_the_end(watch: FrameWatch, stage: St
 
 
 def test_a_stage_that_begins_anew_is_counted_with_its_pause(watch: FrameWatch, stage: Stage) -> None:
-    watch.begin(time.monotonic())
+    watch.start(time.monotonic())
     stage.send(500)
     watch.poll(1.0)
     time.sleep(0.1)
@@ -188,19 +188,19 @@ def test_a_life_that_was_too_short_is_not_judged(tmp_path: Path) -> None:
 
 def test_a_unit_is_started_again_and_only_unasked_ends_are_deaths(tmp_path: Path) -> None:
     unit = Unit("one", (sys.executable, "-c", "import time; time.sleep(60)"), tmp_path / "words")
-    unit.look(0.0)
+    unit.update(0.0)
     first = unit.pid
     unit.kill()
     now, until = 1.0, time.monotonic() + PATIENCE_S
     while unit.starts < 2:
         assert time.monotonic() < until
-        unit.look(now := now + PAUSE_S)
+        unit.update(now := now + PAUSE_S)
     assert unit.pid != first
     assert (unit.kills, unit.deaths) == (1, 0)
     unit.kill(signal.SIGTERM)  # as if it fell by itself
     while unit.starts < 3:
         assert time.monotonic() < until
-        unit.look(now := now + PAUSE_S)
+        unit.update(now := now + PAUSE_S)
     assert (unit.kills, unit.deaths) == (1, 1)
     unit.end(5.0)
     assert unit.pid is None

@@ -8,7 +8,7 @@ from itertools import count
 
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
-from hw_sim.device import Way
+from hw_sim.device import Lane
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.emulator import Emulator, Sender, Sent
 from hw_sim.network import VenueNetwork
@@ -88,14 +88,14 @@ class Line:
         self._clock = clock
         self._waiting: deque[bytes] = deque()
 
-    def send(self, data: bytes) -> bool:
+    def send_packet(self, data: bytes) -> bool:
         if not self.is_up:
             return False
         self.passing_on(data)
         self._waiting.extend(self.box.hear(data, self._clock()))
         return True
 
-    def receive(self) -> bytes | None:
+    def receive_packet(self) -> bytes | None:
         if not self.is_up:
             self._waiting.clear()
             return None
@@ -142,11 +142,11 @@ class Pair:
         self.cable = Line(self.box, self.clock)
         self.cable.is_up = False
         self.sent: list[Sent] = []
-        ways: dict[Way, Sender] = {Way.NETWORK: self.line, Way.CABLE: self.cable}
+        senders: dict[Lane, Sender] = {Lane.NETWORK: self.line, Lane.CABLE: self.cable}
         self.device = device
         self.emulator = Emulator(
             [device],
-            [ways],
+            [senders],
             network=network,
             on_sent=self.sent.append,
             clock=self.clock,

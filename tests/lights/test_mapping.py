@@ -31,7 +31,7 @@ def levels(
     shown = []
     for tick, hand in enumerate(hands, first):
         seen = frame(tick, hand, **changes)
-        shown.append(made.pass_(seen, 1, show_state or ShowState(), seen.frame_time)[1])
+        shown.append(made.render(seen, 1, show_state or ShowState(), seen.frame_time)[1])
     return shown
 
 
@@ -66,9 +66,9 @@ def test_speed_drives_the_dimmer_and_one_late_frame_is_no_step() -> None:
     path = [(0.5 * PERIOD_S * step, 1.0, 0.0) for step in range(60)]
     assert levels(made, *path)[-1][DIMMER] == pytest.approx(128, abs=2)
     late = frame(61, path[-1], late=True)
-    assert made.pass_(late, 1, ShowState(), late.frame_time)[1][DIMMER] == pytest.approx(128, abs=2)
+    assert made.render(late, 1, ShowState(), late.frame_time)[1][DIMMER] == pytest.approx(128, abs=2)
     after = frame(62, (0.5 * PERIOD_S * 61, 1.0, 0.0))
-    assert made.pass_(after, 1, ShowState(), after.frame_time)[1][DIMMER] == pytest.approx(128, abs=6)
+    assert made.render(after, 1, ShowState(), after.frame_time)[1][DIMMER] == pytest.approx(128, abs=6)
 
 
 def test_a_jump_of_the_phrase_is_no_speed_that_a_dancer_could_have() -> None:
@@ -83,7 +83,7 @@ def test_a_stage_that_hangs_moves_no_more() -> None:
     assert levels(made, *path)[-1][DIMMER] > 250
     last = frame(60, path[-1])
     for step in range(30):
-        shown = made.pass_(last, 1, ShowState(), last.frame_time + 0.025 * step)
+        shown = made.render(last, 1, ShowState(), last.frame_time + 0.025 * step)
     assert shown[1][DIMMER] < 5
 
 

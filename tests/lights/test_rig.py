@@ -43,7 +43,7 @@ class Evening:
         for _ in range(max(1, round(seconds / PERIOD_S))):
             self.now += PERIOD_S
             self.frame = newest()
-            shown.append(self.rig.pass_(self.frame, self.generation, self.show_state, self.now)[1])
+            shown.append(self.rig.render(self.frame, self.generation, self.show_state, self.now)[1])
         return shown
 
 
@@ -153,7 +153,7 @@ def test_a_rig_begins_safe_and_stays_so_without_a_stage() -> None:
     made = rig(config)
     made.safety = 1.0
     for number in range(50):
-        levels = made.pass_(None, 0, ShowState(), 100.0 + number * PERIOD_S)[1]
+        levels = made.render(None, 0, ShowState(), 100.0 + number * PERIOD_S)[1]
         assert dimmers(levels)[0] == 51
 
 
@@ -162,14 +162,14 @@ def test_the_old_frame_of_a_dead_stage_lights_nothing() -> None:
     made.safety = 1.0
     old = frame(50)
     for number in range(50):
-        assert dimmers(made.pass_(old, 1, ShowState(), 100.0 + number * PERIOD_S)[1]) == (0, 0, 0)
+        assert dimmers(made.render(old, 1, ShowState(), 100.0 + number * PERIOD_S)[1]) == (0, 0, 0)
 
 
 @pytest.mark.parametrize(("safe", "left"), [({}, 0), ({"dimmer": 0.5}, 128)])
 def test_at_the_end_it_fades_and_leaves_zeros_or_the_safe_look(safe: dict[str, Any], left: int) -> None:
     night = evening(safe=safe)
     night.dance(1.0)
-    night.rig.leave()
+    night.rig.fade_out()
     shown = [dimmers(levels)[0] for levels in night.dance(LEAVING_FADE_S + PERIOD_S)]
     assert shown[0] > 200 and shown == sorted(shown, reverse=True)
     assert shown[-1] == left
@@ -189,7 +189,7 @@ def test_the_end_is_as_dark_as_blackout_and_as_lit_as_panic(show_state: ShowStat
     night.dance(1.0)
     night.show_state = show_state
     night.dance(0.5)
-    night.rig.leave()
+    night.rig.fade_out()
     shown = {dimmers(levels)[0] for levels in night.dance(2 * LEAVING_FADE_S)}
     last = night.rig.last_levels(show_state)[1]
     assert shown | {last[0]} == {left}
@@ -200,7 +200,7 @@ def test_the_end_is_as_dark_as_blackout_and_as_lit_as_panic(show_state: ShowStat
 def test_at_the_end_heads_stay_where_they_point() -> None:
     night = evening(FULL, AIM)
     shown = night.dance(2.0)[-1]
-    night.rig.leave()
+    night.rig.fade_out()
     night.dance(LEAVING_FADE_S + PERIOD_S, hand=(-2.0, 1.0, 1.0))
     before, last = night.dance()[0], night.rig.last_levels(night.show_state)[1]
     assert last[20:24] == before[20:24] != shown[20:24]
@@ -258,7 +258,7 @@ def test_at_a_slow_rate_a_lost_stage_is_seen_and_faded_from_in_the_same_time(rat
     made, period_s, safe_at = slow(rate_hz), 1.0 / rate_hz, np.inf
     for number in range(round(4.0 * rate_hz)):
         now = 1.0 + number * period_s
-        made.pass_(frame(50), 1, ShowState(), now)
+        made.render(frame(50), 1, ShowState(), now)
         safe_at = min(safe_at, now if made.safety >= 1.0 else np.inf)
     assert LOST_S + SAFE_FADE_S - 1e-6 <= safe_at - 1.0 <= LOST_S + SAFE_FADE_S + 1.1 * period_s
 
@@ -267,11 +267,11 @@ def test_passes_that_do_not_keep_up_see_a_lost_stage_and_fade_in_the_same_time()
     made, period_s, safe_at, now = slow(40.0), 0.3, np.inf, 1.0
     for _ in range(10):
         now += period_s
-        made.pass_(frame(round(now / 0.02)), 1, ShowState(), now)
+        made.render(frame(round(now / 0.02)), 1, ShowState(), now)
     last_frame, died_at = frame(round(now / 0.02)), now
     while now < died_at + 4.0:
         now += period_s
-        made.pass_(last_frame, 1, ShowState(), now)
+        made.render(last_frame, 1, ShowState(), now)
         safe_at = min(safe_at, now if made.safety >= 1.0 else np.inf)
     assert LOST_S + SAFE_FADE_S - 0.02 <= safe_at - died_at <= LOST_S + SAFE_FADE_S + 1.1 * period_s
 

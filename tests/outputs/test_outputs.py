@@ -37,8 +37,8 @@ def test_everybody_gets_the_frame(tmp_path: Path, skeleton: Skeleton, frame: Joi
     with OscReceiver(LOOPBACK) as osc, PsnReceiver(LOOPBACK, port=port) as psn:
         outputs = Outputs(configured(osc.port, port), skeleton)
         outputs.share(FrameWriter(tmp_path, facts_of(skeleton)))
-        outputs.send(frame)
-        outputs.tell({"state": "dancing"})
+        outputs.publish_frame(frame)
+        outputs.publish_health({"state": "dancing"})
         reader = FrameReader(tmp_path)
         seen = reader.newest(frame.frame_time)
         assert seen is not None
@@ -56,8 +56,8 @@ def test_without_a_shared_frame_the_others_go_on(skeleton: Skeleton, frame: Join
     (port,) = free_ports(1)
     with OscReceiver(LOOPBACK) as osc:
         outputs = Outputs(configured(osc.port, port), skeleton)
-        outputs.send(frame)
-        outputs.tell({"state": "dancing"})
+        outputs.publish_frame(frame)
+        outputs.publish_health({"state": "dancing"})
         assert len(osc.poll(5.0)) == 3
         outputs.close()
 
@@ -67,7 +67,7 @@ def test_receivers_that_are_not_there_are_named_and_counted(skeleton: Skeleton, 
     settings = {"osc": [{"port": nobody}], "posistagenet": [{"port": port, "interface": "192.0.2.1"}]}
     outputs = Outputs(OutputsConfig.model_validate(settings), skeleton)
     for tick in range(20):
-        outputs.send(fill(frame, skeleton, tick))
+        outputs.publish_frame(fill(frame, skeleton, tick))
     assert [receiver.name for receiver in outputs.receivers] == [
         f"127.0.0.1:{nobody} (ai-toolbox)",
         f"236.10.10.10:{port} (posistagenet)",
@@ -85,14 +85,14 @@ def test_sending_leaves_nothing_for_the_collector(
         outputs = Outputs(configured(osc.port if receivers else nobody, port), skeleton)
         outputs.share(FrameWriter(tmp_path, facts_of(skeleton)))
         for tick in range(200):
-            outputs.send(fill(frame, skeleton, tick))
+            outputs.publish_frame(fill(frame, skeleton, tick))
         gc.collect()
         gc.disable()
         try:
             before = gc.get_count()[0]
             for _ in range(300):
                 frame.frame_time += 0.02
-                outputs.send(frame)
+                outputs.publish_frame(frame)
             left = gc.get_count()[0] - before
         finally:
             gc.enable()

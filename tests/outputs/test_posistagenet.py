@@ -145,7 +145,7 @@ def test_a_multicast_receiver_on_this_machine_gets_every_frame(skeleton: Skeleto
         psn = output(skeleton, port=port)
         for tick in range(60):
             fill(frame, skeleton, tick)
-            psn.send(frame)
+            psn.send_frame(frame)
         came = receiver.poll(5.0)
         while sum(one.is_data for one in came) < 60:
             more = receiver.poll(5.0)
@@ -164,7 +164,7 @@ def test_each_nth_frame_is_sent(skeleton: Skeleton, frame: JointFrame) -> None:
         psn = output(skeleton, port=port, joints=["hip"], every=3)
         for tick in range(10):
             frame.positions[0, 0], frame.frame_time = tick, 10.0 + 0.02 * tick
-            psn.send(frame)
+            psn.send_frame(frame)
         data = [one for one in receiver.poll(5.0) if one.is_data]
         assert [one.trackers[0].position[0] for one in data if one.trackers[0].position] == [0, 3, 6, 9]
         psn.close()
@@ -175,7 +175,7 @@ def test_an_interface_that_the_box_has_not_is_said_and_never_raises(
 ) -> None:
     psn = output(skeleton, interface="192.0.2.1")
     for tick in range(100):
-        psn.send(fill(frame, skeleton, tick))
+        psn.send_frame(fill(frame, skeleton, tick))
     assert (psn.sent, psn.dropped) == (0, 102)
     assert "interface" in psn.last_error
     psn.close()
@@ -184,7 +184,7 @@ def test_an_interface_that_the_box_has_not_is_said_and_never_raises(
 def test_one_receiver_can_be_sent_to_directly(skeleton: Skeleton, frame: JointFrame) -> None:
     with PsnReceiver(LOOPBACK, group=LOOPBACK, port=0) as receiver:
         psn = output(skeleton, host=LOOPBACK, port=receiver.port, joints=["hip"])
-        psn.send(frame)
+        psn.send_frame(frame)
         assert [one.is_data for one in receiver.poll(5.0)] == [False, True]
         psn.close()
 

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.outputs.datagram_sender import LONGEST_PAUSE_S
 from appliance.outputs.joint_frame import JointFrame
-from appliance.outputs.receivers import LONGEST_PAUSE_FRAMES, OscOutputs
+from appliance.outputs.receivers import OscOutputs
 from appliance.pose.skeleton import Skeleton
 from appliance.show.box import OscConfig
 from hw_sim.osc_receiver import OscReceiver, Received
@@ -23,6 +24,7 @@ from tests.outputs.conftest import fill
 
 LOOPBACK = "127.0.0.1"
 PATIENCE_S = 30.0
+FRAME_RATE_HZ = 50
 
 
 @pytest.fixture
@@ -59,7 +61,7 @@ def test_each_receiver_gets_its_dialect_with_the_frame_message_first(
             ],
             skeleton,
         )
-        outputs.send(frame)
+        outputs.send_frame(frame)
         first = take(toolbox, 4)
         assert [address for _, address, _ in first] == [
             "/bunraku/frame",
@@ -78,7 +80,7 @@ def test_each_receiver_gets_its_dialect_with_the_frame_message_first(
 def test_two_receivers_of_one_dialect_get_the_same_bytes(skeleton: Skeleton, frame: JointFrame) -> None:
     with OscReceiver(LOOPBACK) as one, OscReceiver(LOOPBACK) as two:
         outputs = OscOutputs([OscConfig(port=one.port), OscConfig(port=two.port)], skeleton)
-        outputs.send(frame)
+        outputs.send_frame(frame)
         assert [m[1:] for m in take(one, 3)] == [m[1:] for m in take(two, 3)]
         outputs.close()
 
@@ -88,7 +90,7 @@ def test_a_receiver_that_is_not_there_is_counted_and_disturbs_nobody(
 ) -> None:
     outputs = OscOutputs([OscConfig(port=free_port()), OscConfig(port=peer.port)], skeleton)
     for seed in range(20):
-        outputs.send(fill(frame, skeleton, seed))
+        outputs.send_frame(fill(frame, skeleton, seed))
     absent, present = outputs.receivers
     assert len(take(peer, 3 * 20)) == 3 * 20
     assert (present.sent, present.dropped, present.last_error) == (60, 0, "")
@@ -100,27 +102,26 @@ def test_a_receiver_that_is_not_there_is_counted_and_disturbs_nobody(
 def test_a_receiver_that_comes_back_is_served_within_a_second(skeleton: Skeleton, frame: JointFrame) -> None:
     port = free_port()
     outputs = OscOutputs([OscConfig(port=port)], skeleton)
-    for _ in range(500):  # long enough for the longest pause
-        outputs.send(frame)
-    assert outputs.receivers[0].is_paused
+    for seed in range(500):  # long enough for the longest pause
+        outputs.send_frame(fill(frame, skeleton, seed))
     with OscReceiver(LOOPBACK, port) as back:
-        for _ in range(LONGEST_PAUSE_FRAMES + 1):
-            outputs.send(frame)
+        for seed in range(500, 500 + round(LONGEST_PAUSE_S * FRAME_RATE_HZ) + 1):
+            outputs.send_frame(fill(frame, skeleton, seed))
         assert take(back, 3)[0][1] == "/mocap/0/joint/rot_local"
     outputs.close()
 
 
 def test_tries_become_rarer_up_to_once_a_second(skeleton: Skeleton, frame: JointFrame) -> None:
     outputs = OscOutputs([OscConfig(port=free_port())], skeleton)
-    receiver = outputs.receivers[0]
     tries = []
     for number in range(400):
-        paused = receiver.is_paused
-        outputs.send(frame)
-        if not paused:
+        sent = outputs.receivers[0].sent
+        outputs.send_frame(fill(frame, skeleton, number))
+        if outputs.receivers[0].sent > sent:
             tries.append(number)
-    assert list(np.diff(tries))[:4] == [6, 11, 21, 41]
-    assert set(np.diff(tries)[4:]) == {LONGEST_PAUSE_FRAMES + 1}
+    pauses = np.diff(tries)
+    assert pauses[:4] == pytest.approx([5, 10, 20, 40], abs=1)
+    assert pauses[4:] == pytest.approx(LONGEST_PAUSE_S * FRAME_RATE_HZ, abs=1)
     outputs.close()
 
 
@@ -130,7 +131,7 @@ def test_addresses_that_cannot_be_reached_never_raise(
     configs = [OscConfig(host=host, port=9004) for host in ("240.0.0.1", "0.0.0.1")]
     outputs = OscOutputs([*configs, OscConfig(port=peer.port)], skeleton)
     for _ in range(3):
-        outputs.send(frame)
+        outputs.send_frame(frame)
     assert len(take(peer, 9)) == 9
     for receiver in outputs.receivers[:-1]:
         assert receiver.sent + receiver.dropped == 9
@@ -142,7 +143,7 @@ def test_messages_too_long_for_a_datagram_are_dropped_with_the_reason(peer: OscR
     joints = 5000
     skeleton = Skeleton(tuple(map(str, range(joints))), tuple(range(-1, joints - 1)), np.zeros((joints, 3)))
     outputs = OscOutputs([OscConfig(port=peer.port)], skeleton)
-    outputs.send(JointFrame(joints))
+    outputs.send_frame(JointFrame(joints))
     receiver = outputs.receivers[0]
     assert (receiver.sent, receiver.dropped) == (0, 3)
     assert receiver.last_error == "the message is too long for a datagram"
@@ -172,7 +173,7 @@ with OscReceiver("127.0.0.1") as peer:
     outputs = OscOutputs([*dark, OscConfig(port=peer.port)], skeleton)
     arrived = 0
     for _ in range(400):
-        outputs.send(frame)
+        outputs.send_frame(frame)
         arrived += len(peer.poll())
     arrived += len(peer.poll(0.2))
     print(arrived, outputs.receivers[-1].dropped)
@@ -188,13 +189,13 @@ with OscReceiver("127.0.0.1") as peer:
 """
 CABLE_PLUGGED_IN_LATER = """
 outputs = OscOutputs([OscConfig(host="10.99.0.2")], skeleton)
-for _ in range(200):
-    outputs.send(frame)
+for frame.frame_time in np.arange(0.0, 4.0, 0.02):
+    outputs.send_frame(frame)
 print(outputs.receivers[0].sent, outputs.receivers[0].last_error)
 ip("addr add 10.99.0.2/24 dev lo")
 with OscReceiver("10.99.0.2", 9004) as peer:
-    for _ in range(51):
-        outputs.send(frame)
+    for frame.frame_time in np.arange(4.0, 5.02, 0.02):
+        outputs.send_frame(frame)
     print(len(peer.poll()) > 0)
 """
 
@@ -264,8 +265,8 @@ def test_oscdump_reads_every_message(
         dumped: list[list[str]] = []
         assert process.stdout is not None
         for seed in range(10):
-            outputs.send(fill(frame, skeleton, seed))
-            twin.send(frame)
+            outputs.send_frame(fill(frame, skeleton, seed))
+            twin.send_frame(frame)
             expected += ours.poll(timeout=5.0)
             while len(dumped) < len(expected):
                 line = process.stdout.readline()

@@ -41,7 +41,12 @@ class Wearable:
         return self.numbered(self.sequence, degrees, time_us, **fields)
 
     def numbered(
-        self, sequence: int, degrees: float = 0.0, time_us: int | None = None, **fields: int
+        self,
+        sequence: int,
+        degrees: float = 0.0,
+        time_us: int | None = None,
+        length: float = 1.0,
+        **fields: int,
     ) -> bytes:
         half = radians(degrees) / 2
         moment_us = 20_000 * sequence % 2**32 if time_us is None else time_us
@@ -52,7 +57,7 @@ class Wearable:
             self.session,
             sequence,
             moment_us,
-            (cos(half), sin(half), 0.0, 0.0),
+            (length * cos(half), length * sin(half), 0.0, 0.0),
             flags=told.pop("flags", self.flags),
             **told,
         )
@@ -82,14 +87,14 @@ class Wires:
         self.sent: list[tuple[bytes, Origin]] = []
         self.attended: set[Origin] = set()
 
-    def receive(self, now: float) -> Iterator[tuple[bytes, float, Origin]]:
+    def receive_packets(self, now: float) -> Iterator[tuple[bytes, float, Origin]]:
         while self.waiting:
             yield self.waiting.popleft()
 
-    def send(self, packet: bytes, origin: Origin) -> None:
+    def send_packet(self, packet: bytes, origin: Origin) -> None:
         self.sent.append((packet, origin))
 
-    def attend(self, origins: Collection[Origin]) -> None:
+    def reserve_sockets(self, origins: Collection[Origin]) -> None:
         self.attended = set(origins)
 
     def describe(self, origin: Origin) -> str:
@@ -121,7 +126,7 @@ class Box:
 
     def answers(self, wires: Wires | None = None) -> list[tuple[bytes, Origin]]:
         """What the box sends now, and where to."""
-        self.link.tend(self.now)
+        self.link.send_due(self.now)
         wires = wires or self.wires
         sent, wires.sent = wires.sent, []
         return sent

@@ -8,7 +8,8 @@ from collections import Counter
 from hypothesis import given
 from hypothesis import strategies as st
 
-from appliance.sensor import framing, generate_wire, wire
+from appliance.sensor import framing, wire
+from tools import generate_wire
 
 payloads = st.binary(min_size=1, max_size=wire.LARGEST)
 

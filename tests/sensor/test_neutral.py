@@ -215,7 +215,7 @@ def stand(
     """Hear a standing dancer at 50 Hz who sways this far to both sides; when it ended."""
     for step in range(round(seconds / PERIOD_S)):
         angle = degrees + sway * math.sin(0.5 * step)
-        stillness.hear(as_read(about((1.0, 0.0, 0.0), angle)), start + step * PERIOD_S)
+        stillness.add_reading(as_read(about((1.0, 0.0, 0.0), angle)), start + step * PERIOD_S)
     return start + seconds
 
 
@@ -238,7 +238,7 @@ def test_a_move_of_more_than_three_degrees_begins_anew() -> None:
 def test_a_slow_turn_is_not_standing_still() -> None:
     stillness, longest = Stillness(), 0.0
     for step in range(500):
-        stillness.hear(as_read(about((0.0, 1.0, 0.0), 5.0 * step * PERIOD_S)), step * PERIOD_S)
+        stillness.add_reading(as_read(about((0.0, 1.0, 0.0), 5.0 * step * PERIOD_S)), step * PERIOD_S)
         longest = max(longest, stillness.still_s)
     assert 0.3 < longest < 0.7
 
@@ -246,7 +246,7 @@ def test_a_slow_turn_is_not_standing_still() -> None:
 def test_a_sign_that_flips_is_no_movement() -> None:
     stillness = Stillness()
     for step in range(100):
-        stillness.hear((0.6 * (-1.0) ** step, 0.8 * (-1.0) ** step, 0.0, 0.0), step * PERIOD_S)
+        stillness.add_reading((0.6 * (-1.0) ** step, 0.8 * (-1.0) ** step, 0.0, 0.0), step * PERIOD_S)
     assert stillness.still_s == pytest.approx(99 * PERIOD_S)
 
 

@@ -299,7 +299,7 @@ def test_a_key_file_read_anew_keeps_who_dances_and_sends_away_who_is_gone() -> N
     dance(box, wrist, 1.0)
     box.hear(head.reading(), origin=B)
     wrist_key, head_key = KEYS["left-wrist"], KEYS["head"]
-    box.link.admit(
+    box.link.set_keys(
         {"right-wrist": replace(wrist_key, name="right-wrist"), "head": replace(head_key, key=bytes(16))}
     )
     (reading,) = box.hear(wrist.reading())
@@ -307,10 +307,10 @@ def test_a_key_file_read_anew_keeps_who_dances_and_sends_away_who_is_gone() -> N
     assert box.hear(head.reading(), origin=B) == ()
     assert box.counted()["old_session"] == 1
     assert [one.state for one in box.link.states(box.now)] == ["linked", "absent"]
-    box.link.admit(KEYS)  # back again: what was recorded before is worth nothing
+    box.link.set_keys(KEYS)  # back again: what was recorded before is worth nothing
     assert box.hear(head.numbered(1), origin=B) == ()
     assert box.counted()["old_session"] == 2
-    box.link.admit({})
+    box.link.set_keys({})
     assert box.hear(wrist.reading(), head.reading()) == ()
     assert box.answers() == []
     assert box.counted()["device"] == 2

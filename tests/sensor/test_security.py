@@ -15,7 +15,7 @@ from appliance.sensor.keys import SensorKey
 from tests.sensor.peers import KEYS, A, B, Box, Wearable
 
 STRANGER = ("192.168.4.66", 6666)
-BELIEVED = ("accepted", "relocated", "hello", "profile")
+BELIEVED = ("accepted", "hello", "profile")
 
 
 def believed(box: Box) -> dict[str, int]:

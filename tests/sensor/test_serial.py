@@ -93,7 +93,7 @@ def run_until(link: SensorLink, what: Callable[[], bool]) -> None:
 
     def tick() -> bool:
         link.drain(time.monotonic())
-        link.tend(time.monotonic())
+        link.send_due(time.monotonic())
         return what()
 
     await_that(tick)
@@ -131,7 +131,7 @@ def test_a_sensor_pairs_over_a_cable(cable: Cable, opened: tuple[SensorLink, Ser
     reading = await_reading(link)
     assert (reading.sensor, reading.sequence) == ("left-wrist", 1)
     assert reading.arrival <= time.monotonic()
-    link.tend(time.monotonic())
+    link.send_due(time.monotonic())
     (heartbeat,) = sensor.hear()
     assert isinstance(heartbeat, wire.Heartbeat)
     assert heartbeat.echo_sequence == 1
@@ -144,7 +144,7 @@ def test_every_frame_stands_between_two_zero_bytes(
 ) -> None:
     """So that half a line that a person typed, or half a frame, spoils nothing."""
     _, intake = opened
-    intake.send(b"packet", ())
+    intake.send_packet(b"packet", ())
     written = b""
     while len(written) < len(frame(b"packet")) + 1:
         written += cable.read()
@@ -238,14 +238,14 @@ def test_packets_that_nobody_fetches_are_dropped_oldest_first(
 def test_what_cannot_be_written_is_dropped_and_counted(cable: Cable) -> None:
     """Without a cable, and where nobody reads at the other end; reading goes on meanwhile."""
     intake = SerialIntake(str(cable.name))
-    intake.send(b"packet", ())
+    intake.send_packet(b"packet", ())
     assert intake.counts["send_error"] == 1
     cable.plug_in()
     await_that(lambda: intake.trouble is None)
 
     def stuff() -> bool:
         for _ in range(UNSENT_PACKETS):
-            intake.send(bytes(60), ())
+            intake.send_packet(bytes(60), ())
         return intake.counts["send_error"] > UNSENT_PACKETS
 
     await_that(stuff)
@@ -312,7 +312,7 @@ def test_a_device_that_never_opens_does_not_keep_the_box_from_ending(
 def test_what_came_since_the_tick_read_its_time_came_when_it_did(cable: Cable) -> None:
     intake = SerialIntake(str(cable.name))
     intake._packets.extend([(b"before", 99.99), (b"since", 100.7), (b"on another clock", 7000.0)])
-    assert [arrival for _, arrival, _ in intake.receive(100.0)] == [99.99, 100.7, 100.0]
+    assert [arrival for _, arrival, _ in intake.receive_packets(100.0)] == [99.99, 100.7, 100.0]
     intake.close()
 
 

@@ -49,11 +49,11 @@ class Radio:
         """Hello, assignment, first reading; on loopback what was sent has come."""
         self.socket.send(self.wearable.hello())
         link.drain(time.monotonic())
-        link.tend(time.monotonic())
+        link.send_due(time.monotonic())
         assert self.hear()
         self.socket.send(self.wearable.reading())
         assert [reading.sequence for reading in link.drain(time.monotonic())] == [self.wearable.sequence]
-        link.tend(time.monotonic())
+        link.send_due(time.monotonic())
 
 
 def intake_of(link: SensorLink) -> UdpIntake:
@@ -118,7 +118,7 @@ class Clocks:
         self.intake = UdpIntake("127.0.0.1", 0)
 
     def drain(self) -> None:
-        assert list(self.intake.receive(self.now)) == []
+        assert list(self.intake.receive_packets(self.now)) == []
 
     def arrival(self, stamped: float, now: float) -> float:
         """What becomes of a datagram that the kernel stamped at this moment of the monotonic clock."""
@@ -230,7 +230,7 @@ def test_a_sensor_that_changes_its_address_dances_on(link: SensorLink, radio: Ra
             radio.move()
         radio.socket.send(radio.wearable.reading())
         assert [one.sequence for one in link.drain(time.monotonic())] == [radio.wearable.sequence]
-        link.tend(time.monotonic())
+        link.send_due(time.monotonic())
     assert list(intake_of(link)._own) == [radio.socket.getsockname()]
     assert link.counts["accepted"] == 31
 
@@ -242,7 +242,7 @@ def test_readings_that_wait_while_sockets_change_are_not_lost(link: SensorLink, 
     origin = radio.socket.getsockname()
     for attended in ((), (origin,), (), (origin,)):
         radio.socket.send(radio.wearable.reading())
-        intake.attend(attended)
+        intake.reserve_sockets(attended)
         radio.socket.send(radio.wearable.reading())
         assert [one.sequence for one in link.drain(time.monotonic())] == [radio.wearable.sequence]
     assert link.counts["accepted"] == 7
@@ -257,15 +257,15 @@ def test_a_socket_that_its_sensor_does_not_reach_any_more_is_made_anew() -> None
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sensor:
         sensor.bind(("127.0.0.1", 0))
         origin = sensor.getsockname()
-        intake.attend([origin])
+        intake.reserve_sockets([origin])
         own = intake._own[origin]
         sensor.sendto(b"to the address of before", ("127.0.0.1", port))
         sensor.sendto(b"to another one", ("127.0.0.2", port))
-        assert [bytes(data) for data, *_ in intake.receive(0.0)] == [
+        assert [bytes(data) for data, *_ in intake.receive_packets(0.0)] == [
             b"to the address of before",
             b"to another one",
         ]
-        intake.attend([origin])
+        intake.reserve_sockets([origin])
         assert intake._own[origin] is not own
     intake.close()
 
@@ -275,7 +275,7 @@ def test_answers_leave_from_the_listening_port(link: SensorLink, radio: Radio) -
         sensor.settimeout(PATIENCE_S)
         sensor.sendto(radio.wearable.hello(), intake_of(link).address)
         link.drain(time.monotonic())
-        link.tend(time.monotonic())
+        link.send_due(time.monotonic())
         _, whence = sensor.recvfrom(200)
     assert whence == intake_of(link).address
 
@@ -297,7 +297,7 @@ def test_an_impossible_address_says_what_to_do() -> None:
 def test_an_address_that_comes_later_is_listened_to(monkeypatch: pytest.MonkeyPatch) -> None:
     intake = UdpIntake("203.0.113.1", 0)
     assert intake.address_is_absent
-    assert list(intake.receive(time.monotonic())) == []
+    assert list(intake.receive_packets(time.monotonic())) == []
     monkeypatch.setattr(udp, "is_own", lambda host: True)
     assert not intake.address_is_absent
     intake.close()
@@ -315,7 +315,7 @@ def test_closed_sockets_never_raise_into_the_tick(link: SensorLink, radio: Radio
         one.close()
     assert link.drain(time.monotonic()) == ()
     link.strobe("left-wrist", time.monotonic())
-    link.tend(time.monotonic())
+    link.send_due(time.monotonic())
     assert link.counts["socket_error"] == 2
     assert link.counts["send_error"] == 1
 
@@ -326,7 +326,7 @@ def test_an_answer_that_comes_back_keeps_no_reading_out(link: SensorLink, radio:
     port = radio.socket.getsockname()[1]
     radio.socket.close()
     link.strobe("left-wrist", time.monotonic())
-    link.tend(time.monotonic())
+    link.send_due(time.monotonic())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
         again.bind(("127.0.0.1", port))
         again.sendto(radio.wearable.reading(), intake_of(link).address)
@@ -336,8 +336,8 @@ def test_an_answer_that_comes_back_keeps_no_reading_out(link: SensorLink, radio:
 
 def test_an_answer_that_cannot_leave_is_counted() -> None:
     intake = UdpIntake("127.0.0.1", 0)
-    intake.send(b"x", ("203.0.113.1", 9))  # from loopback there is no way there
-    intake.attend([("203.0.113.1", 9)])
+    intake.send_packet(b"x", ("203.0.113.1", 9))  # from loopback there is no way there
+    intake.reserve_sockets([("203.0.113.1", 9)])
     assert intake.counts["send_error"] == 1
     assert intake.counts["socket_error"] == 1
     intake.close()
@@ -346,7 +346,7 @@ def test_an_answer_that_cannot_leave_is_counted() -> None:
 def test_no_sensors_no_port_no_trouble() -> None:
     link = open_link({}, udp=None)
     assert link.drain(0.0) == ()
-    link.tend(0.0)
+    link.send_due(0.0)
     link.close()
 
 
@@ -354,7 +354,7 @@ def test_an_unknown_key_is_not_heard(link: SensorLink, radio: Radio) -> None:
     stranger = Wearable(SensorKey("stranger", 0x33, bytes(16)))
     radio.socket.send(stranger.hello())
     assert link.drain(time.monotonic()) == ()
-    link.tend(time.monotonic())
+    link.send_due(time.monotonic())
     assert link.counts["device"] == 1
     assert radio.hear() == []
 
@@ -397,7 +397,7 @@ def test_a_stranger_floods_while_a_sensor_dances_and_another_one_is_switched_on(
             late.socket.send(late.wearable.hello())
             hellos += 1
         newest = {reading.sensor: reading.sequence for reading in link.drain(time.monotonic())}
-        link.tend(time.monotonic())
+        link.send_due(time.monotonic())
         late.hear()
         sequences.append(newest["left-wrist"])
         tick += 0.02

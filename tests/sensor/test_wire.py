@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from appliance.sensor import generate_wire, wire
+from appliance.sensor import wire
+from tools import generate_wire
 
 KEY = bytes(range(16))
 TAGGER = wire.Tagger(KEY)
@@ -46,7 +47,7 @@ def test_a_reading_is_what_the_documentation_says_byte_for_byte() -> None:
 @pytest.mark.parametrize("path", generate_wire.generated(), ids=lambda path: path.name)
 def test_generated_files_are_fresh(path: Path) -> None:
     assert path.read_text(encoding="utf-8") == generate_wire.generated()[path], (
-        "stale: run python -m appliance.sensor.generate_wire"
+        "stale: run python -m tools.generate_wire"
     )
 
 

@@ -129,7 +129,7 @@ class HeardLink(SensorLink):
     def strobe(self, sensor: str, now: float, seconds: float = 10.0) -> None:
         self.strobed.append(sensor)
 
-    def admit(self, keys: Mapping[str, SensorKey]) -> None:
+    def set_keys(self, keys: Mapping[str, SensorKey]) -> None:
         self.admitted = keys
 
 

@@ -269,7 +269,7 @@ def test_a_replaced_sensor_asks_for_stillness_on_the_boxs_own_link(
     assert stage.taken() == 1
     device_id = key.device_id if has_same_device_id else 0x5BA2E
     spare = SensorKey(SENSOR, device_id, bytes(range(100, 116)))
-    box.link.admit({SENSOR: spare})
+    box.link.set_keys({SENSOR: spare})
     stand(box.pair(boot=2), 80.0)
     assert stage.taken() == 2 and holds(stage.target(), HANGING)
 

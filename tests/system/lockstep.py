@@ -156,7 +156,7 @@ class Lockstep:
                     self.overheard(data)
             if self.link is not None and round(self.now / STEP_S) % round(self.tick_s / STEP_S) == 0:
                 self.believed += (Believed(self.now, one) for one in self.link.drain(self.now))
-                self.link.tend(self.now)
+                self.link.send_due(self.now)
             self.look(self.now)
             if until():
                 return True

@@ -19,7 +19,7 @@ from appliance.box.block import BlockReader, BlockWriter
 from appliance.box.checkpoint import Checkpoint, packed, unpacked
 from appliance.box.checkpoint_file import read_checkpoint
 from appliance.cli.run_with_timeout import within
-from appliance.lights.convert import convert_file
+from appliance.fixture_library.convert import convert_file
 from appliance.outputs.dmx.identity import component_identifier
 from appliance.pose.bvh import BvhError, read_bvh, write_bvh
 from appliance.projector.alignment import AlignmentFile

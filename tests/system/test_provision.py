@@ -160,7 +160,7 @@ def test_a_new_board_s_readings_are_believed_by_cable(tmp_path: Path) -> None:
         while believed < 50:
             assert time.monotonic() < until
             believed += len(link.drain(time.monotonic()))
-            link.tend(time.monotonic())
+            link.send_due(time.monotonic())
             time.sleep(0.004)
         (state,) = link.states(time.monotonic())
         link.close()

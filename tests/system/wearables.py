@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 
 from appliance.sensor.keys import SensorKey
-from hw_sim.device import Way
+from hw_sim.device import Lane
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.emulator import Emulator, Sender, Sent
 from hw_sim.motions import Motion, dance
@@ -24,15 +24,15 @@ HOST = "127.0.0.1"
 
 
 class Radio(UdpSender):
-    """A way by the network that can be lost, both directions at once, without the sensor being told."""
+    """A lane by the network that can be lost, both directions at once, without the sensor being told."""
 
     in_reach = True
 
-    def send(self, data: bytes) -> bool:
-        return super().send(data) if self.in_reach else True
+    def send_packet(self, data: bytes) -> bool:
+        return super().send_packet(data) if self.in_reach else True
 
-    def receive(self) -> bytes | None:
-        while (data := super().receive()) is not None and not self.in_reach:
+    def receive_packet(self) -> bytes | None:
+        while (data := super().receive_packet()) is not None and not self.in_reach:
             pass
         return data
 
@@ -56,10 +56,10 @@ class Wearables:
         self._wearers = [Wearer(motion(number), math.inf) for number in range(len(keys))]
         self.sensors = [EmulatedSensor(key, wearer) for key, wearer in zip(keys, self._wearers, strict=True)]
         self.radios = [Radio(HOST, port) for _ in keys]
-        ways: list[dict[Way, Sender]] = [{Way.NETWORK: radio} for radio in self.radios]
+        senders: list[dict[Lane, Sender]] = [{Lane.NETWORK: radio} for radio in self.radios]
         if cable is not None:
-            ways[0][Way.CABLE] = SerialSender(str(cable))
-        self.emulator = Emulator(self.sensors, ways, network=VenueNetwork(VENUE, 1), on_sent=on_sent)
+            senders[0][Lane.CABLE] = SerialSender(str(cable))
+        self.emulator = Emulator(self.sensors, senders, network=VenueNetwork(VENUE, 1), on_sent=on_sent)
         self._wishes: queue.SimpleQueue[Callable[[float], None]] = queue.SimpleQueue()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -77,7 +77,7 @@ class Wearables:
     def dance(self) -> None:
         """All of them, from the next moment on."""
         for wearer in self._wearers:
-            self.do(wearer.begin)
+            self.do(wearer.start_moving)
 
     def do(self, wish: Callable[[float], None]) -> None:
         """In the sensors' own thread, with the time of the moment."""

@@ -1,4 +1,4 @@
-"""A universe on a USB adapter: a thread of its own writes the newest one and opens the device again."""
+"""A universe on a USB adapter: a thread writes the newest levels and reopens the device."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Protocol
 
 FIRST_PAUSE_S = 0.1
 LONGEST_PAUSE_S = 2.0
-ENDS_WITHIN_S = 1.0  # what was sent last leaves within it, unless the device hangs
+ENDS_WITHIN_S = 1.0  # the last universe leaves within this, unless the device hangs
 _IN_WORDS = {
     errno.ENOENT: "it is not plugged in",
     errno.ENODEV: "it is not plugged in",
@@ -31,16 +31,16 @@ class Adapter(Protocol):
     """An adapter that is plugged in."""
 
     def write(self, data: bytes) -> None:
-        """One universe, 512 levels. May take as long as DMX takes. Raises OSError when it is gone."""
+        """Write one universe, 512 levels. May take as long as DMX takes. Raises OSError when it is gone."""
 
     def close(self) -> None:
-        """Give the device back, without waiting for what it has not taken. Raises nothing."""
+        """Release the device without waiting for output that it has not taken. Never raises."""
 
 
 class AdapterWire:
-    """Newest wins: a universe that has not left when the next one comes is dropped and counted.
+    """Newest wins: a universe that has not left when the next comes is dropped and counted.
 
-    period_s: how often the adapter has to be told even what does not change; None: when there is news alone.
+    period_s: how often unchanged levels must be repeated; None: never.
     """
 
     def __init__(self, name: str, open_adapter: Callable[[], Adapter], period_s: float | None = None) -> None:
@@ -68,16 +68,16 @@ class AdapterWire:
             "It is tried again every 2 seconds: plug it in, or check device and serial in the box file."
         )
 
-    def send(self, data: bytes | bytearray, now: float) -> None:
-        """Leave one universe for the thread; never waits for the device."""
+    def send_universe(self, levels: bytes | bytearray, now: float) -> None:
+        """Hand one universe to the thread; never waits for the device."""
         with self._changed:
             if self._newest is not None:
                 self.dropped += 1
-            self._newest = bytes(data)
+            self._newest = bytes(levels)
             self._changed.notify()
 
-    def close(self, now: float) -> None:
-        """What was sent last leaves, then the device is given back; one that hangs is left to itself."""
+    def close(self) -> None:
+        """Write the last universe and release the device; a device that hangs is abandoned."""
         with self._changed:
             self._closing = True
             self._changed.notify()
@@ -89,29 +89,29 @@ class AdapterWire:
             before = self.sent
             try:
                 self._feed(self._open_adapter())
-            except Exception as error:  # whatever a driver raises: the lights come back when the device does
+            except Exception as error:  # drivers raise anything: the lights return with the device
                 self._failed(error)
-            self.is_open = False  # now that there is a reason to be read
+            self.is_open = False  # after last_error is set
             if self._closing:
                 self.dropped += self._newest is not None
                 return
             pause_s = FIRST_PAUSE_S if self.sent > before else min(2 * pause_s, LONGEST_PAUSE_S)
-            self._rest(pause_s)
+            self._wait(pause_s)
 
     def _feed(self, adapter: Adapter) -> None:
-        """Write until the wire is closed and all has left; raises what the adapter raises."""
+        """Write until the wire is closed and all has left. Raises what the adapter raises."""
         self.is_open = True
         due = time.monotonic()
         try:
             while (data := self._next(due)) is not None:
-                _written(adapter, data)
+                _write_twice(adapter, data)
                 self.sent += 1
                 due = max(due + (self._period_s or 0.0), time.monotonic())
         finally:
             adapter.close()
 
     def _next(self, due: float) -> bytes | None:
-        """Waits for the next universe to write; None when there is none and the wire is closed."""
+        """Wait for the next universe to write; None once the wire is closed and nothing is left."""
         with self._changed:
             if self._period_s is not None:
                 self._changed.wait_for(lambda: self._closing, timeout=max(0.0, due - time.monotonic()))
@@ -123,8 +123,8 @@ class AdapterWire:
             self._last = data or self._last
             return data
 
-    def _rest(self, pause_s: float) -> None:
-        """Wait before the next try; an adapter that comes back is shown the last universe at once."""
+    def _wait(self, pause_s: float) -> None:
+        """Wait before the next try; a returning adapter gets the last universe at once."""
         with self._changed:
             self._changed.wait_for(lambda: self._closing, timeout=pause_s)
             self._newest = self._newest or self._last
@@ -134,8 +134,8 @@ class AdapterWire:
         self.last_error = _IN_WORDS.get(number or 0, str(error))
 
 
-def _written(adapter: Adapter, data: bytes) -> None:
-    """Write, and once more before the adapter is given up: drivers blame it when this process was held up."""
+def _write_twice(adapter: Adapter, data: bytes) -> None:
+    """Write, with one retry: drivers report a failure when this process was held up."""
     try:
         adapter.write(data)
     except OSError:

@@ -31,7 +31,7 @@ class ArtDmx:
 
     def pack(self, data: bytes | bytearray) -> bytearray:
         """The next packet; valid until the next call."""
-        self._sequence = self._sequence % 255 + 1  # 1..255; 0 would mean that nobody counts
+        self._sequence = self._sequence % 255 + 1  # 1..255; 0 would mean unnumbered
         self._packet[_SEQUENCE] = self._sequence
         self._packet[_DATA : _DATA + self._channels] = data[: self._channels]
         return self._packet
@@ -49,10 +49,6 @@ class ArtNetWire(NetworkWire):
         )
         self._packets = ArtDmx(config.number_on_wire, config.channels)
 
-    def send(self, data: bytes | bytearray, now: float) -> None:
-        """One universe, 512 levels."""
-        self._sender.send(self._packets.pack(data), now)
-
-    def close(self, now: float) -> None:
-        """Close the socket; Art-Net has no word for goodbye."""
-        self._sender.close()
+    def send_universe(self, levels: bytes | bytearray, now: float) -> None:
+        """Send one universe, 512 levels."""
+        self.send_datagrams((self._packets.pack(levels),), now)

@@ -1,4 +1,4 @@
-"""The component identifier (CID) by which sACN receivers know a box again: made once, kept for good."""
+"""The component identifier (CID) by which sACN receivers recognise a box: made once, then kept."""
 
 from __future__ import annotations
 

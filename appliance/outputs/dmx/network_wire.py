@@ -5,33 +5,12 @@ from __future__ import annotations
 from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
 
 
-class NetworkWire:
-    """Counts and words of a universe that leaves by datagrams."""
+class NetworkWire(DatagramSender):
+    """A universe that leaves by datagrams."""
 
     def __init__(self, name: str, path: DatagramPath, cure: str) -> None:
-        self.name = name
-        self._sender = DatagramSender(path)
+        super().__init__(name, path)
         self._cure = cure
-
-    @property
-    def sent(self) -> int:
-        """Universes that left."""
-        return self._sender.sent
-
-    @property
-    def dropped(self) -> int:
-        """Universes that did not."""
-        return self._sender.dropped
-
-    @property
-    def last_error(self) -> str:
-        """Why the last one was dropped."""
-        return self._sender.last_error
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the newest universe left."""
-        return self._sender.is_open
 
     @property
     def trouble(self) -> str | None:

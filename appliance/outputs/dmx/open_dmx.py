@@ -9,10 +9,10 @@ import serial
 from appliance.outputs.dmx.adapter_wire import AdapterError, AdapterWire
 from appliance.outputs.dmx.serial_port import (
     close_port,
+    discard_output,
     find_device,
     is_bare_ftdi,
     open_port,
-    throw_away,
     write,
 )
 from appliance.show.dmx import DmxConfig
@@ -31,7 +31,7 @@ class OpenDmx:
     def __init__(self, device: str, channels: int) -> None:
         self._channels = channels
         self._lasts_s = (channels + 1) * SLOT_S + CHIP_S
-        # ENTTEC's cable sends while RTS is off; with RTS on it listens, and the lamps hear nothing.
+        # ENTTEC's cable sends while RTS is off; with RTS on it receives, and the lamps get nothing.
         self._port = open_port(device, BAUD, serial.STOPBITS_TWO, rts=False)
 
     def write(self, data: bytes) -> None:
@@ -43,7 +43,7 @@ class OpenDmx:
         try:
             write(self._port, _START_CODE + data[: self._channels])
         except AdapterError:
-            throw_away(self._port)  # else it would follow the next break, which waits for nothing
+            discard_output(self._port)  # else it would leave after the next break
             raise
         finally:
             time.sleep(self._lasts_s)
@@ -54,7 +54,7 @@ class OpenDmx:
 
 
 def open_dmx_wire(config: DmxConfig) -> AdapterWire:
-    """The wire of a box file's entry; a cable has no memory, so the universe goes out all the time."""
+    """The wire of a box file's entry; a cable has no memory, so the universe is repeated all the time."""
 
     def open_adapter() -> OpenDmx:
         return OpenDmx(find_device(config.device, config.serial, is_bare_ftdi), config.channels)

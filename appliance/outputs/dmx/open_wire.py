@@ -22,9 +22,9 @@ from appliance.show.dmx import DmxConfig
 def open_universes(
     configs: Sequence[DmxConfig], state: Path | None = None, usb_backend: Any = None
 ) -> tuple[Universe, ...]:
-    """All universes of a box, in the order of its box file. Never raises: a wire that is not there says so.
+    """All universes of a box, in the order of its box file. Never raises: see `Wire.trouble`.
 
-    state: the box's state folder; it keeps the identity by which sACN receivers know this box again.
+    state: the box's state folder, which keeps its sACN identity.
     usb_backend: pyusb's; None for the machine's libusb.
     """
     sources = _sources(configs, state)
@@ -58,20 +58,20 @@ def _sources(configs: Sequence[DmxConfig], state: Path | None) -> list[SacnSourc
         if config.wire != "sacn":
             sources.append(None)
             continue
-        interface = config.interface or _way_to(config.host, config.udp_port)
+        interface = config.interface or _interface_to(config.host, config.udp_port)
         if interface not in by_interface:
-            everyone = sacn_packet.group(sacn_packet.DISCOVERY_UNIVERSE)
-            path = DatagramPath(everyone, config.udp_port, interface, hops=config.ttl)
+            group = sacn_packet.group(sacn_packet.DISCOVERY_UNIVERSE)
+            path = DatagramPath(group, config.udp_port, interface, hops=config.ttl)
             by_interface[interface] = SacnSource(cid, config.source_name, path)
         sources.append(by_interface[interface])
     return sources
 
 
-def _way_to(host: str | None, port: int) -> str:
+def _interface_to(host: str | None, port: int) -> str:
     """The address of the interface by which the kernel reaches a host; inside this machine without one."""
     if host is None:
         return LOOPBACK
     try:
-        return DatagramPath(host, port).way()
+        return DatagramPath(host, port).own_address()
     except OSError:
         return LOOPBACK

@@ -1,4 +1,4 @@
-"""How often a universe leaves: at its wire's rate while it changes, as a keep-alive while it does not."""
+"""The rate of a universe: that of its wire while it changes, keep-alives while it does not."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from appliance.show.dmx import SLOTS, DmxConfig
 
 KEEP_ALIVE_S = 0.85  # E1.31 section 6.6.2: 0.8 to 1.0 s, as Art-Net 4 by now; before: 4 s at the latest
 EARLY = 0.75  # of a period
-REPEATS = 3  # E1.31 section 6.6.2: so often what does not change any more, before only keep-alives follow
+REPEATS = 3  # E1.31 section 6.6.2: repeats after the last change, before keep-alives
 
 
 class Universe:
-    """One universe on one wire. Offer it at the wire's rate or faster; the newest leaves, nothing waits.
+    """One universe on one wire. Offer levels at the wire's rate or faster: the newest leave, none wait.
 
-    The rate is never exceeded by more than one universe. A caller that woke late, or that offers 50 a second
-    to a wire that takes 40, still gets the whole rate: a universe may leave three quarters of a period early.
+    The rate is never exceeded by more than one universe. A caller that wakes late, or offers 50 a second to a
+    wire that takes 40, still gets the full rate: a universe may leave three quarters of a period early.
     """
 
     def __init__(self, config: DmxConfig, wire: Wire) -> None:
@@ -29,7 +29,7 @@ class Universe:
         self._sent_at = float("-inf")
 
     def offer(self, data: bytes | bytearray, now: float) -> bool:
-        """512 levels as they are now; whether they left. Monotonic seconds; never waits, never raises."""
+        """Offer 512 levels. Returns whether they left. Monotonic seconds; never waits, never raises."""
         if len(data) != SLOTS:
             raise ValueError(f"A universe has {SLOTS} channels, not {len(data)}.")
         if data != self._newest:
@@ -41,10 +41,10 @@ class Universe:
         return True
 
     def close(self, now: float) -> None:
-        """What was offered last leaves, then the wire is closed."""
+        """Send the last offer, if it has not left, and close the wire."""
         if self._changed:
             self._leave(now)
-        self.wire.close(now)
+        self.wire.close()
 
     def _is_repeated(self, now: float) -> bool:
         return self._same < REPEATS or now - self._sent_at >= KEEP_ALIVE_S
@@ -54,4 +54,4 @@ class Universe:
         self._changed = False
         self._sent_at = now
         self._due = max(self._due, now) + self._period_s
-        self.wire.send(self._newest, now)
+        self.wire.send_universe(self._newest, now)

@@ -1,7 +1,8 @@
-"""sACN: one universe by multicast or to one address; what a box says about itself as a source."""
+"""sACN: one universe by multicast or unicast; the source's list of universes."""
 
 from __future__ import annotations
 
+from math import inf
 from uuid import UUID
 
 from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
@@ -14,31 +15,20 @@ TERMINATIONS = 3  # section 6.2.6
 LOOPBACK = "127.0.0.1"
 
 
-class SacnSource:
-    """This box in one network, and which universes it sends: consoles and monitors list it."""
+class SacnSource(DatagramSender):
+    """This box on one network and the universes that it sends, as consoles and monitors list them."""
 
     def __init__(self, cid: UUID, name: str, path: DatagramPath) -> None:
+        super().__init__(name, path)
         self.cid = cid
-        self.name = name
-        self._universes: list[int] = []
-        self._next = float("-inf")
-        self._sender = DatagramSender(path)
+        self.universes: list[int] = []
+        self._announce_at = -inf
 
-    def begins(self, universe: int) -> None:
-        """From now on it is among those that are announced."""
-        self._universes.append(universe)
-
-    def ends(self, universe: int) -> None:
-        """It is announced no more."""
-        self._universes.remove(universe)
-        if not self._universes:
-            self._sender.close()
-
-    def announce(self, now: float) -> None:
-        """The list of universes, each 10 s; free in between."""
-        if now >= self._next:
-            self._next = now + DISCOVERY_EACH_S
-            self._sender.send(sacn_packet.discovery(self.cid, self.name, self._universes), now)
+    def announce_universes(self, now: float) -> None:
+        """Send the list of universes, every 10 s; free in between."""
+        if now >= self._announce_at:
+            self._announce_at = now + DISCOVERY_EACH_S
+            self.send_datagrams((sacn_packet.discovery(self.cid, self.name, self.universes),), now)
 
 
 class SacnWire(NetworkWire):
@@ -64,16 +54,18 @@ class SacnWire(NetworkWire):
             priority=config.priority,
             preview=config.preview,
         )
-        source.begins(number)
+        source.universes.append(number)
 
-    def send(self, data: bytes | bytearray, now: float) -> None:
-        """One universe, 512 levels."""
-        self._sender.send(self._packets.pack(data), now)
-        self._source.announce(now)
+    def send_universe(self, levels: bytes | bytearray, now: float) -> None:
+        """Send one universe, 512 levels."""
+        self.send_datagrams((self._packets.pack(levels),), now)
+        self._source.announce_universes(now)
 
-    def close(self, now: float) -> None:
-        """Tell receivers that this source leaves: they need not wait 2.5 s for the next one in rank."""
+    def close(self) -> None:
+        """Terminate the stream, so that receivers need not wait 2.5 s for the source next in priority."""
         for _ in range(TERMINATIONS):
-            self._sender.send(self._packets.terminate(), now)
-        self._sender.close()
-        self._source.ends(self._number)
+            self.send_datagrams((self._packets.terminate(),), inf)  # no pause after a failure: now or never
+        super().close()
+        self._source.universes.remove(self._number)
+        if not self._source.universes:
+            self._source.close()

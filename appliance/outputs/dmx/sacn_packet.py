@@ -31,7 +31,7 @@ def _flags_and_length(octets: int) -> int:
 
 
 def source_field(name: str) -> bytes:
-    """A source's name in 64 octets: UTF-8, cut between signs, ended by a zero (section 6.2.2)."""
+    """A source's name in 64 octets: UTF-8, cut between characters, zero-terminated (section 6.2.2)."""
     return name.encode()[:63].decode(errors="ignore").encode().ljust(64, b"\0")
 
 
@@ -73,7 +73,7 @@ class DataPackets:
         return self._number(self._options)
 
     def terminate(self) -> bytearray:
-        """The next packet, which says that the source leaves this universe; its levels count for nothing."""
+        """The next packet, which terminates this source's stream; receivers ignore its levels."""
         return self._number(self._options | TERMINATED)
 
     def _number(self, options: int) -> bytearray:
@@ -84,7 +84,7 @@ class DataPackets:
 
 
 def discovery(cid: UUID, name: str, universes: Iterable[int]) -> bytes:
-    """The one page that lists a source's universes (section 8); a box has far less than 512."""
+    """The one page of a source's universe list (section 8); a box has far fewer than 512."""
     numbers = sorted(set(universes))[:_MOST_UNIVERSES_A_PAGE]
     total = _LIST + 8 + 2 * len(numbers)
     root = struct.pack(">HI16s", _flags_and_length(total - 16), _ROOT_EXTENDED, cid.bytes)

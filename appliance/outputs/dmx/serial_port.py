@@ -13,7 +13,7 @@ from serial.tools.list_ports_common import ListPortInfo
 
 from appliance.outputs.dmx.adapter_wire import AdapterError
 
-WRITE_TIMEOUT_S = 0.25  # ten universes: an adapter that takes nothing for so long hangs
+WRITE_TIMEOUT_S = 0.25  # ten universes: an adapter that takes nothing for this long hangs
 FTDI = (0x0403, 0x6001)
 _PRO_WORDS = ("DMX USB PRO", "ULTRADMX")
 
@@ -30,7 +30,7 @@ def find_device(device: str | None, number: str | None, is_kind: Callable[[ListP
 
 
 def is_usb_pro(port: ListPortInfo) -> bool:
-    """Whether it calls itself a DMX USB Pro, as ENTTEC's do, or an ultraDMX, as DMXking's do."""
+    """Whether it is a DMX USB Pro (ENTTEC) or an ultraDMX (DMXking), by its product name."""
     return any(word in (port.product or "").upper() for word in _PRO_WORDS)
 
 
@@ -42,7 +42,7 @@ def is_bare_ftdi(port: ListPortInfo) -> bool:
 def open_port(
     device: str, baud: int, stopbits: float = serial.STOPBITS_ONE, rts: bool = True
 ) -> serial.Serial:
-    """The device, for this program alone; `rts`: its line 'request to send'. Raises OSError."""
+    """Open the device exclusively; `rts`: its line 'request to send'. Raises OSError."""
     port = serial.Serial(
         None, baud, stopbits=stopbits, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True
     )
@@ -50,12 +50,12 @@ def open_port(
     try:
         port.open()
         return port
-    except termios.error as error:  # no OSError, although it is one
+    except termios.error as error:  # not a subclass of OSError
         raise OSError(*error.args) from None
 
 
 def write(port: serial.Serial, data: bytes) -> None:
-    """All of it, and away with what came in meanwhile. Raises AdapterError."""
+    """Write all of it and discard input. Raises AdapterError."""
     try:
         port.reset_input_buffer()
         port.write(data)
@@ -65,16 +65,16 @@ def write(port: serial.Serial, data: bytes) -> None:
         raise AdapterError("it was unplugged") from None
 
 
-def throw_away(port: serial.Serial) -> None:
-    """What it was given and has not taken yet. Raises nothing."""
+def discard_output(port: serial.Serial) -> None:
+    """Discard output that the device has not taken yet. Never raises."""
     with contextlib.suppress(OSError, termios.error):
         port.reset_output_buffer()
 
 
 def close_port(port: serial.Serial) -> None:
-    """Close once the last universe has left; what a hung adapter has not taken is thrown away.
+    """Close after the last universe has left; output for a hung adapter is discarded.
 
-    Linux would wait 30 s for it to take the rest.
+    Linux would wait 30 s for it.
     """
     give_up = time.monotonic() + WRITE_TIMEOUT_S
     with contextlib.suppress(OSError, termios.error):

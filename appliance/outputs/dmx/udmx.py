@@ -11,7 +11,7 @@ import usb.util
 from appliance.outputs.dmx.adapter_wire import AdapterError, AdapterWire
 from appliance.show.dmx import DmxConfig
 
-VENDOR, PRODUCT = 0x16C0, 0x05DC  # shared by many makers: only its words say what a device is
+VENDOR, PRODUCT = 0x16C0, 0x05DC  # shared by many makers: only the product name identifies it
 PRODUCT_WORD = "uDMX"
 _TO_DEVICE = 0x40  # vendor request to the device
 _SET_CHANNEL_RANGE = 2
@@ -27,7 +27,7 @@ class Udmx:
         self._device = _find(number, backend)
 
     def write(self, data: bytes) -> None:
-        """The channels that changed, in one range; all of them when none did, in case it forgot."""
+        """Write the changed channels as one range; without changes all of them, in case it forgot."""
         first, end = _changed(self._shown, data[: self._channels])
         taken = self._device.ctrl_transfer(
             _TO_DEVICE, _SET_CHANNEL_RANGE, end - first, first, data[first:end], TIMEOUT_MS
@@ -43,19 +43,19 @@ class Udmx:
 
 
 def _find(number: str | None, backend: Any) -> Any:
-    """The uDMX that is meant. Raises AdapterError where there is none, with what to do."""
+    """The uDMX with this serial number. Raises AdapterError with what to do."""
     try:
         devices = list(usb.core.find(find_all=True, idVendor=VENDOR, idProduct=PRODUCT, backend=backend))
     except usb.core.NoBackendError:
         raise AdapterError("libusb is missing; on Debian: sudo apt-get install libusb-1.0-0") from None
-    mute = 0
+    unreadable = 0
     for device in devices:
         try:
             if device.product == PRODUCT_WORD and number in (None, device.serial_number):
                 return device
-        except (usb.core.USBError, ValueError):  # pyusb's words for a device that this user may not read
-            mute += 1
-    if mute:
+        except (usb.core.USBError, ValueError):  # pyusb's errors for a device that this user may not read
+            unreadable += 1
+    if unreadable:
         raise AdapterError("this user may not open it: give the USB device 16c0:05dc to the user (udev rule)")
     raise AdapterError(f"no uDMX{f' with the USB serial number {number}' if number else ''} is plugged in")
 

@@ -1,4 +1,4 @@
-"""ENTTEC DMX USB Pro, and what speaks like it: one universe as a framed message to the widget."""
+"""ENTTEC DMX USB Pro and compatibles: one universe as a framed message to the widget."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from appliance.outputs.dmx.adapter_wire import AdapterWire
 from appliance.outputs.dmx.serial_port import close_port, find_device, is_usb_pro, open_port, write
 from appliance.show.dmx import DmxConfig
 
-BAUD = 57600  # the widget is asked by USB and knows no speed; Linux wants one
+BAUD = 57600  # over USB the speed means nothing; Linux wants one
 _SEND_DMX = 6  # 'Output Only Send DMX Packet Request', DMX USB Pro API 1.44
 _START, _END = 0x7E, b"\xe7"
 _START_CODE = 0
@@ -22,7 +22,7 @@ class UsbPro:
         self._port = open_port(device, BAUD)
 
     def write(self, data: bytes) -> None:
-        """One universe; what the widget said meanwhile (DMX that it receives, garbage) is thrown away."""
+        """Write one universe; input from the widget (received DMX, garbage) is discarded."""
         write(self._port, self._head + data[: self._channels] + _END)
 
     def close(self) -> None:

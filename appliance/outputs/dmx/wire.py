@@ -6,39 +6,27 @@ from typing import Protocol
 
 
 class Wire(Protocol):
-    """One universe on its way. Nothing here waits for a light, and nothing raises.
+    """Carries one universe. Never waits for a light, never raises.
 
-    What cannot be sent at once is dropped and counted: the next universe is 25 ms away. A wire that failed
-    opens itself again, after 0.1 s at first and 2 s at last.
+    What cannot leave at once is dropped and counted: the next universe is 25 ms away. A wire that failed is
+    opened again, after 0.1 s at first, then up to every 2 s.
     """
 
-    name: str  # how to call it in front of people: 'Art-Net 192.168.0.30, universe 1'
-
-    @property
-    def sent(self) -> int:
-        """Universes that left."""
-
-    @property
-    def dropped(self) -> int:
-        """Universes that did not."""
-
-    @property
-    def last_error(self) -> str:
-        """Why the last one was dropped, in a few words; stays after the wire is well again."""
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the newest universe left."""
+    name: str  # in messages: 'Art-Net 192.168.0.30, universe 1'
+    sent: int  # universes that left
+    dropped: int  # universes that did not
+    last_error: str  # why the last one was dropped, in a few words; stays after the wire is well again
+    is_open: bool  # whether the newest universe left
 
     @property
     def trouble(self) -> str | None:
-        """For people: what happened, what the audience sees, what to do; None while all is well."""
+        """What happened, what the audience sees, what to do; None while all is well."""
 
-    def send(self, data: bytes | bytearray, now: float) -> None:
-        """One universe, 512 levels; `now` in monotonic seconds. The levels are copied."""
+    def send_universe(self, levels: bytes | bytearray, now: float) -> None:
+        """Send one universe, 512 levels; `now` in monotonic seconds. The levels are copied."""
 
-    def close(self, now: float) -> None:
-        """The last one to call: lets what was sent last leave, says goodbye where the wire has a word for it.
+    def close(self) -> None:
+        """Let the last universe leave, and end the stream where the protocol has a word for it.
 
         Lights hold what they got last: send zeros or the safe look before.
         """

@@ -1,1 +1,1 @@
-"""Open Sound Control: templates packed once, dialects that fill them, receivers that get them."""
+"""Open Sound Control: templates packed once, and the dialects that fill them."""

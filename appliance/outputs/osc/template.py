@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAX_DATAGRAM = 1468  # bytes: the last multiple of 4 under Ethernet's 1500 less IP and UDP headers
-BUNDLE_HEADER = b"#bundle\0" + struct.pack(">Q", 1)  # the time tag 1 says: at once
+BUNDLE_HEADER = b"#bundle\0" + struct.pack(">Q", 1)  # time tag 1: immediately
 _FORBIDDEN_IN_ADDRESS = str.maketrans(dict.fromkeys(' #*,/?[]{}"', "_"))
 
 
 @dataclass(frozen=True)
 class Message:
-    """One message whose last arguments are `floats` numbers that change in every tick."""
+    """One message; its last arguments are `floats` numbers that change in every tick."""
 
     packed: bytes
     floats: int

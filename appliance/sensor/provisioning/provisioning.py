@@ -1,7 +1,7 @@
-"""Provisioning: a wearable gets its name, network and a fresh key by cable, and the key file learns of it.
+"""Provisioning: a wearable gets its name, network and a new key by cable, and an entry in the key file.
 
-The order keeps both sides right whenever the cable comes loose: nothing is stored until the wearable has
-proved that everything arrived, and the key file changes last, when it is known that it can be written.
+The order keeps both sides consistent whenever the cable comes loose: nothing is stored until the wearable has
+proved that everything arrived; the key file changes last, after it is known to be writable.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class ProvisioningError(Exception):
 
 @dataclass(frozen=True)
 class Settings:
-    """What a wearable is to know. `network` empty: it lives on the cable alone. None: as it is."""
+    """A wearable's new settings. Empty `network`: cable only. None: unchanged."""
 
     name: str
     network: str = ""
@@ -50,7 +50,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Provisioned:
-    """What came of it. `was`: the name that this wearable had in the key file before, if another."""
+    """The result. `was`: the wearable's earlier name in the key file, if another."""
 
     sensor: SensorKey
     identity: Identity
@@ -67,7 +67,7 @@ def provision(
 ) -> Provisioned:
     """Provision the wearable on `console` and enter it into the key file `path`.
 
-    `say` gets each step that is done: what, and in words. `takes_over`: the name may belong to another
+    `say` gets each completed step: its name and a sentence. `takes_over`: the name may belong to another
     wearable so far. Raises ProvisioningError, ConsoleError (nothing answers), KeyFileError and OSError; then
     the key file is as it was.
     """
@@ -84,7 +84,7 @@ def provision(
         change.put(sensor)
         _draft(console, sensor, settings)
         say("settings", f"sent and proved: fresh key, device 0x{sensor.device_id:08x}, {_way(settings)}")
-        change.prepare()  # a full disk is noticed now, with nothing stored anywhere
+        change.prepare()  # a full disk fails here, before anything is stored
         _save(console, sensor, path)
         say("saved", "the wearable keeps them over power-off, and has the key")
         try:
@@ -119,19 +119,19 @@ def _shown(console: WearableConsole) -> str:
 
 
 def _known_as(shown: str, change: KeyEditing) -> str:
-    """The name under which the key file has this wearable, by its device id; empty for a stranger."""
+    """This wearable's name in the key file, by its device id; empty for an unknown one."""
     device = _word_after("device", shown)
     return next((name for name, key in change.keys.items() if f"{key.device_id:08x}" == device), "")
 
 
 def _require_free_name(name: str, known: str, shown: str, change: KeyEditing, takes_over: bool) -> None:
-    """Two wearables must not change places by mistake; one that remembers nothing may be any of them."""
+    """Wearables must not be mixed up by mistake; one without settings may get any name."""
     if takes_over or name not in change.keys or known == name or _word_after("device", shown) == "none":
         return
     own = known or _word_after("name", shown)
-    whose = f"is '{own}' already" if known else f"was provisioned elsewhere (as '{own}')"
+    owner = f"is '{own}' already" if known else f"was provisioned elsewhere (as '{own}')"
     raise ProvisioningError(
-        f"This wearable {whose}, and '{name}' is another one. Nothing was changed. To put this one in the "
+        f"This wearable {owner}, and '{name}' is another one. Nothing was changed. To put this one in the "
         f"place of a broken {name}: bunraku sensors replace {name} "
         + (f"{own} (no cable needed)." if known else "--port, with the other options as now.")
     )
@@ -169,7 +169,7 @@ def _draft(console: WearableConsole, sensor: SensorKey, settings: Settings) -> N
     if not has_arrived:
         raise ProvisioningError(
             "The wearable could not prove that the key arrived whole. Nothing was changed. "
-            "Run this again with another cable; if it stays so, flash the firmware anew."
+            "Run this again with another cable; if that fails, flash the firmware again."
         )
 
 

@@ -58,7 +58,7 @@ def only_wearable(ports: list[FoundPort]) -> str:
 
 
 def ports_sentence(ports: list[FoundPort]) -> str:
-    """What to tell a person who named no port, or a wrong one."""
+    """The message for a missing or wrong port."""
     if not ports:
         return (
             "This machine has no serial port at all. Plug the wearable in with a USB cable that carries data "

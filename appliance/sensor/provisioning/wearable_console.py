@@ -1,6 +1,6 @@
-"""The wearable's text console on its USB cable, from the box's side: one line asked, one line answered.
+"""The wearable's text console on its USB cable, from the box's side: one line each way.
 
-Packets may travel on the same cable meanwhile (each between zero bytes); they are passed over.
+Packets on the same cable (each between zero bytes) are skipped.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from appliance.sensor.wire import TAG_BYTES
 BAUD = 115200  # USB: any speed is the same, but 1200 would start the bootloader
 PATIENCE_S = 15.0  # joining Wi-Fi keeps the wearable from answering for up to 10 s
 LONGEST_LINE = 128
-# Brings the wearable's reader from any state to text: ends a frame that was begun, then sends a void one.
+# Resets the wearable's reader to text: ends an open frame, then sends an empty one.
 _TO_TEXT = b"\x00\x00\x01\x00\n"
 _ASK_AGAIN_S = 3.0
 _IMU_STARTS_S = 2.0  # the BNO055 takes 0.65 s after power-on, and some tries
 _ASK_FOR_IMU_S = 0.2
 _QUIET_S = 0.15
-_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f]")  # nothing that a terminal would obey is ever shown
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f]")  # control characters never reach the terminal
 _LONGEST_ANSWER = 256
 _IDENTITY = re.compile(
     r"ok bunraku-wearable (?P<firmware>\S+) wire (?P<wire>[0-9a-f]{8}) "
@@ -37,20 +37,20 @@ _IDENTITY = re.compile(
 
 
 class ConsoleError(Exception):
-    """The wearable could not be asked: what happened and what to do."""
+    """The wearable's console failed: what happened and what to do."""
 
 
 class UnpluggedError(ConsoleError):
-    """The cable is gone, or the wearable does not answer any more."""
+    """The cable is gone, or the wearable stopped answering."""
 
 
 class RefusedError(ConsoleError):
-    """The wearable understood and said no."""
+    """The wearable refused the command."""
 
 
 @dataclass(frozen=True)
 class Identity:
-    """What a wearable says of itself."""
+    """A wearable's answer to `id`."""
 
     firmware: str
     wire_hash: int
@@ -59,7 +59,7 @@ class Identity:
 
 
 class WearableConsole:
-    """A wearable on a serial port. A context; raises ConsoleError with words for people."""
+    """A wearable on a serial port. A context; raises ConsoleError with a message for people."""
 
     def __init__(self, device: str, patience_s: float = PATIENCE_S) -> None:
         self.device = device
@@ -78,7 +78,7 @@ class WearableConsole:
         self._port.close()
 
     def identify(self) -> Identity:
-        """Find the wearable on this port and ask who it is; an IMU that is just starting is waited for."""
+        """Find the wearable on this port and read its identity, after its IMU has started."""
         until = time.monotonic() + self._patience_s
         while (identity := self._identity(until)) is None:
             if time.monotonic() >= until:
@@ -94,9 +94,9 @@ class WearableConsole:
         return identity
 
     def ask(self, command: str, secret: str = "") -> str:
-        """What comes behind `ok` in the answer. Raises RefusedError, UnpluggedError.
+        """Send a command. Returns what follows `ok` in the answer. Raises RefusedError, UnpluggedError.
 
-        `secret` follows the command and is in no error.
+        `secret` follows the command and is left out of errors.
         """
         line = f"{command} {secret}" if secret else command
         if len(line.encode()) > LONGEST_LINE or any(ord(sign) < 32 for sign in line):
@@ -116,7 +116,7 @@ class WearableConsole:
         raise UnpluggedError(f"The wearable on {self.device} stopped answering (asked: '{command}').")
 
     def proves(self, key: bytes) -> bool:
-        """Whether the wearable has this key; neither the key nor anything that gives it away travels."""
+        """Whether the wearable has this key, by a challenge that does not reveal it."""
         nonce = secrets.token_bytes(8)
         answer = self.ask(f"prove {nonce.hex()}")
         return compare_digest(answer, blake2s(b"prove" + nonce, key=key, digest_size=TAG_BYTES).hexdigest())
@@ -130,7 +130,7 @@ class WearableConsole:
         return self._lines.popleft()
 
     def _identity(self, until: float) -> Identity | None:
-        """What it says of itself; None when no answer comes soon."""
+        """Its identity; None without an answer soon."""
         self._write(_TO_TEXT + b"id\n")
         until = min(time.monotonic() + _ASK_AGAIN_S, until)
         while (line := self._line(until)) is not None:
@@ -142,7 +142,7 @@ class WearableConsole:
         return None
 
     def _settle(self) -> None:
-        """Pass over answers to a question that was asked more than once."""
+        """Skip answers to repeated questions."""
         until = time.monotonic() + self._patience_s
         while time.monotonic() < until and self._line(time.monotonic() + _QUIET_S) is not None:
             pass

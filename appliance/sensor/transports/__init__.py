@@ -1,1 +1,1 @@
-"""The ways by which packets come and go: the network, a cable."""
+"""How packets travel: by network or cable."""

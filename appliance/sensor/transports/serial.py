@@ -21,19 +21,19 @@ LONGEST_RETRY_S = 2.0
 WAITING_PACKETS = 128
 UNSENT_PACKETS = 16
 WRITE_TIMEOUT_S = 0.1
-CLOSE_S = 1.0  # a driver may keep the thread for good, in the call that opens, sets or closes a dead device
+CLOSE_S = 1.0  # a driver may never return from opening, configuring or closing a dead device
 
 
 class SerialIntake:
     """Reads and writes one serial device in a thread of its own: opening a port can take longer than a tick.
 
-    The thread also gives each packet its true time of arrival; it sleeps in the kernel between packets.
+    The thread sleeps in the kernel between packets, and so notes their true arrivals.
     """
 
     def __init__(self, device: str, baud: int = 115200, clock: Callable[[], float] = time.monotonic) -> None:
         self.device = self.name = device
         self.counts: Counter[str] = Counter()
-        # For people; None while the port is open.
+        # A message; None while the port is open.
         self.trouble: str | None = f"{device} is being opened. Sensors on this cable are silent until it is."
         self._origin = (device,)
         self._baud = baud
@@ -46,28 +46,28 @@ class SerialIntake:
         self._thread = threading.Thread(target=self._run, name=f"sensor {device}", daemon=True)
         self._thread.start()
 
-    def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
-        """Packets that have come, and their arrivals (monotonic seconds). Never waits."""
+    def receive_packets(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
+        """Waiting packets and their arrivals (monotonic seconds)."""
         for _ in range(len(self._packets)):
             packet, arrival = self._packets.popleft()
             yield packet, arrival if arrival < now + LONGEST_STOP_S else now, self._origin
 
-    def send(self, packet: bytes, origin: Origin) -> None:
-        """Hand one packet to the thread. Dropped and counted without a cable, or when it cannot keep up."""
+    def send_packet(self, packet: bytes, origin: Origin) -> None:
+        """Hand one packet to the thread. Without a cable, or with a full queue, it is dropped and counted."""
         if self.trouble is not None or len(self._unsent) == UNSENT_PACKETS:
             self.counts["send_error"] += 1
             return
         self._unsent.append(packet)
         self._wake()
 
-    def attend(self, origins: Collection[Origin]) -> None:
-        """A cable has no strangers."""
+    def reserve_sockets(self, origins: Collection[Origin]) -> None:
+        """Nothing to do: a cable carries no other senders."""
 
     def describe(self, origin: Origin) -> str:
         return str(origin[0])
 
     def close(self) -> None:
-        """End the thread; one that a dead device keeps for longer than CLOSE_S is left behind."""
+        """End the thread; after CLOSE_S it is left to a driver that does not return."""
         self._stop.set()
         self._wake()
         self._thread.join(CLOSE_S)
@@ -86,7 +86,7 @@ class SerialIntake:
                     self._unsent.clear()
                     self.trouble = None
                     retry_s = FIRST_RETRY_S
-                    self._talk(port)
+                    self._serve_port(port)
             except (OSError, ValueError) as error:  # pyserial's SerialException is an OSError
                 self.counts["serial_error"] += 1
                 self.trouble = (
@@ -96,7 +96,7 @@ class SerialIntake:
             self._stop.wait(retry_s)
             retry_s = min(2 * retry_s, LONGEST_RETRY_S)
 
-    def _talk(self, port: serial.Serial) -> None:
+    def _serve_port(self, port: serial.Serial) -> None:
         deframer = Deframer(self.counts)
         while not self._stop.is_set():
             ready, _, _ = select.select([port.fileno(), self._woken.fileno()], [], [])
@@ -113,16 +113,16 @@ class SerialIntake:
                 self._write(port, self._unsent.popleft())
 
     def _wake(self) -> None:
-        with suppress(OSError):  # so much unread: it is about to wake
+        with suppress(OSError):  # full: the thread is about to wake anyway
             self._waker.send(b"!")
 
     def _write(self, port: serial.Serial, packet: bytes) -> None:
-        """One frame between two zero bytes: the first ends whatever was written before."""
+        """One frame between two zero bytes: the first ends any earlier fragment."""
         try:
             port.write(END + frame(packet))
         except serial.SerialTimeoutException:
             self.counts["send_error"] += 1
             _, takes_more, _ = select.select([], [port.fileno()], [], 0.0)
-            if not takes_more:  # nobody reads at the other end: what waits is stale
+            if not takes_more:  # the other end does not read: what waits is stale
                 self.counts["send_error"] += len(self._unsent)
                 self._unsent.clear()

@@ -1,4 +1,4 @@
-"""Where packets come from and answers go to: what the network and the cables have in common."""
+"""What network and cables have in common: packets come in, answers go out."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from typing import Any, Protocol, TypeAlias
 
 from appliance.sensor import wire
 
-LONGEST_STOP_S = 5.0  # a box that stood still for longer is not expected to make up for it
+LONGEST_STOP_S = 5.0  # after a longer standstill the box does not catch up
 
-Origin: TypeAlias = tuple[Any, ...]  # whom an intake heard: (host, port) of a datagram, (device,) of a cable
+Origin: TypeAlias = tuple[Any, ...]  # of a packet: (host, port) of a datagram, (device,) of a cable
 
 
 class Intake(Protocol):
-    """UdpIntake, SerialIntake. Nothing here waits or raises; troubles are counted."""
+    """UdpIntake, SerialIntake. Never waits, never raises; errors are counted."""
 
-    name: str  # for people: host and port, or the device
+    name: str  # in messages: host and port, or the device
     counts: Counter[str]
 
-    def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
-        """What waits, up to a bound of the intake's own: packet, arrival (monotonic), whence.
+    def receive_packets(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
+        """Waiting packets, up to the intake's own bound: packet, arrival (monotonic), origin.
 
-        An arrival is after `now` where the box was held up since it read that time.
-        A packet's bytes are valid until the next one.
+        An arrival may be after `now` when the box was held up since it read the clock.
+        A packet's bytes are valid until the next packet.
         """
         ...
 
-    def send(self, packet: bytes, origin: Origin) -> None: ...
+    def send_packet(self, packet: bytes, origin: Origin) -> None: ...
 
-    def attend(self, origins: Collection[Origin]) -> None:
-        """Keep these apart from strangers: linked sensors are heard whatever else comes."""
+    def reserve_sockets(self, origins: Collection[Origin]) -> None:
+        """Give these origins sockets of their own, which a flood from others cannot fill."""
         ...
 
     def describe(self, origin: Origin) -> str: ...
@@ -38,4 +38,4 @@ class Intake(Protocol):
     def close(self) -> None: ...
 
 
-Way: TypeAlias = tuple[Intake, Origin]
+Route: TypeAlias = tuple[Intake, Origin]

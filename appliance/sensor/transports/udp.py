@@ -19,24 +19,24 @@ SO_TIMESTAMPNS = 35
 IP_FREEBIND = 15  # include/uapi/linux/in.h
 TIMESPEC = struct.Struct("@qq")
 OLDEST_S = 1.0
-# The kernel counts about 768 bytes for a datagram of ours and doubles what is asked for.
-COMMON_BUFFER_BYTES = 192 * 1024  # room for some 500 of strangers: two ticks' worth of a heavy flood
-OWN_BUFFER_BYTES = 96 * 1024  # room for some 250 of one sensor: the burst after a stall of 5 s
-# A drain takes at most so many: in a flood 0.7 to 2.5 ms of a tick, by the machine.
+# The kernel counts about 768 bytes for one of our datagrams and doubles the size that is set.
+COMMON_BUFFER_BYTES = 192 * 1024  # some 500 datagrams: two ticks of a heavy flood
+OWN_BUFFER_BYTES = 96 * 1024  # some 250 datagrams: the burst of one sensor after a stall of 5 s
+# Limits of one drain: a flood costs 0.7 to 2.5 ms of a tick, depending on the machine.
 COMMON_PER_DRAIN = 256
 OWN_PER_DRAIN = 32
-OWN_PER_SECOND = 64  # of a stop, in which the box did not drain: what a sensor sends, and some more
+OWN_PER_SECOND = 64  # for each second without a drain: what a sensor sends, with some reserve
 
 
 class PortError(OSError):
-    """The port for the sensors cannot be opened; the message is for the person who set up the box."""
+    """The port for the sensors cannot be opened; the message says what to do."""
 
 
 class UdpIntake:
     """Listens on `host`:`port` (0: any free port, see `address`). Raises PortError when it cannot.
 
-    Everybody is heard on the common socket. A linked sensor has one of its own, on the same port, connected
-    to its address: the kernel puts that sensor's datagrams there, and a flood fills the common one alone.
+    A common socket receives from every address. A linked sensor has a socket of its own, on the same port and
+    connected to its address: the kernel puts its datagrams there, so a flood fills only the common one.
     """
 
     def __init__(self, host: str, port: int) -> None:
@@ -52,15 +52,15 @@ class UdpIntake:
             self._socket.close()
             raise PortError(_advice(host, port, error)) from error
         _prepare(self._socket, COMMON_BUFFER_BYTES)
-        if sys.platform == "linux":  # after bind: a second box must be refused, our own sockets must not
+        if sys.platform == "linux":  # after bind: a second box must fail, our own sockets must not
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         self._bound: Origin = self._socket.getsockname()
         self.address: tuple[str, int] = (self._bound[0], self._bound[1])
         self.name = f"{self._bound[0]}:{self._bound[1]}"
         self._own: dict[Origin, socket.socket] = {}
-        self._left: list[socket.socket] = []  # drained once more before they close
-        self._astray: set[Origin] = set()  # have a socket of their own, but were heard on the common one
-        self._buffer = bytearray(2 * wire.LARGEST)  # longer datagrams are cut, and then have the wrong length
+        self._left: list[socket.socket] = []  # drained once more, then closed
+        self._astray: set[Origin] = set()  # have a socket of their own, but came in on the common one
+        self._buffer = bytearray(2 * wire.LARGEST)  # longer datagrams are cut and have the wrong length
         self._view = memoryview(self._buffer)
         self._buffers = [self._buffer]
         self._ancillary_bytes = socket.CMSG_SPACE(TIMESPEC.size)
@@ -70,17 +70,15 @@ class UdpIntake:
 
     @property
     def address_is_absent(self) -> bool:
-        """Whether this machine does not have the address (yet): nobody is heard until it comes."""
+        """Whether this machine does not have the address (yet): no sensor is received until it does."""
         if self._waits_for_address:
             self._waits_for_address = not is_own(self.address[0])
         return self._waits_for_address
 
-    def receive(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
-        """Waiting datagrams, their arrivals (monotonic seconds) and senders; linked sensors' first.
+    def receive_packets(self, now: float) -> Iterator[tuple[wire.Buffer, float, Origin]]:
+        """Waiting datagrams, their arrivals (monotonic seconds) and senders; linked sensors first.
 
-        After a stop, in which nobody drained, all that linked sensors sent meanwhile: the newest counts.
-        An arrival is after `now` where the box was held up since it read that time.
-        The bytes are valid until the next one. Never waits, never raises: the network's errors are counted.
+        After a standstill it takes all that linked sensors sent meanwhile, because the newest counts.
         """
         self._compare_clocks()
         stop_s = 0.0 if self._received_at is None else min(max(0.0, now - self._received_at), LONGEST_STOP_S)
@@ -98,15 +96,15 @@ class UdpIntake:
                 self._astray.add(received[2])
             yield received
 
-    def send(self, packet: bytes, origin: Origin) -> None:
-        """One datagram from the listening port. What cannot leave at once is dropped and counted."""
+    def send_packet(self, packet: bytes, origin: Origin) -> None:
+        """Send one datagram from the listening port. What cannot leave at once is dropped and counted."""
         try:
             self._socket.sendto(packet, origin)
         except OSError:
             self.counts["send_error"] += 1
 
-    def attend(self, origins: Collection[Origin]) -> None:
-        """Give these senders, and nobody else, a socket of their own."""
+    def reserve_sockets(self, origins: Collection[Origin]) -> None:
+        """Give exactly these senders a socket of their own."""
         if sys.platform != "linux":
             return
         for origin in [one for one in self._own if one not in origins or one in self._astray]:
@@ -147,7 +145,7 @@ class UdpIntake:
             except BlockingIOError:
                 return
             except ConnectionRefusedError:
-                continue  # an answer of ours came back: the sensor was switched off; forged, it costs nothing
+                continue  # our answer was refused: the sensor is off; a forged refusal costs nothing
             except OSError:
                 self.counts["socket_error"] += 1
                 return
@@ -155,9 +153,9 @@ class UdpIntake:
         self.counts["drain_limit"] += 1
 
     def _arrival(self, ancillary: list[tuple[int, int, bytes]], now: float) -> float:
-        """The kernel's stamp on the box's clock. A wall clock that was set meanwhile, or no stamp: `now`.
+        """The kernel's stamp on the box's clock; `now` without a stamp or after the wall clock was set.
 
-        What came while the box was held up, since it read `now`, is no older for that.
+        A datagram that came after the box read `now` keeps its later time.
         """
         if not ancillary or len(ancillary[0][2]) != TIMESPEC.size:
             return now
@@ -169,8 +167,8 @@ class UdpIntake:
         return arrival if came_since else now
 
     def _compare_clocks(self) -> None:
-        """Anew each time: the wall clock may be set. What was known stays as far as these readings allow it:
-        the box may be held up between two of them.
+        """Update the offset at each drain, because the wall clock may be set. The box may be held up between
+        two of these readings, so the known offset is only clamped to their bounds.
         """
         before, wall, after = time.monotonic(), time.time(), time.monotonic()
         known = self._monotonic_minus_wall
@@ -178,8 +176,9 @@ class UdpIntake:
 
 
 def bind_early(one: socket.socket, address: tuple[Any, ...]) -> bool:
-    """Bind, also to an address that this machine is yet to get (an access point that comes up later); returns
-    whether it is there. IP_FREEBIND, ip(7). Raises OSError.
+    """Bind, even to an address that comes later (of an access point). Returns whether it is there now.
+
+    IP_FREEBIND, ip(7). Raises OSError.
     """
     try:
         one.bind(address)

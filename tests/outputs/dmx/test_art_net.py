@@ -14,9 +14,9 @@ def test_a_universe_arrives_as_it_was_sent() -> None:
     with ArtNetReceiver() as node:
         wire = ArtNetWire(config("artnet", universe=0x2A57, port=node.port))
         for tick in range(3):
-            wire.send(universe(tick), 10.0 + tick)
+            wire.send_universe(universe(tick), 10.0 + tick)
         packets = [packet for _, packet in node.poll(1.0)]
-        wire.close(20.0)
+        wire.close()
     assert [packet.levels for packet in packets] == [universe(tick) for tick in range(3)]
     assert [packet.sequence for packet in packets] == [1, 2, 3]
     assert {(packet.net, packet.subnet, packet.universe) for packet in packets} == {(0x2A, 0x5, 0x7)}
@@ -44,26 +44,26 @@ def test_the_sequence_goes_from_255_to_1() -> None:
 def test_another_number_on_the_wire() -> None:
     with ArtNetReceiver() as node:
         wire = ArtNetWire(config("artnet", universe=1, number=0, port=node.port))
-        wire.send(universe(), 0.0)
+        wire.send_universe(universe(), 0.0)
         assert node.poll(1.0)[0][1].port_address == 0
-        wire.close(0.0)
+        wire.close()
 
 
 def test_a_broadcast_needs_the_box_file_s_word() -> None:
     shy = ArtNetWire(config("artnet", host="127.255.255.255", port=free_ports(1)[0]))
-    shy.send(universe(), 0.0)
+    shy.send_universe(universe(), 0.0)
     assert shy.dropped == 1
     assert shy.trouble is not None
     assert "allows no broadcast" in shy.trouble
-    shy.close(0.0)
+    shy.close()
 
 
 def test_a_broadcast_reaches_who_listens_to_all() -> None:
     with ArtNetReceiver(host="") as node:
         wire = ArtNetWire(config("artnet", host="127.255.255.255", broadcast=True, port=node.port))
-        wire.send(universe(), 0.0)
+        wire.send_universe(universe(), 0.0)
         assert node.poll(1.0)[0][1].levels == universe()
-        wire.close(0.0)
+        wire.close()
 
 
 def test_a_node_that_goes_and_comes_back() -> None:
@@ -71,7 +71,7 @@ def test_a_node_that_goes_and_comes_back() -> None:
     wire = ArtNetWire(config("artnet", port=port))
     now = 0.0
     while wire.dropped < 3:  # nobody listens: Linux says so with the next one
-        wire.send(universe(), now)
+        wire.send_universe(universe(), now)
         now += 0.025
     assert not wire.is_open
     assert wire.trouble == (
@@ -82,20 +82,20 @@ def test_a_node_that_goes_and_comes_back() -> None:
     with ArtNetReceiver(port=port) as node:
         back = now + 1.0  # the longest pause
         while now <= back + 0.025:
-            wire.send(universe(9), now)
+            wire.send_universe(universe(9), now)
             now += 0.025
         assert node.poll(1.0)[-1][1].levels == universe(9)
     assert wire.is_open
     assert wire.trouble is None
-    wire.close(now)
+    wire.close()
 
 
 def test_an_interface_that_this_machine_does_not_have() -> None:
     wire = ArtNetWire(config("artnet", interface="192.0.2.77"))
-    wire.send(universe(), 0.0)
+    wire.send_universe(universe(), 0.0)
     assert wire.dropped == 1
     assert "does not have the interface's address" in wire.last_error
-    wire.close(0.0)
+    wire.close()
 
 
 @pytest.mark.parametrize(

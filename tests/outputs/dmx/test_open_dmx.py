@@ -118,14 +118,14 @@ def heard(master: int) -> bytes:
 def test_a_universe_is_told_again_and_again(cable: tuple[int, Path]) -> None:
     master, path = cable
     wire = open_dmx_wire(config("open-dmx", device=str(path)))
-    wire.send(universe(), 0.0)
+    wire.send_universe(universe(), 0.0)
     received = b""
     while len(received) < 6 * 513:
         received += heard(master)
     assert received[: 6 * 513] == (b"\0" + universe()) * 6
     assert wire.dropped == 0
-    wire.send(bytes(512), 0.0)
-    wire.close(0.0)
+    wire.send_universe(bytes(512), 0.0)
+    wire.close()
     while not received.endswith(bytes(513)):
         received += heard(master)
 
@@ -135,7 +135,7 @@ def test_nothing_is_told_before_there_is_something(cable: tuple[int, Path], unti
     os.set_blocking(master, False)
     wire = open_dmx_wire(config("open-dmx", device=str(path)))
     until(lambda: wire.is_open)
-    wire.close(0.0)
+    wire.close()
     with pytest.raises(BlockingIOError):
         os.read(master, 1)
 

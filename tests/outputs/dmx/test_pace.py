@@ -21,13 +21,13 @@ class Listener:
 
     def __init__(self) -> None:
         self.heard: list[tuple[float, bytes]] = []
-        self.closed_at: float | None = None
+        self.is_closed = False
 
-    def send(self, data: bytes | bytearray, now: float) -> None:
-        self.heard.append((now, bytes(data)))
+    def send_universe(self, levels: bytes | bytearray, now: float) -> None:
+        self.heard.append((now, bytes(levels)))
 
-    def close(self, now: float) -> None:
-        self.closed_at = now
+    def close(self) -> None:
+        self.is_closed = True
 
 
 def paced(**keys: object) -> tuple[Universe, Listener]:
@@ -97,7 +97,7 @@ def test_what_was_offered_last_leaves_before_the_end() -> None:
     one.offer(bytes(512), 0.001)
     one.close(0.002)
     assert listener.heard[-1] == (0.002, bytes(512))
-    assert listener.closed_at == 0.002
+    assert listener.is_closed
 
 
 def test_after_a_stall_nothing_leaves_in_a_burst() -> None:

@@ -228,14 +228,14 @@ class Box:
 
 def test_a_node_follows_the_more_important_box_and_falls_back() -> None:
     node, first, second = SacnNode(), Box(100, 10), Box(150, 20)
-    node.hear(first.says(), 0.0)
-    node.hear(second.says(), 0.0)
+    node.receive(first.says(), 0.0)
+    node.receive(second.says(), 0.0)
     assert node.levels(1, 0.1) == second.levels
-    node.hear(first.says(), 2.0)
+    node.receive(first.says(), 2.0)
     assert node.levels(1, 2.5) == second.levels
     assert node.levels(1, 2.6) == first.levels  # the second one is silent for more than 2.5 s
-    node.hear(second.says(), 3.0)
-    node.hear(second.leaves(), 3.1)
+    node.receive(second.says(), 3.0)
+    node.receive(second.leaves(), 3.1)
     assert node.levels(1, 3.1) == first.levels
     assert node.levels(1, 5.0) is None
 
@@ -243,8 +243,8 @@ def test_a_node_follows_the_more_important_box_and_falls_back() -> None:
 def test_a_node_ignores_what_was_overtaken() -> None:
     node, box = SacnNode(), Box(100, 10)
     early, late = box.says(), box.says()
-    node.hear(late, 0.0)
-    node.hear(early, 0.1)
+    node.receive(late, 0.0)
+    node.receive(early, 0.1)
     assert node.out_of_order == 1
 
 

@@ -17,11 +17,11 @@ Until = Callable[[Callable[[], bool]], None]
 def test_a_universe_arrives(until: Until) -> None:
     bus = UdmxBackend()
     wire = udmx_wire(config("udmx"), bus)
-    wire.send(universe(), 0.0)
+    wire.send_universe(universe(), 0.0)
     until(lambda: wire.sent == 1)
     assert bus.levels == universe()
     assert bus.ranges == [(0, 512)]
-    wire.close(0.0)
+    wire.close()
     assert bus.handles == 0
 
 
@@ -31,42 +31,42 @@ def test_only_what_changed_travels(until: Until) -> None:
     levels = bytearray(512)
     for tick, (first, end) in enumerate([(0, 512), (10, 20), (511, 512), (0, 1)], start=1):
         levels[first:end] = bytes([100 + tick]) * (end - first)
-        wire.send(levels, 0.0)
+        wire.send_universe(levels, 0.0)
         until(lambda tick=tick: wire.sent == tick)
         assert bus.levels == levels
     assert bus.ranges == [(0, 512), (10, 10), (511, 1), (0, 1)]
-    wire.send(levels, 0.0)  # a keep-alive says everything, in case it forgot
+    wire.send_universe(levels, 0.0)  # a keep-alive says everything, in case it forgot
     until(lambda: wire.sent == 5)
     assert bus.ranges[-1] == (0, 512)
-    wire.close(0.0)
+    wire.close()
 
 
 def test_an_adapter_on_a_busy_hub_gets_its_time(until: Until) -> None:
     bus = UdmxBackend()
     bus.takes_ms = 400
     wire = udmx_wire(config("udmx"), bus)
-    wire.send(universe(), 0.0)
+    wire.send_universe(universe(), 0.0)
     until(lambda: wire.sent == 1 or wire.last_error != "")
     assert bus.levels == universe()
-    wire.close(0.0)
+    wire.close()
 
 
 def test_fewer_channels(until: Until) -> None:
     bus = UdmxBackend()
     wire = udmx_wire(config("udmx", channels=24), bus)
-    wire.send(universe(), 0.0)
+    wire.send_universe(universe(), 0.0)
     until(lambda: wire.sent == 1)
     assert bus.levels == universe()[:24] + bytes(488)
-    wire.close(0.0)
+    wire.close()
 
 
 def test_pulled_out_mid_universe_and_back(until: Until) -> None:
     bus = UdmxBackend()
     wire = udmx_wire(config("udmx"), bus)
-    wire.send(universe(1), 0.0)
+    wire.send_universe(universe(1), 0.0)
     until(lambda: wire.sent == 1)
     bus.pull_out_after = 0
-    wire.send(universe(2), 0.0)
+    wire.send_universe(universe(2), 0.0)
     until(lambda: not wire.is_open)
     until(lambda: "no uDMX is plugged in" in wire.last_error)
     assert wire.trouble is not None
@@ -77,7 +77,7 @@ def test_pulled_out_mid_universe_and_back(until: Until) -> None:
     until(lambda: bus.levels == universe(2))
     assert bus.ranges[-1] == (0, 512)
     assert wire.trouble is None
-    wire.close(0.0)
+    wire.close()
     assert bus.handles == 0
 
 
@@ -86,7 +86,7 @@ def test_another_device_with_the_shared_numbers_is_left_alone(until: Until) -> N
     wire = udmx_wire(config("udmx"), bus)
     until(lambda: bool(wire.last_error))
     assert "no uDMX is plugged in" in wire.last_error
-    wire.close(0.0)
+    wire.close()
     assert not bus.ranges
 
 
@@ -95,11 +95,11 @@ def test_by_serial_number(until: Until) -> None:
     wire = udmx_wire(config("udmx", serial="right"), bus)
     until(lambda: bool(wire.last_error))
     assert "no uDMX with the USB serial number right is plugged in" in wire.last_error
-    wire.close(0.0)
+    wire.close()
     wire = udmx_wire(config("udmx", serial="left"), bus)
-    wire.send(universe(), 0.0)
+    wire.send_universe(universe(), 0.0)
     until(lambda: wire.sent == 1)
-    wire.close(0.0)
+    wire.close()
 
 
 def test_no_right_to_the_device(until: Until) -> None:
@@ -109,9 +109,9 @@ def test_no_right_to_the_device(until: Until) -> None:
     until(lambda: bool(wire.last_error))
     assert "this user may not open it" in wire.last_error
     bus.is_readable = True
-    wire.send(universe(), 0.0)
+    wire.send_universe(universe(), 0.0)
     until(lambda: wire.sent == 1)
-    wire.close(0.0)
+    wire.close()
 
 
 def test_no_libusb(monkeypatch: pytest.MonkeyPatch, until: Until) -> None:
@@ -122,4 +122,4 @@ def test_no_libusb(monkeypatch: pytest.MonkeyPatch, until: Until) -> None:
     wire = udmx_wire(config("udmx"))
     until(lambda: bool(wire.last_error))
     assert "libusb is missing" in wire.last_error
-    wire.close(0.0)
+    wire.close()

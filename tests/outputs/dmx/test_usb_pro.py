@@ -35,11 +35,11 @@ def test_a_universe_arrives_framed(widget: UsbProWidget, until: Until) -> None:
     with widget:
         wire = wire_to(widget)
         for tick in range(20):
-            wire.send(universe(tick), 0.0)
+            wire.send_universe(universe(tick), 0.0)
             until(lambda tick=tick: widget.levels == universe(tick))
         until(lambda: wire.sent == 20)
         assert (wire.dropped, wire.is_open, wire.trouble) == (0, True, None)
-        wire.close(0.0)
+        wire.close()
     assert {len(packet) for _, packet in widget.universes} == {513}
     assert {packet[0] for _, packet in widget.universes} == {0}
     assert (set(widget.labels), widget.broken) == ({6}, 0)
@@ -48,17 +48,17 @@ def test_a_universe_arrives_framed(widget: UsbProWidget, until: Until) -> None:
 def test_fewer_channels_make_a_shorter_message(widget: UsbProWidget, until: Until) -> None:
     with widget:
         wire = wire_to(widget, channels=24)
-        wire.send(universe(), 0.0)
+        wire.send_universe(universe(), 0.0)
         until(lambda: widget.levels == universe()[:24])
-        wire.close(0.0)
+        wire.close()
 
 
 def test_what_was_sent_last_arrives_before_the_end(widget: UsbProWidget, until: Until) -> None:
     with widget:
         wire = wire_to(widget)
-        wire.send(universe(), 0.0)
-        wire.send(bytes(512), 0.0)
-        wire.close(0.0)
+        wire.send_universe(universe(), 0.0)
+        wire.send_universe(bytes(512), 0.0)
+        wire.close()
         until(lambda: widget.levels == bytes(512))
 
 
@@ -71,29 +71,29 @@ def test_a_device_that_is_not_there_is_told_and_found_when_it_comes(
         f"DMX USB Pro {widget.path}, universe 1: it is not plugged in. Its lights do not follow; the show "
         "goes on. It is tried again every 2 seconds: plug it in, or check device and serial in the box file."
     )
-    wire.send(universe(1), 0.0)
-    wire.send(universe(2), 0.0)
+    wire.send_universe(universe(1), 0.0)
+    wire.send_universe(universe(2), 0.0)
     assert wire.dropped == 1
     with widget:
         until(lambda: widget.levels == universe(2))
         assert wire.trouble is None
-        wire.close(0.0)
+        wire.close()
 
 
 def test_pulled_out_mid_universe_and_back(widget: UsbProWidget, until: Until) -> None:
     widget.plug_in()
     wire = wire_to(widget)
-    wire.send(universe(1), 0.0)
+    wire.send_universe(universe(1), 0.0)
     until(lambda: widget.levels == universe(1))
     widget.pull_out()
-    wire.send(universe(2), 0.0)
+    wire.send_universe(universe(2), 0.0)
     until(lambda: bool(wire.last_error))
     assert "unplugged" in wire.last_error
     until(lambda: not wire.is_open)
     widget.plug_in()  # a new universe is not needed: it shows the last one by itself
     until(lambda: widget.levels == universe(2))
     assert wire.is_open
-    wire.close(0.0)
+    wire.close()
     widget.pull_out()
 
 
@@ -101,29 +101,29 @@ def test_garbage_from_the_widget_changes_nothing(widget: UsbProWidget, until: Un
     with widget:
         wire = wire_to(widget)
         for tick in range(40):
-            widget.say(bytes(range(256)) * 8 + b"\x7e\x05\xff\xff")
-            wire.send(universe(tick), 0.0)
+            widget.send_message(bytes(range(256)) * 8 + b"\x7e\x05\xff\xff")
+            wire.send_universe(universe(tick), 0.0)
             until(lambda tick=tick: widget.levels == universe(tick))
         until(lambda: wire.sent == 40)
         assert widget.broken == 0
-        wire.close(0.0)
+        wire.close()
 
 
 def test_a_widget_that_hangs_holds_up_nobody_and_comes_back(widget: UsbProWidget, until: Until) -> None:
     with widget:
         wire = wire_to(widget)
-        wire.send(universe(), 0.0)
+        wire.send_universe(universe(), 0.0)
         until(lambda: wire.sent == 1)
         widget.hang()
         while not wire.last_error:
-            wire.send(universe(100), 0.0)
+            wire.send_universe(universe(100), 0.0)
             time.sleep(0.002)
         assert wire.last_error == "it takes no more data"
         assert wire.dropped > 10  # one write hung all the while: nobody else did
         widget.hang(False)
-        wire.send(universe(200), 0.0)
+        wire.send_universe(universe(200), 0.0)
         until(lambda: widget.levels == universe(200))
-        wire.close(0.0)
+        wire.close()
 
 
 def test_a_wire_ends_while_its_widget_hangs(widget: UsbProWidget, until: Until) -> None:
@@ -131,22 +131,22 @@ def test_a_wire_ends_while_its_widget_hangs(widget: UsbProWidget, until: Until) 
         wire = wire_to(widget)
         widget.hang()
         while not wire.last_error:
-            wire.send(universe(), 0.0)
+            wire.send_universe(universe(), 0.0)
             time.sleep(0.002)
-        wire.close(0.0)
+        wire.close()
         until(lambda: not wire.is_open)
 
 
 def test_another_program_has_it(widget: UsbProWidget, until: Until) -> None:
     with widget:
         first = wire_to(widget)
-        first.send(universe(), 0.0)
+        first.send_universe(universe(), 0.0)
         until(lambda: first.sent == 1)
         second = wire_to(widget)
         until(lambda: bool(second.last_error))
         assert second.last_error == "another program uses it"
-        second.close(0.0)
-        first.close(0.0)
+        second.close()
+        first.close()
 
 
 def test_a_machine_that_is_held_up_while_it_writes_blames_no_widget(
@@ -167,12 +167,12 @@ def test_a_machine_that_is_held_up_while_it_writes_blames_no_widget(
     with widget:
         wire = wire_to(widget)
         for tick in range(10):
-            wire.send(universe(tick), 0.0)
+            wire.send_universe(universe(tick), 0.0)
             until(lambda tick=tick: wire.sent == tick + 1)
         assert now == 5.0
         until(lambda: widget.levels == universe(9))
         assert (wire.last_error, widget.broken) == ("", 0)
-        wire.close(0.0)
+        wire.close()
 
 
 class Adapter:
@@ -195,11 +195,11 @@ class Adapter:
 def test_an_adapter_is_given_up_when_it_fails_twice(fails: int, closed: int, until: Until) -> None:
     adapter = Adapter(fails)
     wire = AdapterWire("slow", lambda: adapter)
-    wire.send(universe(), 0.0)
+    wire.send_universe(universe(), 0.0)
     until(lambda: wire.sent == 1)
     assert (adapter.closed, adapter.shown) == (closed, [universe()])
     assert wire.last_error == ("it is slow" if closed else "")
-    wire.close(0.0)
+    wire.close()
 
 
 def test_who_sees_that_a_wire_is_not_open_reads_why(until: Until) -> None:
@@ -207,10 +207,10 @@ def test_who_sees_that_a_wire_is_not_open_reads_why(until: Until) -> None:
     wire = AdapterWire("slow", lambda: adapter)
     adapter.close = lambda: seen.append((wire.is_open, wire.last_error))  # type: ignore[method-assign]
     seen: list[tuple[bool, str]] = []
-    wire.send(universe(), 0.0)
+    wire.send_universe(universe(), 0.0)
     until(lambda: wire.sent == 1)
     assert seen[0] != (False, "")
-    wire.close(0.0)
+    wire.close()
 
 
 def test_a_driver_s_own_fault_does_not_end_the_thread(until: Until) -> None:
@@ -223,7 +223,7 @@ def test_a_driver_s_own_fault_does_not_end_the_thread(until: Until) -> None:
     wire = AdapterWire("faulty", open_adapter)  # type: ignore[arg-type]
     until(lambda: len(tries) >= 2)
     assert wire.last_error == "a bug"
-    wire.close(0.0)
+    wire.close()
 
 
 def port(device: str, product: str, serial_number: str) -> ListPortInfo:

@@ -19,7 +19,7 @@ class FlashRows {
   ~FlashRows() = default;
 };
 
-// What a save leaves of the record before it. Kept ones cost no wear; erased ones tell nobody a key or a password.
+// What a save leaves of the record before it. Kept ones cost no wear; erased ones reveal no key or password.
 enum class Old : uint8_t { kKept, kErased };
 
 class PageLog {

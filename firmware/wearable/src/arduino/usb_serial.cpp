@@ -1,4 +1,4 @@
-// USB serial that never waits. Serial.write() would, for up to 70 ms, and availableForWrite() always says 63,
+// USB serial that never waits. Serial.write() would, for up to 70 ms, and availableForWrite() always returns 63,
 // so the endpoint's own flags are asked; so are the bus frames, because the core keeps DTR after an unplug.
 #include "usb_serial.h"
 
@@ -23,7 +23,7 @@ bool endpoint_is_free() {
 void UsbSerial::begin() { Serial.begin(115200); }
 
 bool UsbSerial::is_connected() {
-  if (!USBDevice.configured()) {  // plugged in anew: the core still has the DTR of the last time
+  if (!USBDevice.configured()) {  // plugged in again: the core still has the old DTR
     Serial.end();
     return false;
   }

@@ -6,9 +6,9 @@
 namespace bunraku {
 namespace {
 
-constexpr unsigned long kJoinMs = 10000;   // begin() waits so long at most; its own default is a minute
-constexpr uint8_t kJoinsBeforeRestart = 3;  // then the Wi-Fi module is restarted: it can hang for good
-constexpr unsigned long kDisconnectMs = 500;  // its answer is waited for so long at most
+constexpr unsigned long kJoinMs = 10000;   // longest wait of begin(); its default is a minute
+constexpr uint8_t kJoinsBeforeRestart = 3;  // then the Wi-Fi module is restarted: it can hang forever
+constexpr unsigned long kDisconnectMs = 500;  // longest wait for its answer
 constexpr uint8_t kUnsentBeforeReopening = 5;
 
 }  // namespace
@@ -62,7 +62,7 @@ bool WifiLink::open(uint16_t port) {
   return udp_.begin(port) == 1;
 }
 
-// WiFi101 closes the socket by itself, and says so to nobody, when a packet without content comes in.
+// WiFi101 silently closes the socket when an empty packet comes in.
 bool WifiLink::send(const Address& to, const uint8_t* data, uint16_t count) {
   if (is_socket_lost_) return false;  // without one, endPacket() reads beside its table
   if (udp_.beginPacket(IPAddress(to.ip), to.port) != 1) return false;
@@ -72,7 +72,7 @@ bool WifiLink::send(const Address& to, const uint8_t* data, uint16_t count) {
   return is_sent;
 }
 
-// To the network's own broadcast address: a limited one (255.255.255.255) says nothing about the network.
+// To the network's own broadcast address: the limited one (255.255.255.255) names no network.
 bool WifiLink::broadcast(uint16_t port, const uint8_t* data, uint16_t count) {
   const Address everyone{WiFi.localIP() | ~WiFi.subnetMask(), port};
   return send(everyone, data, count);

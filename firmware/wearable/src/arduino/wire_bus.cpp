@@ -67,7 +67,7 @@ bool WireBus::is_free() {
   return false;
 }
 
-// SAM D21 data sheet, SERCOM I2C CTRLA: LOWTOUTEN ends a transaction whose clock is low for 25 to 35 ms.
+// SAM D21 data sheet, SERCOM I2C CTRLA: LOWTOUTEN ends a transaction with the clock low for 25 to 35 ms.
 // It counts by the SERCOMs' slow clock, which the core leaves without a source: here the 32 kHz crystal, which
 // the core has put on generator 1. INACTOUT stays off: its 200 us are less than the BNO055 stretches.
 void WireBus::limit_waits() {
@@ -88,7 +88,7 @@ void WireBus::limit_waits() {
   }
 }
 
-// Open drain by hand: low is driven, high is left to the pull-up and to whoever stretches.
+// Open drain by hand: low is driven, high is left to the pull-up and to clock stretching.
 void WireBus::pull(pin_size_t line, bool is_low) {
   pinMode(line, INPUT);
   if (is_low) {

@@ -14,10 +14,10 @@ using namespace bno055;
 
 constexpr uint32_t kHealthUs = 1000000;
 constexpr uint32_t kPollUs = 10000;             // the chip's output rate
-constexpr uint32_t kStableUs = 10000000;        // running for so long, earlier repairs are forgotten
+constexpr uint32_t kStableUs = 10000000;        // after running this long, earlier repairs are forgotten
 constexpr uint32_t kSlowestSampleUs = 100000;   // a longer gap is a pause, not a rate
 constexpr uint32_t kBusKeptFreeUs = 3700;       // before a sample: the longest other transaction is 3.4 ms
-constexpr uint32_t kSampleLateUs = 5000;        // and so much after its time
+constexpr uint32_t kSampleLateUs = 5000;        // latest time of a sample after its slot
 constexpr uint8_t kMostMisses = 8;              // bus errors in a row, then the chip is searched for
 constexpr uint8_t kMostUnusable = 25;           // readings in a row without an orientation: 0.5 s
 constexpr uint16_t kDoubtUnchanged = 3;         // its noise alone usually changes a reading sooner: a look

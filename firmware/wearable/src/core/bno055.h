@@ -182,7 +182,7 @@ class Bno055 {
   bool has_id_ = false;
   bool has_profile_ = false;  // it is in the chip
   bool is_cold_ = false;             // the first look after power-on
-  bool is_fusion_expected_ = false;  // it ran when the chip was looked at last
+  bool is_fusion_expected_ = false;  // it ran at the last check of the chip
   bool is_fusion_kept_ = false;      // found fusing as told: nothing is lost
   bool is_suspicious_ = false;  // look at the mode at once
   bool is_linear_new_ = false;

@@ -124,7 +124,7 @@ void Bno055::enter_config() {
   }
 }
 
-// The chip resets before it can acknowledge all of it: the answer says nothing.
+// The chip resets before it can acknowledge the whole write: the result means nothing.
 void Bno055::reset(uint32_t now_us) {
   write(kTrigger, kTriggerReset);
   count(counts_.resets);

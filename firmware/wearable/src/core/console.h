@@ -25,7 +25,7 @@
 
 namespace bunraku {
 
-// What a line asks for that the console cannot do by itself: the wearable does it, and says so if it fails.
+// Requests that the console passes on to the wearable, which reports failures.
 enum class Request : uint8_t { kNothing, kSave, kForget, kStrobe, kSaveCalibration, kRestart };
 
 class Console {

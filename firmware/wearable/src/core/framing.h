@@ -23,7 +23,7 @@ uint8_t frame(const uint8_t* packet, uint8_t count, uint8_t (&out)[kLongestFrame
 uint8_t unframe(uint8_t* stuffed, uint8_t count);
 
 // Tells packets from text in what a host sends. A zero byte begins a packet and drops a line begun; the next
-// one ends it, and text is expected again; also after 0.25 s of silence in a packet: whoever types is heard.
+// one ends it, and text is expected again; also after 0.25 s of silence in a packet, so that typed text gets through.
 class CableInput {
  public:
   enum class Found : uint8_t { kNothing, kPacket, kLine, kOverlongLine };
@@ -45,7 +45,7 @@ class CableInput {
   uint8_t count_ = 0;
   bool is_packet_ = false;
   bool is_overlong_ = false;
-  bool is_delivered_ = false;  // what the buffer holds was given out: the next byte starts anew
+  bool is_delivered_ = false;  // the buffer was delivered: the next byte starts a new item
   uint32_t fed_us_ = 0;
   uint32_t damaged_ = 0;
 };

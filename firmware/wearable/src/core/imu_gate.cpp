@@ -19,8 +19,8 @@ constexpr uint32_t kSlackMillidegrees = 3000;         // rounding, and a fusion 
 constexpr uint32_t kHalfTurnUs = 88500;               // 2000 degrees/s reach every orientation by then
 constexpr uint32_t kLongestStepUs = 60000;            // while refusing, no more way than for this is allowed
 constexpr uint32_t kTimeoutUs = 500000;               // after this long, what was believed is forgotten
-constexpr uint8_t kInsisting = 5;                     // so many refused readings that agree are believed
-constexpr uint8_t kConfirming = 2;                    // so many where nothing was believed before
+constexpr uint8_t kInsisting = 5;                     // this many refused readings that agree are believed
+constexpr uint8_t kConfirming = 2;                    // this many where nothing was believed before
 
 uint32_t norm_squared(const Orientation& q) {
   uint32_t sum = 0;

@@ -1,17 +1,17 @@
-// Can this be a hand? Zero, torn and impossibly fast orientations are kept from the box; integers only.
+// Refuses orientations that no hand can have: zero, torn on the I2C bus, too fast. Integers only.
 #pragma once
 
 #include <stdint.h>
 
 namespace bunraku {
 
-// The rules of the box (appliance/sensor/plausibility.py), and one more: the first reading after a reset
-// or a long silence is believed only when the next one agrees with it.
+// The only such check: what reaches the box is signed, and so is what left this gate. The first reading after a
+// reset or a long silence is believed only when the next one agrees with it.
 class ImuGate {
  public:
   enum class Verdict : uint8_t { kAccepted, kRelocated, kZero, kNorm, kTorn, kRate, kUnconfirmed };
 
-  void reset() { has_believed_ = has_refused_ = false; }  // fusion was started anew: forget what came before
+  void reset() { has_believed_ = has_refused_ = false; }  // after a restart of fusion
 
   // `orientation` w, x, y, z with 16384 for 1, as read at `now_us`. Every rule costs 0.5 s at most.
   Verdict admit(const int16_t (&orientation)[4], uint32_t now_us);

@@ -96,7 +96,7 @@ Received Pairing::assigned(const uint8_t* data, const Way& from, uint32_t now_us
   if (assignment.session == 0 || !is_timely) return count(counts_.replayed), Received::kNothing;
   answered_hello_ = hello;
   const bool is_better_linked = link_.lane == Lane::kCable && from.lane == Lane::kWifi;
-  // A live link keeps its address within a session: who only carried the box's word would get the stream.
+  // A live link keeps its address within a session, else a relay of the box's packets would get the stream.
   const bool is_same_link = link_.lane == from.lane && assignment.session == session_;
   if (is_better_linked || is_same_link) return Received::kNothing;
   if (assignment.session != session_) heartbeat_sequence_ = restore_sequence_ = 0;

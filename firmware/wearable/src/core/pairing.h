@@ -40,7 +40,7 @@ enum class Received : uint8_t { kNothing, kAssignment, kHeartbeat, kCall, kResto
 
 class Pairing {
  public:
-  // Starts with no link and no session; device 0 believes nobody. Sequences go on where they were, so that no
+  // Starts with no link and no session; device 0 accepts no packet. Sequences continue where they were, so that no
   // packet ever repeats.
   void begin(uint32_t device_id, const uint8_t (&key)[wire::kKeyBytes], uint32_t boot_nonce);
 
@@ -60,7 +60,7 @@ class Pairing {
   uint8_t reading(const Sample& sample, const Condition& condition, uint32_t now_us,
                   uint8_t (&packet)[wire::kLargest], Way& to);
 
-  // What a hello tells has changed: says it anew where the link is.
+  // The contents of a hello changed: send another one to the link.
   void introduce();
 
   // A calibration was saved: tells the box three times, a second apart, as soon as linked.
@@ -76,7 +76,7 @@ class Pairing {
   const PairingCounts& counts() const { return counts_; }
 
  private:
-  static constexpr uint8_t kRemembered = 64;  // readings whose time of sending is known, for the round trip
+  static constexpr uint8_t kRemembered = 64;  // readings with a known time of sending, for the round trip
 
   Received assigned(const uint8_t* data, const Way& from, uint32_t now_us);
   Received heard(const uint8_t* data, uint32_t now_us);
@@ -97,7 +97,7 @@ class Pairing {
   bool lane_is_up_[kLanes] = {};
   Timer hello_pause_[kLanes];
   Way link_;
-  Way answer_to_;           // who called, or is to know more
+  Way answer_to_;           // origin of a call, or of the link
   bool is_called_ = false;  // a hello there is due
   Timer call_pause_;
   Timer heard_;             // runs while the box was heard in the last 3 s

@@ -1,5 +1,5 @@
 // What the core needs from the world: seven interfaces, implemented by the sketch and by the simulation.
-// No call may block for longer than its comment says: the core streams at 50 Hz on one thread.
+// No call may block longer than its comment states: the core streams at 50 Hz on one thread.
 #pragma once
 
 #include <stdint.h>

@@ -13,7 +13,7 @@ class Schedule {
     period_us_ = period_us;
   }
 
-  // True once for each slot whose time has come.
+  // True once for each slot that is due.
   bool is_due(uint32_t now_us) {
     const uint32_t ahead_us = next_us_ - now_us;
     if (ahead_us != 0 && ahead_us <= period_us_) return false;  // the next slot is never further ahead

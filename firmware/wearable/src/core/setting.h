@@ -1,4 +1,4 @@
-// What `set ...` says, checked and put into the settings.
+// Parses, checks and stores `set ...`.
 #pragma once
 
 #include "answer.h"

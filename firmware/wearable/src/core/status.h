@@ -10,7 +10,7 @@ namespace bunraku {
 enum class State : uint8_t {
   kNotProvisioned,  // has no device id or no key: waits for the cable
   kJoining,         // looks for its Wi-Fi network
-  kGreeting,        // at least one lane is up; says hello and waits to be assigned
+  kGreeting,        // at least one lane is up; sends hellos and waits for an assignment
   kLinked,          // streams to its box
 };
 

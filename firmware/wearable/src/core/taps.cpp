@@ -9,7 +9,7 @@ constexpr uint32_t kSpike = 1000, kQuiet = 300;
 constexpr uint32_t kSettledUs = 300'000;  // quiet before the first tap and after the second
 constexpr uint32_t kLongestUs = 90'000;   // a tap rings this long; what stays loud longer is a movement
 constexpr uint32_t kNearestUs = 100'000, kFurthestUs = 500'000;  // from the first tap to the second
-constexpr uint32_t kGapUs = 60'000;       // missing samples: begin anew
+constexpr uint32_t kGapUs = 60'000;       // missing samples: start again
 
 uint32_t square(int16_t value) { return static_cast<uint32_t>(static_cast<int32_t>(value) * value); }
 

@@ -14,7 +14,7 @@ constexpr uint32_t kSecondUs = 1'000'000;
 constexpr uint32_t kImuStartsUs = 10'000;  // its wait for the chip begins, and passes during the first join
 constexpr uint32_t kImuFirstMs = 2'000;
 constexpr uint32_t kConsoleFirstUs = 10'000'000;  // after a hang: time to open the port, before the next one
-constexpr uint32_t kUnlinkedForSavingUs = 30'000'000;  // then nobody dances: the heading may be lost
+constexpr uint32_t kUnlinkedForSavingUs = 30'000'000;  // then no dance is running: the heading may be lost
 
 }  // namespace
 
@@ -24,7 +24,7 @@ void Wearable::begin() {
   status_.boot_nonce = draw_boot_nonce(settings_.key, ports_.flash, ports_.board);
   imu_.start(settings_.imu, now_us);
   start_pairing();
-  is_radio_in_doubt_ = ports_.board.was_reset_by_watchdog();  // nothing else blocks for so long
+  is_radio_in_doubt_ = ports_.board.was_reset_by_watchdog();  // nothing else blocks this long
   join_pause_.start(now_us, is_radio_in_doubt_ ? kConsoleFirstUs : kImuStartsUs);
   schedule_.start(now_us, kSecondUs / pairing_.rate_hz());
   measure_battery(now_us);
@@ -86,7 +86,7 @@ void Wearable::keep_calibration(uint32_t now_us) {
   pairing_.announce_profile(offsets);
 }
 
-// By itself only where nobody's heading is lost by it, and once: a calibration in use stays as it is.
+// Automatically only when no heading is lost, and once: a calibration in use stays.
 bool Wearable::may_save_calibration(uint32_t now_us) {
   if (pairing_.is_linked()) linked_lately_.start(now_us, kUnlinkedForSavingUs);
   if (linked_lately_.is_running(now_us) || has_saved_profile_) return false;
@@ -110,7 +110,7 @@ bool Wearable::store_profile(const uint8_t* imu_id, const uint8_t* offsets) {  /
   return !status_.is_profile_unsaved;
 }
 
-// What is due to be said: hellos, and a calibration that was saved.
+// Sends what is due: hellos, and a saved calibration.
 void Wearable::greet(uint32_t now_us) {
   uint8_t packet[wire::kLargest];
   Way to;
@@ -148,7 +148,7 @@ void Wearable::set_lamp(bool is_on) {
   status_.is_light_on = is_on;
 }
 
-// A hello tells whose calibration the box may know: the IMU gets a moment to say who it is.
+// A hello carries the IMU's id, for its kept calibration: the IMU gets a moment to report it.
 bool Wearable::may_greet() {
   may_greet_ = may_greet_ || imu_.has_id() || imu_.has_failed() || uptime_ms_ > kImuFirstMs;
   return may_greet_;

@@ -78,7 +78,7 @@ class Wearable {
   uint32_t uptime_ms_ = 0, uptime_rest_us_ = 0;
   Timer battery_pause_;
   Timer strobe_;
-  Timer saving_;                // the lamp says: do not switch off
+  Timer saving_;                // the lamp warns: do not switch off
   Timer restart_pause_;         // the answer still leaves
   bool is_restarting_ = false;
 

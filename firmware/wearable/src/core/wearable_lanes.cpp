@@ -34,7 +34,7 @@ void Wearable::serve_cable(uint32_t now_us) {
     conversation_.stop();
     cable_first_.start(now_us, kCableFirstUs);
   }
-  // Hellos would disturb whoever types; a link on the cable goes on.
+  // Hellos would disturb typing; a link on the cable continues.
   const bool is_quiet = conversation_.is_running(now_us) && pairing_.link().lane != Lane::kCable;
   pairing_.set_lane(Lane::kCable, is_connected && !is_quiet && may_greet());
   uint8_t byte;
@@ -113,7 +113,7 @@ void Wearable::save_calibration(uint32_t now_us) {
   saving_.start(now_us, kSavingUs);
 }
 
-// From now on these settings count: pairing starts anew, Wi-Fi and IMU where their settings are others.
+// Apply settings: restarts pairing, and Wi-Fi and IMU if their settings changed.
 void Wearable::adopt(const Settings& settings, uint32_t now_us) {
   const bool is_same_network = strcmp(settings.network, settings_.network) == 0 &&
                                strcmp(settings.password, settings_.password) == 0;

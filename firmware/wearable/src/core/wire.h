@@ -1,5 +1,5 @@
 // The packets between a wearable and the box. Made from appliance/sensor/wire.py; do not edit.
-// `python -m appliance.sensor.generate_wire` writes it anew.
+// Regenerate it with `python -m tools.generate_wire`.
 #pragma once
 
 #include <stdint.h>
@@ -54,8 +54,15 @@ void get(const uint8_t*& at, Value (&values)[count]) {
   for (Value& value : values) get(at, value);
 }
 
-// The sensor is on and looks for its box: each 500 ms on every way that is up, broadcast on Wi-Fi.
-// Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+// Each packet has its fields as a macro too: one list for writing, reading and the tests.
+#define BUNRAKU_PUT(field) put(at, field);
+#define BUNRAKU_GET(field) get(at, field);
+
+// The sensor is on and looks for its box: every 500 ms on network and cable, broadcast on Wi-Fi.
+// Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` does not check the tag.
+#define BUNRAKU_HELLO(X) \
+X(device_id) X(boot_nonce) X(session) X(sequence) X(wire_hash) X(firmware_major) X(firmware_minor) \
+X(firmware_patch) X(battery) X(flags) X(imu_id)
 struct Hello {
   static constexpr uint8_t kKind = 1;
   static constexpr uint8_t kSignedBytes = 45;
@@ -64,7 +71,7 @@ struct Hello {
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
   uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
   uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
-  uint32_t wire_hash;  // hash of this declaration; a mismatch says which side to update
+  uint32_t wire_hash;  // hash of this declaration; a mismatch means that one side needs an update
   uint8_t firmware_major;  // firmware version
   uint8_t firmware_minor;
   uint8_t firmware_patch;
@@ -74,36 +81,18 @@ struct Hello {
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
-    put(at, device_id);
-    put(at, boot_nonce);
-    put(at, session);
-    put(at, sequence);
-    put(at, wire_hash);
-    put(at, firmware_major);
-    put(at, firmware_minor);
-    put(at, firmware_patch);
-    put(at, battery);
-    put(at, flags);
-    put(at, imu_id);
+    BUNRAKU_HELLO(BUNRAKU_PUT)
   }
   void read(const uint8_t* at) {
     at += sizeof kMagic + sizeof kVersion + sizeof kKind;
-    get(at, device_id);
-    get(at, boot_nonce);
-    get(at, session);
-    get(at, sequence);
-    get(at, wire_hash);
-    get(at, firmware_major);
-    get(at, firmware_minor);
-    get(at, firmware_patch);
-    get(at, battery);
-    get(at, flags);
-    get(at, imu_id);
+    BUNRAKU_HELLO(BUNRAKU_GET)
   }
 };
 
-// The box takes the sensor: stream to the sender of this packet. Bound to the hello that it answers.
-// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+// The box takes the sensor, which then streams to the sender of this packet. Bound to one hello.
+// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` does not check the tag.
+#define BUNRAKU_ASSIGNMENT(X) \
+X(device_id) X(boot_nonce) X(session) X(sequence) X(hello_sequence) X(hand) X(rate_hz) X(led)
 struct Assignment {
   static constexpr uint8_t kKind = 2;
   static constexpr uint8_t kSignedBytes = 27;
@@ -112,37 +101,26 @@ struct Assignment {
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
   uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
   uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
-  uint32_t hello_sequence;  // sequence of the hello that is answered
+  uint32_t hello_sequence;  // sequence of the hello that it answers
   uint8_t hand;  // which hand of the show, from 0; 255 none
   uint8_t rate_hz;  // readings a second
   uint8_t led;  // 0 off, 1 on, 2 slow, 3 fast, 4 strobe
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
-    put(at, device_id);
-    put(at, boot_nonce);
-    put(at, session);
-    put(at, sequence);
-    put(at, hello_sequence);
-    put(at, hand);
-    put(at, rate_hz);
-    put(at, led);
+    BUNRAKU_ASSIGNMENT(BUNRAKU_PUT)
   }
   void read(const uint8_t* at) {
     at += sizeof kMagic + sizeof kVersion + sizeof kKind;
-    get(at, device_id);
-    get(at, boot_nonce);
-    get(at, session);
-    get(at, sequence);
-    get(at, hello_sequence);
-    get(at, hand);
-    get(at, rate_hz);
-    get(at, led);
+    BUNRAKU_ASSIGNMENT(BUNRAKU_GET)
   }
 };
 
-// One orientation of the sensor, as often a second as the assignment says: 50 times.
-// Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+// One orientation of the sensor, at the rate of the assignment: 50 a second.
+// Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` does not check the tag.
+#define BUNRAKU_READING(X) \
+X(device_id) X(boot_nonce) X(session) X(sequence) X(sensor_time_us) X(orientation) X(calibration) \
+X(battery) X(round_trip) X(taps) X(recoveries) X(flags)
 struct Reading {
   static constexpr uint8_t kKind = 3;
   static constexpr uint8_t kSignedBytes = 39;
@@ -162,38 +140,18 @@ struct Reading {
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
-    put(at, device_id);
-    put(at, boot_nonce);
-    put(at, session);
-    put(at, sequence);
-    put(at, sensor_time_us);
-    put(at, orientation);
-    put(at, calibration);
-    put(at, battery);
-    put(at, round_trip);
-    put(at, taps);
-    put(at, recoveries);
-    put(at, flags);
+    BUNRAKU_READING(BUNRAKU_PUT)
   }
   void read(const uint8_t* at) {
     at += sizeof kMagic + sizeof kVersion + sizeof kKind;
-    get(at, device_id);
-    get(at, boot_nonce);
-    get(at, session);
-    get(at, sequence);
-    get(at, sensor_time_us);
-    get(at, orientation);
-    get(at, calibration);
-    get(at, battery);
-    get(at, round_trip);
-    get(at, taps);
-    get(at, recoveries);
-    get(at, flags);
+    BUNRAKU_READING(BUNRAKU_GET)
   }
 };
 
-// The box is there: each second, and at once when the light changes. Three seconds without it and the sensor says hello again.
-// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+// The box is there: every second, and at once when the light changes. After three seconds without it the sensor sends hellos again.
+// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` does not check the tag.
+#define BUNRAKU_HEARTBEAT(X) \
+X(device_id) X(boot_nonce) X(session) X(sequence) X(echo_sequence) X(echo_held_us) X(led)
 struct Heartbeat {
   static constexpr uint8_t kKind = 4;
   static constexpr uint8_t kSignedBytes = 29;
@@ -208,28 +166,18 @@ struct Heartbeat {
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
-    put(at, device_id);
-    put(at, boot_nonce);
-    put(at, session);
-    put(at, sequence);
-    put(at, echo_sequence);
-    put(at, echo_held_us);
-    put(at, led);
+    BUNRAKU_HEARTBEAT(BUNRAKU_PUT)
   }
   void read(const uint8_t* at) {
     at += sizeof kMagic + sizeof kVersion + sizeof kKind;
-    get(at, device_id);
-    get(at, boot_nonce);
-    get(at, session);
-    get(at, sequence);
-    get(at, echo_sequence);
-    get(at, echo_held_us);
-    get(at, led);
+    BUNRAKU_HEARTBEAT(BUNRAKU_GET)
   }
 };
 
-// The box does not know the session of a reading, because it was started anew: say hello at once.
-// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+// The box does not know the session of a reading, because it was restarted: send a hello at once.
+// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` does not check the tag.
+#define BUNRAKU_CALL(X) \
+X(device_id) X(boot_nonce) X(session) X(sequence)
 struct Call {
   static constexpr uint8_t kKind = 5;
   static constexpr uint8_t kSignedBytes = 20;
@@ -241,22 +189,18 @@ struct Call {
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
-    put(at, device_id);
-    put(at, boot_nonce);
-    put(at, session);
-    put(at, sequence);
+    BUNRAKU_CALL(BUNRAKU_PUT)
   }
   void read(const uint8_t* at) {
     at += sizeof kMagic + sizeof kVersion + sizeof kKind;
-    get(at, device_id);
-    get(at, boot_nonce);
-    get(at, session);
-    get(at, sequence);
+    BUNRAKU_CALL(BUNRAKU_GET)
   }
 };
 
-// A calibration that the sensor has learned, for the box to keep: an update erases the sensor's own.
-// Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+// A calibration that the sensor has learned, for the box to keep: an update erases the sensor's copy.
+// Sensor to box; `write` fills the first kSignedBytes, the tag follows; `read` does not check the tag.
+#define BUNRAKU_PROFILE(X) \
+X(device_id) X(boot_nonce) X(session) X(sequence) X(imu_id) X(offsets)
 struct Profile {
   static constexpr uint8_t kKind = 6;
   static constexpr uint8_t kSignedBytes = 58;
@@ -270,26 +214,18 @@ struct Profile {
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
-    put(at, device_id);
-    put(at, boot_nonce);
-    put(at, session);
-    put(at, sequence);
-    put(at, imu_id);
-    put(at, offsets);
+    BUNRAKU_PROFILE(BUNRAKU_PUT)
   }
   void read(const uint8_t* at) {
     at += sizeof kMagic + sizeof kVersion + sizeof kKind;
-    get(at, device_id);
-    get(at, boot_nonce);
-    get(at, session);
-    get(at, sequence);
-    get(at, imu_id);
-    get(at, offsets);
+    BUNRAKU_PROFILE(BUNRAKU_GET)
   }
 };
 
-// A calibration that the box has kept, for a sensor that has none. With the first five heartbeats.
-// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+// A kept calibration for a sensor that has none, with the first five heartbeats.
+// Box to sensor; `write` fills the first kSignedBytes, the tag follows; `read` does not check the tag.
+#define BUNRAKU_RESTORE(X) \
+X(device_id) X(boot_nonce) X(session) X(sequence) X(imu_id) X(offsets)
 struct Restore {
   static constexpr uint8_t kKind = 7;
   static constexpr uint8_t kSignedBytes = 58;
@@ -298,28 +234,21 @@ struct Restore {
   uint32_t boot_nonce;  // random, drawn by the sensor at each power-on
   uint32_t session;  // given by the box to this power-on, by a hash with its secret; 0 before one
   uint32_t sequence;  // counts this kind of packet from this sender to this receiver, since its start
-  uint8_t imu_id[16];  // unique id of the BNO055; another one ignores it
+  uint8_t imu_id[16];  // unique id of the BNO055 that it is for
   uint8_t offsets[22];  // BNO055 registers 0x55 to 0x6A
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
-    put(at, device_id);
-    put(at, boot_nonce);
-    put(at, session);
-    put(at, sequence);
-    put(at, imu_id);
-    put(at, offsets);
+    BUNRAKU_RESTORE(BUNRAKU_PUT)
   }
   void read(const uint8_t* at) {
     at += sizeof kMagic + sizeof kVersion + sizeof kKind;
-    get(at, device_id);
-    get(at, boot_nonce);
-    get(at, session);
-    get(at, sequence);
-    get(at, imu_id);
-    get(at, offsets);
+    BUNRAKU_RESTORE(BUNRAKU_GET)
   }
 };
+
+#undef BUNRAKU_PUT
+#undef BUNRAKU_GET
 
 }  // namespace wire
 }  // namespace bunraku

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import yaml
 
-from appliance.lights.open_fixture_library import LibraryError, profile_values
+from appliance.fixture_library.open_fixture_library import LibraryError, profile_values
 from appliance.pose.foreign_file import content, plain_json
 from appliance.show.config_error import ConfigError, Problem
 from appliance.show.fixture_profile import FOLDER, ProfileConfig

@@ -1,6 +1,6 @@
 """Writes what is made from the wire's declaration: wire.h, the tables in docs/wire.md, the golden vectors.
 
-`python -m appliance.sensor.generate_wire` in the repository writes them anew; a test fails when one is stale.
+`python -m tools.generate_wire` in the repository regenerates them; a test fails when one is stale.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from appliance.sensor import framing, wire
-from appliance.sensor.generate_header import header
+from tools.wire_header import header
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[1]
 TABLES = REPOSITORY / "docs" / "wire.md"
 HEADER = REPOSITORY / "firmware" / "wearable" / "src" / "core" / "wire.h"
 VECTORS = REPOSITORY / "tests" / "golden" / "wire.json"

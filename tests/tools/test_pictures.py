@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from hw_sim.lamp_picture import GROUPS, draw_lamp
-from hw_sim.lamp_traces import SHOWN_S, Trace, traces
-from hw_sim.wearing_picture import draw_wearing
+from tools.lamp_picture import GROUPS, draw_lamp
+from tools.lamp_traces import SHOWN_S, Trace, traces
+from tools.wearing_picture import draw_wearing
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from appliance.cli.app import command_line
-from appliance.lights.open_fixture_library import LibraryError, profile_values
+from appliance.fixture_library.open_fixture_library import LibraryError, profile_values
 from appliance.lights.patch import Patch
 from appliance.show.fixture_profile import load_profile
 from appliance.show.lights import LightsConfig, drivable

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from textwrap import wrap
+
 from appliance.sensor import wire
 from appliance.sensor.wire import Coding, Layout
 
 TOP = """\
 // The packets between a wearable and the box. Made from appliance/sensor/wire.py; do not edit.
-// `python -m appliance.sensor.generate_wire` writes it anew.
+// Regenerate it with `python -m tools.generate_wire`.
 #pragma once
 
 #include <stdint.h>
@@ -61,11 +63,17 @@ template <typename Value, uint8_t count>
 void get(const uint8_t*& at, Value (&values)[count]) {
   for (Value& value : values) get(at, value);
 }
+
+// Each packet has its fields as a macro too: one list for writing, reading and the tests.
+#define BUNRAKU_PUT(field) put(at, field);
+#define BUNRAKU_GET(field) get(at, field);
 """
 
 PACKET = """
 // %(meaning)s
-// %(direction)s; `write` fills the first kSignedBytes, the tag follows; `read` looks at no tag.
+// %(direction)s; `write` fills the first kSignedBytes, the tag follows; `read` does not check the tag.
+#define %(macro)s(X) \\
+%(fields)s
 struct %(name)s {
   static constexpr uint8_t kKind = %(kind)d;
   static constexpr uint8_t kSignedBytes = %(signed)d;
@@ -74,16 +82,19 @@ struct %(name)s {
 
   void write(uint8_t* at) const {
     put(at, kMagic), put(at, kVersion), put(at, kKind);
-%(puts)s
+    %(macro)s(BUNRAKU_PUT)
   }
   void read(const uint8_t* at) {
     at += sizeof kMagic + sizeof kVersion + sizeof kKind;
-%(gets)s
+    %(macro)s(BUNRAKU_GET)
   }
 };
 """
 
 BOTTOM = """
+#undef BUNRAKU_PUT
+#undef BUNRAKU_GET
+
 }  // namespace wire
 }  // namespace bunraku
 """
@@ -116,8 +127,8 @@ def _packet(layout: Layout) -> str:
         "signed": layout.signed_bytes,
         "size": layout.size,
         "members": "\n".join(_member(*field) for field in layout.fields),
-        "puts": "\n".join(f"    put(at, {name});" for name, _, _ in layout.fields),
-        "gets": "\n".join(f"    get(at, {name});" for name, _, _ in layout.fields),
+        "macro": f"BUNRAKU_{layout.name.upper()}",
+        "fields": " \\\n".join(wrap(" ".join(f"X({name})" for name, _, _ in layout.fields), 106)),
     }
 
 

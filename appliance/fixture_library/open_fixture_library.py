@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
-from appliance.lights.library_attribute import capabilities_of, meaning_of
+from appliance.fixture_library.attribute_meaning import capabilities_of, meaning_of
 from appliance.show.fixture_profile import DIMMER, FINE, MAX_CHANNELS, UNUSED
 
 Json = Mapping[str, Any]

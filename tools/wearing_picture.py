@@ -1,4 +1,4 @@
-"""docs/pictures/wearing.png, by `python -m hw_sim.wearing_picture`: neutral pose, sensor and its arrow."""
+"""docs/pictures/wearing.png, by `python -m tools.wearing_picture`: neutral pose, sensor and its arrow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/pictures/lamp.png, by `python -m hw_sim.lamp_picture`: what the sensor's lamp shows and means.
+"""docs/pictures/lamp.png, by `python -m tools.lamp_picture`: what the sensor's lamp shows and means.
 
 Every row is a trace of the compiled firmware in its simulated world, not of a table beside it.
 """
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hw_sim.lamp_traces import SHOWN_S, Trace, traces
+from tools.lamp_traces import SHOWN_S, Trace, traces
 
 PICTURE = Path("docs/pictures/lamp.png")
 WIDTH, ROW, TOP, HEADING = 1280, 74, 84, 58
