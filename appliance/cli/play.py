@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from appliance.box.log_writer import LogWriter
 from appliance.box.show_state import forget_show_state
 from appliance.box.stop_signals import stop_signals
-from appliance.sensor.memory_block import forget_memory
+from appliance.sensor.memory import forget_memory
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.control import ControlConfig
@@ -89,7 +89,7 @@ def play_show(
             with _accompanied(company + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:
-                from appliance.keeper.kept import keep_rest
+                from appliance.keeper.keeper import keep_rest
 
                 keep_rest(stage.box, stage.sharing.noted, journal, minutes, speaker.say)
         if not alone:

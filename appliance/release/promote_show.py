@@ -1,50 +1,52 @@
-"""The proof: a chosen show that has danced is a good one, and so it is kept; one that has not is let go."""
+"""A chosen show that has danced is a good one: mirrored to the disk once in a stage's life."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
-from appliance.keeper.keeper_health import CHOICE_NOT_KEPT
+from appliance.keeper.fallback import CHOICE_NOT_KEPT
+from appliance.keeper.mirror import reason_of
 from appliance.outputs.frame_reader import FrameReader
 from appliance.release.choice import CHOSEN, Choice, alone_in
 from appliance.release.start_attempts import PROVEN_S
 
-_AGAIN_S = 10.0  # a disk that took nothing is tried again
 
+class MirroredProof:
+    """After PROVEN_S of dancing: the pair that dances is good, and those that did not dance are let go."""
 
-class Proof:
-    """A carrier of the keeper: notes once in a stage's life, after PROVEN_S of dancing, what became of it."""
-
-    fallback = CHOICE_NOT_KEPT.name
+    name, fallback = "That a show has danced", CHOICE_NOT_KEPT
+    recovered = "That the show has danced is kept now."
 
     def __init__(self, runtime: Path, chosen: Path) -> None:
-        self.complaint = ""
         self._frames = FrameReader(runtime)
         self._chosen = chosen
         self._proven: tuple[int, str] | None = None
-        self._again_at = 0.0
 
-    def turn(self, now: float) -> None:
-        """Look whether the stage has danced for long enough; monotonic seconds."""
+    def copy(self, now: float) -> None:
+        """As Mirrored; while a preflight reads a stick it waits for another turn."""
         newest, facts = self._frames.newest(now), self._frames.facts
-        if newest is None or facts is None or facts.rehearsal or now < self._again_at:
-            return
-        if newest.left - facts.started < PROVEN_S:
+        if newest is None or facts is None or facts.rehearsal or newest.left - facts.started < PROVEN_S:
             return
         choice = Choice.read(self._chosen)
         if choice is None or facts.show_directory != choice.first.show.resolve():
             return
-        if self._proven != (facts.pid, choice.first.id) and self._is_noted(choice.first.id, now):
-            self._proven = (facts.pid, choice.first.id)
+        proven = (facts.pid, choice.first.id)
+        if self._proven != proven and self._is_noted(choice.first.id):
+            self._proven = proven
 
-    def last_turn(self) -> None:
-        """Nothing waits."""
+    def explain(self, error: Exception) -> str:
+        """The complaint."""
+        return (
+            f"{self._chosen.parent} or the data partition: that the show has danced cannot be kept "
+            f"({reason_of(error)}). The dance goes on; after the next power-on the show is tried again. "
+            "Check the data partition."
+        )
+
+    def close(self) -> None:
+        """Release the shared frame."""
         self._frames.close()
 
-    def _is_noted(self, identity: str, now: float) -> bool:
-        """Nobody is waited for: while a preflight reads a stick, the journal has to go on."""
-        self.complaint, self._again_at = "", now + _AGAIN_S
+    def _is_noted(self, identity: str) -> bool:
         try:
             with alone_in(self._chosen.parent):
                 choice = Choice.read(self._chosen)
@@ -58,12 +60,4 @@ class Proof:
                     noted.write(choice.data / CHOSEN)
         except BlockingIOError:
             return False
-        except OSError as error:
-            self.complaint = (
-                f"{self._chosen.parent} or the data partition: that the show has danced cannot be kept "
-                f"({os.strerror(error.errno or 0)}). The dance goes on; after the next power-on it is tried "
-                "anew. Look at the data partition."
-            )
-            return False
-        self._again_at = 0.0
         return True

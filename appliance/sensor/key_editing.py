@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import yaml
 
-from appliance.box.private_file import put_in_place, write_beside
+from appliance.box.durable import put_in_place, write_beside
 from appliance.sensor.keys import (
     HEADER,
     KeyFileError,
@@ -80,7 +80,7 @@ class KeyEditing:
 
     def prepare(self) -> None:
         """Write the changed file beside the old one, so that what can fail fails now. Raises OSError."""
-        self._beside = write_beside(self.path, self._text)
+        self._beside = write_beside(self.path, self._text.encode(), private=True)
 
     def commit(self) -> None:
         """Let the changed file take the old one's place. Raises OSError."""

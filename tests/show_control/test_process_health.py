@@ -5,23 +5,18 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from appliance.box.checkpoint_file import CheckpointCarrier
 from appliance.box.fallback import Fallback, Fallbacks
 from appliance.box.process_health import LATE_S, ProcessHealth, ProcessHealthWriter
-from appliance.keeper.journal_carrier import JournalCarrier
-from appliance.keeper.keeper_health import (
-    CHOICE_NOT_KEPT,
-    JOURNAL_STOPPED,
-    PLACE_NOT_KEPT,
-    SENSORS_NOT_KEPT,
-    KeeperHealth,
-)
-from appliance.keeper.sensor_memory_carrier import MemoryCarrier
+from appliance.keeper.fallback import CHOICE_NOT_KEPT, JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT
+from appliance.keeper.journal import MirroredJournal
+from appliance.keeper.keeper import KeeperHealth
+from appliance.keeper.mirror import Mirror, Mirrored
+from appliance.keeper.records import mirrored_checkpoint, mirrored_sensor_memory
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair
-from appliance.release.promote_show import Proof
+from appliance.release.promote_show import MirroredProof
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import Status
 from tests.bundles import FIGURE
@@ -85,25 +80,32 @@ def test_a_second_projector_says_nothing(folder: Path) -> None:
     first.close()
 
 
+def mirror(mirrored: Mirrored) -> Mirror:
+    return Mirror(mirrored, lambda words: None)
+
+
 def test_the_keeper_tells_that_the_journal_has_stopped(folder: Path) -> None:
-    carrier = JournalCarrier(folder, Path("/nowhere/at/all"), 1.0, lambda words: None)
-    carrier.complaint = "The disk is full."
+    journal = mirror(MirroredJournal(folder, Path("/nowhere/at/all"), 1.0))
+    journal.complaint = "The disk is full."
     keeper = KeeperHealth(folder)
-    keeper.tell([carrier], 10.0)
+    keeper.report([journal], 10.0)
     assert told(ProcessHealth(folder), 10.0) == {JOURNAL_STOPPED.name: ("keeper", 1, True)}
     keeper.end(11.0)
 
 
 def test_the_keeper_tells_all_that_it_cannot_keep(folder: Path) -> None:
-    chosen, place = Proof(folder, folder / CHOSEN), CheckpointCarrier(folder, folder, lambda words: None)
-    sensors = MemoryCarrier(folder, folder, lambda words: None)
+    chosen, place = (
+        mirror(MirroredProof(folder, folder / CHOSEN)),
+        mirror(mirrored_checkpoint(folder, folder)),
+    )
+    sensors = mirror(mirrored_sensor_memory(folder, folder))
     chosen.complaint = place.complaint = sensors.complaint = "The disk is read-only."
     keeper = KeeperHealth(folder)
-    keeper.tell([chosen, place, sensors], 10.0)
+    keeper.report([chosen, place, sensors], 10.0)
     rows = {PLACE_NOT_KEPT.name, SENSORS_NOT_KEPT.name, CHOICE_NOT_KEPT.name}
     assert set(told(ProcessHealth(folder), 10.0)) == rows
     chosen.complaint = place.complaint = sensors.complaint = ""
-    keeper.tell([chosen, place, sensors], 12.0)
+    keeper.report([chosen, place, sensors], 12.0)
     assert not any(active for _, _, active in told(ProcessHealth(folder), 12.0).values())
     keeper.end(13.0)
 

@@ -12,7 +12,7 @@ import pytest
 
 from appliance.box.fallback import RECENT_S, Fallback, Fallbacks, Fallen, fallen
 from appliance.box.process_health import OF_THE_COMPANY
-from appliance.keeper.keeper_health import OF_THE_KEEPER
+from appliance.keeper.fallback import OF_THE_KEEPER
 from appliance.lights.fallback import OF_THE_LIGHTS
 from appliance.projector.fallback import OF_THE_PROJECTOR
 from appliance.sensor.link import SensorReading

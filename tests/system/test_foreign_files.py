@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 from appliance.box.block import BlockReader, BlockWriter
-from appliance.box.checkpoint import Checkpoint, packed, unpacked
-from appliance.box.checkpoint_file import read_checkpoint
+from appliance.box.checkpoint import Checkpoint, packed, read_checkpoint, unpacked
 from appliance.cli.run_with_timeout import within
 from appliance.lights.convert import convert_file
 from appliance.outputs.dmx.identity import component_identifier

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader
-from appliance.box.checkpoint_file import CheckpointFile, read_checkpoint
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, packed, read_checkpoint
+from appliance.box.record import SlotFile
 from tests.bundles import write_show
 from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
 
@@ -154,8 +154,8 @@ def await_carried(folder: Path) -> None:
 
 
 def _as_of_another_boot(path: Path, place: Checkpoint) -> None:
-    file = CheckpointFile(path)
-    file.write(replace(place, boot="of another boot"))
+    file = SlotFile(path)
+    file.write(packed(replace(place, boot="of another boot")))
     file.close()
 
 
