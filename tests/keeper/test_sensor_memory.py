@@ -152,9 +152,8 @@ def test_nothing_new_writes_nothing(box: Box) -> None:
     before = (box.state / FILE_NAME).stat()
     for turn in range(3):
         box.keeper.turn(102.0 + turn)
-    Mirror(mirrored_sensor_memory(box.runtime, box.state), silent).last_turn(
-        105.0
-    )  # a keeper that starts anew finds it there
+    restarted = Mirror(mirrored_sensor_memory(box.runtime, box.state), silent)
+    restarted.last_turn(105.0)  # it finds on the disk what memory has
     assert os.path.samestat((box.state / FILE_NAME).stat(), before)
     memory.close()
 

@@ -61,7 +61,7 @@ def test_a_rehearsal_leaves_what_the_venue_keeps_and_the_show_goes_on_behind_it(
         box.await_words("After a restart of the stage the show goes on")
         assert box.end() == 0
         assert "Traceback" not in box.words
-    assert read_memory((tmp_path / "state" / FILE_NAME).read_text())[1] == PROFILES
+    assert read_memory((tmp_path / "state" / FILE_NAME).read_bytes())[1] == PROFILES
 
 
 def test_a_rehearsal_that_is_killed_is_not_gone_on_with(tmp_path: Path) -> None:
