@@ -174,11 +174,11 @@ def test_a_return_measures_nothing_and_reads_no_phrase(show: Path, tmp_path: Pat
     with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
         box.frames(5)
         runtime = tmp_path / "runtime"
-        measured = (runtime / "admission.json").read_bytes()
+        measured = (runtime / "admission").read_bytes()
         [phrase] = (runtime / "prepared").iterdir()
         made = phrase.stat().st_mtime_ns
         box.kill_and_restart()
         box.frames(5)
-        assert (runtime / "admission.json").read_bytes() == measured
+        assert (runtime / "admission").read_bytes() == measured
         assert json.loads(measured)["measured"]["asked_coding"] == 3
         assert phrase.stat().st_mtime_ns == made
