@@ -79,7 +79,7 @@ def _play(wishes: Wishes) -> int:
 
     chosen = wishes.pop("chosen", None)
     if isinstance(chosen, Path):
-        from appliance.release.start_attempts import ended_well, pair_to_dance
+        from appliance.release.trial import ended_well, pair_to_dance
 
         pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
         wishes |= {"show": pair.show, "box": pair.box, "proven": True}  # by the preflight

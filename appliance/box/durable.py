@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
+
+_LOCK_RETRY_S = 0.02
 
 
 def write_whole(path: Path, content: bytes, private: bool = False) -> None:
@@ -75,6 +79,25 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
+@contextlib.contextmanager
+def alone_in(folder: Path, patience_s: float = 0.0) -> Iterator[None]:
+    """One process at a time in a folder, even a read-only one; without the folder there is nothing to guard.
+
+    Raises BlockingIOError where another process does not leave within `patience_s`: it may hang on a disk.
+    """
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except OSError:
+        yield
+        return
+    try:
+        _lock(descriptor, time.monotonic() + patience_s)
+        yield
+    finally:
+        fcntl.flock(descriptor, fcntl.LOCK_UN)  # a fork of ours that hangs has it open too
+        os.close(descriptor)
+
+
 def _beside(path: Path) -> Path:
     """Where the new content of `path` is written before it takes its place."""
     return path.with_name(f".{path.name}.new")
@@ -85,3 +108,13 @@ def _give_to_owner(descriptor: int, path: Path) -> None:
     owner = (path if path.exists() else path.parent).stat()
     if (owner.st_uid, owner.st_gid) != (os.geteuid(), os.getegid()) and (os.geteuid() == 0 or path.exists()):
         os.fchown(descriptor, owner.st_uid, owner.st_gid)
+
+
+def _lock(descriptor: int, until: float) -> None:
+    while True:
+        try:
+            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= until:
+                raise
+            time.sleep(_LOCK_RETRY_S)

@@ -63,7 +63,7 @@ class Fallbacks:
         """Whether it is in force for longer than its moment; not counted again."""
         self._tallies[name].active = active
 
-    def told(self, now: float) -> list[Fallen]:
+    def happened(self, now: float) -> list[Fallen]:
         """Those that ever happened, in their order."""
         return [
             Fallen(name, one.count, one.active or now < one.recent_until, one.words)
@@ -73,12 +73,12 @@ class Fallbacks:
 
     def line(self, now: float) -> str:
         """The names of those in force, for the status line; "" on a good night."""
-        names = [one.name for one in self.told(now) if one.active]
+        names = [one.name for one in self.happened(now) if one.active]
         return f"fallbacks: {', '.join(names)}" if names else ""
 
 
 def fallen(values: Any) -> tuple[Fallen, ...]:
-    """From JSON, as `told` gave them; what is none of ours is left out."""
+    """From JSON, as `happened` gave them; anything else is left out."""
     found = []
     for value in values if isinstance(values, list) else ():
         if isinstance(value, list) and len(value) == len(Fallen._fields):

@@ -26,7 +26,7 @@ def pair_of(show: Path | None, box: Path | None, chosen: Path | None) -> tuple[P
     require_no("--box", box, chosen)
     import time
 
-    from appliance.release.start_attempts import pair_to_dance
+    from appliance.release.trial import pair_to_dance
 
     pair = pair_to_dance(chosen, time.monotonic(), lambda words: print(words, flush=True))
     return pair.show, pair.box

@@ -12,7 +12,7 @@ from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.stop_signals import stop_signals
 from appliance.keeper.keeper import END_BESIDE_S, END_S, KeeperHealth, mirrored_by, supervise
 from appliance.keeper.mirror_process import MirrorProcess
-from appliance.release.promote_show import MirroredProof
+from appliance.release.trial import MirroredProof
 from appliance.show.box import load_box
 
 

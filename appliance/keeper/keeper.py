@@ -50,7 +50,7 @@ class KeeperHealth:
         """Call it often; monotonic seconds."""
         for mirror in mirrors:
             self._fallbacks.set(mirror.fallback.name, bool(mirror.complaint), mirror.complaint)
-        self._health.tell(now)
+        self._health.publish_health(now)
 
     def end(self, now: float) -> None:
         """The keeper ends as it should."""

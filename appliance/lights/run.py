@@ -189,7 +189,7 @@ def light_up(directory: Path | None, box_file: Path | None) -> None:
 
         def pulse(now: float) -> None:
             notifier.ping(now)
-            company.tell(now)
+            company.publish_health(now)
 
         if directory is not None:
             lights = Lights(load_show(directory), box, box_file, stage, show_state, speaker.say, fallbacks)

@@ -215,7 +215,7 @@ class Stage:
         """How the box is, for readers of the shared frame."""
         roster = roster_lines(self.cast.link.states(now), self.wearing.neutral_of)
         age_s, locked = self._sensor_age_s(now), self._is_locked
-        fallbacks = self.watch.fallbacks.told(now)
+        fallbacks = self.watch.fallbacks.happened(now)
         self.sharing.tell(now, self.health, self.cast, self.iterations, age_s, locked, roster, fallbacks)
 
     def _tell_people(self, words: str) -> None:

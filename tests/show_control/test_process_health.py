@@ -16,7 +16,7 @@ from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair
-from appliance.release.promote_show import MirroredProof
+from appliance.release.trial import MirroredProof
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import Status
 from tests.bundles import FIGURE
@@ -32,12 +32,12 @@ def told(company: ProcessHealth, now: float) -> dict[str, tuple[str, int, bool]]
 def test_a_process_tells_its_fallbacks(folder: Path) -> None:
     fallbacks, company = Fallbacks([DMX]), ProcessHealth(folder)
     lights = ProcessHealthWriter(folder, "lights", fallbacks)
-    lights.tell(10.0)
+    lights.publish_health(10.0)
     assert told(company, 10.0) == {}
     fallbacks.set("dmx-away", True, "The adapter is unplugged.")
-    lights.tell(10.5)
+    lights.publish_health(10.5)
     assert told(company, 10.5) == {}, "once a second is enough"
-    lights.tell(11.0)
+    lights.publish_health(11.0)
     assert told(company, 11.0) == {"dmx-away": ("lights", 1, True)}
     lights.end(11.5)
     lights.close()
@@ -48,19 +48,19 @@ def test_lights_projector_and_keeper_that_die_are_counted(folder: Path) -> None:
     company = ProcessHealth(folder)
     for who in ("lights", "projector", "keeper"):
         first = ProcessHealthWriter(folder, who, Fallbacks(()))
-        first.tell(10.0)
+        first.publish_health(10.0)
         first.close()  # and never says that it ends
         assert told(company, 10.0 + LATE_S) == {}
         late = told(company, 10.1 + LATE_S)
         assert late == {f"{who}-died": (who, 1, True)}
         second = ProcessHealthWriter(folder, who, Fallbacks(()))
-        second.tell(20.0)
+        second.publish_health(20.0)
         assert told(company, 20.0) == {f"{who}-died": (who, 1, False)}
         second.end(21.0)
         second.close()
         assert told(company, 90.0) == {f"{who}-died": (who, 1, False)}, "who has ended is not late"
         third = ProcessHealthWriter(folder, who, Fallbacks(()))
-        third.tell(100.0)
+        third.publish_health(100.0)
         assert told(company, 100.0) == {}
         third.close()
         (folder / f"{who}.health").unlink()
@@ -73,8 +73,8 @@ def test_a_second_projector_says_nothing(folder: Path) -> None:
     second = ProcessHealthWriter(folder, "projector", second_fallbacks)
     for row in (STAGE_UNSEEN, PICTURES_SMALLER):
         second_fallbacks.set(row.name, True)
-    first.tell(10.0)
-    second.tell(10.0)
+    first.publish_health(10.0)
+    second.publish_health(10.0)
     assert told(ProcessHealth(folder), 10.0) == {}
     second.close()
     first.close()

@@ -49,7 +49,7 @@ def stage(danced: StageParts) -> Watch:
 
 
 def of(stage: Watch, row: Fallback, now: float) -> Fallen:
-    found = [one for one in stage.fallbacks.told(now) if one.name == row.name]
+    found = [one for one in stage.fallbacks.happened(now) if one.name == row.name]
     return found[0] if found else Fallen(row.name, 0, False, row.words)
 
 
@@ -179,7 +179,7 @@ def test_how_a_stage_begins(stage: Watch, what: str) -> None:
     begins(stage)
     assert (before, of(stage, row, 1.0).active) == (0, True)
     others = {one.name for one, _ in BEGINNINGS.values()} - {row.name}
-    assert not others & {one.name for one in stage.fallbacks.told(1.0)}
+    assert not others & {one.name for one in stage.fallbacks.happened(1.0)}
 
 
 def test_the_status_line_names_what_is_in_force() -> None:
@@ -195,7 +195,7 @@ def test_what_begins_counts_once_until_it_is_over() -> None:
     every = Fallbacks(OF_THE_STAGE)
     for active in (True, True, False, True):
         every.set(rows.RECEIVER_GONE.name, active)
-    assert every.told(0.0)[0].times == 2
+    assert every.happened(0.0)[0].times == 2
 
 
 def test_other_versions_say_what_they_like() -> None:

@@ -89,7 +89,7 @@ class Evening:
     @property
     def silences(self) -> int:
         return sum(
-            one.times for one in self.stage.watch.fallbacks.told(0.0) if one.name == SENSOR_SILENT.name
+            one.times for one in self.stage.watch.fallbacks.happened(0.0) if one.name == SENSOR_SILENT.name
         )
 
     def dance(self, seconds: float) -> None:

@@ -23,7 +23,7 @@ from appliance.outputs.dmx.identity import component_identifier
 from appliance.pose.bvh import BvhError, read_bvh, write_bvh
 from appliance.projector.alignment import AlignmentFile
 from appliance.release.choice import Choice
-from appliance.release.start_attempts import pair_to_dance
+from appliance.release.trial import pair_to_dance
 from appliance.sensor.keys import KeyFileError, load_keys
 from appliance.show.config_error import ConfigError
 from appliance.show.projector import ProjectorConfig

@@ -13,8 +13,7 @@ from appliance.cli.run_with_timeout import within
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.release.choice import CHOSEN
-from appliance.release.promote_show import MirroredProof
-from appliance.release.start_attempts import pair_to_dance
+from appliance.release.trial import MirroredProof, pair_to_dance
 from tests.bundles import FIGURE
 from tests.show_control.doubles import facts
 from tests.system.test_preflight import Machine, late

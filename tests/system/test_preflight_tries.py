@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
+from appliance.box.durable import alone_in
 from appliance.cli.run_with_timeout import within
 from appliance.keeper.mirror import Mirror
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
-from appliance.release.choice import CHOSEN, Choice, Pair, alone_in
-from appliance.release.promote_show import MirroredProof
-from appliance.release.start_attempts import ANEW, TRIES, ended_well, pair_to_dance
+from appliance.release.choice import CHOSEN, Choice, Pair
+from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair_to_dance
 from tests.bundles import FIGURE, write_show
 from tests.show_control.doubles import facts
 
