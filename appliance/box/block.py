@@ -38,7 +38,7 @@ class BlockWriter:
         self._file.rings[0].write(self._prefix + payload)
 
     def close(self) -> None:
-        """Let go of the file; it stays, with its last payload."""
+        """Release the file; it stays, with its last payload."""
         self._file.close()
 
 
@@ -73,7 +73,7 @@ class BlockReader:
         return newest[1][len(self._prefix) :]
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Release the file."""
         self._file.close()
 
 

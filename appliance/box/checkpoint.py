@@ -1,4 +1,4 @@
-"""The place of the dance: what a stage that starts anew must know to go on where the last one was."""
+"""The place of the dance: what a restarted stage must know to continue where the last one was."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-RECENT_S = 5.0  # what happens at one moment counts as in force for so long
+RECENT_S = 5.0  # what happens at one moment counts as in force for this long
 
 
 class Fallback(NamedTuple):
@@ -47,7 +47,7 @@ class Fallbacks:
         tally.recent_until = now + RECENT_S
 
     def follow(self, name: str, total: int, now: float) -> None:
-        """The same for what somebody else counts."""
+        """The same from a counter that is kept elsewhere."""
         if (times := total - self._tallies[name].count) > 0:
             self.count(name, now, times)
 

@@ -44,7 +44,7 @@ STAGE_HUNG = Fallback(
 COMMANDS_DROPPED = Fallback(
     "commands-dropped",
     "More commands came at once than show control carries out: the oldest gave way, without a reply. Panic, "
-    "blackout, stop and go went before them, and the dance goes on. Look which desk sends so many.",
+    "blackout, stop and go went before them, and the dance goes on. Check which desk sends this many.",
 )
 SHOW_REFUSED = Fallback(
     "show-refused", "A show or box file is broken and was refused; the last good one dances."

@@ -106,7 +106,7 @@ def _take(
     from appliance.release.shelf import NoRoomError, Shelf, UnreadableError
 
     no_room = ""
-    # In memory where the disk takes nothing: a stick that is pulled in mid-show is missed by nobody.
+    # In memory where the disk takes nothing: then a stick may be pulled in mid-show.
     for root in (places.data, places.run):
         shelf = Shelf(root)
         try:
@@ -168,7 +168,7 @@ def _as_on_the_stick(words: str, copies: dict[str, str]) -> str:
 
 
 def _printable(words: str) -> str:
-    """A file's name may be no text: nobody who tells these words any further should stumble over it."""
+    """A file's name may be no text; these words must be printable everywhere."""
     return words.encode("utf-8", "backslashreplace").decode()
 
 

@@ -50,7 +50,7 @@ class Pair(NamedTuple):
 
     @property
     def is_there(self) -> bool:
-        """Whether both can still be found, on a disk that may be gone or belong to somebody else."""
+        """Whether both can still be found, on a disk that may be gone or another one."""
         try:
             return (self.show / "show.yaml").is_file() and self.box.is_file()
         except OSError:

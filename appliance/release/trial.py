@@ -17,7 +17,7 @@ from appliance.pose.foreign_file import kept_json
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair
 
 TRIES, ANEW = "tries", "anew"
-PROVEN_S = 10.0  # a show that has danced for so long dances on this box
+PROVEN_S = 10.0  # a show that has danced for this long dances on this box
 _STARTS, _STARTS_OF_A_GOOD_ONE = 3, 6
 
 

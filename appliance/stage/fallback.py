@@ -17,7 +17,7 @@ READING_REFUSED = Fallback(
 PACKET_REFUSED = Fallback(
     "packet-refused",
     "Datagrams that are none of our sensors' were dropped. The audience sees nothing of it. If it goes on, "
-    "somebody else is in the sensors' network.",
+    "another device is in the sensors' network.",
 )
 CABLE_AWAY = Fallback(
     "cable-away",
@@ -34,11 +34,11 @@ NOT_LET_IN = Fallback(
 TICK_LATE = Fallback(
     "tick-late",
     "A tick was late: the last pose left once more. The audience sees nothing of one, a tremble of many. "
-    "Look who else uses the processor: bunraku doctor.",
+    "Check what else uses the processor: bunraku doctor.",
 )
 TICK_SKIPPED = Fallback(
     "tick-skipped",
-    "Slots went by without a frame: the machine was held up. The dance goes on in its place. Look who else "
+    "Slots went by without a frame: the machine was held up. The dance goes on in its place. Check what else "
     "uses the processor: bunraku doctor.",
 )
 OVER_BUDGET = Fallback(

@@ -105,7 +105,7 @@ class SensorMemory:
         except OSError as error:
             self._say(
                 f"{path}: what was remembered of the sensors cannot be read ({error.strerror}). "
-                "Sensors need a moment of stillness tonight. Check who may read this file."
+                "Sensors need a moment of stillness tonight. Check the permissions of this file."
             )
         except ValueError:
             self._set_aside(path)
