@@ -8,7 +8,7 @@ import os
 import struct
 import zlib
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from appliance.box.block import BlockReader, BlockWriter
 from appliance.box.durable import write_whole
@@ -43,19 +43,6 @@ class Record(NamedTuple):
         return BlockReader(runtime / self.name, self.kind, scope=self.scope)
 
 
-class RecordFile(Protocol):
-    """A record on the disk."""
-
-    def read(self) -> list[bytes]:
-        """What is whole in it, the newest first; nothing without a file. Raises OSError, ValueError."""
-
-    def write(self, payload: bytes) -> None:
-        """Wait until it is on the disk. Raises OSError; then what was there is still there."""
-
-    def close(self) -> None:
-        """Release the file."""
-
-
 class WholeFile:
     """A record that people may read, edit and remove: replaced as a whole, private (mode 0600)."""
 
@@ -63,7 +50,7 @@ class WholeFile:
         self._path, self._largest = path, largest
 
     def read(self) -> list[bytes]:
-        """As RecordFile; raises ValueError for a file that is too large."""
+        """Its content, if there is a file. Raises OSError, and ValueError for one that is too large."""
         try:
             return [content(self._path, self._largest)]
         except (FileNotFoundError, NotADirectoryError):
@@ -72,7 +59,7 @@ class WholeFile:
             raise ValueError(error.strerror) from None
 
     def write(self, payload: bytes) -> None:
-        """As RecordFile."""
+        """Wait until it is on the disk. Raises OSError; then the file is as it was."""
         write_whole(self._path, payload, private=True)
 
     def close(self) -> None:
@@ -92,7 +79,7 @@ class SlotFile:
         self._newest = 0
 
     def read(self) -> list[bytes]:
-        """As RecordFile; never raises."""
+        """What is whole in it, the newest first. Never raises."""
         try:
             descriptor = os.open(self._path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
         except OSError:
@@ -105,7 +92,10 @@ class SlotFile:
             os.close(descriptor)
 
     def write(self, payload: bytes) -> None:
-        """As RecordFile. A file that was replaced (a disk mounted over it) is left; ValueError: too long."""
+        """Wait until it is on the disk; a file that was replaced (a disk mounted over it) is left.
+
+        Raises OSError, and ValueError for what is longer than a slot; then the newest payload is still there.
+        """
         if len(payload) > SLOT_CAPACITY:
             raise ValueError(f"{len(payload)} bytes are more than the {SLOT_CAPACITY} of a slot.")
         try:

@@ -9,14 +9,13 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Protocol
 
-from appliance.box.fallback import Fallback, Fallbacks
+from appliance.box.fallback import Fallbacks
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import Claim, RuntimeFolderError
 from appliance.keeper.fallback import OF_THE_KEEPER
 from appliance.keeper.journal import MirroredJournal
-from appliance.keeper.mirror import LOOK_S, Mirrored
+from appliance.keeper.mirror import LOOK_S, Mirror, Mirrored
 from appliance.keeper.mirror_process import MirrorProcess
 from appliance.keeper.records import mirrored_checkpoint, mirrored_sensor_memory
 from appliance.show.box import BoxConfig
@@ -29,16 +28,6 @@ LAST_TURN_S = 1.5
 _REST_S = 3.5  # and LAST_TURN_S: a person waits at a terminal
 
 
-class Complaining(Protocol):
-    """A mirror, or its process."""
-
-    @property
-    def complaint(self) -> str: ...
-
-    @property
-    def fallback(self) -> Fallback: ...
-
-
 class KeeperHealth:
     """What the keeper reports to the box's other processes."""
 
@@ -46,7 +35,7 @@ class KeeperHealth:
         self._fallbacks = Fallbacks(OF_THE_KEEPER)
         self._health = ProcessHealthWriter(runtime, "keeper", self._fallbacks)
 
-    def report(self, mirrors: Iterable[Complaining], now: float) -> None:
+    def report(self, mirrors: Iterable[Mirror | MirrorProcess], now: float) -> None:
         """Call it often; monotonic seconds."""
         for mirror in mirrors:
             self._fallbacks.set(mirror.fallback.name, bool(mirror.complaint), mirror.complaint)

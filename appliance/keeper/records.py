@@ -9,7 +9,7 @@ from pathlib import Path
 from appliance.box.block import BlockReader
 from appliance.box.checkpoint import PLACE, unpacked
 from appliance.box.fallback import Fallback
-from appliance.box.record import RecordFile, SlotFile
+from appliance.box.record import SlotFile, WholeFile
 from appliance.keeper.fallback import PLACE_NOT_KEPT, SENSORS_NOT_KEPT
 from appliance.keeper.mirror import reason_of
 from appliance.sensor.memory import memory_file, memory_record
@@ -24,7 +24,7 @@ class MirroredRecord:
         fallback: Fallback,
         block: BlockReader,
         state: Path,
-        file: RecordFile,
+        file: SlotFile | WholeFile,
         meaning: Callable[[bytes], object],
         words: str,
     ) -> None:

@@ -22,6 +22,7 @@ from appliance.recorder.reading import read_journal
 from appliance.recorder.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
 from appliance.show.box import BoxConfig
 from appliance.stage.recorder import FILE, FORMAT, KIND
+from tests.box import disks
 from tests.bundles import write_show
 from tests.fake_clock import FakeTime
 from tests.recorder.night import Night
@@ -38,29 +39,12 @@ def night(tmp_path: Path) -> Night:
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[Path]:
     """A file system of its own, of eight megabytes."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mounting = ("mount", "-t", "tmpfs", "-o", f"size={DISK_BYTES}", "tmpfs", str(folder))
-    if subprocess.run(mounting, capture_output=True, check=False).returncode:
-        pytest.skip("no file system can be mounted here (not root, or in a closed container)")
-    yield folder
-    subprocess.run(("umount", "-l", str(folder)), check=True)
-
-
-def fill(disk: Path, but: int = 0) -> Path:
-    """All the room that is left, but for so many bytes, taken by somebody else."""
-    ballast = disk / "ballast"
-    with ballast.open("wb", buffering=0) as file:
-        try:
-            while True:
-                file.write(bytes(4096))
-        except OSError:
-            file.truncate(file.tell() - but)
-            return ballast
+    with disks.tiny(tmp_path / "disk", str(DISK_BYTES)) as folder:
+        yield folder
 
 
 def note(night: Night, ticks: int) -> None:
-    """So many ticks that cost no dance; their poses pack no smaller than those of one."""
+    """This many ticks that cost no dance; their poses pack no smaller than those of one."""
     noise = np.random.default_rng(0)
     for _ in range(ticks):
         night.tick.frame.pose[...] = noise.random(night.tick.frame.pose.shape)
@@ -76,7 +60,7 @@ def test_a_full_disk_is_said_once_and_the_newest_follows_when_there_is_room(nigh
     mirror = night.mirror(disk / "journal")
     night.dance(100)
     mirror.turn(0.0)
-    ballast = fill(disk)
+    ballast = disks.fill(disk)
     for turn in range(1, 100):
         night.dance(5)
         mirror.turn(float(turn))
@@ -160,7 +144,7 @@ def test_the_oldest_go_where_room_is_short_but_never_the_newest_minute(night: Ni
         note(night, 50)
         mirror.turn(float(second))
     assert len(segment_paths(folder)) == 3
-    fill(disk, but=int(LEAST_FREE_SHARE * DISK_BYTES) + 100_000)
+    disks.fill(disk, but=int(LEAST_FREE_SHARE * DISK_BYTES) + 100_000)
     for second in range(170, 330):
         note(night, 50)
         mirror.turn(float(second))
