@@ -51,13 +51,13 @@ class Fallbacks:
         if (times := total - self._tallies[name].count) > 0:
             self.count(name, now, times)
 
-    def set(self, name: str, active: bool, words: str = "") -> None:
-        """In force from now on, or over; `words`: more than the usual ones. Counts when it begins."""
+    def set(self, name: str, complaint: bool | str) -> None:
+        """In force from now on, or over ("", False); a sentence replaces the usual words. Counts starts."""
         tally = self._tallies[name]
-        tally.count += active and not tally.active
-        tally.active = active
-        if words:
-            tally.words = words
+        tally.count += bool(complaint) and not tally.active
+        tally.active = bool(complaint)
+        if complaint and isinstance(complaint, str):
+            tally.words = complaint
 
     def hold(self, name: str, active: bool) -> None:
         """Whether it is in force for longer than its moment; not counted again."""

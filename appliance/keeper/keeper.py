@@ -38,7 +38,7 @@ class KeeperHealth:
     def report(self, mirrors: Iterable[Mirror | MirrorProcess], now: float) -> None:
         """Call it often; monotonic seconds."""
         for mirror in mirrors:
-            self._fallbacks.set(mirror.fallback.name, bool(mirror.complaint), mirror.complaint)
+            self._fallbacks.set(mirror.fallback.name, mirror.complaint)
         self._health.publish_health(now)
 
     def end(self, now: float) -> None:

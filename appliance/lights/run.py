@@ -134,7 +134,7 @@ class Lights:
                 self._say(trouble or f"{name} is well again.")
             self._troubles[name] = trouble
         troubles = " ".join(filter(None, self._troubles.values()))
-        self._fallbacks.set(DMX_AWAY.name, bool(troubles), troubles)
+        self._fallbacks.set(DMX_AWAY.name, troubles)
 
 
 def rig_problems(show: Show, box: BoxConfig, box_file: Path | None) -> list[Problem]:

@@ -33,8 +33,8 @@ class Watch:
         self._dropped: dict[str, int] = {}
         self._ways: dict[str, str] = {}
         self._said: set[tuple[str, str]] = set()  # what is so, and was said
-        self.fallbacks.set(rows.ITERATIONS_LOWERED.name, not admission.fits, admission.sentence())
-        self.fallbacks.set(rows.NOT_LET_IN.name, bool(cast.complaints), " ".join(cast.complaints))
+        self.fallbacks.set(rows.ITERATIONS_LOWERED.name, "" if admission.fits else admission.sentence())
+        self.fallbacks.set(rows.NOT_LET_IN.name, " ".join(cast.complaints))
 
     def count_silences(self, now: float) -> None:
         """At each tick: sensors that have just fallen silent. Some microseconds, without allocating."""
@@ -52,13 +52,13 @@ class Watch:
         """
         self.fallbacks.follow(rows.STAGE_RESTARTED.name, resuming.restarts, now)
         self.fallbacks.follow(rows.POWER_CUT.name, resuming.power_cuts, now)
-        self.fallbacks.set(rows.PLACE_NOT_NOTED.name, bool(resuming.complaint), resuming.complaint)
-        self.fallbacks.set(rows.NOT_SHARED.name, bool(not_shared), not_shared)
+        self.fallbacks.set(rows.PLACE_NOT_NOTED.name, resuming.complaint)
+        self.fallbacks.set(rows.NOT_SHARED.name, not_shared)
         self.fallbacks.set(rows.NOT_RECORDED.name, not is_recorded)
 
     def note_missing_rights(self, missing: Sequence[str]) -> None:
         """Which real-time rights the stage did not get, sentences."""
-        self.fallbacks.set(rows.NOT_REALTIME.name, bool(missing), " ".join(missing))
+        self.fallbacks.set(rows.NOT_REALTIME.name, " ".join(missing))
 
     def check(self, now: float, health: Health, sensors: Sequence[SensorState] = ()) -> list[str]:
         """Once a second: bring the fallbacks up to date; sentences about what changed since the last call.
@@ -84,8 +84,8 @@ class Watch:
         every.follow(rows.OVER_BUDGET.name, health.over_budget, now)
         every.follow(rows.NETWORK_FAILED.name, health.not_finite, now)
         intakes = self._cast.link.intakes
-        cables = " ".join(filter(None, (getattr(one, "trouble", None) for one in intakes)))
-        every.set(rows.CABLE_AWAY.name, bool(cables), cables)
+        cables = filter(None, (getattr(one, "trouble", None) for one in intakes))
+        every.set(rows.CABLE_AWAY.name, " ".join(cables))
         is_absent = any(getattr(one, "address_is_absent", False) for one in intakes)
         every.set(rows.ADDRESS_ABSENT.name, is_absent)
         every.set(rows.RECEIVER_GONE.name, is_receiver_gone)

@@ -34,7 +34,7 @@ def test_a_process_tells_its_fallbacks(folder: Path) -> None:
     lights = ProcessHealthWriter(folder, "lights", fallbacks)
     lights.publish_health(10.0)
     assert told(company, 10.0) == {}
-    fallbacks.set("dmx-away", True, "The adapter is unplugged.")
+    fallbacks.set("dmx-away", "The adapter is unplugged.")
     lights.publish_health(10.5)
     assert told(company, 10.5) == {}, "once a second is enough"
     lights.publish_health(11.0)
