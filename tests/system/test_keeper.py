@@ -200,8 +200,8 @@ def test_a_mirror_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper
 
 def test_mirrors_end_with_a_keeper_that_is_killed(keeper: Keeper) -> None:
     keeper.goes_on()
+    await_that(lambda: len(children(keeper.process.pid)) == 3, "not all have started")
     processes = children(keeper.process.pid)
-    assert len(processes) == 3
     keeper.process.kill()
     keeper.process.wait()
     await_that(lambda: not any(map(lives, processes)), "they outlive their keeper")
