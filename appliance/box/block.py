@@ -13,12 +13,21 @@ class BlockWriter:
     """A small file of one kind with the newest payload in it, at most `capacity` bytes.
 
     Continues a sound file of the same kind (readers notice nothing), otherwise or when `fresh` puts a new one
-    in its place. Raises BlockingIOError while another process writes the one to continue, and OSError where
-    the folder takes no file.
+    in its place. `scope`: what the payloads are about; readers of another scope find none. Raises
+    BlockingIOError while another process writes the one to continue, OSError where the folder takes no file.
     """
 
-    def __init__(self, path: Path, kind: str, capacity: int, fresh: bool = False, version: int = 1) -> None:
-        shapes = [(_SLOTS, capacity)]
+    def __init__(
+        self,
+        path: Path,
+        kind: str,
+        capacity: int,
+        fresh: bool = False,
+        version: int = 1,
+        scope: bytes = b"",
+    ) -> None:
+        self._prefix = _prefix(scope)
+        shapes = [(_SLOTS, len(self._prefix) + capacity)]
         resumed = None if fresh else RingFileWriter.resumed(path, kind, version, shapes)
         self._file = resumed or RingFileWriter.new(path, kind, version, shapes)
         if resumed is None:
@@ -26,10 +35,10 @@ class BlockWriter:
 
     def write(self, payload: bytes) -> None:
         """Publish; raises ValueError above the capacity."""
-        self._file.rings[0].write(payload)
+        self._file.rings[0].write(self._prefix + payload)
 
     def close(self) -> None:
-        """Let go of the file; it stays, with its last payload."""
+        """Release the file; it stays, with its last payload."""
         self._file.close()
 
 
@@ -40,7 +49,10 @@ class BlockReader:
     `writer`: what people call the program that writes it.
     """
 
-    def __init__(self, path: Path, kind: str, version: int = 1, writer: str = "its writer") -> None:
+    def __init__(
+        self, path: Path, kind: str, version: int = 1, writer: str = "its writer", scope: bytes = b""
+    ) -> None:
+        self._prefix = _prefix(scope)
         self._file = RingFileReader(path, kind, version, writer)
 
     @property
@@ -53,13 +65,17 @@ class BlockReader:
         return self._file.writer_lives()
 
     def read(self) -> bytes | None:
-        """The newest whole payload; None before the first one. Never waits, never raises."""
+        """The newest whole payload; None before the first of this scope. Never waits, never raises."""
         self._file.look()
-        for ring in self._file.rings:
-            newest = ring.newest()
-            return newest[1] if newest else None
-        return None
+        newest = self._file.rings[0].newest() if self._file.rings else None
+        if newest is None or not newest[1].startswith(self._prefix):
+            return None
+        return newest[1][len(self._prefix) :]
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Release the file."""
         self._file.close()
+
+
+def _prefix(scope: bytes) -> bytes:
+    return scope + b"\0" if scope else b""

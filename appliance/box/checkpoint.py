@@ -1,4 +1,4 @@
-"""The place of the dance: what a stage that starts anew must know to go on where the last one was."""
+"""The place of the dance: what a restarted stage must know to continue where the last one was."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-from appliance.box.block import BlockReader, BlockWriter
+from appliance.box.record import Record, SlotFile
 from appliance.pose.foreign_file import plain_json
 
-FILE, KIND = "place", "place"
 LARGEST = 4000  # bytes of a packed place; one slot on the disk is a page of 4096
+PLACE = Record("place", "place", LARGEST)
+FILE = PLACE.name
 
 _NUMBERS = struct.Struct("<q9d4HBB")
 _ENDED = 1
@@ -116,14 +117,14 @@ class CheckpointWriter:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._block = BlockWriter(folder / FILE, KIND, LARGEST)
+        self._block = PLACE.writer(folder)
 
     def write(self, place: Checkpoint) -> None:
         """Readers see this one from now on; raises ValueError as `packed` does."""
         self._block.write(packed(place))
 
     def close(self) -> None:
-        """Let go of the file; it stays, with its last place."""
+        """Release the file; it stays, with its last place."""
         self._block.close()
 
 
@@ -131,7 +132,7 @@ class CheckpointReader:
     """Reads the place in memory; the stage may be there or not."""
 
     def __init__(self, folder: Path) -> None:
-        self._block = BlockReader(folder / FILE, KIND)
+        self._block = PLACE.reader(folder)
 
     def read(self) -> Checkpoint | None:
         """The newest place; None where none was written. Never waits, never raises."""
@@ -148,8 +149,14 @@ class CheckpointReader:
         return self._block.writer_lives()
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Release the file."""
         self._block.close()
+
+
+def read_checkpoint(path: Path) -> Checkpoint | None:
+    """The newest whole place on the disk; None where there is none. Never raises."""
+    places = (unpacked(payload) for payload in SlotFile(path).read())
+    return next((place for place in places if place is not None), None)
 
 
 def boot_id() -> str:

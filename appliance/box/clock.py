@@ -43,7 +43,7 @@ class TickClock:
         self._slot = Slot(deadline=monotonic())
 
     def begin(self, in_s: float) -> None:
-        """Call it before the first wait, when all is ready: the grid begins in so many seconds."""
+        """Call it before the first wait, when all is ready: the grid begins in this many seconds."""
         self._slot.deadline = self.now() + in_s - self.period_s
 
     def wait(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-RECENT_S = 5.0  # what happens at one moment counts as in force for so long
+RECENT_S = 5.0  # what happens at one moment counts as in force for this long
 
 
 class Fallback(NamedTuple):
@@ -47,23 +47,23 @@ class Fallbacks:
         tally.recent_until = now + RECENT_S
 
     def follow(self, name: str, total: int, now: float) -> None:
-        """The same for what somebody else counts."""
+        """The same from a counter that is kept elsewhere."""
         if (times := total - self._tallies[name].count) > 0:
             self.count(name, now, times)
 
-    def set(self, name: str, active: bool, words: str = "") -> None:
-        """In force from now on, or over; `words`: more than the usual ones. Counts when it begins."""
+    def set(self, name: str, complaint: bool | str) -> None:
+        """In force from now on, or over ("", False); a sentence replaces the usual words. Counts starts."""
         tally = self._tallies[name]
-        tally.count += active and not tally.active
-        tally.active = active
-        if words:
-            tally.words = words
+        tally.count += bool(complaint) and not tally.active
+        tally.active = bool(complaint)
+        if complaint and isinstance(complaint, str):
+            tally.words = complaint
 
     def hold(self, name: str, active: bool) -> None:
         """Whether it is in force for longer than its moment; not counted again."""
         self._tallies[name].active = active
 
-    def told(self, now: float) -> list[Fallen]:
+    def happened(self, now: float) -> list[Fallen]:
         """Those that ever happened, in their order."""
         return [
             Fallen(name, one.count, one.active or now < one.recent_until, one.words)
@@ -73,12 +73,12 @@ class Fallbacks:
 
     def line(self, now: float) -> str:
         """The names of those in force, for the status line; "" on a good night."""
-        names = [one.name for one in self.told(now) if one.active]
+        names = [one.name for one in self.happened(now) if one.active]
         return f"fallbacks: {', '.join(names)}" if names else ""
 
 
 def fallen(values: Any) -> tuple[Fallen, ...]:
-    """From JSON, as `told` gave them; what is none of ours is left out."""
+    """From JSON, as `happened` gave them; anything else is left out."""
     found = []
     for value in values if isinstance(values, list) else ():
         if isinstance(value, list) and len(value) == len(Fallen._fields):

@@ -1,4 +1,4 @@
-"""Lines for people, written by a thread of its own: a stopped terminal never holds up the tick."""
+"""Lines for people, written by a thread: a stopped terminal never holds up the tick."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _LAST_WORDS_S = 0.5
 class LogWriter:
     """Writes lines to a file descriptor (standard output by default).
 
-    dropped: how many lines found no room, because nothing took those before; the reader is told.
+    dropped: how many lines found no room because nothing read those before; a later line says so.
     """
 
     def __init__(self, descriptor: int = 1) -> None:
@@ -46,7 +46,7 @@ class LogWriter:
                     )
                     self._told = dropped
         except OSError:
-            return  # nobody listens any more: the show goes on
+            return  # the reader is gone: the show goes on
 
     def _write(self, line: str) -> None:
         os.write(self._descriptor, f"{line}\n".encode(errors="backslashreplace"))

@@ -1,4 +1,4 @@
-"""Words to systemd: ready, still alive, what is going on, about to end (sd_notify(3))."""
+"""Notifies systemd: ready, still alive, what is going on, about to end (sd_notify(3))."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _PINGS_IN_A_PERIOD = 4
 
 
 class Notifier:
-    """Tells systemd how this process is; silent where nobody listens, never raises, never waits.
+    """Tells systemd how this process is; does nothing without systemd, never raises, never waits.
 
     Takes $NOTIFY_SOCKET, $WATCHDOG_USEC and $WATCHDOG_PID, which systemd sets for a unit with Type=notify
     and WatchdogSec=. A word for which systemd has no room at the moment is lost; READY comes again.
@@ -32,22 +32,22 @@ class Notifier:
 
     def ready(self, status: str = "") -> None:
         """It works now."""
-        self._owed = "" if self._tell("READY=1", status) else "READY=1\n"
+        self._owed = "" if self._send("READY=1", status) else "READY=1\n"
 
     def ping(self, now: float) -> None:
-        """It still works; monotonic seconds. Call it as often as you like: told four times a period."""
+        """It still works; monotonic seconds. Call it often: sent four times a period."""
         if now >= self._due and self._socket is not None and self.every_s != float("inf"):
             self._due = now + self.every_s
-            if self._tell(f"{self._owed}WATCHDOG=1"):
+            if self._send(f"{self._owed}WATCHDOG=1"):
                 self._owed = ""
 
     def status(self, words: str) -> None:
-        """One line for whoever asks `systemctl status`."""
-        self._tell("", words)
+        """One line for `systemctl status`."""
+        self._send("", words)
 
     def stopping(self) -> None:
         """It ends by itself now."""
-        self._tell("STOPPING=1")
+        self._send("STOPPING=1")
 
     def close(self) -> None:
         """Say nothing more."""
@@ -55,8 +55,8 @@ class Notifier:
             self._socket.close()
             self._socket = None
 
-    def _tell(self, word: str, status: str = "") -> bool:
-        """Whether it was taken; True where nobody listens."""
+    def _send(self, word: str, status: str = "") -> bool:
+        """Whether it was taken; True without systemd."""
         if self._socket is None:
             return True
         lines = [word] if word else []
@@ -75,7 +75,7 @@ def _address(named: str) -> str:
 
 
 def _watchdog_s(environ: Mapping[str, str]) -> float:
-    """The watchdog's period in seconds; infinite where it waits for nobody, or for another process."""
+    """The watchdog's period in seconds; infinite where there is none, or it watches another process."""
     if environ.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
         return float("inf")
     with contextlib.suppress(ValueError):

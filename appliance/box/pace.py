@@ -1,4 +1,4 @@
-"""Pace: how much time a pass that follows the stage goes on by; one that was held up goes on by little."""
+"""Pace: how far a pass that follows the stage advances; one that was held up advances little."""
 
 from __future__ import annotations
 

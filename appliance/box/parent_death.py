@@ -1,4 +1,4 @@
-"""The lifeline: a process that another one started ends when that one ends, however that happens."""
+"""A child process ends when its parent ends, however that happens."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import signal
 import sys
 
 PARENT = "BUNRAKU_PARENT"  # in the environment: the process to end with
-TOLD = "BUNRAKU_TOLD"  # in the environment: the exit status before this try, whose reason people have read
+TOLD = "BUNRAKU_TOLD"  # in the environment: the exit status of the try before, which has said why
 _PR_SET_PDEATHSIG = 1
 
 

@@ -1,4 +1,4 @@
-"""Company: a small block of each process in the runtime folder, so that show control knows how all are."""
+"""Process health: a small block of each process in the runtime folder, read by show control."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from appliance.box.block import BlockReader, BlockWriter
+from appliance.box.block import BlockWriter
 from appliance.box.fallback import Fallback, Fallbacks, Fallen, fallen
+from appliance.box.record import Record
 from appliance.pose.foreign_file import kept_json, plain_json
 
 WHO = ("lights", "projector", "keeper")
 BEAT_S, LATE_S = 1.0, 5.0
-_KIND, _LARGEST = "company", 8192
+_LARGEST = 8192
 _CHOSEN = "chosen.json"
 
 DIED = {
@@ -43,7 +44,7 @@ STAGE_HUNG = Fallback(
 COMMANDS_DROPPED = Fallback(
     "commands-dropped",
     "More commands came at once than show control carries out: the oldest gave way, without a reply. Panic, "
-    "blackout, stop and go went before them, and the dance goes on. Look which desk sends so many.",
+    "blackout, stop and go went before them, and the dance goes on. Check which desk sends this many.",
 )
 SHOW_REFUSED = Fallback(
     "show-refused", "A show or box file is broken and was refused; the last good one dances."
@@ -55,29 +56,31 @@ OF_THE_COMPANY = (*DIED.values(), STAGE_HUNG, COMMANDS_DROPPED, SHOW_REFUSED, SH
 
 
 class ProcessHealthWriter:
-    """A process says once a second how it is; without a place for it, it says nothing and works on."""
+    """A process publishes its health once a second; without room for the block it works on without."""
 
     def __init__(self, folder: Path, who: str, fallbacks: Fallbacks) -> None:
         self._fallbacks = fallbacks
         self._due = 0.0
         self._block: BlockWriter | None = None
-        before = _read(folder, who)
+        record = _record(who)
+        with contextlib.closing(record.reader(folder)) as block:
+            before = _parsed(block.read())
         self._starts = 1 if before is None or before.get("ended") else int(before.get("starts", 0)) + 1
         with contextlib.suppress(OSError):
-            self._block = BlockWriter(folder / f"{who}.health", _KIND, _LARGEST)
+            self._block = record.writer(folder)
 
-    def tell(self, now: float) -> None:
-        """Call it as often as you like; monotonic seconds."""
+    def publish_health(self, now: float) -> None:
+        """Call it often; monotonic seconds."""
         if now >= self._due:
             self._due = now + BEAT_S
             self._write(now, ended=False)
 
     def end(self, now: float) -> None:
-        """It ends as it should: who only closes, as an error passes by, will have died."""
+        """It ends as it should; a process that only closes its block, after an error, counts as died."""
         self._write(now, ended=True)
 
     def close(self) -> None:
-        """Let go of the block."""
+        """Release the block."""
         if self._block is not None:
             self._block.close()
             self._block = None
@@ -85,7 +88,7 @@ class ProcessHealthWriter:
     def _write(self, now: float, ended: bool) -> None:
         if self._block is None:
             return
-        told = self._fallbacks.told(now)
+        told = self._fallbacks.happened(now)
         values = {"pid": os.getpid(), "starts": self._starts, "beat": now, "ended": ended, "fallbacks": told}
         packed = json.dumps(values).encode()
         while len(packed) > _LARGEST and told:
@@ -95,7 +98,7 @@ class ProcessHealthWriter:
 
 
 class Member(NamedTuple):
-    """A process beside the stage, as it last said. late: it said nothing for LATE_S, and did not end."""
+    """A process beside the stage. late: it published nothing for LATE_S, and did not end."""
 
     who: str
     starts: int
@@ -104,15 +107,15 @@ class Member(NamedTuple):
 
 
 class ProcessHealth:
-    """What all of them said; never waits, never raises."""
+    """What all of them published; never waits, never raises."""
 
     def __init__(self, folder: Path) -> None:
-        self._blocks = {who: BlockReader(folder / f"{who}.health", _KIND) for who in WHO}
+        self._blocks = {who: _record(who).reader(folder) for who in WHO}
         self._chosen, self._chosen_at = folder / _CHOSEN, -1
         self._of_choice: tuple[Fallen, ...] = ()
 
     def members(self, now: float) -> list[Member]:
-        """Those who are or were there since power-on."""
+        """Processes that have run since power-on."""
         found = []
         for who, block in self._blocks.items():
             values = _parsed(block.read())
@@ -123,7 +126,7 @@ class ProcessHealth:
         return found
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
-        """Process and fallback: what each said, what shows that it died, what became of shows."""
+        """Process and fallback: what each published, whether it died, and shows that do not dance."""
         found = []
         for member in self.members(now):
             died = DIED[member.who]
@@ -134,12 +137,12 @@ class ProcessHealth:
         return found + [("preflight", one) for one in self._choice()]
 
     def close(self) -> None:
-        """Let go of all blocks."""
+        """Release all blocks."""
         for block in self._blocks.values():
             block.close()
 
     def _choice(self) -> tuple[Fallen, ...]:
-        """Shows and box files that do not dance, as the preflight and the stage have noted them."""
+        """Shows and box files that do not dance, as noted by the preflight and the stage."""
         try:
             changed = self._chosen.stat().st_mtime_ns
             if changed != self._chosen_at:
@@ -157,9 +160,8 @@ def _of_choice(refused: list[str], aside: list[list[str]]) -> list[Fallen]:
     return [Fallen(one.name, len(words), True, " ".join(words)) for one, words in both if words]
 
 
-def _read(folder: Path, who: str) -> dict[str, Any] | None:
-    with contextlib.closing(BlockReader(folder / f"{who}.health", _KIND)) as block:
-        return _parsed(block.read())
+def _record(who: str) -> Record:
+    return Record(f"{who}.health", "company", _LARGEST)
 
 
 def _parsed(payload: bytes | None) -> dict[str, Any] | None:

@@ -23,7 +23,7 @@ _CHECK = struct.Struct("<I")  # CRC-32 of header and shapes
 _MOST_RINGS = 8
 _LARGEST_PAYLOAD = 1 << 24  # bytes; a reader takes a slot at once, however much of it was written
 _LONGEST = _HEADER.size + _MOST_RINGS * _SHAPE.size + _CHECK.size
-_LOCK_TRIES, _LOCK_RETRY_S = 10, 0.01  # who looks whether a writer lives holds the lock for a moment
+_LOCK_TRIES, _LOCK_RETRY_S = 10, 0.01  # a check whether a writer lives holds the lock for a moment
 
 
 class RingFileWriter:
@@ -80,7 +80,7 @@ class RingFileWriter:
         _temporary(self._path).rename(self._path)
 
     def close(self, remove: bool = False) -> None:
-        """Let go of the file; `remove`: it goes too, unless somebody has put another one in its place."""
+        """Release the file; `remove`: it goes too, unless another one has taken its place."""
         if self._descriptor < 0:
             return
         with contextlib.suppress(OSError):
@@ -126,7 +126,7 @@ class RingFileReader:
             return False
         self.close()
         self._descriptor = descriptor
-        self._identity = found.st_dev, found.st_ino  # nobody else gets this pair while the file is open
+        self._identity = found.st_dev, found.st_ino  # no other file gets this pair while this one is open
         self.complaint = self._understand(descriptor)
         return True
 
@@ -147,7 +147,7 @@ class RingFileReader:
         self.complaint = f"{self._path} {reason}"
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Release the file."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
         self._descriptor, self._identity, self.rings = -1, None, []
@@ -209,7 +209,7 @@ def _temporary(path: Path) -> Path:
 
 
 def _made(temporary: Path) -> int:
-    """A file of ours, empty and locked; made anew where who clears up took it before it was locked."""
+    """A file of ours, empty and locked; made again where `_clear_up` took it before it was locked."""
     flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
     while True:
         descriptor = os.open(temporary, flags, 0o600)

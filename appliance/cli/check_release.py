@@ -25,9 +25,9 @@ def check_release(data: Path) -> int:
     """0: it can; 1: it cannot, and stderr says why. Opens no port and writes nothing."""
     problems = list(_missing())
     if not problems:
-        from appliance.release.choosing import remembered
+        from appliance.release.adoption import read_choice
 
-        for pair in (Pair(), *remembered(data).pairs[:1]):
+        for pair in (Pair(), *read_choice(data).pairs[:1]):
             problems += _undanced(pair)
     for words in problems:
         print(words, file=sys.stderr)

@@ -14,12 +14,10 @@ from appliance.box.notify import Notifier
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.options import BoxFile, ChosenFile
-from appliance.keeper.carrier_process import CarrierProcess, Kept
-from appliance.keeper.keeper import END_BESIDE_S, END_S
-from appliance.keeper.keeper_health import KeeperHealth
-from appliance.keeper.kept import keep_all, kept_by
+from appliance.keeper.keeper import END_BESIDE_S, END_S, KeeperHealth, mirrored_by, supervise
+from appliance.keeper.mirror_process import MirrorProcess
 from appliance.release.choice import box_of
-from appliance.release.promote_show import Proof
+from appliance.release.trial import MirroredProof
 from appliance.show.box import load_box
 
 
@@ -38,18 +36,20 @@ def keep(
         closing(Claim(runtime, "keeper")),
         closing(Notifier()) as notifier,
     ):
-        kept = kept_by(config, runtime, journal or config.journal.folder, minutes or config.journal.minutes)
-        if chosen is not None:  # that this show has danced is kept, too
-            kept.append(Kept("That a show has danced", Proof.fallback, lambda say: Proof(runtime, chosen)))
+        mirrored = mirrored_by(
+            config, runtime, journal or config.journal.folder, minutes or config.journal.minutes
+        )
+        if chosen is not None:
+            mirrored.append(MirroredProof(runtime, chosen))
         end_s = END_BESIDE_S if chosen is None else END_S
-        processes = [CarrierProcess(one, runtime, end_s, speaker.say) for one in kept]
+        processes = [MirrorProcess(one, runtime, end_s, speaker.say) for one in mirrored]
         health = KeeperHealth(runtime)
         notifier.ready("The journal and the place of the dance are kept.")
 
         def after_look(now: float) -> None:
             notifier.ping(now)
-            health.tell(processes, now)
+            health.report(processes, now)
 
-        keep_all(processes, stopped, after_look, end_s)
+        supervise(processes, stopped, after_look, end_s)
         notifier.stopping()
         health.end(time.monotonic())

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from appliance.box.log_writer import LogWriter
 from appliance.box.show_state import forget_show_state
 from appliance.box.stop_signals import stop_signals
-from appliance.sensor.memory_block import forget_memory
+from appliance.sensor.memory import forget_memory
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.control import ControlConfig
@@ -96,7 +96,7 @@ def play_show(
             with _running(companions + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:
-                from appliance.keeper.kept import keep_rest
+                from appliance.keeper.keeper import keep_rest
 
                 keep_rest(stage.box, stage.sharing.noted, journal, minutes, speaker.say)
         if not alone:
@@ -115,7 +115,7 @@ def play_show(
             for line in rehearsal_picture(journal, rehearse, show):
                 speaker.say(line)
     if chosen is not None:
-        from appliance.release.start_attempts import ended_well
+        from appliance.release.trial import ended_well
 
         ended_well(chosen)
     return 0
@@ -124,7 +124,7 @@ def play_show(
 def _pair_to_dance(chosen: Path, directory: Path | None, box_file: Path | None) -> tuple[Path, Path]:
     """Show and box file that the preflight chose; their start is counted."""
     from appliance.release.choice import require_no
-    from appliance.release.start_attempts import pair_to_dance
+    from appliance.release.trial import pair_to_dance
 
     require_no("--show", directory, chosen)
     require_no("--box", box_file, chosen)

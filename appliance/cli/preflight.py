@@ -10,10 +10,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from appliance.box.durable import alone_in
 from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, within
+from appliance.release.adoption import Outcome, Places, adopt, built_in_box, chosen_before
 from appliance.release.arrivals import look
-from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice, alone_in
-from appliance.release.choosing import Outcome, Places, built_in_box, choose, chosen_before
+from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice
 
 ANEW = "anew"  # touched when units have to restart, for another show or box file dances
 _AT_ONCE_S = 120.0  # after power-on a stick takes effect at once; later no show is interrupted
@@ -66,7 +67,7 @@ def _found(options: Options, places: Places) -> Outcome:
 
     def chosen() -> Outcome:
         arrivals = [look("stick", options.stick), look("boot", boot)]
-        return choose(places, arrivals, candidate_problems, options.late)
+        return adopt(places, arrivals, candidate_problems, options.late)
 
     try:
         if _is_folder(options.stick):
@@ -76,7 +77,7 @@ def _found(options: Options, places: Places) -> Outcome:
         words = f"The stick could not be read ({error}). What danced before goes on. Try another stick."
     except Exception as error:
         words = f"What is new cannot be looked at ({error!r}). What danced before goes on. Copy it again."
-    outcome = choose(places, [], candidate_problems)
+    outcome = adopt(places, [], candidate_problems)
     return Outcome(outcome.choice._replace(refused=(words, *outcome.choice.refused)), False, (words,))
 
 

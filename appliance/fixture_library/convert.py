@@ -6,6 +6,7 @@ from pathlib import Path
 
 import yaml
 
+from appliance.box.durable import put_in_place, write_beside
 from appliance.fixture_library.open_fixture_library import LibraryError, profile_values
 from appliance.pose.foreign_file import content, plain_json
 from appliance.show.config_error import ConfigError, Problem
@@ -28,14 +29,13 @@ def convert_file(source: Path, out: Path | None) -> None:
         values, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
     )
     out.parent.mkdir(parents=True, exist_ok=True)
-    written = out.with_name(f".{out.name}.new")
-    written.write_text(text, encoding="utf-8")
+    written = write_beside(out, text.encode())
     try:
         profile = validated(ProfileConfig, read_yaml(written), {})
     except ConfigError:
         written.unlink()
         raise
-    written.replace(out)
+    put_in_place(written, out)
     for note in notes:
         print(note)
     modes = ", ".join(f"{mode.name} ({len(mode.channels)})" for mode in profile.modes)

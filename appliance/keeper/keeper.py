@@ -1,4 +1,4 @@
-"""The keeper: processes of its own that carry from memory to the disk what must survive a power cut.
+"""The keeper: carries what must survive a power cut from memory to the disk, each thing in its own process.
 
 The stage touches no disk while it dances: a disk that is full, read-only, gone or hangs stops these alone.
 """
@@ -6,61 +6,93 @@ The stage touches no disk while it dances: a disk that is full, read-only, gone 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
+from pathlib import Path
 
-TURN_S = 0.5
-# The machine goes down: whoever starts after the stage ends before it (the lights may take 4 s), then the
+from appliance.box.fallback import Fallbacks
+from appliance.box.process_health import ProcessHealthWriter
+from appliance.box.runtime_folder import Claim, RuntimeFolderError
+from appliance.keeper.fallback import OF_THE_KEEPER
+from appliance.keeper.journal import MirroredJournal
+from appliance.keeper.mirror import LOOK_S, Mirror, Mirrored
+from appliance.keeper.mirror_process import MirrorProcess
+from appliance.keeper.records import mirrored_checkpoint, mirrored_sensor_memory
+from appliance.show.box import BoxConfig
+
+# The machine goes down: services that start after the stage end before it (the lights may take 4 s), then the
 # stage says that its show has ended (it may take 3 s). Beside a stage of one's own it says so at once.
 END_S, END_BESIDE_S = 8.0, 1.0
-LOOK_S = 0.05  # how often it looks whether it is to end
+# For the last turns, once the show has ended; systemd gives the keeper 10 s, `bunraku play` gives it 3 s.
+LAST_TURN_S = 1.5
+_REST_S = 3.5  # and LAST_TURN_S: a person waits at a terminal
 
 
-class Carrier(Protocol):
-    """Carries one thing (the journal, the place, the sensors' memory) from the runtime folder to the disk.
+class KeeperHealth:
+    """What the keeper reports to the box's other processes."""
 
-    complaint: what cannot be kept, in words for people, or ""; fallback: the name under which it is told.
-    """
+    def __init__(self, runtime: Path) -> None:
+        self._fallbacks = Fallbacks(OF_THE_KEEPER)
+        self._health = ProcessHealthWriter(runtime, "keeper", self._fallbacks)
 
-    complaint: str
-    fallback: str
+    def report(self, mirrors: Iterable[Mirror | MirrorProcess], now: float) -> None:
+        """Call it often; monotonic seconds."""
+        for mirror in mirrors:
+            self._fallbacks.set(mirror.fallback.name, mirror.complaint)
+        self._health.publish_health(now)
 
-    def turn(self, now: float) -> None:
-        """Bring the disk up to date; monotonic seconds. Waits as long as the disk does. Never raises."""
+    def end(self, now: float) -> None:
+        """The keeper ends as it should."""
+        self._health.end(now)
+        self._health.close()
 
-    def last_turn(self) -> None:
-        """Before the process ends: the rest. Never raises."""
+
+def mirrored_by(box: BoxConfig, runtime: Path, journal: Path | None, minutes: float) -> list[Mirrored]:
+    """What this box keeps: its journal, where one is wanted, and its records, where it has a state folder."""
+    mirrored: list[Mirrored] = []
+    if (state := box.state_folder) is not None:
+        mirrored += [mirrored_checkpoint(runtime, state), mirrored_sensor_memory(runtime, state)]
+    if journal is not None:
+        mirrored.append(MirroredJournal(runtime, journal, minutes))
+    return mirrored
 
 
-def keep_on(
-    carriers: Sequence[Carrier],
+def supervise(
+    processes: Sequence[MirrorProcess],
     stopped: Callable[[], bool],
-    after_turn: Callable[[float], None] = lambda now: None,
-    monotonic: Callable[[], float] = time.monotonic,
-    sleep: Callable[[float], None] = time.sleep,
-    goes_on: Callable[[], bool] = lambda: False,
-    end_s: float = END_S,
+    after_look: Callable[[float], None],
+    end_s: float,
 ) -> None:
-    """Turn by turn until `stopped`, then one last turn; `after_turn`: for the watchdog.
+    """Run them until `stopped` and all have ended, for end_s and LAST_TURN_S at most.
 
-    A show that still `goes_on` then is carried until its end, for `end_s` at most: an end that is not on the
-    disk would be taken for a power cut. Each is given the time at which it begins: the disk may have held up
-    those before it.
+    after_look: for the watchdog, and to report health; monotonic seconds.
     """
-    asked_at: float | None = None
+    until = float("inf")
+    while True:
+        now = time.monotonic()
+        for process in processes:
+            process.supervise(now)
+        after_look(now)
+        if until == float("inf") and stopped():
+            until = now + end_s + LAST_TURN_S
+            for process in processes:
+                process.request_end()
+        if now >= until or (until < float("inf") and all(process.has_ended for process in processes)):
+            break
+        time.sleep(LOOK_S)
+    for process in processes:
+        process.abandon()
 
-    def is_over() -> bool:
-        nonlocal asked_at
-        if asked_at is None and stopped():
-            asked_at = monotonic()
-        return asked_at is not None and (not goes_on() or monotonic() - asked_at >= end_s)
 
-    while not is_over():
-        until = monotonic() + TURN_S
-        for carrier in carriers:
-            carrier.turn(monotonic())
-        after_turn(monotonic())
-        while not is_over() and (rest_s := until - monotonic()) > 0.0:
-            sleep(min(rest_s, LOOK_S))
-    for carrier in carriers:
-        carrier.last_turn()
+def keep_rest(
+    box: BoxConfig, runtime: Path, journal: Path | None, minutes: float, say: Callable[[str], None]
+) -> None:
+    """After the dance: carry what a keeper did not live to carry, because it was ended while it started."""
+    try:
+        claim = Claim(runtime, "keeper")
+    except RuntimeFolderError:  # one that is still at work
+        return
+    with closing(claim):
+        mirrored = mirrored_by(box, runtime, journal, minutes)
+        processes = [MirrorProcess(one, runtime, 0.0, say) for one in mirrored]
+        supervise(processes, lambda: True, lambda now: None, _REST_S)

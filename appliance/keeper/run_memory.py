@@ -29,7 +29,7 @@ from appliance.stage.recorder import (
 
 @dataclass(frozen=True)
 class Keyframe:
-    """The state of the dance after so many entries of the log, packed."""
+    """The state of the dance after this many entries of the log, packed."""
 
     position: int
     data: bytes
@@ -51,7 +51,7 @@ class Piece:
 class RunMemory:
     """One stage's memory. It can be read while the stage dances, and after it has died.
 
-    entries, keyframe: number of the last entry and position of the last keyframe that were kept.
+    entries, keyframe: number of the last entry and position of the last keyframe on the disk.
     """
 
     def __init__(self, reader: RingFileReader, facts: dict[str, Any], identity: tuple[int, int]) -> None:
@@ -115,7 +115,7 @@ class RunMemory:
             self.entries = piece.entries[-1].number
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Release the file."""
         self._reader.close()
 
     def _keyframes(self) -> Iterator[Keyframe]:

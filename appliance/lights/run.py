@@ -134,7 +134,7 @@ class Lights:
                 self._say(trouble or f"{name} is well again.")
             self._troubles[name] = trouble
         troubles = " ".join(filter(None, self._troubles.values()))
-        self._fallbacks.set(DMX_AWAY.name, bool(troubles), troubles)
+        self._fallbacks.set(DMX_AWAY.name, troubles)
 
 
 def rig_problems(show: Show, box: BoxConfig, box_file: Path | None) -> list[Problem]:
@@ -189,7 +189,7 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
 
         def pulse(now: float) -> None:
             notifier.ping(now)
-            process_health.tell(now)
+            process_health.publish_health(now)
 
         if directory is not None:
             lights = Lights(load_show(directory), box, box_file, stage, show_state, speaker.say, fallbacks)

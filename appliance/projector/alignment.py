@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from appliance.box.private_file import replace_private
+from appliance.box.durable import write_whole
 from appliance.pose.foreign_file import TooLargeError, content
 from appliance.projector.corners import WHOLE, Corners, complaint
 from appliance.show.box import BoxConfig
@@ -117,7 +117,7 @@ class AlignmentFile:
     def _write(self, alignment: Alignment) -> bool:
         try:
             self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            replace_private(self.path, _text(alignment, self._from_box))
+            write_whole(self.path, _text(alignment, self._from_box).encode(), private=True)
         except OSError as error:
             self._say(
                 f"{self.path}: the alignment cannot be kept ({error.strerror}). The picture lies as you put "

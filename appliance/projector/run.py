@@ -231,7 +231,7 @@ class Run:
         if self._reader.facts is not None:
             self._fallbacks.set(STAGE_UNSEEN.name, stage != "fresh" and not self._projector.sees_stage)
         self._fallbacks.set(PICTURES_SMALLER.name, share < 1.0)
-        self._health.tell(now)
+        self._health.publish_health(now)
 
     def _check_context(self) -> None:
         if self._context.is_lost:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import io
-import os
 import re
 import tarfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-from appliance.box.durable import sync_folder
+from appliance.box.durable import replacing
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import EXPORTED, header_of, segments_of
 from appliance.recorder.record import DAMAGED
@@ -35,25 +34,20 @@ def export(
     """
     show, size = _show_and_size(journal)
     target = to / _name(show, wall_clock()) if to.is_dir() else to
-    part = target.with_name(f".{target.name}.part")
     written, checksums = 0, []
     try:
-        with part.open("wb") as file:
-            with tarfile.open(fileobj=file, mode="w:", format=tarfile.USTAR_FORMAT) as archive:
-                for number, (_, data) in enumerate(segments_of(journal), 1):
-                    name = f"{number:08d}{SUFFIX}"  # whatever it is called there
-                    _add(archive, name, data)
-                    checksums.append(f"{hashlib.sha256(data).hexdigest()}  {name}\n")
-                    written += len(data)
-                    progress(written, max(size, written))
-                _add(archive, CHECKSUMS, "".join(checksums).encode())
-            file.flush()
-            os.fsync(file.fileno())
-        part.rename(target)
-        sync_folder(target.parent)
+        with (
+            replacing(target) as file,
+            tarfile.open(fileobj=file, mode="w:", format=tarfile.USTAR_FORMAT) as archive,
+        ):
+            for number, (_, data) in enumerate(segments_of(journal), 1):
+                name = f"{number:08d}{SUFFIX}"  # whatever it is called there
+                _add(archive, name, data)
+                checksums.append(f"{hashlib.sha256(data).hexdigest()}  {name}\n")
+                written += len(data)
+                progress(written, max(size, written))
+            _add(archive, CHECKSUMS, "".join(checksums).encode())
     except OSError as error:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
         raise JournalError(
             f"{target}: the journal cannot be written there ({error.strerror}). It stays on the box. Take a "
             "stick with more room that can be written to, or name another place."

@@ -32,7 +32,7 @@ class Segments:
     def __init__(self, folder: Path, most_ticks: int) -> None:
         self._folder = folder
         self._most_ticks = most_ticks
-        self._older: deque[tuple[Path, int]] | None = None  # and the ticks in each; None: not looked yet
+        self._older: deque[tuple[Path, int]] | None = None  # and the ticks in each; None: not read yet
         self._path: Path | None = None
         self._descriptor = -1
         self._is_tight = False
@@ -53,14 +53,14 @@ class Segments:
     def begin(self) -> None:
         """Start a new segment; the one before is complete."""
         self.finish()
-        older = self._look()
+        older = self._read_folder()
         number = 1 + max((_number(path.name) or 0 for path, _ in older), default=0)
         path = self._folder / f"{number:08d}{SUFFIX}"
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC
         try:
             self._descriptor = os.open(path, flags, 0o600)
         except FileExistsError:
-            self._older = None  # another keeper writes here: look anew
+            self._older = None  # another keeper writes here: read the folder again
             raise
         self._path = path
         sync_folder(self._folder)
@@ -84,11 +84,11 @@ class Segments:
         self._descriptor, self._path, self.ticks = -1, None, 0
 
     def forget(self) -> None:
-        """After an error: what is in the folder may have changed, look anew."""
+        """After an error: the folder may have changed, read it again."""
         self.finish()
         self._older = None
 
-    def _look(self) -> deque[tuple[Path, int]]:
+    def _read_folder(self) -> deque[tuple[Path, int]]:
         if self._older is None:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             paths = segment_paths(self._folder)
@@ -97,7 +97,7 @@ class Segments:
 
     def _make_room(self, size: int) -> None:
         """Let the oldest segments go, but for the newest minute; raises OSError when that is not enough."""
-        older = self._look()
+        older = self._read_folder()
         kept = self.ticks + sum(ticks for _, ticks in older)
         while older and kept - older[0][1] >= self._most_ticks:
             kept -= older[0][1]

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import json
-import os
-import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +17,6 @@ DATA = Path("/data/bunraku")
 RUN = Path("/run/bunraku")
 CHOSEN = "chosen.json"
 _MOST_REMEMBERED = 2  # the newest and the last good one; what comes with the box is always there
-_AGAIN_S = 0.02
 
 
 class Pair(NamedTuple):
@@ -56,7 +50,7 @@ class Pair(NamedTuple):
 
     @property
     def is_there(self) -> bool:
-        """Whether both can still be found, on a disk that may be gone or belong to somebody else."""
+        """Whether both can still be found, on a disk that may be gone or another one."""
         try:
             return (self.show / "show.yaml").is_file() and self.box.is_file()
         except OSError:
@@ -183,35 +177,6 @@ def appliance_box(places: dict[str, str]) -> str:
     for usual, place in places.items():
         text = text.replace(usual, place)
     return text
-
-
-@contextlib.contextmanager
-def alone_in(folder: Path, patience_s: float = 0.0) -> Iterator[None]:
-    """One process at a time in a folder, also in a read-only one; without one there is nothing to guard.
-
-    Raises BlockingIOError where another one does not leave within `patience_s`: it may hang on a disk.
-    """
-    try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    except OSError:
-        yield
-        return
-    try:
-        _lock(descriptor, time.monotonic() + patience_s)
-        yield
-    finally:
-        fcntl.flock(descriptor, fcntl.LOCK_UN)  # a fork of ours that hangs has it open too
-        os.close(descriptor)
-
-
-def _lock(descriptor: int, until: float) -> None:
-    while True:
-        try:
-            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if time.monotonic() >= until:
-                raise
-            time.sleep(_AGAIN_S)
 
 
 def _pair(values: dict[str, Any]) -> Pair:

@@ -47,7 +47,7 @@ def _is_installed() -> bool:
 
 
 def _become_owner_of(folder: Path) -> None:
-    """Root becomes the user to whom it belongs; others stay who they are."""
+    """Root becomes the folder's owner; other users stay as they are."""
     owner = folder.stat()
     if os.geteuid() == 0 and owner.st_uid != 0:
         os.initgroups(pwd.getpwuid(owner.st_uid).pw_name, owner.st_gid)

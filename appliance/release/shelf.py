@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from appliance.box.durable import sync_folder, write_whole
+from appliance.box.durable import new_file, sync_folder, write_whole
 from appliance.release.arrivals import SHOW, Arrival
 from appliance.release.choice import Choice, appliance_box
 from appliance.show.bundle import WORKSHOP
@@ -122,10 +122,8 @@ def _copy_files(source: Path, target: Path, names: list[tuple[str, int]]) -> str
         digest = hashlib.sha256()
         with _reading(source / name) as reading:
             try:
-                with (target / name).open("wb") as writing:
+                with new_file(target / name) as writing:
                     copied = _copy(reading, writing, digest, source / name, size)
-                    writing.flush()
-                    os.fsync(writing.fileno())
             except OSError as error:
                 raise NoRoomError(f"{target}: {error.strerror}") from error
         if copied != size:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
-import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import yaml
 
-from appliance.box.private_file import put_in_place, write_beside
+from appliance.box.durable import alone_in, put_in_place, write_beside
 from appliance.sensor.keys import (
     HEADER,
     KeyFileError,
@@ -80,7 +77,7 @@ class KeyEditing:
 
     def prepare(self) -> None:
         """Write the changed file beside the old one, so that errors happen now. Raises OSError."""
-        self._beside = write_beside(self.path, self._text)
+        self._beside = write_beside(self.path, self._text.encode(), private=True)
 
     def commit(self) -> None:
         """Replace the old file with the changed one. Raises OSError."""
@@ -129,32 +126,17 @@ def editing(path: Path) -> Iterator[KeyEditing]:
     A file that does not exist yet has no sensors. Raises KeyFileError for another writer or a broken file,
     OSError when its folder cannot be written.
     """
-    path = path.resolve()  # a symbolic link stays one
-    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        _lock(folder, path)
-        change = KeyEditing(path)
-        try:
-            yield change
-        finally:
-            change.discard()
-    finally:
-        os.close(folder)  # releases the lock
-
-
-def _lock(folder: int, path: Path) -> None:
-    """Lock the folder: the file itself is replaced at each change."""
-    until = time.monotonic() + _PATIENCE_S
-    while True:
-        try:
-            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return
+    path = path.resolve()  # a link stays one
+    with ExitStack() as held:
+        try:  # the folder is locked: the file itself is replaced at each change
+            held.enter_context(alone_in(path.parent, _PATIENCE_S))
         except BlockingIOError:
-            if time.monotonic() > until:
-                raise KeyFileError(
-                    path, None, "another bunraku is changing this file; try again when it is done"
-                ) from None
-            time.sleep(0.05)
+            raise KeyFileError(
+                path, None, "another bunraku is changing this file; try again when it is done"
+            ) from None
+        change = KeyEditing(path)
+        held.callback(change.discard)
+        yield change
 
 
 class _Place(NamedTuple):

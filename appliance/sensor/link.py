@@ -12,7 +12,7 @@ from typing import cast
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.known_sensor import KnownSensor
-from appliance.sensor.memory_text import with_profile
+from appliance.sensor.memory import with_profile
 from appliance.sensor.pairing import NO_HAND, Pairing
 from appliance.sensor.state import SensorReading as SensorReading
 from appliance.sensor.state import SensorState as SensorState

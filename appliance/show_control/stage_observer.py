@@ -44,7 +44,7 @@ class StageObserver:
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
         """Process and fallback, of all processes of the box, as far as they ever happened."""
-        own = [("control", one) for one in self._seen.told(now)]
+        own = [("control", one) for one in self._seen.happened(now)]
         stage = fallen(self.health().get("fallbacks")) if self.state(now) != "absent" else ()
         return [*(("stage", one) for one in stage), *own, *self._company.fallbacks(now)]
 

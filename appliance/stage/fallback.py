@@ -1,15 +1,8 @@
-"""The stage's fallbacks: what it does when something goes wrong, counted from those who notice it."""
+"""The stage's fallbacks: what it does when something goes wrong; `watch.py` notices it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from appliance.box.fallback import Fallback, Fallbacks, Fallen
-from appliance.dancer.puppeteers import HOLD_S
-from appliance.stage.admission import Admission
-from appliance.stage.health import Health
-from appliance.stage.resume import Resumption
-from appliance.stage.stage_parts import StageParts
+from appliance.box.fallback import Fallback
 
 SENSOR_SILENT = Fallback(
     "sensor-silent",
@@ -24,7 +17,7 @@ READING_REFUSED = Fallback(
 PACKET_REFUSED = Fallback(
     "packet-refused",
     "Datagrams that are none of our sensors' were dropped. The audience sees nothing of it. If it goes on, "
-    "somebody else is in the sensors' network.",
+    "another device is in the sensors' network.",
 )
 CABLE_AWAY = Fallback(
     "cable-away",
@@ -41,11 +34,11 @@ NOT_LET_IN = Fallback(
 TICK_LATE = Fallback(
     "tick-late",
     "A tick was late: the last pose left once more. The audience sees nothing of one, a tremble of many. "
-    "Look who else uses the processor: bunraku doctor.",
+    "Check what else uses the processor: bunraku doctor.",
 )
 TICK_SKIPPED = Fallback(
     "tick-skipped",
-    "Slots went by without a frame: the machine was held up. The dance goes on in its place. Look who else "
+    "Slots went by without a frame: the machine was held up. The dance goes on in its place. Check what else "
     "uses the processor: bunraku doctor.",
 )
 OVER_BUDGET = Fallback(
@@ -98,72 +91,3 @@ OF_THE_STAGE = (
     *(TICK_LATE, TICK_SKIPPED, OVER_BUDGET, ITERATIONS_LOWERED, NETWORK_FAILED),
     *(RECEIVER_GONE, NOT_REALTIME, NOT_SHARED, NOT_RECORDED, PLACE_NOT_NOTED, STAGE_RESTARTED, POWER_CUT),
 )
-
-_FOREIGN = ("length", "magic", "version", "kind", "device", "tag", "old_session", "old_hello")
-
-
-class StageFallbacks:
-    """Sensors are watched at each tick, all else is looked at once a second, after the frame has left."""
-
-    def __init__(self, cast: StageParts, admission: Admission) -> None:
-        self._cast = cast
-        self.all = Fallbacks(OF_THE_STAGE)
-        self._worn = [joints[0] for joints in cast.worn.values()]
-        self._silent = [False] * len(self._worn)
-        self._dropped: dict[str, int] = {}
-        self.all.set(ITERATIONS_LOWERED.name, not admission.fits, admission.sentence())
-        self.all.set(NOT_LET_IN.name, bool(cast.complaints), " ".join(cast.complaints))
-
-    def watch(self, now: float) -> None:
-        """At each tick: who has just fallen silent. Some microseconds, nothing is made."""
-        for place, worn in enumerate(self._worn):
-            silent = HOLD_S < worn.silent_s(now) < float("inf")
-            if silent != self._silent[place]:
-                self._silent[place] = silent
-                if silent:
-                    self.all.count(SENSOR_SILENT.name, now)
-
-    def begin(self, now: float, resuming: Resumption, not_shared: str, is_recorded: bool) -> None:
-        """Right before the first tick: how it came to this start, and what the stage could not get.
-
-        `not_shared`: why no frames can be shared, else "".
-        """
-        self.all.follow(STAGE_RESTARTED.name, resuming.restarts, now)
-        self.all.follow(POWER_CUT.name, resuming.power_cuts, now)
-        self.all.set(PLACE_NOT_NOTED.name, bool(resuming.complaint), resuming.complaint)
-        self.all.set(NOT_SHARED.name, bool(not_shared), not_shared)
-        self.all.set(NOT_RECORDED.name, not is_recorded)
-
-    def lack_rights(self, missing: Sequence[str]) -> None:
-        """Which real-time rights the stage did not get, sentences."""
-        self.all.set(NOT_REALTIME.name, bool(missing), " ".join(missing))
-
-    def look(self, now: float, health: Health) -> None:
-        """Once a second: what others have counted."""
-        counts, every = self._cast.link.counts, self.all
-        every.hold(SENSOR_SILENT.name, any(self._silent))
-        every.follow(READING_REFUSED.name, counts.get("norm", 0), now)
-        every.follow(PACKET_REFUSED.name, sum(counts.get(one, 0) for one in _FOREIGN), now)
-        every.follow(TICK_LATE.name, health.late, now)
-        every.follow(TICK_SKIPPED.name, health.skipped, now)
-        every.follow(OVER_BUDGET.name, health.over_budget, now)
-        every.follow(NETWORK_FAILED.name, health.not_finite, now)
-        cables = [getattr(one, "trouble", None) or "" for one in self._cast.link.intakes]
-        every.set(CABLE_AWAY.name, any(cables), " ".join(filter(None, cables)))
-        every.set(
-            ADDRESS_ABSENT.name,
-            any(getattr(one, "address_is_absent", False) for one in self._cast.link.intakes),
-        )
-        every.set(RECEIVER_GONE.name, self._receiver_is_gone())
-
-    def told(self, now: float) -> Sequence[Fallen]:
-        """For the shared frame's health."""
-        return self.all.told(now)
-
-    def _receiver_is_gone(self) -> bool:
-        """Whether one of them has not taken a frame of the last second."""
-        before, self._dropped = (
-            self._dropped,
-            {one.name: one.dropped for one in self._cast.outputs.receivers},
-        )
-        return any(dropped > before.get(name, 0) for name, dropped in self._dropped.items())

@@ -1,4 +1,4 @@
-"""Phrases made ready once: read, resampled and surveyed they are kept as numbers, for the next start."""
+"""Phrases prepared once: read, resampled and surveyed they are kept as numbers, for the next start."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from appliance.box.durable import write_whole
 from appliance.dancer.forward_kinematics import soles_of
 from appliance.dancer.grounding import Floor, survey
 from appliance.dancer.phrase import FPS
@@ -26,7 +27,7 @@ from appliance.pose.skeleton import Skeleton
 FOLDER = ".prepared"  # in a show bundle: hidden, so it is no part of what was packed
 MEMORY = "prepared"  # in the folder where the box's processes meet
 SUFFIX = ".phrase"
-LARGEST = 64 * 2**20  # bytes: longer phrases are read anew, the folder may be one in memory
+LARGEST = 64 * 2**20  # bytes: longer phrases are read again, the folder may be one in memory
 
 _MAGIC = b"bunraku phrase 1\n"
 _HEAD = struct.Struct("<17sII3x")  # magic, bytes of the facts, CRC-32 of all that follows
@@ -95,7 +96,7 @@ def _name(path: Path, grounded: bool) -> str:
 
 
 def _keep(path: Path, phrase: Recording, floor: Floor | None) -> None:
-    """Write it beside, then give it its name: nobody finds half of it. Raises OSError without room."""
+    """Raises OSError without room."""
     arrays = [np.ascontiguousarray(array, np.float32) for array in _arrays(phrase, floor)]
     names = {"joints": phrase.skeleton.names, "parents": [int(parent) for parent in phrase.skeleton.parents]}
     facts = json.dumps({**names, "shapes": [array.shape for array in arrays]}).encode()
@@ -111,12 +112,7 @@ def _keep(path: Path, phrase: Recording, floor: Floor | None) -> None:
     check = 0
     for part in parts:
         check = zlib.crc32(part, check)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_bytes(b"".join((_HEAD.pack(_MAGIC, len(facts), check), *parts)))
-        temporary.rename(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, b"".join((_HEAD.pack(_MAGIC, len(facts), check), *parts)))
 
 
 def _kept(path: Path, skeleton: Skeleton) -> tuple[Recording, Floor | None] | None:

@@ -5,8 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, CheckpointWriter, boot_id
-from appliance.box.checkpoint_file import read_checkpoint
+from appliance.box.checkpoint import (
+    FILE,
+    Checkpoint,
+    CheckpointReader,
+    CheckpointWriter,
+    boot_id,
+    read_checkpoint,
+)
 from appliance.show.box import Resume
 from appliance.stage.iterations import Iterations
 from appliance.stage.stage_parts import StageParts

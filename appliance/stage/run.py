@@ -11,14 +11,12 @@ from appliance.box.notify import Notifier
 from appliance.box.realtime import enter_realtime, leave_realtime
 from appliance.box.show_state import ShowStateReader
 from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
-from appliance.sensor.link import SensorState
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.show_control.orders import Order, OrderInbox
 from appliance.stage.admission import Admission
 from appliance.stage.admission_cache import admitted
 from appliance.stage.carry_out import carry_out, resume
-from appliance.stage.fallback import StageFallbacks
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.phase_lock import PhaseLock
@@ -94,8 +92,7 @@ class Stage:
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         self.lock = PhaseLock() if box.phase_lock and self.cast.primary else None
-        self.watch = Watch(self.cast)
-        self.fallbacks = StageFallbacks(self.cast, self.admission)
+        self.watch = Watch(self.cast, self.admission)
 
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
         """Tick until `stopped` says so or the seconds are over; this thread is the real-time one."""
@@ -106,7 +103,7 @@ class Stage:
         missing = enter_realtime(self.box.realtime.priority)
         for words in missing:
             self.say(words)
-        self.fallbacks.lack_rights(missing)
+        self.watch.note_missing_rights(missing)
         try:
             self._tick_on(seconds, stopped)
         finally:
@@ -123,7 +120,7 @@ class Stage:
         self.health.begin(begun)
         facts = facts_of(self.show, self.box_file, self.iterations, begun, self.rehearsal)
         self.sharing.begin(self.cast, facts, self.say)
-        self.fallbacks.begin(begun, self.resuming, self.sharing.complaint, self.recorder is not None)
+        self.watch.note_start(begun, self.resuming, self.sharing.complaint, self.recorder is not None)
         self._tell(begun)
         self.resuming.begin(self.cast, self.iterations)
         if self.recorder is not None:
@@ -158,7 +155,7 @@ class Stage:
             self.notifier.ready()
         self.notifier.ping(slot.started)
         if not self._comes_from_stop:
-            self.fallbacks.watch(slot.started)
+            self.watch.count_silences(slot.started)
         self.resuming.note(self.cast, self.iterations, slot.tick)
         if self.recorder is not None:
             flags = late * LATE | tick.frame.late * RESENT | tick.network_failed * NOT_FINITE
@@ -214,14 +211,12 @@ class Stage:
         for sentence in filter(None, words):
             self.say(sentence)
 
-    def _tell(self, now: float) -> list[SensorState]:
-        """How the box is, for whoever reads the shared frame; gives how the sensors are."""
-        states = self.cast.link.states(now)
-        roster = roster_lines(states, self.wearing.neutral_of)
+    def _tell(self, now: float) -> None:
+        """How the box is, for readers of the shared frame."""
+        roster = roster_lines(self.cast.link.states(now), self.wearing.neutral_of)
         age_s, locked = self._sensor_age_s(now), self._is_locked
-        fallbacks = self.fallbacks.told(now)
+        fallbacks = self.watch.fallbacks.happened(now)
         self.sharing.tell(now, self.health, self.cast, self.iterations, age_s, locked, roster, fallbacks)
-        return states
 
     def _tell_people(self, words: str) -> None:
         """Say it, and note in the journal that it was said after this tick."""
@@ -242,12 +237,13 @@ class Stage:
         """Once a second, after the frame has left."""
         times = self.iterations
         self.health.look(now)
-        self.fallbacks.look(now, self.health)
+        news = self.watch.check(now, self.health, self.cast.link.states(now))
         line = self.health.line(times.coding, times.interaction, self._sensor_age_s(now), self._is_locked)
-        line = "  ".join(filter(None, (line, self.fallbacks.all.line(now))))
+        line = "  ".join(filter(None, (line, self.watch.fallbacks.line(now))))
         self.notifier.status(line)
         self.say(line)
-        for sentence in self.watch.news(now, self._tell(now)):
+        self._tell(now)
+        for sentence in news:
             self._tell_people(sentence)
         for imu_id, offsets in self.cast.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)

@@ -2,38 +2,46 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from pathlib import Path
 
-from appliance.sensor.memory_block import FILE_NAME, MemoryReader, MemoryWriter, text_on_disk
-from appliance.sensor.memory_text import DamagedMemoryError, Worn, memory_text, remembered, with_profile
+from appliance.box.block import BlockWriter
+from appliance.sensor.memory import (
+    FILE_NAME,
+    DamagedMemoryError,
+    Worn,
+    memory_file,
+    memory_record,
+    memory_text,
+    read_memory,
+    with_profile,
+)
 from appliance.sensor.neutral import NeutralPose
 
 
 class SensorMemory:
     """Neutral poses by sensor and joint, calibrations by IMU.
 
-    What is new goes into the runtime folder, which is memory: to keep something never waits, and nothing here
-    raises. The keeper carries it to the state folder. A start takes what the runtime folder has, which is
-    what the box knew last, and reads the disk where that has nothing: after each power-on.
+    Changes go into the runtime folder, which is memory: nothing here waits for a disk or raises. The keeper
+    carries them to the state folder. A start reads the runtime folder, which has what the box knew
+    last, and the disk where that has nothing: after each power-on.
     """
 
     def __init__(self, state: Path | None, say: Callable[[str], None], runtime: Path | None = None) -> None:
-        """state: the folder on the disk; None, or without a runtime folder: what is new is for this run."""
+        """state: the folder on the disk; None, or without a runtime folder: changes last for this run."""
         self._say = say
         self._neutral: dict[Worn, NeutralPose] = {}
         self._profiles: dict[bytes, bytes] = {}
-        self._writer: MemoryWriter | None = None
+        self._writer: BlockWriter | None = None
         if state is None:
             return
+        if runtime is None or not self._read_block(runtime, state):
+            self._read_file(state)
         if runtime is None:
-            self._load(state)
             return
-        if not self._take_up(runtime, state):
-            self._load(state)
         try:
-            self._writer = MemoryWriter(runtime, state)
+            self._writer = memory_record(state).writer(runtime)
         except OSError as error:
             self._complain(f"{runtime}: {error.strerror}")
 
@@ -58,7 +66,7 @@ class SensorMemory:
             self._write()
 
     def close(self) -> None:
-        """Let go of the runtime folder's file; what is in it stays."""
+        """Release the runtime folder's file; its content stays."""
         if self._writer is not None:
             self._writer.close()
 
@@ -66,7 +74,7 @@ class SensorMemory:
         if self._writer is None:
             return
         try:
-            self._writer.write(memory_text(self._neutral, self._profiles))
+            self._writer.write(memory_text(self._neutral, self._profiles).encode())
         except ValueError as error:  # of thousands of sensors
             self.close()
             self._writer = None
@@ -79,28 +87,25 @@ class SensorMemory:
             "`runtime:` in the box file."
         )
 
-    def _take_up(self, runtime: Path, state: Path) -> bool:
-        """Go on with what the last stage wrote into memory; False where there is nothing of this box."""
-        reader = MemoryReader(runtime, state)
-        text = reader.read()
-        reader.close()
-        if text is None:
+    def _read_block(self, runtime: Path, state: Path) -> bool:
+        """Continue from what the last stage wrote into memory; False where there is nothing of this box."""
+        with closing(memory_record(state).reader(runtime)) as reader:
+            text = reader.read()
+        try:
+            self._neutral, self._profiles = read_memory(text or b"")
+        except DamagedMemoryError:
             return False
-        with contextlib.suppress(DamagedMemoryError):
-            self._neutral, self._profiles = remembered(text)
-            return True
-        return False
+        return True
 
-    def _load(self, state: Path) -> None:
+    def _read_file(self, state: Path) -> None:
         path = state / FILE_NAME
         try:
-            text = text_on_disk(state)
-            if text is not None:
-                self._neutral, self._profiles = remembered(text)
+            for text in memory_file(state).read():
+                self._neutral, self._profiles = read_memory(text)
         except OSError as error:
             self._say(
                 f"{path}: what was remembered of the sensors cannot be read ({error.strerror}). "
-                "Sensors need a moment of stillness tonight. Check who may read this file."
+                "Sensors need a moment of stillness tonight. Check the permissions of this file."
             )
         except ValueError:
             self._set_aside(path)

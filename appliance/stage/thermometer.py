@@ -18,7 +18,7 @@ class Thermometer:
             self._descriptor = -1
 
     def celsius(self) -> float | None:
-        """None on machines that do not tell."""
+        """None on machines without one."""
         if self._descriptor < 0:
             return None
         try:
@@ -27,7 +27,7 @@ class Thermometer:
             return None
 
     def close(self) -> None:
-        """Let go of it."""
+        """Release the file."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
         self._descriptor = -1

@@ -1,99 +1,149 @@
-"""Looks once a second at what a technician must hear about, and says each thing once."""
+"""Notices trouble: keeps the stage's fallbacks, and says each change once to people."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 
+from appliance.box.fallback import Fallbacks
+from appliance.dancer.puppeteers import HOLD_S
 from appliance.sensor import wire
 from appliance.sensor.state import LOW_BATTERY, SensorState
+from appliance.stage import fallback as rows
+from appliance.stage.admission import Admission
+from appliance.stage.health import Health
+from appliance.stage.resume import Resumption
 from appliance.stage.stage_parts import StageParts
 
 SILENT_S = 0.5
 CHARGED = 25  # percent: above it a low battery may be said again
 
+_FOREIGN = ("length", "magic", "version", "kind", "device", "tag", "old_session", "old_hello")
+
 
 class Watch:
-    """Remembers what was said about sensors, receivers and the network, so that only changes are said."""
+    """Checks for silent sensors at each tick, for all else once a second, after the frame has left."""
 
-    def __init__(self, cast: StageParts) -> None:
+    def __init__(self, cast: StageParts, admission: Admission) -> None:
         self._cast = cast
-        self._silent: set[str] = set()
-        self._ways: dict[str, str] = {}
-        self._complaints: set[str] = set()
-        self._low: set[str] = set()
-        self._gone: set[str] = set()
+        self.fallbacks = Fallbacks(rows.OF_THE_STAGE)
+        self._worn = [joints[0] for joints in cast.worn.values()]
+        self._silent = [False] * len(self._worn)
         self._dropped: dict[str, int] = {}
-        self._network_failed = False
+        self._ways: dict[str, str] = {}
+        self._said: set[tuple[str, str]] = set()  # what is so, and was said
+        self.fallbacks.set(rows.ITERATIONS_LOWERED.name, "" if admission.fits else admission.sentence())
+        self.fallbacks.set(rows.NOT_LET_IN.name, " ".join(cast.complaints))
 
-    def news(self, now: float, sensors: Sequence[SensorState] = ()) -> Iterator[str]:
-        """Sentences about what changed since the last look; `now` in monotonic seconds.
+    def count_silences(self, now: float) -> None:
+        """At each tick: sensors that have just fallen silent. Some microseconds, without allocating."""
+        for place, worn in enumerate(self._worn):
+            silent = HOLD_S < worn.silent_s(now) < math.inf
+            if silent != self._silent[place]:
+                self._silent[place] = silent
+                if silent:
+                    self.fallbacks.count(rows.SENSOR_SILENT.name, now)
 
-        `sensors`: how the link sees each of them at this moment.
+    def note_start(self, now: float, resuming: Resumption, not_shared: str, is_recorded: bool) -> None:
+        """Right before the first tick: how it came to this start, and what the stage could not get.
+
+        `not_shared`: why no frames can be shared, else "".
         """
-        for sensor in sensors:
-            yield from self._links(sensor)
-        yield from self._silences(now, {sensor.name for sensor in sensors})
-        yield from self._receivers()
-        if self._cast.puppet.is_broken != self._network_failed:
-            self._network_failed = self._cast.puppet.is_broken
-            yield (
-                "The network gives poses that are not numbers. The dancer holds the last good pose. "
-                "Copy the show bundle again and start anew."
-                if self._network_failed
-                else "The network gives poses again. The dancer moves."
-            )
+        self.fallbacks.follow(rows.STAGE_RESTARTED.name, resuming.restarts, now)
+        self.fallbacks.follow(rows.POWER_CUT.name, resuming.power_cuts, now)
+        self.fallbacks.set(rows.PLACE_NOT_NOTED.name, resuming.complaint)
+        self.fallbacks.set(rows.NOT_SHARED.name, not_shared)
+        self.fallbacks.set(rows.NOT_RECORDED.name, not is_recorded)
 
-    def _links(self, sensor: SensorState) -> Iterator[str]:
+    def note_missing_rights(self, missing: Sequence[str]) -> None:
+        """Which real-time rights the stage did not get, sentences."""
+        self.fallbacks.set(rows.NOT_REALTIME.name, " ".join(missing))
+
+    def check(self, now: float, health: Health, sensors: Sequence[SensorState] = ()) -> list[str]:
+        """Once a second: bring the fallbacks up to date; sentences about what changed since the last call.
+
+        now: monotonic seconds; sensors: as the link sees them at this moment.
+        """
+        before, self._dropped = self._dropped, {one.name: one.dropped for one in self._cast.outputs.receivers}
+        gone = {name for name, dropped in self._dropped.items() if dropped > before.get(name, 0)}
+        self._update_fallbacks(now, health, bool(gone))
+        return [
+            *(sentence for sensor in sensors for sentence in self._sensor_news(sensor)),
+            *self._silence_news(now, {sensor.name for sensor in sensors}),
+            *self._output_news(gone),
+        ]
+
+    def _update_fallbacks(self, now: float, health: Health, is_receiver_gone: bool) -> None:
+        every, counts = self.fallbacks, self._cast.link.counts
+        every.hold(rows.SENSOR_SILENT.name, any(self._silent))
+        every.follow(rows.READING_REFUSED.name, counts.get("norm", 0), now)
+        every.follow(rows.PACKET_REFUSED.name, sum(counts.get(one, 0) for one in _FOREIGN), now)
+        every.follow(rows.TICK_LATE.name, health.late, now)
+        every.follow(rows.TICK_SKIPPED.name, health.skipped, now)
+        every.follow(rows.OVER_BUDGET.name, health.over_budget, now)
+        every.follow(rows.NETWORK_FAILED.name, health.not_finite, now)
+        intakes = self._cast.link.intakes
+        cables = filter(None, (getattr(one, "trouble", None) for one in intakes))
+        every.set(rows.CABLE_AWAY.name, " ".join(cables))
+        is_absent = any(getattr(one, "address_is_absent", False) for one in intakes)
+        every.set(rows.ADDRESS_ABSENT.name, is_absent)
+        every.set(rows.RECEIVER_GONE.name, is_receiver_gone)
+
+    def _changes(self, what: str, name: str, is_so: bool) -> bool:
+        """Whether this is to be said: it was not so at the last call and is now, or the reverse."""
+        if is_so == ((what, name) in self._said):
+            return False
+        self._said ^= {(what, name)}
+        return True
+
+    def _sensor_news(self, sensor: SensorState) -> Iterator[str]:
         """What a person should know of one sensor's link, battery and firmware."""
         name, way_before = sensor.name, self._ways.get(sensor.name)
         if sensor.state == "linked" and sensor.way and sensor.way != way_before:
             self._ways[name] = sensor.way
+            joints = ", ".join(puppeteer.joint for puppeteer in self._cast.worn.get(name, ()))
+            no_joint = "no joint of this show"
             yield (
                 f"Sensor {name} now speaks by {sensor.way}. The dance goes on."
                 if way_before
-                else f"Sensor {name} is linked by {sensor.way}, {self._holds(name)}."
+                else f"Sensor {name} is linked by {sensor.way}, and holds {joints or no_joint}."
             )
-        if sensor.complaint and sensor.complaint not in self._complaints:
-            self._complaints.add(sensor.complaint)
+        if sensor.complaint and self._changes("complaint", sensor.complaint, True):
             yield sensor.complaint
-        if sensor.battery < LOW_BATTERY and name not in self._low:
-            self._low.add(name)
+        is_charged = CHARGED <= sensor.battery != wire.BATTERY_UNKNOWN
+        is_low = sensor.battery < LOW_BATTERY or (("low", name) in self._said and not is_charged)
+        if self._changes("low", name, is_low) and is_low:
             yield f"Sensor {name}: {sensor.battery} % of its battery left. The dance goes on. Charge it soon."
-        elif CHARGED <= sensor.battery != wire.BATTERY_UNKNOWN:
-            self._low.discard(name)
 
-    def _holds(self, name: str) -> str:
-        joints = [puppeteer.joint for puppeteer in self._cast.worn.get(name, ())]
-        return f"and holds {', '.join(joints)}" if joints else "and holds no joint of this show"
-
-    def _silences(self, now: float, known: Set[str]) -> Iterator[str]:
-        """`known`: who has a key; one that was revoked is silent for good, and that was said."""
+    def _silence_news(self, now: float, known: set[str]) -> Iterator[str]:
+        """known: sensors that have a key; a revoked one is silent for good, and that was said."""
         for name, joints in self._cast.worn.items():
             silent_s = joints[0].silent_s(now)
-            if silent_s <= SILENT_S:
-                if name in self._silent:
-                    self._silent.remove(name)
-                    yield f"Sensor {name} is back. It takes its joint again."
-            elif silent_s < math.inf and name not in self._silent and name in known:
-                self._silent.add(name)
+            was_said = ("silent", name) in self._said
+            is_silent = silent_s > SILENT_S and (was_said or (silent_s < math.inf and name in known))
+            if self._changes("silent", name, is_silent):
                 yield (
                     f"Sensor {name} silent for {silent_s:.1f} s. The dancer moves freely. Check its battery."
+                    if is_silent
+                    else f"Sensor {name} is back. It takes its joint again."
                 )
 
-    def _receivers(self) -> Iterator[str]:
+    def _output_news(self, gone: set[str]) -> Iterator[str]:
+        """What a person should know of the receivers, and of the network."""
         for receiver in self._cast.outputs.receivers:
-            dropped_before, self._dropped[receiver.name] = (
-                self._dropped.get(receiver.name, 0),
-                receiver.dropped,
-            )
-            is_gone = receiver.dropped > dropped_before
-            if is_gone and receiver.name not in self._gone:
-                self._gone.add(receiver.name)
+            is_gone = receiver.name in gone
+            if self._changes("gone", receiver.name, is_gone):
                 yield (
                     f"Receiver {receiver.name} does not get the dance: {receiver.last_error}. "
                     "The others go on, and it is tried again each second. Start it, or check its address."
+                    if is_gone
+                    else f"Receiver {receiver.name} gets the dance again."
                 )
-            elif not is_gone and receiver.name in self._gone:
-                self._gone.remove(receiver.name)
-                yield f"Receiver {receiver.name} gets the dance again."
+        is_broken = self._cast.puppet.is_broken
+        if self._changes("network", "", is_broken):
+            yield (
+                "The network gives poses that are not numbers. The dancer holds the last good pose. "
+                "Copy the show bundle again and restart."
+                if is_broken
+                else "The network gives poses again. The dancer moves."
+            )

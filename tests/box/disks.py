@@ -41,6 +41,18 @@ def tiny(folder: Path, size: str) -> contextlib.AbstractContextManager[Path]:
     return mounted(folder, "-t", "tmpfs", "-o", f"size={size}", "tmpfs")
 
 
+def fill(disk: Path, but: int = 0) -> Path:
+    """Take all the room that is left, but for this many bytes; the file that takes it."""
+    ballast = disk / "ballast"
+    with ballast.open("wb", buffering=0) as file:
+        try:
+            while True:
+                file.write(bytes(4096))
+        except OSError:
+            file.truncate(file.tell() - but)
+            return ballast
+
+
 def made_image(path: Path, megabytes: int = 8) -> Path:
     """A disk with an ext4 file system, as a file."""
     with path.open("wb") as stream:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -15,13 +15,14 @@ from appliance.box.checkpoint import Checkpoint, CheckpointReader, CheckpointWri
 from appliance.box.clock import TICK_S
 from appliance.box.ring_file import RingFileWriter
 from appliance.box.runtime_folder import Claim
-from appliance.keeper.journal_carrier import RETRY_S
-from appliance.keeper.keeper import END_S, TURN_S, keep_on
-from appliance.keeper.kept import keep_rest
+from appliance.keeper.fallback import JOURNAL_STOPPED
+from appliance.keeper.keeper import END_S, keep_rest
+from appliance.keeper.mirror import RETRY_S, TURN_S, Mirror, mirror_until
 from appliance.recorder.reading import read_journal
 from appliance.recorder.segments import LEAST_FREE_SHARE, SEGMENT_TICKS, segment_paths
 from appliance.show.box import BoxConfig
 from appliance.stage.recorder import FILE, FORMAT, KIND
+from tests.box import disks
 from tests.bundles import write_show
 from tests.fake_clock import FakeTime
 from tests.recorder.night import Night
@@ -38,29 +39,12 @@ def night(tmp_path: Path) -> Night:
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[Path]:
     """A file system of its own, of eight megabytes."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mounting = ("mount", "-t", "tmpfs", "-o", f"size={DISK_BYTES}", "tmpfs", str(folder))
-    if subprocess.run(mounting, capture_output=True, check=False).returncode:
-        pytest.skip("no file system can be mounted here (not root, or in a closed container)")
-    yield folder
-    subprocess.run(("umount", "-l", str(folder)), check=True)
-
-
-def fill(disk: Path, but: int = 0) -> Path:
-    """All the room that is left, but for so many bytes, taken by somebody else."""
-    ballast = disk / "ballast"
-    with ballast.open("wb", buffering=0) as file:
-        try:
-            while True:
-                file.write(bytes(4096))
-        except OSError:
-            file.truncate(file.tell() - but)
-            return ballast
+    with disks.tiny(tmp_path / "disk", str(DISK_BYTES)) as folder:
+        yield folder
 
 
 def note(night: Night, ticks: int) -> None:
-    """So many ticks that cost no dance; their poses pack no smaller than those of one."""
+    """This many ticks that cost no dance; their poses pack no smaller than those of one."""
     noise = np.random.default_rng(0)
     for _ in range(ticks):
         night.tick.frame.pose[...] = noise.random(night.tick.frame.pose.shape)
@@ -73,49 +57,49 @@ def note(night: Night, ticks: int) -> None:
 
 
 def test_a_full_disk_is_said_once_and_the_newest_follows_when_there_is_room(night: Night, disk: Path) -> None:
-    carrier = night.carrier(disk / "journal")
+    mirror = night.mirror(disk / "journal")
     night.dance(100)
-    carrier.turn(0.0)
-    ballast = fill(disk)
+    mirror.turn(0.0)
+    ballast = disks.fill(disk)
     for turn in range(1, 100):
         night.dance(5)
-        carrier.turn(float(turn))
+        mirror.turn(float(turn))
     (said,) = night.said
     assert "the journal stops growing (No space left on device)" in said and "Free the disk" in said
-    assert carrier.complaint == said
-    assert carrier.errors == 1 + int(98 / RETRY_S)
+    assert mirror.complaint == said
+    assert mirror.failed == 1 + int(98 / RETRY_S)
     ballast.unlink()
-    carrier.turn(200.0)
-    assert carrier.complaint == "" and "grows again" in night.said[1]
+    mirror.turn(200.0)
+    assert mirror.complaint == "" and "grows again" in night.said[1]
     assert read_journal(disk / "journal").ticks["tick"].tolist() == list(range(595))
 
 
 def test_a_disk_that_becomes_read_only_is_no_reason_to_stop(night: Night, disk: Path) -> None:
-    carrier = night.carrier(disk / "journal")
+    mirror = night.mirror(disk / "journal")
     night.dance(50)
-    carrier.turn(0.0)
-    carrier._segments.finish()  # nobody writes: it can be remounted
+    mirror.turn(0.0)
+    mirror._mirrored._segments.finish()  # nobody writes: it can be remounted
     subprocess.run(("mount", "-o", "remount,ro", str(disk)), check=True)
     night.dance(50)
-    carrier.turn(1.0)
-    assert "Read-only file system" in carrier.complaint
+    mirror.turn(1.0)
+    assert "Read-only file system" in mirror.complaint
     subprocess.run(("mount", "-o", "remount,rw", str(disk)), check=True)
-    carrier.turn(1.0 + RETRY_S)
+    mirror.turn(1.0 + RETRY_S)
     assert read_journal(disk / "journal").ticks["tick"].tolist() == list(range(100))
 
 
 def test_a_disk_that_is_not_there_is_waited_for(night: Night, tmp_path: Path) -> None:
     (tmp_path / "data").touch()  # nothing can be made below a file
-    carrier = night.carrier(tmp_path / "data" / "journal")
+    mirror = night.mirror(tmp_path / "data" / "journal")
     night.dance(50)
-    carrier.turn(0.0)
-    assert "Not a directory" in carrier.complaint
+    mirror.turn(0.0)
+    assert "Not a directory" in mirror.complaint
     (tmp_path / "data").unlink()
     (tmp_path / "data").mkdir()
-    carrier.turn(5.0)
-    assert carrier.complaint
-    carrier.turn(RETRY_S)
-    assert not carrier.complaint
+    mirror.turn(5.0)
+    assert mirror.complaint
+    mirror.turn(RETRY_S)
+    assert not mirror.complaint
     assert len(read_journal(tmp_path / "data" / "journal").ticks) == 50
 
 
@@ -135,35 +119,35 @@ def test_what_another_release_has_noted_is_said_and_the_next_stage_is_kept(
     with closing(RingFileWriter.new(night.runtime / FILE, KIND, FORMAT, [(1, 500)] * 3)) as other:
         other.rings[0].write(facts)
         other.publish()
-        carrier = night.carrier(tmp_path / "journal")
-        carrier.turn(0.0)
-        assert "not of this release" in carrier.complaint and night.said == [carrier.complaint]
-        carrier.turn(RETRY_S)
+        mirror = night.mirror(tmp_path / "journal")
+        mirror.turn(0.0)
+        assert "not of this release" in mirror.complaint and night.said == [mirror.complaint]
+        mirror.turn(RETRY_S)
     stage = Night(night.show.directory, night.runtime)
     stage.dance(30)
-    carrier.turn(2 * RETRY_S)
-    assert carrier.complaint == ""
+    mirror.turn(2 * RETRY_S)
+    assert mirror.complaint == ""
     assert len(read_journal(tmp_path / "journal").ticks) == 30
 
 
 def test_a_memory_of_another_format_is_said_too(night: Night, tmp_path: Path) -> None:
     with closing(RingFileWriter.new(night.runtime / FILE, KIND, FORMAT + 1, [(1, 500)] * 3)) as other:
         other.publish()
-        carrier = night.carrier(tmp_path / "journal")
-        carrier.turn(0.0)
-        assert "Update this program" in carrier.complaint
+        mirror = night.mirror(tmp_path / "journal")
+        mirror.turn(0.0)
+        assert "Update this program" in mirror.complaint
 
 
 def test_the_oldest_go_where_room_is_short_but_never_the_newest_minute(night: Night, disk: Path) -> None:
-    carrier, folder = night.carrier(disk / "journal"), disk / "journal"
+    mirror, folder = night.mirror(disk / "journal"), disk / "journal"
     for second in range(170):
         note(night, 50)
-        carrier.turn(float(second))
+        mirror.turn(float(second))
     assert len(segment_paths(folder)) == 3
-    fill(disk, but=int(LEAST_FREE_SHARE * DISK_BYTES) + 100_000)
+    disks.fill(disk, but=int(LEAST_FREE_SHARE * DISK_BYTES) + 100_000)
     for second in range(170, 330):
         note(night, 50)
-        carrier.turn(float(second))
+        mirror.turn(float(second))
         if second % 10 == 9:
             ticks = read_journal(folder).ticks["tick"]
             assert len(ticks) >= SEGMENT_TICKS
@@ -171,34 +155,52 @@ def test_the_oldest_go_where_room_is_short_but_never_the_newest_minute(night: Ni
     assert night.said == []
 
 
-def test_the_keeper_turns_until_it_is_stopped_and_then_once_more() -> None:
-    time, happened = FakeTime(), list[str]()
+class Copied:
+    """Anything that is mirrored; `copy` is the test's."""
 
-    class Carried:
-        complaint, fallback = "", "not-kept"
+    name, fallback, recovered = "A thing", JOURNAL_STOPPED, "It is kept again."
 
-        def turn(self, now: float) -> None:
-            happened.append(f"turn at {now - 1000.0:.1f}")
+    def __init__(self, copy: Callable[[float], None]) -> None:
+        self.copy, self.is_closed = copy, False
 
-        def last_turn(self) -> None:
-            happened.append("last turn")
+    def explain(self, error: Exception) -> str:
+        return str(error)
 
-    keep_on([Carried()], lambda: time.now > 1001.2, lambda now: None, time.monotonic, time.sleep)
-    assert happened == ["turn at 0.0", "turn at 0.5", "turn at 1.0", "last turn"]
+    def close(self) -> None:
+        self.is_closed = True
+
+
+def test_a_mirror_turns_until_it_is_stopped_and_then_once_more() -> None:
+    time, copied_at = FakeTime(), list[float]()
+    copied = Copied(lambda now: copied_at.append(round(now - 1000.0, 1)))
+    clock = {"monotonic": time.monotonic, "sleep": time.sleep}
+    mirror_until(lambda: time.now > 1001.2, Mirror(copied, print), lambda: False, END_S, **clock)
+    assert copied_at[:3] == [0.0, 0.5, 1.0] and len(copied_at) == 4
+    assert copied.is_closed
+
+
+def test_an_error_is_said_once_and_tried_again_later() -> None:
+    said, copied_at, errors = list[str](), list[float](), [OSError("Full."), ValueError("Too long."), None]
+
+    def copy(now: float) -> None:
+        copied_at.append(now)
+        if error := errors[0]:
+            raise error
+
+    mirror = Mirror(Copied(copy), said.append)
+    for now in range(100):
+        mirror.turn(float(now))
+        if now in (39, 69):
+            errors.pop(0)
+    assert said == ["Full.", "Too long.", "It is kept again."]
+    assert copied_at == [*np.arange(0.0, 70.0, RETRY_S), *range(70, 100)]
+    assert (mirror.failed, mirror.complaint) == (7, "")
 
 
 def end_of(place: CheckpointWriter, runtime: Path, ends_at: float, end_s: float = END_S) -> list[float]:
-    """When a keeper that is stopped at 0.7 s turns, the last time at its end; its stage ends at `ends_at`."""
+    """When a mirror that is stopped at 0.7 s turns, the last time at its end; its stage ends at `ends_at`."""
     time, turned = FakeTime(), list[float]()
-
-    class Carried:
-        complaint, fallback = "", "not-kept"
-
-        def turn(self, now: float) -> None:
-            turned.append(round(now - 1000.0, 2))
-
-        def last_turn(self) -> None:
-            self.turn(time.now)
+    mirror = Mirror(Copied(lambda now: turned.append(round(now - 1000.0, 2))), print)
 
     def sleep(seconds: float) -> None:
         time.sleep(seconds)
@@ -207,7 +209,7 @@ def end_of(place: CheckpointWriter, runtime: Path, ends_at: float, end_s: float 
     place.write(PLACE)
     with closing(CheckpointReader(runtime)) as reader:
         clock = {"monotonic": time.monotonic, "sleep": sleep}
-        keep_on([Carried()], lambda: time.now > 1000.69, goes_on=reader.goes_on, end_s=end_s, **clock)
+        mirror_until(lambda: time.now > 1000.69, mirror, reader.goes_on, end_s, **clock)
     return turned
 
 
@@ -228,25 +230,6 @@ def test_a_show_that_does_not_end_is_not_waited_for_for_ever(tmp_path: Path) -> 
     place.close()
     with closing(CheckpointReader(tmp_path)) as reader:
         assert not reader.goes_on(), "the stage is gone: nobody will say that its show has ended"
-
-
-def test_whatever_the_disk_takes_each_is_given_the_time_at_which_it_begins() -> None:
-    """A beat with the time from before a slow disk would tell of a keeper that died."""
-    time, begun, beats = FakeTime(), list[float](), list[float]()
-
-    class Slow:
-        complaint, fallback = "", "not-kept"
-
-        def turn(self, now: float) -> None:
-            begun.append(now)
-            time.work(2.0)
-
-        def last_turn(self) -> None:
-            pass
-
-    keep_on([Slow(), Slow()], lambda: time.now > 1005.0, beats.append, time.monotonic, time.sleep)
-    assert begun == [1000.0, 1002.0, 1004.0, 1006.0]
-    assert beats == [1004.0, 1008.0]
 
 
 def test_what_a_keeper_did_not_live_to_carry_is_carried_after_the_dance(night: Night, tmp_path: Path) -> None:

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from appliance.keeper.sensor_memory_carrier import RETRY_S, MemoryCarrier
-from appliance.sensor.memory_block import FILE_NAME, MemoryWriter, forget_memory
-from appliance.sensor.memory_text import IMU_ID_BYTES, LARGEST, MOST_PROFILES
+from appliance.box.block import BlockWriter
+from appliance.keeper.mirror import RETRY_S, Mirror
+from appliance.keeper.records import mirrored_sensor_memory
+from appliance.sensor.memory import FILE_NAME, IMU_ID_BYTES, LARGEST, MOST_PROFILES, forget_memory
 from appliance.sensor.neutral import NeutralPose
 from appliance.stage.sensor_memory import SensorMemory
 
@@ -36,7 +37,7 @@ class Box:
         self.runtime.mkdir(exist_ok=True)
         for path in self.runtime.iterdir():
             path.unlink()
-        self.keeper = MemoryCarrier(self.runtime, self.state, self.said.append)
+        self.keeper = Mirror(mirrored_sensor_memory(self.runtime, self.state), self.said.append)
 
     def memory(self, say: Callable[[str], None] = silent) -> SensorMemory:
         """As a stage that starts has it."""
@@ -90,9 +91,9 @@ def test_a_stage_that_is_killed_has_lost_nothing_though_no_disk_took_it(box: Box
 
 def test_a_sensors_joints_are_kept_all_or_none(box: Box, monkeypatch: pytest.MonkeyPatch) -> None:
     """A stage that is killed between two of them would ask its dancer to stand still in mid-dance."""
-    written: list[str] = []
-    real = MemoryWriter.write
-    monkeypatch.setattr(MemoryWriter, "write", lambda self, text: (written.append(text), real(self, text))[1])
+    written: list[bytes] = []
+    real = BlockWriter.write
+    monkeypatch.setattr(BlockWriter, "write", lambda self, text: (written.append(text), real(self, text))[1])
     memory = box.memory()
     memory.keep_neutral("left-wrist", {"lShldr": POSE, "lHand": POSE})
     assert len(written) == 1
@@ -119,7 +120,7 @@ def test_the_file_is_its_owners_alone_and_nothing_stays_beside_it(box: Box, tmp_
     box.power_on()
     memory = box.memory()
     memory.keep_profile(IMU, OFFSETS)
-    box.keeper.last_turn()
+    box.keeper.last_turn(100.0)
     memory.close()
     [path] = box.state.iterdir()
     assert path.name == FILE_NAME
@@ -151,7 +152,8 @@ def test_nothing_new_writes_nothing(box: Box) -> None:
     before = (box.state / FILE_NAME).stat()
     for turn in range(3):
         box.keeper.turn(102.0 + turn)
-    MemoryCarrier(box.runtime, box.state, silent).last_turn()  # a keeper that starts anew finds it there
+    restarted = Mirror(mirrored_sensor_memory(box.runtime, box.state), silent)
+    restarted.last_turn(105.0)  # it finds on the disk what memory has
     assert os.path.samestat((box.state / FILE_NAME).stat(), before)
     memory.close()
 
@@ -163,7 +165,7 @@ def test_a_box_that_ends_leaves_the_disks_word_to_count(box: Box) -> None:
     memory.close()
     forget_memory(box.runtime, box.state)
     assert box.memory().neutral("a", "b") == POSE
-    box.keeper.last_turn()
+    box.keeper.last_turn(100.0)
     forget_memory(box.runtime, box.state)
     (box.state / FILE_NAME).unlink()
     assert box.memory().neutral("a", "b") is None
@@ -240,7 +242,7 @@ def test_a_disk_that_takes_nothing_is_said_once_and_tried_again(box: Box) -> Non
         assert memory.neutral("a", f"joint {number}") == POSE
         box.keeper.turn(100.0 + RETRY_S * number)
     assert len(box.said) == 1 and box.keeper.complaint == box.said[0]
-    assert "cannot be kept" in box.said[0] and "`state` in the box file" in box.said[0]
+    assert "cannot be kept" in box.said[0] and "`state:` in the box file" in box.said[0]
     box.state.unlink()
     box.keeper.turn(200.0)
     assert box.keeper.complaint == "" and "again" in box.said[1]

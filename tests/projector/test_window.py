@@ -233,7 +233,7 @@ def test_a_stage_that_was_held_up_with_the_projector_is_no_black_picture(tmp_pat
 
     def is_black_told() -> bool:
         run._report(now)
-        return any(one.name == STAGE_UNSEEN.name and one.active for one in run._fallbacks.told(now))
+        return any(one.name == STAGE_UNSEEN.name and one.active for one in run._fallbacks.happened(now))
 
     def draw(pictures: int, stage: StageDouble | None = None) -> None:
         nonlocal now

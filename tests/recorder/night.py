@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from appliance.box.clock import TICK_S, Slot
-from appliance.keeper.journal_carrier import JournalCarrier
+from appliance.keeper.journal import MirroredJournal
+from appliance.keeper.mirror import Mirror
 from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
@@ -63,13 +64,13 @@ class Night:
         self.recorder.event(ORDER, now, order=asked, done=done, words=words)
         return done, words
 
-    def carrier(self, folder: Path, minutes: float = 30.0) -> JournalCarrier:
-        """Who keeps this night in a folder."""
-        return JournalCarrier(self.runtime, folder, minutes, self.said.append, lambda: 1.8e9)
+    def mirror(self, folder: Path, minutes: float = 30.0) -> Mirror:
+        """Keeps this night in a folder."""
+        return Mirror(MirroredJournal(self.runtime, folder, minutes, lambda: 1.8e9), self.said.append)
 
     def kept(self, folder: Path) -> Path:
         """The folder, once all that was noted is in it."""
-        self.carrier(folder).last_turn()
+        self.mirror(folder).last_turn(0.0)
         return folder
 
     def _flags(self) -> int:

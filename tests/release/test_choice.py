@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from appliance.release.adoption import Outcome, Places, adopt, read_choice
 from appliance.release.arrivals import Arrival, look
 from appliance.release.choice import (
     APPLIANCE_BOX,
@@ -22,7 +23,6 @@ from appliance.release.choice import (
     box_of,
     write_whole,
 )
-from appliance.release.choosing import Outcome, Places, choose, remembered
 from appliance.release.shelf import NoRoomError, Shelf, UnreadableError
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
@@ -51,7 +51,7 @@ class Venue:
             (where / "box.yaml").write_text(box)
 
     def look(self) -> Outcome:
-        return choose(self.places, [look("stick", self.stick), look("boot", self.boot)], self._check)
+        return adopt(self.places, [look("stick", self.stick), look("boot", self.boot)], self._check)
 
     def _check(self, show: Path, box: Path) -> list[str]:
         self.checked.append((show, box))
@@ -109,7 +109,7 @@ def test_a_show_before_that_never_danced_is_better_than_none(venue: Venue) -> No
     for words in ("spring", "summer"):
         venue.bring(venue.stick, words)
         venue.look()
-    pairs = remembered(venue.places.data).pairs
+    pairs = read_choice(venue.places.data).pairs
     assert [(pair.show / "show.yaml").read_text() for pair in pairs] == ["summer", "spring"]
 
 
@@ -210,7 +210,7 @@ def test_a_stick_that_is_pulled_while_it_is_read_is_looked_at_again(venue: Venue
     venue.bring(venue.stick, "spring")
     arrival = look("stick", venue.stick)
     (venue.stick / "show" / "puppet.onnx").unlink()
-    outcome = choose(venue.places, [arrival], venue._check)
+    outcome = adopt(venue.places, [arrival], venue._check)
     assert outcome.choice.complete().first.show == EMBEDDED_SHOW
     assert "Plug it in again" in " ".join(outcome.choice.refused)
     assert not list((venue.places.data / "shows").iterdir()), "a copy was left half-done"
@@ -282,7 +282,7 @@ def test_what_comes_with_the_box_follows_the_release(venue: Venue, tmp_path: Pat
     venue.look()
     path = venue.places.data / CHOSEN
     path.write_text(path.read_text().replace(str(EMBEDDED_SHOW), str(tmp_path / "an older release")))
-    assert remembered(venue.places.data).first.show == EMBEDDED_SHOW
+    assert read_choice(venue.places.data).first.show == EMBEDDED_SHOW
 
 
 def test_a_pair_put_aside_is_not_taken_again_from_the_same_stick(venue: Venue) -> None:

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from appliance.box.durable import alone_in
+from appliance.release.adoption import adopt, read_choice
 from appliance.release.arrivals import look
-from appliance.release.choice import CHOSEN, Aside, Choice, Pair, alone_in
-from appliance.release.choosing import choose, remembered
+from appliance.release.choice import CHOSEN, Aside, Choice, Pair
 from appliance.release.shelf import Shelf, UnreadableError
 from tests.release.test_choice import BROKEN, Venue, dancing
 
@@ -72,7 +73,7 @@ def test_a_show_that_was_lost_comes_back_also_after_a_pulled_stick(venue: Venue)
     arrival = look("stick", venue.stick)
     network = venue.stick / "show" / "puppet.onnx"
     network.rename(venue.stick / "away")
-    assert choose(venue.places, [arrival], venue._check).choice.first.id != first.id
+    assert adopt(venue.places, [arrival], venue._check).choice.first.id != first.id
     (venue.stick / "away").rename(network)
     assert dancing(venue.look()) == "spring"
 
@@ -80,7 +81,7 @@ def test_a_show_that_was_lost_comes_back_also_after_a_pulled_stick(venue: Venue)
 def test_what_is_refused_beside_a_running_show_is_checked_again_at_power_on(venue: Venue) -> None:
     venue.bring(venue.stick, "spring")
     arrivals = [look("stick", venue.stick)]
-    late = choose(venue.places, arrivals, lambda show, box: ["It did not end in time."], late=True)
+    late = adopt(venue.places, arrivals, lambda show, box: ["It did not end in time."], late=True)
     assert not late.taken
     assert "did not end" in (venue.places.data / "refusals" / "stick.txt").read_text()
     assert dancing(venue.look()) == "spring"
@@ -105,7 +106,7 @@ def test_a_good_show_that_does_not_dance_tonight_is_tried_again_after_power_off(
 def test_a_name_that_is_no_text_stops_nobody(venue: Venue, content: str) -> None:
     venue.bring(venue.stick, content)
     (venue.stick / "show" / NO_TEXT).write_bytes(b"1")
-    said = choose(
+    said = adopt(
         venue.places, [look("stick", venue.stick)], lambda show, box: [f"{show / NO_TEXT}: what is this?"]
     )
     for words in (*said.words, *said.choice.refused):
@@ -199,4 +200,4 @@ def test_a_reader_that_hangs_holds_up_nobody_once_its_preflight_has_given_up(tmp
 
 
 def test_nothing_is_remembered_of_nothing(tmp_path: Path) -> None:
-    assert remembered(tmp_path / "none").pairs == ()
+    assert read_choice(tmp_path / "none").pairs == ()

@@ -9,7 +9,7 @@ import pytest
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorState
-from appliance.sensor.memory_text import MOST_PROFILES
+from appliance.sensor.memory import MOST_PROFILES
 from tests.sensor.peers import IMU_ID, KEYS, A, B, Box, Wearable
 
 EIGHT = {f"hand-{n}": SensorKey(f"hand-{n}", 0x100 + n, bytes([n]) * 16) for n in range(8)}

@@ -5,23 +5,18 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from appliance.box.checkpoint_file import CheckpointCarrier
 from appliance.box.fallback import Fallback, Fallbacks
 from appliance.box.process_health import LATE_S, ProcessHealth, ProcessHealthWriter
-from appliance.keeper.journal_carrier import JournalCarrier
-from appliance.keeper.keeper_health import (
-    CHOICE_NOT_KEPT,
-    JOURNAL_STOPPED,
-    PLACE_NOT_KEPT,
-    SENSORS_NOT_KEPT,
-    KeeperHealth,
-)
-from appliance.keeper.sensor_memory_carrier import MemoryCarrier
+from appliance.keeper.fallback import CHOICE_NOT_KEPT, JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT
+from appliance.keeper.journal import MirroredJournal
+from appliance.keeper.keeper import KeeperHealth
+from appliance.keeper.mirror import Mirror, Mirrored
+from appliance.keeper.records import mirrored_checkpoint, mirrored_sensor_memory
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.projector.fallback import OF_THE_PROJECTOR, PICTURES_SMALLER, STAGE_UNSEEN
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair
-from appliance.release.promote_show import Proof
+from appliance.release.trial import MirroredProof
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import Status
 from tests.bundles import FIGURE
@@ -37,12 +32,12 @@ def told(company: ProcessHealth, now: float) -> dict[str, tuple[str, int, bool]]
 def test_a_process_tells_its_fallbacks(folder: Path) -> None:
     fallbacks, company = Fallbacks([DMX]), ProcessHealth(folder)
     lights = ProcessHealthWriter(folder, "lights", fallbacks)
-    lights.tell(10.0)
+    lights.publish_health(10.0)
     assert told(company, 10.0) == {}
-    fallbacks.set("dmx-away", True, "The adapter is unplugged.")
-    lights.tell(10.5)
+    fallbacks.set("dmx-away", "The adapter is unplugged.")
+    lights.publish_health(10.5)
     assert told(company, 10.5) == {}, "once a second is enough"
-    lights.tell(11.0)
+    lights.publish_health(11.0)
     assert told(company, 11.0) == {"dmx-away": ("lights", 1, True)}
     lights.end(11.5)
     lights.close()
@@ -53,19 +48,19 @@ def test_lights_projector_and_keeper_that_die_are_counted(folder: Path) -> None:
     company = ProcessHealth(folder)
     for who in ("lights", "projector", "keeper"):
         first = ProcessHealthWriter(folder, who, Fallbacks(()))
-        first.tell(10.0)
+        first.publish_health(10.0)
         first.close()  # and never says that it ends
         assert told(company, 10.0 + LATE_S) == {}
         late = told(company, 10.1 + LATE_S)
         assert late == {f"{who}-died": (who, 1, True)}
         second = ProcessHealthWriter(folder, who, Fallbacks(()))
-        second.tell(20.0)
+        second.publish_health(20.0)
         assert told(company, 20.0) == {f"{who}-died": (who, 1, False)}
         second.end(21.0)
         second.close()
         assert told(company, 90.0) == {f"{who}-died": (who, 1, False)}, "who has ended is not late"
         third = ProcessHealthWriter(folder, who, Fallbacks(()))
-        third.tell(100.0)
+        third.publish_health(100.0)
         assert told(company, 100.0) == {}
         third.close()
         (folder / f"{who}.health").unlink()
@@ -78,32 +73,39 @@ def test_a_second_projector_says_nothing(folder: Path) -> None:
     second = ProcessHealthWriter(folder, "projector", second_fallbacks)
     for row in (STAGE_UNSEEN, PICTURES_SMALLER):
         second_fallbacks.set(row.name, True)
-    first.tell(10.0)
-    second.tell(10.0)
+    first.publish_health(10.0)
+    second.publish_health(10.0)
     assert told(ProcessHealth(folder), 10.0) == {}
     second.close()
     first.close()
 
 
+def mirror(mirrored: Mirrored) -> Mirror:
+    return Mirror(mirrored, lambda words: None)
+
+
 def test_the_keeper_tells_that_the_journal_has_stopped(folder: Path) -> None:
-    carrier = JournalCarrier(folder, Path("/nowhere/at/all"), 1.0, lambda words: None)
-    carrier.complaint = "The disk is full."
+    journal = mirror(MirroredJournal(folder, Path("/nowhere/at/all"), 1.0))
+    journal.complaint = "The disk is full."
     keeper = KeeperHealth(folder)
-    keeper.tell([carrier], 10.0)
+    keeper.report([journal], 10.0)
     assert told(ProcessHealth(folder), 10.0) == {JOURNAL_STOPPED.name: ("keeper", 1, True)}
     keeper.end(11.0)
 
 
 def test_the_keeper_tells_all_that_it_cannot_keep(folder: Path) -> None:
-    chosen, place = Proof(folder, folder / CHOSEN), CheckpointCarrier(folder, folder, lambda words: None)
-    sensors = MemoryCarrier(folder, folder, lambda words: None)
+    chosen, place = (
+        mirror(MirroredProof(folder, folder / CHOSEN)),
+        mirror(mirrored_checkpoint(folder, folder)),
+    )
+    sensors = mirror(mirrored_sensor_memory(folder, folder))
     chosen.complaint = place.complaint = sensors.complaint = "The disk is read-only."
     keeper = KeeperHealth(folder)
-    keeper.tell([chosen, place, sensors], 10.0)
+    keeper.report([chosen, place, sensors], 10.0)
     rows = {PLACE_NOT_KEPT.name, SENSORS_NOT_KEPT.name, CHOICE_NOT_KEPT.name}
     assert set(told(ProcessHealth(folder), 10.0)) == rows
     chosen.complaint = place.complaint = sensors.complaint = ""
-    keeper.tell([chosen, place, sensors], 12.0)
+    keeper.report([chosen, place, sensors], 12.0)
     assert not any(active for _, _, active in told(ProcessHealth(folder), 12.0).values())
     keeper.end(13.0)
 

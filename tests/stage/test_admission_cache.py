@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -13,7 +13,7 @@ from appliance.show.box import BoxConfig, LimitsConfig, OutputsConfig, SensorsCo
 from appliance.show.show import load_show
 from appliance.stage import admission_cache as module
 from appliance.stage.admission import Admission
-from appliance.stage.admission_cache import FILE, admitted
+from appliance.stage.admission_cache import admission_record, admitted
 from appliance.stage.stage_parts import StageParts, assemble
 from tests.bundles import write_show
 
@@ -73,17 +73,18 @@ def test_whatever_changes_is_measured(
     assert len(measured) == 4
 
 
-@pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b'{"asked": 1, "measured": {}}', b"\xff\xfe"])
+@pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b'{"coding": 3}', b"\xff\xfe"])
 def test_what_cannot_be_read_is_measured(
     cast: StageParts, bundle: Path, tmp_path: Path, measured: list[int], content: bytes
 ) -> None:
     show = load_show(bundle)
     admitted(tmp_path, cast, show, BOX, comes_back=False)
-    kept = json.loads((tmp_path / FILE).read_bytes())
-    (tmp_path / FILE).write_bytes(content)
+    record = admission_record(show, BOX)
+    with closing(record.writer(tmp_path)) as block:
+        block.write(content)
     admitted(tmp_path, cast, show, BOX, comes_back=True)
     assert len(measured) == 2
-    (tmp_path / FILE).write_text(json.dumps({**kept, "measured": {"coding": 3}}))
+    (tmp_path / record.name).write_bytes(content)
     admitted(tmp_path, cast, show, BOX, comes_back=True)
     assert len(measured) == 3
 
@@ -91,5 +92,6 @@ def test_what_cannot_be_read_is_measured(
 def test_a_folder_that_takes_no_file_costs_nothing_but_time(
     cast: StageParts, bundle: Path, tmp_path: Path
 ) -> None:
-    (tmp_path / FILE).mkdir()
-    assert admitted(tmp_path, cast, load_show(bundle), BOX, comes_back=True).coding >= 1
+    show = load_show(bundle)
+    (tmp_path / admission_record(show, BOX).name).mkdir()
+    assert admitted(tmp_path, cast, show, BOX, comes_back=True).coding >= 1

@@ -12,7 +12,7 @@ import pytest
 
 from appliance.box.fallback import RECENT_S, Fallback, Fallbacks, Fallen, fallen
 from appliance.box.process_health import OF_THE_COMPANY
-from appliance.keeper.keeper_health import OF_THE_KEEPER
+from appliance.keeper.fallback import OF_THE_KEEPER
 from appliance.lights.fallback import OF_THE_LIGHTS
 from appliance.projector.fallback import OF_THE_PROJECTOR
 from appliance.sensor.link import SensorReading
@@ -20,10 +20,11 @@ from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfi
 from appliance.show.show import load_show
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
-from appliance.stage.fallback import OF_THE_STAGE, StageFallbacks
+from appliance.stage.fallback import OF_THE_STAGE
 from appliance.stage.health import Health
 from appliance.stage.resume import Resumption
 from appliance.stage.stage_parts import StageParts, assemble
+from appliance.stage.watch import Watch
 from tests.bundles import write_show
 
 FITS = Admission(3, 2, 3, 2, 64, 0.1, 0.2, 0.3, 10.0)
@@ -43,12 +44,12 @@ def danced(tmp_path: Path) -> Iterator[StageParts]:
 
 
 @pytest.fixture
-def stage(danced: StageParts) -> StageFallbacks:
-    return StageFallbacks(danced, FITS)
+def stage(danced: StageParts) -> Watch:
+    return Watch(danced, FITS)
 
 
-def of(stage: StageFallbacks, row: Fallback, now: float) -> Fallen:
-    found = [one for one in stage.told(now) if one.name == row.name]
+def of(stage: Watch, row: Fallback, now: float) -> Fallen:
+    found = [one for one in stage.fallbacks.happened(now) if one.name == row.name]
     return found[0] if found else Fallen(row.name, 0, False, row.words)
 
 
@@ -56,55 +57,55 @@ def hear(danced: StageParts, at: float) -> None:
     danced.hear(SensorReading("left-wrist", (1.0, 0.0, 0.0, 0.0), 1, 0, at, at, 90, 255))
 
 
-def test_sensor_silent(stage: StageFallbacks, danced: StageParts) -> None:
+def test_sensor_silent(stage: Watch, danced: StageParts) -> None:
     for now in (1.0, 1.02):
-        stage.watch(now)
+        stage.count_silences(now)
     assert of(stage, rows.SENSOR_SILENT, 1.0).times == 0, "one that was never heard is not silent"
     hear(danced, 2.0)
     for now in (2.08, 2.12, 2.14, 20.0):
-        stage.watch(now)
-    stage.look(20.0, Health())
+        stage.count_silences(now)
+    stage.check(20.0, Health())
     assert of(stage, rows.SENSOR_SILENT, 20.0)[1:3] == (1, True)
     hear(danced, 20.5)
-    stage.watch(20.52)
-    stage.look(21.0, Health())
+    stage.count_silences(20.52)
+    stage.check(21.0, Health())
     assert of(stage, rows.SENSOR_SILENT, 21.0)[1:3] == (1, False)
 
 
-def test_reading_refused(stage: StageFallbacks, danced: StageParts) -> None:
+def test_reading_refused(stage: Watch, danced: StageParts) -> None:
     danced.link._counts["norm"] += 3
-    stage.look(1.0, Health())
-    stage.look(2.0, Health())
+    stage.check(1.0, Health())
+    stage.check(2.0, Health())
     assert of(stage, rows.READING_REFUSED, 2.0)[1:3] == (3, True)
     assert not of(stage, rows.READING_REFUSED, 1.1 + RECENT_S).active
 
 
 @pytest.mark.parametrize("reason", ["length", "magic", "device", "tag"])
-def test_packet_refused(stage: StageFallbacks, danced: StageParts, reason: str) -> None:
+def test_packet_refused(stage: Watch, danced: StageParts, reason: str) -> None:
     danced.link._counts[reason] += 1
-    stage.look(1.0, Health())
+    stage.check(1.0, Health())
     assert of(stage, rows.PACKET_REFUSED, 1.0)[1:3] == (1, True)
 
 
-def test_cable_away(stage: StageFallbacks, danced: StageParts) -> None:
-    stage.look(1.0, Health())
+def test_cable_away(stage: Watch, danced: StageParts) -> None:
+    stage.check(1.0, Health())
     told = of(stage, rows.CABLE_AWAY, 1.0)
     assert told[1:3] == (1, True)
     assert "ttyACM0" in told.words
     danced.link.intakes[0].trouble = None  # type: ignore[attr-defined]
-    stage.look(2.0, Health())
+    stage.check(2.0, Health())
     assert of(stage, rows.CABLE_AWAY, 2.0)[1:3] == (1, False)
 
 
-def test_address_absent(stage: StageFallbacks, danced: StageParts) -> None:
-    stage.look(1.0, Health())
+def test_address_absent(stage: Watch, danced: StageParts) -> None:
+    stage.check(1.0, Health())
     assert of(stage, rows.ADDRESS_ABSENT, 1.0).times == 0
     danced.link.intakes[0].address_is_absent = True  # type: ignore[attr-defined]
-    stage.look(2.0, Health())
+    stage.check(2.0, Health())
     assert of(stage, rows.ADDRESS_ABSENT, 2.0)[1:3] == (1, True)
 
 
-def test_sensor_not_let_in(stage: StageFallbacks) -> None:
+def test_sensor_not_let_in(stage: Watch) -> None:
     told = of(stage, rows.NOT_LET_IN, 1.0)
     assert told[1:3] == (1, True)
     assert "key file" in told.words
@@ -119,37 +120,37 @@ def test_sensor_not_let_in(stage: StageFallbacks) -> None:
         (rows.NETWORK_FAILED, "not_finite"),
     ],
 )
-def test_what_health_counts(stage: StageFallbacks, row: Fallback, counter: str) -> None:
+def test_what_health_counts(stage: Watch, row: Fallback, counter: str) -> None:
     health = Health()
     setattr(health, counter, 2)
-    stage.look(1.0, health)
+    stage.check(1.0, health)
     setattr(health, counter, 5)
-    stage.look(2.0, health)
+    stage.check(2.0, health)
     assert of(stage, row, 2.0)[1:3] == (5, True)
-    stage.look(3.0 + RECENT_S, health)
+    stage.check(3.0 + RECENT_S, health)
     assert of(stage, row, 3.0 + RECENT_S)[1:3] == (5, False)
 
 
-def test_iterations_lowered(danced: StageParts, stage: StageFallbacks) -> None:
+def test_iterations_lowered(danced: StageParts, stage: Watch) -> None:
     assert of(stage, rows.ITERATIONS_LOWERED, 0.0).times == 0
-    told = of(StageFallbacks(danced, DOES_NOT_FIT), rows.ITERATIONS_LOWERED, 0.0)
+    told = of(Watch(danced, DOES_NOT_FIT), rows.ITERATIONS_LOWERED, 0.0)
     assert told[1:3] == (1, True)
     assert "30 coding iterations do not fit" in told.words
 
 
-def test_receiver_gone(stage: StageFallbacks, danced: StageParts) -> None:
-    stage.look(1.0, Health())
+def test_receiver_gone(stage: Watch, danced: StageParts) -> None:
+    stage.check(1.0, Health())
     danced.outputs.receivers[0].dropped += 4
-    stage.look(2.0, Health())
+    stage.check(2.0, Health())
     assert of(stage, rows.RECEIVER_GONE, 2.0)[1:3] == (1, True)
-    stage.look(3.0, Health())
+    stage.check(3.0, Health())
     assert of(stage, rows.RECEIVER_GONE, 3.0)[1:3] == (1, False)
 
 
-def test_not_realtime(stage: StageFallbacks) -> None:
-    stage.lack_rights(())
+def test_not_realtime(stage: Watch) -> None:
+    stage.note_missing_rights(())
     assert of(stage, rows.NOT_REALTIME, 0.0).times == 0
-    stage.lack_rights(("Memory is not locked.",))
+    stage.note_missing_rights(("Memory is not locked.",))
     assert of(stage, rows.NOT_REALTIME, 0.0) == Fallen("not-realtime", 1, True, "Memory is not locked.")
 
 
@@ -157,24 +158,27 @@ def resumed(**changes: Any) -> Resumption:
     return cast(Resumption, SimpleNamespace(**{"restarts": 0, "power_cuts": 0, "complaint": ""} | changes))
 
 
-BEGINNINGS: dict[str, tuple[Fallback, Callable[[StageFallbacks], None]]] = {
-    "restarts": (rows.STAGE_RESTARTED, lambda stage: stage.begin(1.0, resumed(restarts=2), "", True)),
-    "power cuts": (rows.POWER_CUT, lambda stage: stage.begin(1.0, resumed(power_cuts=2), "", True)),
-    "place": (rows.PLACE_NOT_NOTED, lambda stage: stage.begin(1.0, resumed(complaint="Full."), "", True)),
-    "frames": (rows.NOT_SHARED, lambda stage: stage.begin(1.0, resumed(), "Full.", True)),
-    "journal": (rows.NOT_RECORDED, lambda stage: stage.begin(1.0, resumed(), "", False)),
+BEGINNINGS: dict[str, tuple[Fallback, Callable[[Watch], None]]] = {
+    "restarts": (rows.STAGE_RESTARTED, lambda stage: stage.note_start(1.0, resumed(restarts=2), "", True)),
+    "power cuts": (rows.POWER_CUT, lambda stage: stage.note_start(1.0, resumed(power_cuts=2), "", True)),
+    "place": (
+        rows.PLACE_NOT_NOTED,
+        lambda stage: stage.note_start(1.0, resumed(complaint="Full."), "", True),
+    ),
+    "frames": (rows.NOT_SHARED, lambda stage: stage.note_start(1.0, resumed(), "Full.", True)),
+    "journal": (rows.NOT_RECORDED, lambda stage: stage.note_start(1.0, resumed(), "", False)),
 }
 
 
 @pytest.mark.parametrize("what", BEGINNINGS)
-def test_how_a_stage_begins(stage: StageFallbacks, what: str) -> None:
+def test_how_a_stage_begins(stage: Watch, what: str) -> None:
     row, begins = BEGINNINGS[what]
-    stage.begin(0.0, resumed(), "", True)
+    stage.note_start(0.0, resumed(), "", True)
     before = of(stage, row, 0.0).times
     begins(stage)
     assert (before, of(stage, row, 1.0).active) == (0, True)
     others = {one.name for one, _ in BEGINNINGS.values()} - {row.name}
-    assert not others & {one.name for one in stage.told(1.0)}
+    assert not others & {one.name for one in stage.fallbacks.happened(1.0)}
 
 
 def test_the_status_line_names_what_is_in_force() -> None:
@@ -190,7 +194,7 @@ def test_what_begins_counts_once_until_it_is_over() -> None:
     every = Fallbacks(OF_THE_STAGE)
     for active in (True, True, False, True):
         every.set(rows.RECEIVER_GONE.name, active)
-    assert every.told(0.0)[0].times == 2
+    assert every.happened(0.0)[0].times == 2
 
 
 def test_other_versions_say_what_they_like() -> None:
@@ -198,17 +202,17 @@ def test_other_versions_say_what_they_like() -> None:
     assert fallen([["tick-late", 2, True, "Words."]]) == (Fallen("tick-late", 2, True, "Words."),)
 
 
-def test_a_look_costs_little_and_a_watch_makes_nothing(stage: StageFallbacks, danced: StageParts) -> None:
+def test_counting_silences_allocates_nothing(stage: Watch, danced: StageParts) -> None:
     """Objects that a tick leaves behind would call the collector, which is switched off during a show."""
     import sys
 
     hear(danced, 1.0)
-    stage.watch(1.0)
+    stage.count_silences(1.0)
     grown = []
     for _ in range(3):  # others of this process leave something now and then
         before = sys.getallocatedblocks()
         for _ in range(1000):
-            stage.watch(1.05)
+            stage.count_silences(1.05)
         grown.append(sys.getallocatedblocks() - before)
     assert min(grown) < 50
 

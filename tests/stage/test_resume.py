@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import yaml
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, CheckpointWriter, boot_id
-from appliance.box.checkpoint_file import CheckpointFile
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, CheckpointWriter, boot_id, packed
 from appliance.box.clock import TICK_S, Slot
+from appliance.box.record import SlotFile
 from appliance.box.show_state import ShowState, ShowStateWriter
 from appliance.dancer.motion_source import Playback
 from appliance.pose import quaternion
@@ -168,8 +168,8 @@ def test_after_a_power_cut_a_show_that_stood_dances(
     cast_of: Callable[[], StageParts], runtime: Path, tmp_path: Path, boot: str, rate: float
 ) -> None:
     """The dark show state has gone with the memory: in full light the phrase does not stand still."""
-    with closing(CheckpointFile(tmp_path / "state" / FILE)) as file:
-        file.write(replace(PLACE, rate=0.0, boot=boot))
+    with closing(SlotFile(tmp_path / "state" / FILE)) as file:
+        file.write(packed(replace(PLACE, rate=0.0, boot=boot)))
     cast = cast_of()
     with closing(Resumption("A test", runtime, tmp_path / "state", "always")) as resuming:
         assert "goes on at 2.0 s" in resuming.go_on(cast, Iterations(1, 0, 20))
@@ -266,8 +266,8 @@ def test_memory_is_asked_first_then_the_disk(
         put(runtime, replace(PLACE, boot=here, ended=in_memory == "ended"))
     if on_disk:
         boot = here if on_disk == "here" else "another"
-        file = CheckpointFile(tmp_path / "state" / FILE)
-        file.write(replace(PLACE, position_s=3.0, boot=boot, ended=on_disk == "ended"))
+        file = SlotFile(tmp_path / "state" / FILE)
+        file.write(packed(replace(PLACE, position_s=3.0, boot=boot, ended=on_disk == "ended")))
         file.close()
     cast = cast_of()
     resuming = Resumption("A test", runtime, tmp_path / "state", wanted)  # type: ignore[arg-type]

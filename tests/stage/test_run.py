@@ -88,7 +88,9 @@ class Evening:
 
     @property
     def silences(self) -> int:
-        return sum(one.times for one in self.stage.fallbacks.told(0.0) if one.name == SENSOR_SILENT.name)
+        return sum(
+            one.times for one in self.stage.watch.fallbacks.happened(0.0) if one.name == SENSOR_SILENT.name
+        )
 
     def dance(self, seconds: float) -> None:
         self.stage.dance(seconds, lambda: self.weights.append(self._weight) or False)  # type: ignore[func-returns-value]

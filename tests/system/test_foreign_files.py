@@ -16,15 +16,14 @@ import numpy as np
 import pytest
 
 from appliance.box.block import BlockReader, BlockWriter
-from appliance.box.checkpoint import Checkpoint, packed, unpacked
-from appliance.box.checkpoint_file import read_checkpoint
+from appliance.box.checkpoint import Checkpoint, packed, read_checkpoint, unpacked
 from appliance.cli.run_with_timeout import within
 from appliance.fixture_library.convert import convert_file
 from appliance.outputs.dmx.identity import component_identifier
 from appliance.pose.bvh import BvhError, read_bvh, write_bvh
 from appliance.projector.alignment import AlignmentFile
 from appliance.release.choice import Choice
-from appliance.release.start_attempts import pair_to_dance
+from appliance.release.trial import pair_to_dance
 from appliance.sensor.keys import KeyFileError, load_keys
 from appliance.show.config_error import ConfigError
 from appliance.show.projector import ProjectorConfig

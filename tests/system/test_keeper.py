@@ -16,15 +16,14 @@ from typing import Any
 import pytest
 import yaml
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter
-from appliance.box.checkpoint_file import read_checkpoint
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, read_checkpoint
 from appliance.box.process_health import ProcessHealth
 from appliance.box.ring_file import RingFileWriter
-from appliance.keeper.keeper_health import JOURNAL_STOPPED, SENSORS_NOT_KEPT
-from appliance.keeper.kept import keep_rest
+from appliance.keeper.fallback import JOURNAL_STOPPED, SENSORS_NOT_KEPT
+from appliance.keeper.keeper import keep_rest
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import read_journal
-from appliance.sensor.memory_block import FILE_NAME, MemoryWriter
+from appliance.sensor.memory import FILE_NAME, memory_record
 from appliance.show.box import load_box
 from appliance.stage.recorder import FILE as JOURNAL_FILE
 from appliance.stage.recorder import FORMAT, KIND
@@ -35,7 +34,7 @@ from tests.system.box import PATIENCE_S, started
 from tests.system.processes import children
 
 KEEP = (sys.executable, "-m", "appliance.cli", "keep")
-MEMORY = '{"neutral": [], "profiles": {}}'
+MEMORY = b'{"neutral": [], "profiles": {}}'
 
 
 def await_that(happened: Callable[[], Any], what: str) -> None:
@@ -154,13 +153,13 @@ def test_what_a_keeper_left_is_not_waited_for_on_a_disk_that_hangs(disk: Path, k
     assert any("The journal: the disk does not answer" in words for words in said)
 
 
-def test_a_file_that_does_not_answer_holds_up_its_own_carrier_alone(tmp_path: Path) -> None:
+def test_a_file_that_does_not_answer_holds_up_its_own_mirror_alone(tmp_path: Path) -> None:
     """Without a disk to freeze: a pipe without a writer, which waits for one when it is opened."""
     (tmp_path / "state").mkdir()
     os.mkfifo(tmp_path / "state" / FILE_NAME)
     (tmp_path / "disk").mkdir()
     (tmp_path / "runtime").mkdir(mode=0o700)
-    with closing(MemoryWriter(tmp_path / "runtime", tmp_path / "state")) as memory:
+    with closing(memory_record(tmp_path / "state").writer(tmp_path / "runtime")) as memory:
         memory.write(MEMORY)
         keeper = Keeper(tmp_path)
         try:
@@ -186,7 +185,7 @@ def test_a_journal_of_another_release_costs_neither_place_nor_keeper(keeper: Kee
     assert "Traceback" not in keeper.words
 
 
-def test_a_carrier_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper) -> None:
+def test_a_mirror_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper) -> None:
     keeper.goes_on()
     keeper.night.dance(20)
     await_that(lambda: keeper.kept_ticks() == 20, keeper.words)
@@ -199,10 +198,10 @@ def test_a_carrier_that_dies_is_started_again_and_the_others_go_on(keeper: Keepe
     assert keeper.end() == 0
 
 
-def test_carriers_end_with_a_keeper_that_is_killed(keeper: Keeper) -> None:
+def test_mirrors_end_with_a_keeper_that_is_killed(keeper: Keeper) -> None:
     keeper.goes_on()
+    await_that(lambda: len(children(keeper.process.pid)) == 3, "not all have started")
     processes = children(keeper.process.pid)
-    assert len(processes) == 3
     keeper.process.kill()
     keeper.process.wait()
     await_that(lambda: not any(map(lives, processes)), "they outlive their keeper")

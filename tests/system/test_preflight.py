@@ -13,11 +13,12 @@ from pathlib import Path
 
 import pytest
 
+from appliance.box.durable import alone_in
 from appliance.cli import candidate
 from appliance.cli import preflight as commands
 from appliance.cli.preflight import ANEW, Options, candidate_problems, preflight
 from appliance.cli.run_with_timeout import TimedOutError, within
-from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice, alone_in
+from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice
 from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
 from appliance.show.show import load_show

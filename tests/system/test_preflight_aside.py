@@ -13,8 +13,7 @@ from appliance.cli.run_with_timeout import within
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.release.choice import CHOSEN
-from appliance.release.promote_show import Proof
-from appliance.release.start_attempts import pair_to_dance
+from appliance.release.trial import MirroredProof, pair_to_dance
 from tests.bundles import FIGURE
 from tests.show_control.doubles import facts
 from tests.system.test_preflight import Machine, late
@@ -54,9 +53,9 @@ def dances_for_long(machine: Machine) -> None:
     writer, frame = FrameWriter(machine.run, shown), JointFrame(len(FIGURE))
     frame.frame_time = now
     writer.write(frame)
-    proof = Proof(machine.run, machine.run / CHOSEN)
-    proof.turn(now)
-    proof.last_turn()
+    proof = MirroredProof(machine.run, machine.run / CHOSEN)
+    proof.copy(now)
+    proof.close()
     writer.close()
 
 

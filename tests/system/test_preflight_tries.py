@@ -10,12 +10,13 @@ from pathlib import Path
 
 import pytest
 
+from appliance.box.durable import alone_in
 from appliance.cli.run_with_timeout import within
+from appliance.keeper.mirror import Mirror
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
-from appliance.release.choice import CHOSEN, Choice, Pair, alone_in
-from appliance.release.promote_show import Proof
-from appliance.release.start_attempts import ANEW, TRIES, ended_well, pair_to_dance
+from appliance.release.choice import CHOSEN, Choice, Pair
+from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair_to_dance
 from tests.bundles import FIGURE, write_show
 from tests.show_control.doubles import facts
 
@@ -150,8 +151,12 @@ def test_without_a_choice_what_comes_with_the_box_dances(tmp_path: Path) -> None
     assert "The audience sees the show that comes with the box" in said[0]
 
 
+def proof_of(evening: Evening) -> Mirror:
+    return Mirror(MirroredProof(evening.run, evening.run / CHOSEN), print)
+
+
 def test_who_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(evening: Evening) -> None:
-    proof = Proof(evening.run, evening.run / CHOSEN)
+    proof = proof_of(evening)
     evening.dance(seconds=9.0)
     proof.turn(time.monotonic())
     assert not evening.kept.first.good
@@ -160,31 +165,31 @@ def test_who_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(evening:
     assert evening.kept.first.good
     assert evening.choice.first.good
     assert proof.complaint == ""
-    proof.last_turn()
+    proof.last_turn(time.monotonic())
 
 
 def test_a_rehearsal_proves_nothing(evening: Evening) -> None:
-    proof = Proof(evening.run, evening.run / CHOSEN)
+    proof = proof_of(evening)
     evening.dance(seconds=10.5, rehearsal=True)
     proof.turn(time.monotonic())
     assert not evening.kept.first.good
-    proof.last_turn()
+    proof.last_turn(time.monotonic())
 
 
 def test_what_was_put_aside_is_let_go_once_another_one_has_danced(evening: Evening) -> None:
     for _ in range(4):
         evening.start(danced_s=None)
-    proof = Proof(evening.run, evening.run / CHOSEN)
+    proof = proof_of(evening)
     evening.dance(seconds=10.5)
     proof.turn(time.monotonic())
     assert [pair.id for pair in evening.kept.pairs] == [BEFORE]
     assert evening.kept.aside == evening.choice.aside
     assert [put_aside for put_aside, _ in evening.kept.aside] == [NEW]
-    proof.last_turn()
+    proof.last_turn(time.monotonic())
 
 
 def test_a_preflight_that_reads_a_stick_does_not_hold_up_the_keeper(evening: Evening) -> None:
-    proof = Proof(evening.run, evening.run / CHOSEN)
+    proof = proof_of(evening)
     evening.dance(seconds=10.5)
     now = time.monotonic()
     with alone_in(evening.data), alone_in(evening.run):
@@ -192,7 +197,7 @@ def test_a_preflight_that_reads_a_stick_does_not_hold_up_the_keeper(evening: Eve
     assert (proof.complaint, evening.kept.first.good) == ("", False)
     proof.turn(now + 11.0)
     assert evening.kept.first.good
-    proof.last_turn()
+    proof.last_turn(time.monotonic())
 
 
 def test_a_show_that_is_gone_with_its_disk_is_not_even_tried(evening: Evening) -> None:
@@ -206,7 +211,7 @@ def test_a_show_that_is_gone_with_its_disk_is_not_even_tried(evening: Evening) -
 
 
 def test_a_proof_that_cannot_be_kept_is_said_and_tried_again(evening: Evening) -> None:
-    proof = Proof(evening.run, evening.run / CHOSEN)
+    proof = proof_of(evening)
     evening.dance(seconds=10.5)
     temporary = evening.data / f".{CHOSEN}.new"
     temporary.mkdir()
@@ -219,7 +224,7 @@ def test_a_proof_that_cannot_be_kept_is_said_and_tried_again(evening: Evening) -
     proof.turn(now + 11.0)
     assert evening.kept.first.good
     assert proof.complaint == ""
-    proof.last_turn()
+    proof.last_turn(time.monotonic())
 
 
 def test_a_broken_chosen_show_gives_way_on_the_real_stage(evening: Evening, tmp_path: Path) -> None:

@@ -8,12 +8,10 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from appliance.box.checkpoint import FILE
-from appliance.box.checkpoint_file import read_checkpoint
+from appliance.box.checkpoint import FILE, read_checkpoint
 from appliance.outputs.frame_reader import FrameReader
 from appliance.recorder.reading import read_journal
-from appliance.sensor.memory_block import FILE_NAME, MemoryWriter
-from appliance.sensor.memory_text import memory_text, remembered
+from appliance.sensor.memory import FILE_NAME, memory_record, memory_text, read_memory
 from tests.bundles import write_show
 from tests.system.box import Box, await_end_of_keeper, playing
 
@@ -42,8 +40,8 @@ def test_a_rehearsal_leaves_what_the_venue_keeps_and_the_show_goes_on_behind_it(
         box.frames(60)
         box.end(signal.SIGKILL)
         await_end_of_keeper(runtime)
-        memory = MemoryWriter(runtime, tmp_path / "state")  # learnt, and not carried to the disk yet
-        memory.write(memory_text({}, PROFILES))
+        memory = memory_record(tmp_path / "state").writer(runtime)  # learnt, and not on the disk yet
+        memory.write(memory_text({}, PROFILES).encode())
         memory.close()
         kept = {name: files_of(tmp_path / name) for name in ("state", "journal")}
         noted = {name: (runtime / name).read_bytes() for name in (FILE, FILE_NAME, "journal")}
@@ -63,7 +61,7 @@ def test_a_rehearsal_leaves_what_the_venue_keeps_and_the_show_goes_on_behind_it(
         box.await_words("After a restart of the stage the show goes on")
         assert box.end() == 0
         assert "Traceback" not in box.words
-    assert remembered((tmp_path / "state" / FILE_NAME).read_text())[1] == PROFILES
+    assert read_memory((tmp_path / "state" / FILE_NAME).read_bytes())[1] == PROFILES
 
 
 def test_a_rehearsal_that_is_killed_is_not_gone_on_with(tmp_path: Path) -> None:

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader
-from appliance.box.checkpoint_file import CheckpointFile, read_checkpoint
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, packed, read_checkpoint
+from appliance.box.record import SlotFile
 from tests.bundles import write_show
 from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
 
@@ -154,8 +154,8 @@ def await_carried(folder: Path) -> None:
 
 
 def _as_of_another_boot(path: Path, place: Checkpoint) -> None:
-    file = CheckpointFile(path)
-    file.write(replace(place, boot="of another boot"))
+    file = SlotFile(path)
+    file.write(packed(replace(place, boot="of another boot")))
     file.close()
 
 
@@ -174,11 +174,11 @@ def test_a_return_measures_nothing_and_reads_no_phrase(show: Path, tmp_path: Pat
     with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
         box.frames(5)
         runtime = tmp_path / "runtime"
-        measured = (runtime / "admission.json").read_bytes()
+        measured = (runtime / "admission").read_bytes()
         [phrase] = (runtime / "prepared").iterdir()
         made = phrase.stat().st_mtime_ns
         box.kill_and_restart()
         box.frames(5)
-        assert (runtime / "admission.json").read_bytes() == measured
+        assert (runtime / "admission").read_bytes() == measured
         assert json.loads(measured)["measured"]["asked_coding"] == 3
         assert phrase.stat().st_mtime_ns == made

@@ -280,7 +280,7 @@ def test_a_show_that_ends_as_usual_leaves_nothing_in_force(show: Path, tmp_path:
         assert box.end() == 0
         assert show_state(tmp_path) == ShowState()
         assert is_free(box.control)
-        left = {"stage.lock", "place", "journal", "prepared", "admission.json"}  # for the next start
+        left = {"stage.lock", "place", "journal", "prepared", "admission"}  # for the next start
         left |= {"keeper.lock", "keeper.health", "sensors.memory"}
         assert set(os.listdir(tmp_path / "runtime")) <= left  # noqa: PTH208
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from pathlib import Path
 from uuid import UUID, uuid4
 
+from appliance.box.durable import write_whole
 from appliance.pose.foreign_file import content
 
 FILE = "sacn-cid"
@@ -26,9 +26,7 @@ def component_identifier(state: Path | None) -> UUID:
         return kept
     with contextlib.suppress(OSError):
         state.mkdir(parents=True, exist_ok=True)
-        draft = state / f"{FILE}.{os.getpid()}"
-        draft.write_text(f"{fresh}\n", encoding="ascii")
-        draft.replace(state / FILE)
+        write_whole(state / FILE, f"{fresh}\n".encode())
     return fresh
 
 

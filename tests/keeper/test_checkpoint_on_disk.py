@@ -6,21 +6,16 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, packed
-from appliance.box.checkpoint_file import (
-    EVERY_S,
-    RETRY_S,
-    SLOT_BYTES,
-    SLOTS,
-    CheckpointCarrier,
-    CheckpointFile,
-    read_checkpoint,
-)
+from appliance.box.checkpoint import FILE, Checkpoint, CheckpointWriter, packed, read_checkpoint
+from appliance.box.record import SLOT_BYTES, SLOT_CAPACITY, SLOTS, SlotFile
+from appliance.keeper.mirror import RETRY_S, TURN_S, Mirror
+from appliance.keeper.records import mirrored_checkpoint
 from tests.box import disks
 from tests.deploy.cut import cut_off
 
@@ -35,21 +30,21 @@ def at(tick: int) -> Checkpoint:
 
 
 def written(path: Path, *ticks: int) -> None:
-    file = CheckpointFile(path)
+    file = SlotFile(path)
     for tick in ticks:
-        file.write(at(tick))
+        file.write(packed(at(tick)))
     file.close()
 
 
-class Carried:
-    """A carrier with its folders, a stage's end of the place, and what was said."""
+class Mirrored:
+    """A mirror with its folders, a stage's end of the place, and what was said."""
 
     def __init__(self, runtime: Path, state: Path) -> None:
         runtime.mkdir(exist_ok=True)
         self.said: list[str] = []
         self.stage = CheckpointWriter(runtime)
         self.state = state
-        self.carrier = CheckpointCarrier(runtime, state, self.said.append)
+        self.mirror = Mirror(mirrored_checkpoint(runtime, state), self.said.append)
 
     @property
     def on_disk(self) -> Checkpoint | None:
@@ -57,8 +52,8 @@ class Carried:
 
 
 @pytest.fixture
-def carried(tmp_path: Path) -> Iterator[Carried]:
-    one = Carried(tmp_path / "runtime", tmp_path / "state")
+def mirrored(tmp_path: Path) -> Iterator[Mirrored]:
+    one = Mirrored(tmp_path / "runtime", tmp_path / "state")
     yield one
     one.stage.close()
 
@@ -112,6 +107,14 @@ def test_a_write_torn_at_any_byte_leaves_the_place_before(tmp_path: Path) -> Non
         path.write_bytes(before)
 
 
+def test_more_than_a_slot_holds_is_refused_and_changes_nothing(tmp_path: Path) -> None:
+    written(tmp_path / FILE, 1)
+    before = (tmp_path / FILE).read_bytes()
+    with closing(SlotFile(tmp_path / FILE)) as file, pytest.raises(ValueError, match=str(SLOT_CAPACITY)):
+        file.write(bytes(SLOT_CAPACITY + 1))
+    assert (tmp_path / FILE).read_bytes() == before
+
+
 def test_the_older_slot_is_the_one_that_is_written(tmp_path: Path) -> None:
     path = tmp_path / FILE
     written(path, 1, 2)
@@ -128,114 +131,110 @@ def _alone(path: Path, slots: list[bytes], slot: int) -> Checkpoint | None:
 
 def test_a_file_that_another_disk_covers_is_left(tmp_path: Path) -> None:
     """A data partition that is mounted late lies over the folder in which the file was made."""
-    file = CheckpointFile(tmp_path / "state" / FILE)
-    file.write(at(1))
+    file = SlotFile(tmp_path / "state" / FILE)
+    file.write(packed(at(1)))
     (tmp_path / "state").rename(tmp_path / "covered")
-    file.write(at(2))
+    file.write(packed(at(2)))
     file.close()
     assert read_checkpoint(tmp_path / "covered" / FILE) == at(1)
     assert read_checkpoint(tmp_path / "state" / FILE) == at(2)
 
 
-def test_carried_once_in_each_turn_and_only_what_is_new(carried: Carried) -> None:
-    carried.carrier.turn(100.0)
-    assert not carried.state.exists()
-    carried.stage.write(at(1))
-    carried.carrier.turn(100.1)
-    assert carried.on_disk is None  # not its turn yet
-    carried.carrier.turn(100.0 + EVERY_S)
-    assert carried.on_disk == at(1)
-    before = (carried.state / FILE).read_bytes()
-    carried.stage.write(at(2))  # a show that stands: only its ticks go on
-    carried.carrier.turn(110.0)
-    assert (carried.state / FILE).read_bytes() == before
-    carried.stage.write(replace(PLACE, position_s=2.0))
-    carried.carrier.turn(120.0)
-    assert carried.on_disk == replace(PLACE, position_s=2.0)
-    assert carried.said == []
+def test_carried_once_in_each_turn_and_only_what_is_new(mirrored: Mirrored) -> None:
+    mirrored.mirror.turn(100.0)
+    assert not mirrored.state.exists()
+    mirrored.stage.write(at(1))
+    mirrored.mirror.turn(100.0 + TURN_S)
+    assert mirrored.on_disk == at(1)
+    before = (mirrored.state / FILE).read_bytes()
+    mirrored.stage.write(at(2))  # a show that stands: only its ticks go on
+    mirrored.mirror.turn(110.0)
+    assert (mirrored.state / FILE).read_bytes() == before
+    mirrored.stage.write(replace(PLACE, position_s=2.0))
+    mirrored.mirror.turn(120.0)
+    assert mirrored.on_disk == replace(PLACE, position_s=2.0)
+    assert mirrored.said == []
 
 
-def test_the_last_turn_carries_what_is_newest(carried: Carried) -> None:
-    carried.stage.write(at(1))
-    carried.carrier.turn(100.0)
-    carried.stage.write(replace(PLACE, position_s=2.0, ended=True))
-    carried.carrier.last_turn()
-    assert carried.on_disk == replace(PLACE, position_s=2.0, ended=True)
-
-
-@needs_mounts
-def test_a_full_disk_is_survived(carried: Carried) -> None:
-    with disks.tiny(carried.state, "4k"):  # one of the two slots fits
-        carried.stage.write(at(1))
-        carried.carrier.turn(100.0)
-        assert carried.on_disk is None
-        assert len(carried.said) == 1 and "No space left" in carried.said[0]
-        assert list(carried.state.iterdir()) == []  # nothing half-written is left
-    with disks.tiny(carried.state, "8k"):
-        carried.carrier.turn(110.0)
-        assert carried.on_disk == at(1)
+def test_the_last_turn_carries_what_is_newest(mirrored: Mirrored) -> None:
+    mirrored.stage.write(at(1))
+    mirrored.mirror.turn(100.0)
+    mirrored.stage.write(replace(PLACE, position_s=2.0, ended=True))
+    mirrored.mirror.last_turn(100.5)
+    assert mirrored.on_disk == replace(PLACE, position_s=2.0, ended=True)
 
 
 @needs_mounts
-def test_a_disk_that_fills_up_later_takes_the_place_all_the_same(carried: Carried) -> None:
+def test_a_full_disk_is_survived(mirrored: Mirrored) -> None:
+    with disks.tiny(mirrored.state, "4k"):  # one of the two slots fits
+        mirrored.stage.write(at(1))
+        mirrored.mirror.turn(100.0)
+        assert mirrored.on_disk is None
+        assert len(mirrored.said) == 1 and "No space left" in mirrored.said[0]
+        assert list(mirrored.state.iterdir()) == []  # nothing half-written is left
+    with disks.tiny(mirrored.state, "8k"):
+        mirrored.mirror.turn(110.0)
+        assert mirrored.on_disk == at(1)
+
+
+@needs_mounts
+def test_a_disk_that_fills_up_later_takes_the_place_all_the_same(mirrored: Mirrored) -> None:
     """All the room that it will ever need was taken when the file was made."""
-    with disks.tiny(carried.state, "64k"):
-        carried.stage.write(at(1))
-        carried.carrier.turn(100.0)
-        with pytest.raises(OSError, match="No space"), (carried.state / "film").open("wb", 0) as film:
-            while True:
-                film.write(bytes(4096))
+    with disks.tiny(mirrored.state, "64k"):
+        mirrored.stage.write(at(1))
+        mirrored.mirror.turn(100.0)
+        disks.fill(mirrored.state)
         for turn in range(1, 5):
-            carried.stage.write(replace(PLACE, position_s=float(turn)))
-            carried.carrier.turn(100.0 + turn)
-            assert carried.on_disk == replace(PLACE, position_s=float(turn))
-        assert carried.said == []
+            mirrored.stage.write(replace(PLACE, position_s=float(turn)))
+            mirrored.mirror.turn(100.0 + turn)
+            assert mirrored.on_disk == replace(PLACE, position_s=float(turn))
+        assert mirrored.said == []
 
 
 @needs_mounts
-def test_a_read_only_disk_is_survived_and_taken_when_it_is_writable(tmp_path: Path, carried: Carried) -> None:
+def test_a_read_only_disk_is_survived_and_taken_again_later(tmp_path: Path, mirrored: Mirrored) -> None:
     image = disks.made_image(tmp_path / "image")
-    with disks.disk(image, carried.state):
-        written(carried.state / FILE, 1)
-    carried.stage.write(replace(PLACE, position_s=2.0))
-    with disks.disk(image, carried.state, "ro"):
+    with disks.disk(image, mirrored.state):
+        written(mirrored.state / FILE, 1)
+    mirrored.stage.write(replace(PLACE, position_s=2.0))
+    with disks.disk(image, mirrored.state, "ro"):
         for turn in range(3):
-            carried.carrier.turn(100.0 + RETRY_S * turn)
-        assert carried.on_disk == at(1)  # it can still be read
-        assert len(carried.said) == 1 and "Read-only" in carried.said[0]
-    with disks.disk(image, carried.state):
-        carried.carrier.turn(200.0)
-        assert carried.on_disk == replace(PLACE, position_s=2.0)
+            mirrored.mirror.turn(100.0 + RETRY_S * turn)
+        assert mirrored.on_disk == at(1)  # it can still be read
+        assert len(mirrored.said) == 1 and "Read-only" in mirrored.said[0]
+    with disks.disk(image, mirrored.state):
+        mirrored.mirror.turn(200.0)
+        assert mirrored.on_disk == replace(PLACE, position_s=2.0)
 
 
 @needs_mounts
-def test_a_disk_that_fails_in_the_middle(tmp_path: Path, carried: Carried) -> None:
+def test_a_disk_that_fails_in_the_middle(tmp_path: Path, mirrored: Mirrored) -> None:
     """Every write gives an input/output error from one moment on: the keeper goes on, and says so once."""
     image = disks.made_image(tmp_path / "image")
-    with disks.disk(image, carried.state):
-        carried.stage.write(at(1))
-        carried.carrier.turn(100.0)
-        cut_off(carried.state)
-        carried.stage.write(replace(PLACE, position_s=2.0))
+    with disks.disk(image, mirrored.state):
+        mirrored.stage.write(at(1))
+        mirrored.mirror.turn(100.0)
+        cut_off(mirrored.state)
+        mirrored.stage.write(replace(PLACE, position_s=2.0))
         for turn in range(3):
-            carried.carrier.turn(110.0 + RETRY_S * turn)
-        assert carried.carrier.failed == 3 and len(carried.said) == 1
-    with disks.disk(image, carried.state):
-        assert carried.on_disk == at(1)
-        carried.carrier.turn(200.0)  # the same process finds the disk that is back
-        assert carried.on_disk == replace(PLACE, position_s=2.0)
+            mirrored.mirror.turn(110.0 + RETRY_S * turn)
+        assert mirrored.mirror.failed == 3 and len(mirrored.said) == 1
+    with disks.disk(image, mirrored.state):
+        assert mirrored.on_disk == at(1)
+        mirrored.mirror.turn(200.0)  # the same process finds the disk that is back
+        assert mirrored.on_disk == replace(PLACE, position_s=2.0)
 
 
 WRITER = """
 import sys
 from pathlib import Path
-from appliance.box.checkpoint import Checkpoint
-from appliance.box.checkpoint_file import CheckpointFile
-file, tick = CheckpointFile(Path(sys.argv[1])), int(sys.argv[2])
+from appliance.box.checkpoint import Checkpoint, packed
+from appliance.box.record import SlotFile
+file, tick = SlotFile(Path(sys.argv[1])), int(sys.argv[2])
 while True:
     tick += 1
     try:
-        file.write(Checkpoint("A show", "main", 1.5, (0.0, 30.0), tick=tick))
+        file.write(packed(Checkpoint("A show", "main", 1.5, (0.0, 30.0), tick=tick)))
     except OSError:
         break
     print(tick, flush=True)

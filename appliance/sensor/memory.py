@@ -1,16 +1,24 @@
-"""The sensors' memory as text: neutral poses by sensor and joint, calibrations by the IMU's id."""
+"""What a box remembers of its sensors, as a record: neutral poses by sensor and joint, calibrations by IMU.
+
+The record is text in memory and on the disk, so that people can read, edit and remove the file.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import yaml
 
+from appliance.box.record import Record, WholeFile
 from appliance.sensor.neutral import NeutralPose
 
+FILE_NAME = "sensors.memory"
 HEADER = "# What this box remembers of its sensors: neutral poses, and calibrations by the IMU's id.\n"
 IMU_ID_BYTES = 16
 OFFSETS_BYTES = 22
@@ -22,6 +30,26 @@ Worn = tuple[str, str]  # sensor, joint
 
 class DamagedMemoryError(ValueError):
     """The text is none that a box wrote."""
+
+
+def memory_record(state: Path) -> Record:
+    """In memory, for this state folder alone."""
+    return Record(FILE_NAME, "sensors", LARGEST, os.fsencode(state.absolute()))
+
+
+def memory_file(state: Path) -> WholeFile:
+    """On the disk."""
+    return WholeFile(state / FILE_NAME, LARGEST)
+
+
+def forget_memory(runtime: Path, state: Path) -> None:
+    """Remove from memory what the disk has, so that a person may edit or remove the file. Never raises."""
+    with (
+        contextlib.suppress(OSError, ValueError),
+        contextlib.closing(memory_record(state).reader(runtime)) as reader,
+    ):
+        if [reader.read()] == memory_file(state).read():
+            (runtime / FILE_NAME).unlink()
 
 
 def with_profile(profiles: Mapping[bytes, bytes], imu_id: bytes, offsets: bytes) -> dict[bytes, bytes]:
@@ -50,10 +78,10 @@ def memory_text(neutral: Mapping[Worn, NeutralPose], profiles: Mapping[bytes, by
     return "".join(lines)
 
 
-def remembered(text: str) -> tuple[dict[Worn, NeutralPose], dict[bytes, bytes]]:
+def read_memory(text: bytes) -> tuple[dict[Worn, NeutralPose], dict[bytes, bytes]]:
     """Neutral poses, and calibrations (22 bytes) by IMU (16 bytes). Raises DamagedMemoryError."""
     try:
-        return _remembered(yaml.load(text, _PlainLoader))
+        return _checked(yaml.load(text.decode(), _PlainLoader))
     except (
         ValueError,
         TypeError,
@@ -75,8 +103,8 @@ class _PlainLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
-def _remembered(values: Any) -> tuple[dict[Worn, NeutralPose], dict[bytes, bytes]]:
-    """What a file's values say. Raises ValueError, TypeError, KeyError or AttributeError for nonsense."""
+def _checked(values: Any) -> tuple[dict[Worn, NeutralPose], dict[bytes, bytes]]:
+    """Raises ValueError, TypeError, KeyError or AttributeError for values of no such file."""
     neutral = {
         (str(sensor), str(joint)): _pose(entry)
         for sensor, joints in values["neutral"].items()

@@ -1,4 +1,4 @@
-"""A carrier's process under the test's clock: what hangs is told, and killed and started again in the end."""
+"""A mirror's process under the test's clock: what hangs is told, and killed and started again in the end."""
 
 from __future__ import annotations
 
@@ -9,26 +9,30 @@ from pathlib import Path
 
 import pytest
 
-from appliance.keeper.carrier_process import HANGS_S, STUCK_S, CarrierProcess, Kept
+from appliance.keeper.fallback import JOURNAL_STOPPED
+from appliance.keeper.mirror_process import HANGS_S, STUCK_S, MirrorProcess
 from tests.show_control.doubles import until
 
 STEP_S = 0.5
 
 
 class Stuck:
-    """Its first turn never ends."""
+    """Its first copy never ends."""
 
-    complaint, fallback = "", "not-kept"
+    name, fallback, recovered = "A thing", JOURNAL_STOPPED, ""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
-    def turn(self, now: float) -> None:
+    def copy(self, now: float) -> None:
         with self._path.open("a") as file:
             file.write("turn\n")
         signal.pause()
 
-    def last_turn(self) -> None:
+    def explain(self, error: Exception) -> str:
+        return str(error)
+
+    def close(self) -> None:
         pass
 
 
@@ -37,8 +41,7 @@ class Watched:
 
     def __init__(self, folder: Path) -> None:
         self.now, self.said, self._turns = 1000.0, list[str](), folder / "turns"
-        kept = Kept("A thing", "not-kept", lambda say: Stuck(self._turns))
-        self.process = CarrierProcess(kept, folder, 0.0, self.said.append)
+        self.process = MirrorProcess(Stuck(self._turns), folder, 0.0, self.said.append)
 
     @property
     def turns(self) -> int:
@@ -47,7 +50,7 @@ class Watched:
     def look_for(self, seconds: float) -> None:
         for _ in range(round(seconds / STEP_S)):
             self.now += STEP_S
-            self.process.look(self.now)
+            self.process.supervise(self.now)
 
     def goes_on(self) -> bool:
         self.look_for(STEP_S)
@@ -60,7 +63,7 @@ def watched(tmp_path: Path) -> Iterator[Watched]:
     watched.look_for(STEP_S)
     until(lambda: watched.turns == 1)
     yield watched
-    watched.process.leave()
+    watched.process.abandon()
 
 
 def test_what_hangs_is_told_after_a_while_and_started_again_in_the_end(watched: Watched) -> None:
@@ -79,5 +82,5 @@ def test_what_hangs_is_told_after_a_while_and_started_again_in_the_end(watched: 
 
 def test_a_keeper_that_was_held_up_itself_blames_no_disk(watched: Watched) -> None:
     watched.now += 1000.0
-    watched.process.look(watched.now)
+    watched.process.supervise(watched.now)
     assert watched.process.complaint == ""

@@ -1,4 +1,4 @@
-"""Trying what was chosen: a show that does not dance is put aside, and the next one is tried."""
+"""Trying what was chosen: a show that dances is proven; one that does not is put aside for the next."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from appliance.box.durable import write_whole
+from appliance.box.durable import alone_in, write_whole
+from appliance.keeper.fallback import CHOICE_NOT_KEPT
+from appliance.keeper.mirror import reason_of
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.foreign_file import kept_json
-from appliance.release.choice import Aside, Choice, Pair
+from appliance.release.choice import CHOSEN, Aside, Choice, Pair
 
 TRIES, ANEW = "tries", "anew"
-PROVEN_S = 10.0  # a show that has danced for so long dances on this box
+PROVEN_S = 10.0  # a show that has danced for this long dances on this box
 _STARTS, _STARTS_OF_A_GOOD_ONE = 3, 6
 
 
 class Tries(NamedTuple):
-    """Starts in a row in which a pair did not dance long enough, and the process of the newest."""
+    """Consecutive starts in which a pair did not dance long enough, and the process of the newest."""
 
     id: str = ""
     starts: int = 0
@@ -30,8 +32,8 @@ class Tries(NamedTuple):
 def pair_to_dance(chosen: Path, now: float, say: Callable[[str], None]) -> Pair:
     """What to dance in this start, which is counted; never raises, for something always dances.
 
-    A pair that is new has to dance for PROVEN_S within three starts. One that has done so may be killed
-    as often as somebody likes, if only each time a frame came.
+    A new pair has to dance for PROVEN_S within three starts. A proven one may be killed any number of times,
+    if a frame came each time.
     """
     choice = Choice.read(chosen)
     if choice is None:
@@ -42,7 +44,7 @@ def pair_to_dance(chosen: Path, now: float, say: Callable[[str], None]) -> Pair:
         return Pair(good=True)
     folder = chosen.parent
     choice = _found_again(chosen, choice, say)
-    tries = _counted(folder, choice.first, now)
+    tries = _read_tries(folder, choice.first, now)
     if tries is not None and len(choice.pairs) > 1:
         most = _STARTS_OF_A_GOOD_ONE if choice.first.good else _STARTS
         if tries.starts >= most:
@@ -60,7 +62,59 @@ def ended_well(chosen: Path) -> None:
         (chosen.parent / TRIES).unlink()
 
 
-def _counted(folder: Path, pair: Pair, now: float) -> Tries | None:
+class MirroredProof:
+    """After PROVEN_S of dancing: the pair that dances is good, and those that did not dance are let go."""
+
+    name, fallback = "That a show has danced", CHOICE_NOT_KEPT
+    recovered = "That the show has danced is kept now."
+
+    def __init__(self, runtime: Path, chosen: Path) -> None:
+        self._frames = FrameReader(runtime)
+        self._chosen = chosen
+        self._proven: tuple[int, str] | None = None
+
+    def copy(self, now: float) -> None:
+        """As Mirrored; while a preflight reads a stick it waits for another turn."""
+        newest, facts = self._frames.newest(now), self._frames.facts
+        if newest is None or facts is None or facts.rehearsal or newest.left - facts.started < PROVEN_S:
+            return
+        choice = Choice.read(self._chosen)
+        if choice is None or facts.show_directory != choice.first.show.resolve():
+            return
+        proven = (facts.pid, choice.first.id)
+        if self._proven != proven and self._is_noted(choice.first.id):
+            self._proven = proven
+
+    def explain(self, error: Exception) -> str:
+        """The complaint."""
+        return (
+            f"{self._chosen.parent} or the data partition: that the show has danced cannot be kept "
+            f"({reason_of(error)}). The dance goes on; after the next power-on the show is tried again. "
+            "Check the data partition."
+        )
+
+    def close(self) -> None:
+        """Release the shared frame."""
+        self._frames.close()
+
+    def _is_noted(self, identity: str) -> bool:
+        try:
+            with alone_in(self._chosen.parent):
+                choice = Choice.read(self._chosen)
+                if choice is None or choice.first.id != identity:
+                    return False
+                choice.with_good(identity).write(self._chosen)
+            with alone_in(choice.data):
+                kept = Choice.read(choice.data / CHOSEN)
+                noted = None if kept is None else kept.with_good(identity).without(choice)
+                if noted is not None and noted != kept:
+                    noted.write(choice.data / CHOSEN)
+        except BlockingIOError:
+            return False
+        return True
+
+
+def _read_tries(folder: Path, pair: Pair, now: float) -> Tries | None:
     """What became of the starts before this one; None while another process still dances."""
     try:
         tries = Tries(*kept_json(folder / TRIES))
@@ -91,7 +145,7 @@ def _put_aside(chosen: Path, choice: Choice, starts: int, say: Callable[[str], N
         f"that {_source(after)}. Run bunraku check on it, mend it, and bring it again."
     )
     left = choice._replace(pairs=choice.pairs[1:], aside=(*choice.aside, Aside(before.id, words)))
-    return _told(chosen, choice, left, words, say)
+    return _publish(chosen, choice, left, words, say)
 
 
 def _found_again(chosen: Path, choice: Choice, say: Callable[[str], None]) -> Choice:
@@ -104,10 +158,10 @@ def _found_again(chosen: Path, choice: Choice, say: Callable[[str], None]) -> Ch
         f"{_source(choice.pairs[there])}. Look at the data partition: bunraku doctor."
     )
     left = choice._replace(pairs=choice.pairs[there:], refused=(words, *choice.refused))
-    return _told(chosen, choice, left, words, say)
+    return _publish(chosen, choice, left, words, say)
 
 
-def _told(chosen: Path, before: Choice, after: Choice, words: str, say: Callable[[str], None]) -> Choice:
+def _publish(chosen: Path, before: Choice, after: Choice, words: str, say: Callable[[str], None]) -> Choice:
     """What dances from now on, to all processes of the box."""
     say(words)
     with contextlib.suppress(OSError):

@@ -53,7 +53,7 @@ class Outcome(NamedTuple):
         return Outcome(Choice.of(choice), bool(taken), tuple(words))
 
 
-def remembered(data: Path) -> Choice:
+def read_choice(data: Path) -> Choice:
     """What was chosen last, as far as it is still there; nothing (what comes with the box) without it."""
     choice = Choice.read(data / CHOSEN) or Choice(pairs=())
     pairs = (one.here() for one in choice.pairs if one.id)
@@ -61,11 +61,11 @@ def remembered(data: Path) -> Choice:
 
 
 def chosen_before(places: Places) -> Choice:
-    """What is remembered, without what did not dance since power-on: the keeper may not have noted it yet."""
-    return remembered(places.data).without(Choice.read(places.run / CHOSEN) or Choice())
+    """The same, without pairs that did not dance since power-on: the keeper may not have noted that yet."""
+    return read_choice(places.data).without(Choice.read(places.run / CHOSEN) or Choice())
 
 
-def choose(places: Places, arrivals: list[Arrival], check: Check, late: bool = False) -> Outcome:
+def adopt(places: Places, arrivals: list[Arrival], check: Check, late: bool = False) -> Outcome:
     """Take what is new and sound. The newest arrival counts; the stick goes before the boot partition.
 
     late: beside a running show, where a check may fail for want of time or memory: what is refused then is
@@ -95,7 +95,7 @@ def choose(places: Places, arrivals: list[Arrival], check: Check, late: bool = F
             taken = taken or newest.id != (choice.pairs or (Pair(),))[0].id
             choice, brought = choice.with_newest(newest), brought | lacking.parts
             said.append(f"{newest.source[0].upper()}{newest.source[1:]}: its show is checked and dances.")
-    said += _remember(places.data, choice, seen)
+    said += _write_choice(places.data, choice, seen)
     return Outcome(choice._replace(refused=tuple(refused)), taken, tuple(said))
 
 
@@ -106,7 +106,7 @@ def _take(
     from appliance.release.shelf import NoRoomError, Shelf, UnreadableError
 
     no_room = ""
-    # In memory where the disk takes nothing: a stick that is pulled in mid-show is missed by nobody.
+    # In memory where the disk takes nothing: then a stick may be pulled in mid-show.
     for root in (places.data, places.run):
         shelf = Shelf(root)
         try:
@@ -168,11 +168,11 @@ def _as_on_the_stick(words: str, copies: dict[str, str]) -> str:
 
 
 def _printable(words: str) -> str:
-    """A file's name may be no text: nobody who tells these words any further should stumble over it."""
+    """A file's name may be no text; these words must be printable everywhere."""
     return words.encode("utf-8", "backslashreplace").decode()
 
 
-def _remember(data: Path, choice: Choice, seen: dict[str, Any]) -> list[str]:
+def _write_choice(data: Path, choice: Choice, seen: dict[str, Any]) -> list[str]:
     try:
         if choice.pairs:
             choice._replace(refused=(), data=data).write(data / CHOSEN)

@@ -1,0 +1,27 @@
+"""The keeper's fallbacks: what cannot be kept on the disk, while the dance goes on."""
+
+from __future__ import annotations
+
+from appliance.box.fallback import Fallback
+
+JOURNAL_STOPPED = Fallback(
+    "journal-stopped",
+    "The journal does not grow: the disk is full, read-only or gone. The audience sees nothing of it; the "
+    "newest minute stays in memory, and the disk is tried each 10 s. Free some room, or check the disk.",
+)
+PLACE_NOT_KEPT = Fallback(
+    "place-not-kept",
+    "The place of the dance is not kept on the disk. The audience sees nothing of it, but after a power cut "
+    "the dance begins where it was kept last. Free some room, or check the disk.",
+)
+SENSORS_NOT_KEPT = Fallback(
+    "sensors-not-kept",
+    "Neutral poses and calibrations are not kept on the disk. The audience sees nothing of it, but after a "
+    "power cut sensors need a moment of stillness. Free some room, or check the disk.",
+)
+CHOICE_NOT_KEPT = Fallback(
+    "choice-not-kept",
+    "That a show has danced, or has not, cannot be kept. The audience sees nothing of it; the show is tried "
+    "again after the next power-on. Free some room, or check the disk.",
+)
+OF_THE_KEEPER = (JOURNAL_STOPPED, PLACE_NOT_KEPT, SENSORS_NOT_KEPT, CHOICE_NOT_KEPT)

@@ -1,0 +1,44 @@
+"""Files that are whole or not there: every error leaves what was there, and nothing beside it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from appliance.box.durable import new_file, put_in_place, replacing, write_beside, write_whole
+
+
+def test_a_file_is_replaced_as_a_whole(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    for content in (b"one", b"two" * 100_000, b""):
+        (tmp_path / ".file.new").write_bytes(b"left by a process that was killed")
+        write_whole(path, content)
+        assert path.read_bytes() == content
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("private", [False, True])
+def test_a_private_file_is_its_owners_alone(tmp_path: Path, private: bool) -> None:
+    before = os.umask(0)
+    try:
+        write_whole(tmp_path / "file", b"content", private)
+    finally:
+        os.umask(before)
+    assert (tmp_path / "file").stat().st_mode & 0o777 == (0o600 if private else 0o666)
+
+
+def test_an_error_on_the_way_leaves_what_was_there(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"before")
+    with pytest.raises(ValueError, match="halfway"), replacing(path) as stream:
+        stream.write(b"half of it")
+        raise ValueError("halfway")
+    with pytest.raises(FileExistsError), new_file(path):
+        pass
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OSError):
+        put_in_place(write_beside(tmp_path / "folder", b"content"), tmp_path / "folder")
+    assert path.read_bytes() == b"before"
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["file", "folder"]
