@@ -30,6 +30,7 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.register_profile("long", untimed)
     settings.register_profile("short", untimed, max_examples=50)
     settings.load_profile("long" if config.getoption("--long") else "short")
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each process compiles all modules
     worker = os.environ.get("PYTEST_XDIST_WORKER")
     if worker:  # its own share of the ports: no other takes one between choice and use
         share = slice(int(worker.removeprefix("gw")), None, int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))

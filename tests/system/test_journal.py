@@ -6,7 +6,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -20,13 +19,12 @@ from appliance.recorder.reading import read_journal
 from appliance.recorder.segments import segment_paths
 from tests.bundles import swaying_phrase, write_show
 from tests.show_control.doubles import Asker
-from tests.system.box import PATIENCE_S, Box, playing
-from tests.system.processes import children_that_say
+from tests.system.box import JOURNAL, Box, playing
+from tests.system.processes import BUNRAKU, PATIENCE_S, await_that, children_that_say
 from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
 
-JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 CUES = [{"name": "storm", "phrase": "slow", "iterations": [5, 4], "hands": ["lShldr"], "fade_s": 1.0}]
 
 
@@ -43,7 +41,7 @@ def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def bunraku(*arguments: str) -> str:
     """What a command says; it must succeed."""
     done = subprocess.run(
-        [sys.executable, "-m", "appliance.cli", *arguments],
+        [*BUNRAKU, *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -55,13 +53,13 @@ def bunraku(*arguments: str) -> str:
 
 def await_keeper(journal: Path, runs: int = 1) -> None:
     """Until a keeper has kept something of so many starts of the stage."""
-    until = time.monotonic() + PATIENCE_S
-    while time.monotonic() < until:
+
+    def are_kept() -> bool:
         with contextlib.suppress(JournalError):
-            if len(read_journal(journal).runs) >= runs:
-                return
-        time.sleep(0.05)
-    raise AssertionError(f"nothing of {runs} runs was kept")
+            return len(read_journal(journal).runs) >= runs
+        return False
+
+    await_that(are_kept, f"nothing of {runs} runs was kept")
 
 
 def disturb(box: Box) -> None:
@@ -144,9 +142,7 @@ def test_a_keeper_that_hangs_or_dies_costs_no_tick_of_the_journal(show: Path, tm
 
 def until_another(journal: Path) -> None:
     """Until the keeper that was started instead has begun a segment of its own."""
-    until = time.monotonic() + PATIENCE_S
-    while len(segment_paths(journal)) < 2 and time.monotonic() < until:
-        time.sleep(0.05)
+    await_that(lambda: len(segment_paths(journal)) >= 2)
 
 
 def test_a_file_in_the_place_of_the_journal_is_refused(show: Path, tmp_path: Path) -> None:

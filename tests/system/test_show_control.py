@@ -26,12 +26,11 @@ from appliance.recorder.reading import read_journal
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show
 from tests.show_control.doubles import Asker, until
-from tests.system.box import PATIENCE_S, PLAY, Box, is_free, playing
+from tests.system.box import JOURNAL, PATIENCE_S, PLAY, Box, is_free, playing
 from tests.system.processes import children_that_say
 
 pytestmark = pytest.mark.realtime
 
-JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 CUES: list[dict[str, Any]] = [
     {"name": "calm", "iterations": [2, 1], "look": "lines", "fade_s": 0.1},
     {"name": "storm", "iterations": [4, 3], "hands": [], "look": "ink", "master": 0.5, "fade_s": 0.1},
