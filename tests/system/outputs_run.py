@@ -92,12 +92,18 @@ class Measurement:
                 "processes": {"control", "lights"} <= self._venue.pids().keys(),
                 "lamps": all(self._follows(self._level(universe), universe) for universe in LAMPS),
                 "sensor": "neutral pose taken" in self._venue.said("stage"),
+                "picture": self._is_picture_there(self._venue.said("projector")),
             }
             if all(is_ready.values()):
                 return
             ended = [name for name, process in self._venue.processes.items() if process.poll() is not None]
             told = {name: self._venue.said(name) for name in ("stage", "sensor", "projector")}
             assert not ended and time.monotonic() < until, f"{ended or is_ready}: {told}"
+
+    @staticmethod
+    def _is_picture_there(said: str) -> bool:
+        """A processor that draws is said after some pictures of the dance; a graphics card draws at once."""
+        return "The picture is" in said and ("llvmpipe" not in said or "No graphics card draws here" in said)
 
     def run(self, seconds: float) -> None:
         """Hear and look for so long."""

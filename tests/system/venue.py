@@ -21,7 +21,7 @@ from hw_sim.posistagenet import PsnReceiver
 from tests.system import namespace, olad
 from tests.system.namespace import Namespace
 from tests.system.olad import Olad
-from tests.system.processes import BUNRAKU, PATIENCE_S, children, started
+from tests.system.processes import BUNRAKU, PATIENCE_S, children_that_say, started
 
 SENSOR = "left-wrist"
 STAND_STILL_S = 20.0  # the neutral pose takes 1.5 s; a busy machine makes pauses, and it begins again
@@ -56,9 +56,9 @@ class Venue:
     def pids(self) -> dict[str, int]:
         """All processes by name, the stage's companions among them."""
         found = {name: process.pid for name, process in self.processes.items()}
-        for pid in children(found["stage"]):
-            words = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b".", b"\0").split(b"\0")
-            found |= {name: pid for name in ("control", "lights") if name.encode() in words}
+        for name, word in (("control", "appliance.show_control"), ("lights", "lights")):
+            for pid in children_that_say(found["stage"], word):
+                found[name] = pid
         return found
 
     def lost(self, name: str) -> int:
