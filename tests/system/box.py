@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import os
 import signal
 import socket
 import subprocess
@@ -88,8 +89,9 @@ class Box:
         Show control of a killed box ends by itself: while it holds the port, the next box would be refused.
         """
         companions = children_that_say(self.process.pid, "appliance.show_control")
-        self.process.send_signal(number)
-        status = self.process.wait(PATIENCE_S)
+        with ending_emulators(self.process.pid):
+            self.process.send_signal(number)
+            status = self.process.wait(PATIENCE_S)
         await_that(
             lambda: not any(says(pid, "appliance.show_control") for pid in companions), lambda: self.words
         )
@@ -126,8 +128,19 @@ def playing(
         try:
             yield running
         finally:
-            running.process.kill()
-            running.process.wait()
+            with ending_emulators(running.process.pid):
+                running.process.kill()
+                running.process.wait()
+
+
+@contextlib.contextmanager
+def ending_emulators(box: int) -> Iterator[None]:
+    """A box that is killed inside leaves its emulated sensors behind."""
+    emulators = children_that_say(box, "emulate")
+    yield
+    for pid in emulators:
+        if says(pid, "emulate"):
+            os.kill(pid, signal.SIGKILL)
 
 
 def await_end_of_keeper(runtime: Path) -> None:
