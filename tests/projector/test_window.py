@@ -61,7 +61,7 @@ window.close()
 
 @contextlib.contextmanager
 def virtual_display() -> Iterator[str]:
-    """A real X server on no screen; it does not begin anew, deaf meanwhile, when a window is closed."""
+    """A real X server on no screen; it does not reset, deaf meanwhile, when a window is closed."""
     reading, writing = os.pipe()
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", str(writing), "-screen", "0", "640x480x24", "-nolisten", "tcp", "-noreset"],

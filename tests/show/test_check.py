@@ -21,7 +21,7 @@ from tests.show.conftest import MOVING, NAMES, SHOW_YAML, recording, save_networ
 
 
 def only(directory: Path, repack: bool = True) -> Finding:
-    """The one finding of a bundle, packed anew so that checksums do not speak too."""
+    """The one finding of a bundle, packed again so that checksums do not speak too."""
     if repack:
         write_checksums(directory)
     findings = verify_bundle(directory)
@@ -57,7 +57,7 @@ def test_a_missing_file_is_found(bundle: Path) -> None:
     ]
 
 
-def test_a_file_without_a_checksum_is_a_warning_and_hidden_ones_are_nobodys_business(bundle: Path) -> None:
+def test_a_file_without_a_checksum_is_a_warning_and_hidden_ones_do_not_matter(bundle: Path) -> None:
     (bundle / "notes.txt").write_text("remember the gaffer tape")
     (bundle / ".DS_Store").write_text("a stick that was in another machine")
     finding = only(bundle, repack=False)

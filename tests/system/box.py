@@ -57,7 +57,7 @@ class Box:
         return found
 
     def last_frames(self) -> list[list[Any]]:
-        """Those that the process, which has ended, had sent and nobody has taken yet."""
+        """Those that the process, which has ended, had sent and the test has not taken yet."""
         return [arguments for _, address, arguments in self.receiver.poll() if "frame" in address]
 
     def frame_that(self, is_wanted: Callable[[list[Any]], bool]) -> list[Any]:

@@ -64,32 +64,32 @@ def await_keeper(journal: Path, runs: int = 1) -> None:
 
 def disturb(box: Box) -> None:
     """Show control, a sensor that comes and goes, and a machine that stands still for a moment."""
-    with contextlib.closing(Asker(box.control)) as desk:
+    with contextlib.closing(Asker(box.control)) as console:
         with Wearables([box.key], box.sensors) as wearables:
             box.frame_that(lambda frame: frame[2] > 20)
-            assert desk.order("/cue", "storm")[2] == 1
-            desk.order("/sensors/neutral")
+            assert console.order("/cue", "storm")[2] == 1
+            console.order("/sensors/neutral")
             wearables.dance()
             box.frames(60)
-        desk.tell("/player/rate", -1.0)
+        console.tell("/player/rate", -1.0)
         box.process.send_signal(signal.SIGSTOP)
         time.sleep(0.15)
         box.process.send_signal(signal.SIGCONT)
         box.frames(30)
-        await_rate(box, desk, -1.0)
-        assert desk.order("/iterations", 2, 1)[2] == 1
+        await_rate(box, console, -1.0)
+        assert console.order("/iterations", 2, 1)[2] == 1
         with Wearables([box.key], box.sensors) as wearables:
             wearables.dance()
             box.frames(60)
 
 
-def await_rate(box: Box, desk: Asker, rate: float) -> None:
+def await_rate(box: Box, console: Asker, rate: float) -> None:
     """What a player streams is not answered: it is sent again until the stage has noted it."""
     until = time.monotonic() + PATIENCE_S
     with contextlib.closing(CheckpointReader(box.words_file.with_name("runtime"))) as reader:
         while (place := reader.read()) is None or place.rate != rate:
             assert time.monotonic() < until, place
-            desk.tell("/player/rate", rate)
+            console.tell("/player/rate", rate)
             box.frames(5)
 
 

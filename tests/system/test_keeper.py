@@ -69,9 +69,9 @@ class Keeper(Process):
         return None if place is None else place.position_s
 
     def fallbacks(self) -> set[str]:
-        """Those in force, as desks hear them."""
-        with closing(ProcessHealth(self.runtime)) as company:
-            found = company.fallbacks(time.monotonic())
+        """Those in force, as consoles hear them."""
+        with closing(ProcessHealth(self.runtime)) as processes:
+            found = processes.fallbacks(time.monotonic())
         return {one.name for process, one in found if process == "keeper" and one.active}
 
 
@@ -99,7 +99,7 @@ def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Pat
         keeper.night.dance(50)
         for _ in range(3):
             keeper.goes_on()
-        await_that(lambda: keeper.fallbacks() == {JOURNAL_STOPPED.name}, "nobody is told")
+        await_that(lambda: keeper.fallbacks() == {JOURNAL_STOPPED.name}, "the fallback is not told")
         assert "The journal: the disk has not answered for 5 s" in keeper.words
         keeper.goes_on()
         assert keeper.end() == 0
@@ -139,7 +139,7 @@ def test_a_file_that_does_not_answer_holds_up_its_own_carrier_alone(tmp_path: Pa
             keeper.goes_on()
             keeper.night.dance(20)
             await_that(lambda: keeper.kept_ticks() == 20, lambda: keeper.words)
-            await_that(lambda: keeper.fallbacks() == {SENSORS_NOT_KEPT.name}, "nobody is told")
+            await_that(lambda: keeper.fallbacks() == {SENSORS_NOT_KEPT.name}, "the fallback is not told")
             keeper.goes_on(ended=True)
             assert keeper.end() == 0
         finally:

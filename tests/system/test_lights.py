@@ -118,7 +118,7 @@ def test_a_stage_that_hangs_brings_the_safe_look_too(tmp_path: Path) -> None:
 
 @contextlib.contextmanager
 def terminal_that_stands_still() -> Iterator[int]:
-    """Takes not one sign more, as after Ctrl-S or in a connection that is gone: whoever writes waits."""
+    """Takes no further byte, as after Ctrl-S or on a lost connection: the writer waits."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     with contextlib.suppress(BlockingIOError):

@@ -104,7 +104,7 @@ def test_a_port_that_is_taken_is_named_with_what_to_do(show: Path, tmp_path: Pat
         first.frames(5)
 
 
-def test_a_receiver_that_nobody_runs_does_not_disturb_the_other(show: Path, tmp_path: Path) -> None:
+def test_a_receiver_that_does_not_run_does_not_disturb_the_other(show: Path, tmp_path: Path) -> None:
     [nobody] = free_ports(1)
     with playing(show, tmp_path, more_receivers=[{"host": HOST, "port": nobody}]) as box:
         frames = box.frames(120)

@@ -195,7 +195,7 @@ def test_what_danced_before_is_chosen_before_anything_new_is_looked_at(
     assert "nobody thought of this" in said[0] and said[0] in machine.choice.refused
 
 
-def test_a_preflight_that_never_ends_holds_up_nobody(
+def test_a_preflight_that_never_ends_holds_up_nothing(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     machine.bring("Spring")
@@ -341,7 +341,7 @@ def test_what_is_given_up_is_ended_with_all_that_it_started() -> None:
     with pytest.raises(TimedOutError, match="not within"):
         within(0.5, endless)
     os.close(writing)
-    assert select.select([reading], [], [], PATIENCE_S)[0], "somebody still holds the other end"
+    assert select.select([reading], [], [], PATIENCE_S)[0], "another process still holds the other end"
     assert os.read(reading, 1) == b""
     os.close(reading)
 

@@ -158,7 +158,7 @@ def test_a_new_board_s_readings_are_believed_by_cable(tmp_path: Path) -> None:
     assert (state.state, state.way, state.firmware) == ("linked", bench.device, "1.0.0")
 
 
-def test_provisioned_anew_the_old_key_is_nowhere_in_the_flash(tmp_path: Path) -> None:
+def test_provisioned_again_the_old_key_is_nowhere_in_the_flash(tmp_path: Path) -> None:
     keys = []
     with Bench() as bench:
         for _ in range(2):

@@ -95,7 +95,7 @@ def test_switched_on_it_is_used_and_standing_still_gives_the_neutral_pose(show: 
     assert np.median(np.abs((dancing["targets"][:, 0] * hands).sum(1)[fluent])) > 0.9995
 
 
-def test_killed_and_started_anew_it_uses_the_readings_and_the_neutral_pose_again(
+def test_killed_and_restarted_it_uses_the_readings_and_the_neutral_pose_again(
     show: Path, tmp_path: Path
 ) -> None:
     with playing(show, tmp_path) as box:
@@ -174,7 +174,7 @@ def test_switched_off_and_on_its_joint_goes_on_without_standing_still(show: Path
             assert box.end() == 0
 
 
-def test_a_double_tap_takes_the_neutral_pose_anew(show: Path, tmp_path: Path) -> None:
+def test_a_double_tap_takes_the_neutral_pose_again(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path) as box:
         box.frames(1)
         with Wearables(

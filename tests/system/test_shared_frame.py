@@ -30,7 +30,7 @@ mkdir -m 700 "$1/runtime" && mount -t tmpfs -o size=16k,mode=700 none "$1/runtim
 """
 
 
-def test_frames_facts_and_health_are_there_for_whoever_reads(show: Path, tmp_path: Path) -> None:
+def test_frames_facts_and_health_are_there_for_each_reader(show: Path, tmp_path: Path) -> None:
     reader = FrameReader(tmp_path / "runtime")
     assert reader.state(time.monotonic()) == "absent"
     with playing(show, tmp_path, "--alone", settings={"limits": {"late_ms": 20}}) as box:
