@@ -90,12 +90,12 @@ def test_faults_of_show_yaml_keep_their_lines(bundle: Path) -> None:
     ("change", "words"),
     [
         ({"joints": ("hip", "chest", "lSholder")}, ["'lSholder'", "Did you mean 'lShldr'?"]),
-        ({"facts": {"bunraku.window": "16"}}, ["16 poses long"]),
-        ({"facts": {"bunraku.joints": ""}}, ["does not say which joints"]),
-        ({"facts": {"bunraku.rest": "[[1, 0, 0]]"}}, ["rest pose"]),
-        ({"facts": {"bunraku.rest": "nonsense"}}, ["rest pose"]),
+        ({"facts": {"window": "16"}}, ["16 poses long"]),
+        ({"facts": {"joints": ""}}, ["does not say which joints"]),
+        ({"facts": {"rest": "[[1, 0, 0]]"}}, ["rest pose"]),
+        ({"facts": {"rest": "nonsense"}}, ["rest pose"]),
         ({"joints": ("hip", "chest", "lShldr", "chest", "rShldr")}, ["names a joint twice"]),
-        ({"facts": {"bunraku.joints": ",".join(NAMES)}}, ["has the shape [8, 5, 4], not [8, 6, 4]"]),
+        ({"facts": {"joints": ",".join(NAMES)}}, ["has the shape [8, 5, 4], not [8, 6, 4]"]),
         ({"without": "weights"}, ["no input 'weights'"]),
         (  # an older release exported it: one orientation a hand
             {"targets": [5, 4]},
