@@ -8,8 +8,10 @@ ARGS ?= --seconds 30
 TEST_ARGS ?=
 # Empty, or --long: every count of the tests at its full length.
 LENGTH ?=
-# Test files run beside each other: they own their ports, folders and boxes. Four at most, for each may start a box.
-BESIDE := --numprocesses=auto --maxprocesses=4 --dist=loadfile --no-loadscope-reorder
+# Test files run beside each other: they own their ports, folders and boxes. One more than there are cores, for many
+# wait; four at most, for each may start a box.
+WORKERS = $(shell cores=$$(nproc); echo $$((cores < 3 ? cores + 1 : 4)))
+BESIDE = --numprocesses=$(WORKERS) --dist=loadfile --no-loadscope-reorder
 
 # What is needed from the system, as package:command or package:file (where the package brings no command).
 DEBIAN_FOR_FIRMWARE := cmake:cmake g++:g++ make:make
