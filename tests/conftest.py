@@ -11,9 +11,10 @@ import pytest
 from hypothesis import settings
 
 import hw_sim.peers
+from tests.boot import figures_report
 
 ROOT = Path(__file__).resolve().parents[1]
-# The files that take longest; last, one would run alone. All others keep their order.
+# Files that take longest begin, where files run beside each other: last, one would run alone.
 LONGEST_FIRST = ("tests/test_readme.py", "tests/boot/", "tests/system/", "tests/studio/")
 _folders = itertools.count()
 
@@ -30,6 +31,8 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.register_profile("long", untimed)
     settings.register_profile("short", untimed, max_examples=50)
     settings.load_profile("long" if config.getoption("--long") else "short")
+    report = figures_report.FiguresReport(ROOT / "build" / "boot")
+    config.pluginmanager.register(report, figures_report.NAME)
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each process compiles all modules
     worker = os.environ.get("PYTEST_XDIST_WORKER")
     if worker:  # its own share of the ports: no other takes one between choice and use
@@ -39,6 +42,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return
     items.sort(
         key=lambda item: next(
             (place for place, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)),
