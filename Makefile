@@ -6,6 +6,12 @@ BIN := $(VENV)/bin
 PICTURE := out/dance.png
 ARGS ?= --seconds 30
 TEST_ARGS ?=
+# Empty, or --long: every count of the tests at its full length.
+LENGTH ?=
+# Test files run beside each other: they own their ports, folders and boxes. One more than there are cores, for many
+# wait; four at most, for each may start a box.
+WORKERS = $(shell cores=$$(nproc); echo $$((cores < 3 ? cores + 1 : 4)))
+BESIDE = --numprocesses=$(WORKERS) --dist=loadfile --no-loadscope-reorder
 
 # What is needed from the system, as package:command or package:file (where the package brings no command).
 DEBIAN_FOR_FIRMWARE := cmake:cmake g++:g++ make:make
@@ -27,18 +33,19 @@ DEBIAN_FOR_IMAGE := $(DEBIAN_FOR_BOOT) mtools:mcopy dosfstools:mkfs.vfat fdisk:s
 DEBIAN_FOR_VM := $(DEBIAN_FOR_IMAGE) qemu-system-x86:qemu-system-x86_64 ovmf:/usr/share/ovmf/OVMF.fd
 DEBIAN_FOR_SOAK := $(DEBIAN_FOR_GL) stress-ng:stress-ng rt-tests:cyclictest
 
-FUZZ_SECONDS ?= 30
+FUZZ_SECONDS ?= $(if $(LENGTH),30,5)
 MINUTES ?= 60
 # The key that signs releases, and the one after it: docs/releases.md.
 SIGNING = $(if $(KEY),--key '$(KEY)') $(if $(NEXT_KEY),--next-key '$(NEXT_KEY)')
 
 .DEFAULT_GOAL := help
-.PHONY: help run release studio firmware test firmware-test fuzz-corpus lint bench lock clean soak boot-figures \
+.PHONY: help run release studio firmware test test-long firmware-test fuzz-corpus lint bench lock clean soak boot-figures \
     boot-root image test-vm debian-for-image debian-for-vm debian-for-firmware debian-for-tests debian-for-boot debian-for-soak
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 	@echo "  make run ARGS='--seconds 10' passes options on; make run ARGS= dances until Ctrl-C"
+	@echo "  make test TEST_ARGS='--seed 5 tests/cli' passes options to pytest; test-long is pytest --long"
 
 run: $(VENV)/.ready-to-run ## dance with an emulated sensor, in a window or into a picture
 	@mkdir -p $(dir $(PICTURE))
@@ -52,7 +59,10 @@ firmware: debian-for-firmware ## build the wearable's firmware for this machine:
 
 test: $(VENV)/.ready-to-test debian-for-tests debian-for-boot ## style, types, contracts, all tests
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target firmware-test lint boot-root
-	@$(BIN)/pytest $(TEST_ARGS)
+	@$(BIN)/pytest $(BESIDE) $(LENGTH) $(TEST_ARGS)
+
+test-long: ## the same with every count at its full length: power cuts, fuzzing, random files, property tests
+	@$(MAKE) --no-print-directory test LENGTH=--long
 
 boot-root: $(VENV)/.ready-to-test debian-for-boot
 	@$(BIN)/python -m tests.boot.root
@@ -83,7 +93,7 @@ cmake --build build/$(1) --target $(2) --parallel 2 -- --silent --no-print-direc
 endef
 
 boot-figures: $(VENV)/.ready-to-test debian-for-boot ## boot the box, harm it, cut its power; times in out/boot (root)
-	@BUNRAKU_FIGURES=out/boot $(BIN)/pytest tests/boot -rs $(TEST_ARGS)
+	@BUNRAKU_FIGURES=out/boot $(BIN)/pytest tests/boot --long -rs $(TEST_ARGS)
 
 image: debian-for-image ## the box's disk image, out/bunraku-amd64.img (ARCH=arm64: a Pi's root as a tar; KEY=FILE; root)
 ifeq ($(ARCH),arm64)

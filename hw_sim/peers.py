@@ -24,7 +24,7 @@ STARTS_WITHIN_S = 60.0
 ENDS_WITHIN_S = 10.0
 FRAME = b"/bunraku/frame\0"
 PRIORITY = 50  # below the box's: the receiver's clock readings matter, the box's ticks matter more
-_PORTS = range(20000, 32000)  # below Linux' net.ipv4.ip_local_port_range
+PORTS = range(20000, 32000)  # below Linux' net.ipv4.ip_local_port_range
 _CHANCE = random.SystemRandom()  # unseeded, so that two runs at once choose different ports
 STEP_EVERY_S = 0.6
 STEP_DEGREES = 40.0
@@ -157,7 +157,7 @@ def free_ports(count: int, kind: socket.SocketKind = socket.SOCK_DGRAM) -> list[
     with contextlib.ExitStack() as opened:
         ports: list[int] = []
         while len(ports) < count:
-            port = _CHANCE.choice(_PORTS)
+            port = _CHANCE.choice(PORTS)
             one = opened.enter_context(socket.socket(socket.AF_INET, kind))
             with contextlib.suppress(OSError):  # in use
                 one.bind(("0.0.0.0", port))

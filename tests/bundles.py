@@ -1,8 +1,9 @@
-"""Small show bundles for the stage's tests, made without torch: a swaying phrase, a hand-made network."""
+"""Small show bundles, made without torch: a swaying phrase, a hand-made network."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -58,17 +59,29 @@ def swaying_phrase(seconds: float = 3.0) -> Recording:
     return Recording(FIGURE, poses, np.tile([0.0, 0.95, 0.0], (count, 1)), 50.0)
 
 
+def puppet_inputs(joints: int, targets: list[int] | None = None) -> list[onnx.ValueInfoProto]:
+    """The inputs of a puppet's network for so many moving joints; `targets`: another shape of these."""
+    shapes = {
+        "window": (TensorProto.FLOAT, [WINDOW, joints, 4]),
+        "mask": (TensorProto.BOOL, [joints]),
+        "targets": (TensorProto.FLOAT, targets or [WINDOW, joints, 4]),
+        "weights": (TensorProto.FLOAT, [joints]),
+        "coding_iterations": (TensorProto.INT64, []),
+        "interaction_iterations": (TensorProto.INT64, []),
+    }
+    return [helper.make_tensor_value_info(name, *shape) for name, shape in shapes.items()]
+
+
+def set_facts(model: onnx.ModelProto, joints: Sequence[str], /, **more: str) -> None:
+    """Write into a network which joints it moves, at rest without a turn, and more facts."""
+    rest = np.tile(quaternion.IDENTITY, (len(joints), 1)).tolist()
+    facts = {"joints": ",".join(joints), "window": str(WINDOW), "rest": json.dumps(rest), **more}
+    helper.set_model_props(model, {f"bunraku.{name}": fact for name, fact in facts.items()})
+
+
 def _network(kind: str) -> onnx.ModelProto:
     """Held joints show their targets, the others the window; `broken` divides by nothing."""
     moving = len(MOVING)
-    inputs = [
-        helper.make_tensor_value_info("window", TensorProto.FLOAT, [WINDOW, moving, 4]),
-        helper.make_tensor_value_info("mask", TensorProto.BOOL, [moving]),
-        helper.make_tensor_value_info("targets", TensorProto.FLOAT, [WINDOW, moving, 4]),
-        helper.make_tensor_value_info("weights", TensorProto.FLOAT, [moving]),
-        helper.make_tensor_value_info("coding_iterations", TensorProto.INT64, []),
-        helper.make_tensor_value_info("interaction_iterations", TensorProto.INT64, []),
-    ]
     outputs = [
         helper.make_tensor_value_info("poses", TensorProto.FLOAT, [WINDOW, moving, 4]),
         helper.make_tensor_value_info("latent", TensorProto.FLOAT, [1]),
@@ -104,16 +117,8 @@ def _network(kind: str) -> onnx.ModelProto:
             helper.make_node("ReduceMax", ["matrix3"], ["largest"], keepdims=0),
             helper.make_node("Reshape", ["largest", "one"], ["latent"]),
         ]
-    graph = helper.make_graph(nodes, kind, inputs, outputs, constants)
+    graph = helper.make_graph(nodes, kind, puppet_inputs(moving), outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
     model.ir_version = 9
-    facts = {
-        "bunraku.joints": ",".join(MOVING),
-        "bunraku.window": str(WINDOW),
-        "bunraku.architecture": kind,
-        "bunraku.latent": "1",
-        "bunraku.precision": "fp32",
-        "bunraku.rest": json.dumps(np.tile(quaternion.IDENTITY, (moving, 1)).tolist()),
-    }
-    helper.set_model_props(model, facts)
+    set_facts(model, MOVING, architecture=kind, latent="1", precision="fp32")
     return model

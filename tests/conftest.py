@@ -1,19 +1,71 @@
-"""What several test folders share."""
+"""What several test folders share, and how a whole run is laid out."""
 
 from __future__ import annotations
 
 import itertools
+import os
+import random
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-# Property tests are not timed: a busy machine must not fail them.
-settings.register_profile("untimed", settings.get_profile(settings.get_current_profile_name()), deadline=None)
-settings.load_profile("untimed")
+import hw_sim.peers
+from tests.boot import figures_report
 
 ROOT = Path(__file__).resolve().parents[1]
+# Files that take longest begin, where files run beside each other: last, one would run alone.
+LONGEST_FIRST = ("tests/test_readme.py", "tests/boot/", "tests/system/", "tests/studio/")
 _folders = itertools.count()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("bunraku")
+    group.addoption("--long", action="store_true", help="every count at its full length: make test-long")
+    group.addoption("--seed", type=int, help="repeat a random test with the seed that it printed")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    # Property tests are not timed: a busy machine must not fail them. What fails prints how to repeat it.
+    untimed = settings(deadline=None, print_blob=True)
+    settings.register_profile("long", untimed)
+    settings.register_profile("short", untimed, max_examples=50)
+    settings.load_profile("long" if config.getoption("--long") else "short")
+    report = figures_report.FiguresReport(ROOT / "build" / "boot")
+    config.pluginmanager.register(report, figures_report.NAME)
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each process compiles all modules
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if worker:  # its own share of the ports: no other takes one between choice and use
+        share = slice(int(worker.removeprefix("gw")), None, int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))
+        hw_sim.peers.PORTS = hw_sim.peers.PORTS[share]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return
+    items.sort(
+        key=lambda item: next(
+            (place for place, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)),
+            len(LONGEST_FIRST),
+        )
+    )
+
+
+@pytest.fixture(scope="session")
+def long_run(pytestconfig: pytest.Config) -> bool:
+    """Whether every count has its full length."""
+    return bool(pytestconfig.getoption("--long"))
+
+
+@pytest.fixture
+def chance(request: pytest.FixtureRequest) -> random.Random:
+    """Differs in each run; a test that fails prints its seed."""
+    seed = request.config.getoption("--seed")
+    if seed is None:
+        seed = random.SystemRandom().randrange(1 << 30)
+    request.node.add_report_section("setup", "seed", f"Repeat this with --seed {seed}")
+    return random.Random(seed)
 
 
 @pytest.fixture(autouse=True)

@@ -1,4 +1,4 @@
-"""The house stands: imports run one way, the box never needs torch, names and locks are as agreed."""
+"""The architecture holds: imports run one way, the box never needs torch, names and locks are as agreed."""
 
 from __future__ import annotations
 

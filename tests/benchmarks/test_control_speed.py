@@ -22,19 +22,19 @@ MEDIAN_S, OF_A_HUNDRED_S = 0.05, 0.25
 
 @pytest.fixture
 def flooded(folder: Path, tmp_path: Path) -> Iterator[Callable[[str], Asker]]:
-    """Show control as the process that a box runs, a flood of this kind, and a desk."""
+    """Show control as the process that a box runs, a flood of this kind, and a console."""
     with ExitStack() as opened:
 
         def begin(kind: str) -> Asker:
             _, port = opened.enter_context(control_process(folder, tmp_path / "words.txt"))
-            desk = opened.enter_context(closing(Asker(port)))
-            assert desk.ask("/ping") == ["/pong"]
+            console = opened.enter_context(closing(Asker(port)))
+            assert console.ask("/ping") == ["/pong"]
             if kind in KINDS:
                 command = [sys.executable, "-m", "tests.show_control.flood", str(port), kind]
                 flood = opened.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE))
                 opened.callback(lambda: _end(flood))
                 assert flood.stdout is not None and flood.stdout.readline()
-            return desk
+            return console
 
         yield begin
 
@@ -56,9 +56,9 @@ def test_panic_in_a_flood(measured: Callable[..., Any], flooded: Callable[[str],
     """50 ms in the median and 250 ms in 99 of 100 are the limit, and each is answered."""
     if kind == STRANGERS and not stranger():
         pytest.skip("This machine has no address from which a stranger could send.")
-    desk = flooded(kind)
+    console = flooded(kind)
     timed = measured(kind, GROUP, reference=kind not in KINDS)
-    reply = timed.pedantic(desk.ask, args=("/panic",), rounds=ROUNDS)
+    reply = timed.pedantic(console.ask, args=("/panic",), rounds=ROUNDS)
     assert reply[:3] == ["/reply", "/panic", 1]
     if timed.stats is not None:
         took_s = sorted(timed.stats.stats.data)

@@ -100,8 +100,8 @@ def test_the_return_by_the_whole_parser(starts: Callable[..., Starts], measured:
 
 def test_noting_the_place(tmp_path: Path, measured: Callable[..., Any]) -> None:
     box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
-    cast = assemble(load_show(default_show_path()), box)
+    parts = assemble(load_show(default_show_path()), box)
     resuming, iterations = Resumption("A show", tmp_path, None, "always"), Iterations(10, 9, 20)
-    measured("noting it", NOTE_GROUP, reference=True)(lambda: resuming.note(cast, iterations, 1))
+    measured("noting it", NOTE_GROUP, reference=True)(lambda: resuming.note(parts, iterations, 1))
     resuming.close()
-    cast.close()
+    parts.close()

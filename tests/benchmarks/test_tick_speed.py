@@ -46,7 +46,7 @@ def key(tmp_path: Path) -> SensorKey:
 
 
 @pytest.fixture
-def cast(tmp_path: Path, key: SensorKey, show: Path, receiver: socket.socket) -> Iterator[StageParts]:
+def parts(tmp_path: Path, key: SensorKey, show: Path, receiver: socket.socket) -> Iterator[StageParts]:
     out = OscConfig(port=receiver.getsockname()[1], dialect="ai-toolbox")
     box = BoxConfig(
         sensors=SensorsConfig(udp=UdpConfig(port=0), keys=tmp_path / "sensors.keys"),
@@ -57,14 +57,14 @@ def cast(tmp_path: Path, key: SensorKey, show: Path, receiver: socket.socket) ->
     made.close()
 
 
-def test_the_whole_tick(measured: Callable[..., Any], cast: StageParts, key: SensorKey) -> None:
-    intake = cast.link.intakes[0]
+def test_the_whole_tick(measured: Callable[..., Any], parts: StageParts, key: SensorKey) -> None:
+    intake = parts.link.intakes[0]
     assert isinstance(intake, UdpIntake)
     sensor = PairedSensor(key, intake.address[1], turning(seconds_per_turn=7.2), 100.0)
-    now = sensor.pair(cast.link, 100.0)
-    paired = cast.link.counts["accepted"]
-    wearing = SensorFit(cast, SensorMemory(None, print), print)
-    tick = Tick(cast, wearing, Iterations(10, 9, 10), latest_start_s=TICK_S)
+    now = sensor.pair(parts.link, 100.0)
+    paired = parts.link.counts["accepted"]
+    wearing = SensorFit(parts, SensorMemory(None, print), print)
+    tick = Tick(parts, wearing, Iterations(10, 9, 10), latest_start_s=TICK_S)
     slot, ran = Slot(), 0
 
     def next_slot() -> tuple[tuple[Slot], dict[str, object]]:
@@ -72,14 +72,14 @@ def test_the_whole_tick(measured: Callable[..., Any], cast: StageParts, key: Sen
         ran += 1
         slot.tick, slot.deadline = ran, now + ran * TICK_S
         slot.started = slot.deadline
-        cast.link.send_due(slot.deadline)
+        parts.link.send_due(slot.deadline)
         sensor.advance(slot.deadline)
         return (slot,), {}
 
-    label = f"datagram to sendto, {cast.puppet.architecture} {cast.puppet.precision}"
+    label = f"datagram to sendto, {parts.puppet.architecture} {parts.puppet.precision}"
     benchmark = measured(label, "the whole tick, back to back")
     benchmark.pedantic(tick.run, setup=next_slot, rounds=400)
     sensor.close()
-    assert cast.link.counts["accepted"] - paired == ran
+    assert parts.link.counts["accepted"] - paired == ran
     assert not tick.frame.late and not tick.network_failed
     assert tick.frame.sensor_sequence == paired + ran - 1

@@ -1,31 +1,26 @@
-"""What all boot tests share: the root, the hall around the box, the box itself, the table at the end."""
+"""What all boot tests share: the root, the hall around the box, the box itself, the figures."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.boot import rights
+from tests.boot import figures_report, rights
 from tests.boot.box import KEYS, Box, standing
 from tests.boot.disk import DataDisk
 from tests.boot.figures import Figures
 from tests.boot.hall import Hall, hall
-from tests.boot.root import BUILT, root_image
-
-_FIGURES = pytest.StashKey[Figures]()
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    config.stash[_FIGURES] = Figures()
+from tests.boot.root import root_image
 
 
 @pytest.fixture(scope="session")
 def figures(pytestconfig: pytest.Config) -> Figures:
     """Where measured times go."""
-    return pytestconfig.stash[_FIGURES]
+    report = pytestconfig.pluginmanager.get_plugin(figures_report.NAME)
+    assert isinstance(report, figures_report.FiguresReport)
+    return report.figures
 
 
 @pytest.fixture(scope="session")
@@ -80,21 +75,3 @@ def dancing(
         made.await_sensor()
         yield made
         around.switch_sensor_off()
-
-
-def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    """With $BUNRAKU_FIGURES the limits count; elsewhere a machine may be as busy as it likes."""
-    over = session.config.stash[_FIGURES].over()
-    if "BUNRAKU_FIGURES" in os.environ and over and exitstatus == pytest.ExitCode.OK:
-        session.exitstatus = pytest.ExitCode.TESTS_FAILED
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """The table, also as files: in $BUNRAKU_FIGURES, else in build/boot."""
-    measured = config.stash[_FIGURES]
-    if not measured.values:
-        return
-    terminalreporter.section("times of the boot tests")
-    for line in measured.table():
-        terminalreporter.write_line(line)
-    measured.write(Path(os.environ.get("BUNRAKU_FIGURES", BUILT)))

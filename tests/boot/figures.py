@@ -23,6 +23,13 @@ class Figures:
         if limit is not None:
             self.limits[name] = limit
 
+    def add(self, other: Figures) -> None:
+        """Those of another process too."""
+        for name, values in other.values.items():
+            self.values.setdefault(name, []).extend(values)
+        self.limits |= other.limits
+        self.units |= other.units
+
     def over(self) -> list[str]:
         """Whose median is above its limit."""
         return [name for name, limit in self.limits.items() if _median(self.values[name]) > limit]

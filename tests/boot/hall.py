@@ -26,7 +26,7 @@ BOX, HALL = "10.77.0.1", "10.77.0.2"
 SENSOR = "left-wrist"
 SENSORS, CONTROL, FRAMES = 9750, 9002, 9004
 _TIMESTAMPS = 35  # SO_TIMESTAMPNS
-_BUFFER_BYTES = 64 << 20  # minutes of frames: nobody has to read while the box is being killed
+_BUFFER_BYTES = 64 << 20  # minutes of frames: the test need not read while the box is being killed
 
 
 class Audience:
@@ -85,14 +85,14 @@ class Hall:
     box_network: Namespace
     network: Namespace
     audience: Audience
-    desk: socket.socket
+    console: socket.socket
     key_file: bytes = b""
     sensor: subprocess.Popen[bytes] | None = None
 
     def ask(self, address: str, patience_s: float = 5.0) -> list[tuple[str, list[Any]]]:
         """What show control answers to a question without arguments."""
         padded = address.encode() + b"\0" * (4 - len(address) % 4)
-        self.desk.sendto(padded + b",\0\0\0", (BOX, CONTROL))
+        self.console.sendto(padded + b",\0\0\0", (BOX, CONTROL))
         return self.answers(
             lambda answers: any(where in ("/end", "/reply", "/pong") for where, _ in answers), patience_s
         )
@@ -104,9 +104,9 @@ class Hall:
         found: list[tuple[str, list[Any]]] = []
         until = time.monotonic() + patience_s
         while not enough(found) and time.monotonic() < until:
-            if select.select([self.desk], [], [], 0.05)[0]:
+            if select.select([self.console], [], [], 0.05)[0]:
                 with contextlib.suppress(OSError):
-                    found += decode(self.desk.recv(65536))
+                    found += decode(self.console.recv(65536))
         return found
 
     def dance_with_sensor(self) -> None:
@@ -131,23 +131,25 @@ class Hall:
 
 @contextlib.contextmanager
 def hall(folder: Path) -> Iterator[Hall]:
-    """Two networks and a cable between them: the box at 10.77.0.1, everybody else at 10.77.0.2."""
+    """Two networks and a cable between them: the box at 10.77.0.1, all else at 10.77.0.2."""
     with contextlib.ExitStack() as opened:
         box = opened.enter_context(Namespace("box"))
         outside = opened.enter_context(Namespace("hall"))
         Cable(box, f"{BOX}/24", outside, f"{HALL}/24")
         with outside.entered():
             audience = opened.enter_context(contextlib.closing(Audience()))
-            desk = opened.enter_context(contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)))
-            desk.bind((HALL, 0))
+            console = opened.enter_context(
+                contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            )
+            console.bind((HALL, 0))
         create_keys(folder / "sensors.keys", [SENSOR])
-        made = Hall(folder, box, outside, audience, desk, (folder / "sensors.keys").read_bytes())
+        made = Hall(folder, box, outside, audience, console, (folder / "sensors.keys").read_bytes())
         opened.callback(made.switch_sensor_off)
         yield made
 
 
 def box_file(**own: Any) -> str:
-    """The venue's box file: the dance, its heartbeat and its desk are in the hall."""
+    """The venue's box file: the dance, its heartbeat and its console are in the hall."""
     values: dict[str, Any] = {
         "sensors": {"udp": {"host": "0.0.0.0", "port": SENSORS}, "keys": "/data/bunraku/keys/sensors.keys"},
         "outputs": {

@@ -108,7 +108,7 @@ class Machine:
     def main_pid(self, unit: str) -> int:
         """Of a unit's process, as this machine outside numbers it; 0 when it does not run.
 
-        Read from the control group: the unit may be starting anew, and systemctl would have to wait for it.
+        Read from the control group: the unit may be restarting, and systemctl would have to wait for it.
         """
         inside = self.show(unit, "MainPID")
         for line in self.run(

@@ -22,7 +22,7 @@ class Seen(NamedTuple):
 def pause_after(frames: Sequence[Seen], at: float) -> tuple[Seen, Seen] | None:
     """The last frame of the life that ended around `at`, the first one of the next; None: it goes on.
 
-    However long a machine that is busy takes for it: each life of the stage counts its ticks anew.
+    However long a machine that is busy takes for it: each life of the stage counts its ticks from 0.
     """
     for before, after in pairwise(frames):
         if after.at > at and after.tick <= before.tick:
@@ -46,7 +46,7 @@ def missing_ticks(frames: Sequence[Seen]) -> int:
 
 
 def lives(frames: Sequence[Seen]) -> int:
-    """In how many lives of the stage these frames were danced: each counts its ticks anew."""
+    """In how many lives of the stage these frames were danced: each counts its ticks from 0."""
     return 1 + sum(after.tick <= before.tick for before, after in pairwise(frames))
 
 

@@ -14,7 +14,7 @@ from tests.boot.pauses import lives, longest_pause_s, missing_ticks, share
 # The watchdogs of the projector and the console take 10 s and more: those of the others show that they bite.
 HARM = [("SIGKILL", name) for name in ("projector", "console", "control", "lights")]
 HARM += [("SIGSTOP", name) for name in ("control", "lights")]
-DANCED = 0.1  # of the frames, on the busiest machine; of a stage that waits for somebody none would come
+DANCED = 0.1  # of the frames, on the busiest machine; a stage that waits for another process sends none
 
 pytestmark = pytest.mark.boot
 

@@ -49,7 +49,7 @@ def test_a_full_data_partition(box: Box, figures: Figures) -> None:
     _is_full(box)
     box.machine.await_that(
         lambda: "the journal stops growing" in box.machine.log("bunraku-keeper"),
-        "nobody says that it is full",
+        "the keeper does not say that it is full",
     )
     box.machine.path("/data/filler").unlink()
     newest = time.time()

@@ -67,7 +67,7 @@ def test_it_dances_after_a_power_cut_and_goes_back_for_good(installed: Box, figu
     )
     assert "9.9.4" in box.machine.run("readlink", "/opt/bunraku/current")
     assert box.machine.show("bunraku-console", "TasksMax") == "17", "systemd has read this release's units"
-    box.machine.await_that(lambda: _watch_is_over(box), "nobody says that it dances")
+    box.machine.await_that(lambda: _watch_is_over(box), "the watch does not end: it dances")
     assert box.machine.show(_WATCH, "Result") == "success"
     assert not box.machine.path(f"{KEPT}/tries").exists()
     assert box.machine.run("systemctl", "--failed", "--plain", "--no-legend") == ""
@@ -90,7 +90,7 @@ def test_one_whose_stage_does_not_start_any_more_gives_way(installed: Box, figur
     figures.note(
         "a release that fails at power-on: until what came before dances", first.at - box.machine.powered_at
     )
-    box.machine.await_that(lambda: _watch_is_over(box), "nobody says that it does not dance")
+    box.machine.await_that(lambda: _watch_is_over(box), "the watch does not end: it does not dance")
     assert "9.9.4  put aside: its stage did not dance" in _bash(box, "bunraku-install --list")
     box.machine.cut_power()
     box.power_on()

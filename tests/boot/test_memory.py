@@ -1,4 +1,4 @@
-"""Memory runs out: whoever took it dies, and if it hits the stage, it dances again."""
+"""Memory runs out: the process that took it is killed; a stage that is killed dances again."""
 
 from __future__ import annotations
 

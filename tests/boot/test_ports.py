@@ -41,13 +41,13 @@ def test_the_firewall_lets_in_what_the_box_file_opens_and_nothing_else(dancing: 
     machine = dancing.machine
     dancing.await_unit("bunraku-firewall")
     dancing.await_unit("bunraku-control")
-    assert dancing.hall.ask("/ping"), "a listed desk is shut out"
+    assert dancing.hall.ask("/ping"), "a listed console is shut out"
     assert _heard(dancing, inside=True), "this test cannot tell what gets in"
     assert not _heard(dancing, inside=False), machine.run("nft", "list", "ruleset")
 
 
 def _heard(box: Box, inside: bool) -> bool:
-    """Whether a program that listens on a port of its own hears somebody inside of the box, or outside."""
+    """Whether a program that listens on a port of its own hears a sender inside the box, or outside."""
     entered = ["nsenter", "--target", str(box.machine.pid1), "--all", "/usr/bin/python3", "-c"]
     listener = subprocess.Popen([*entered, _LISTEN], stderr=subprocess.DEVNULL)
     network = box.hall.box_network if inside else box.hall.network

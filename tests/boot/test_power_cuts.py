@@ -12,18 +12,20 @@ from appliance.box.checkpoint import Checkpoint
 from tests.boot.box import KEYS, Box
 from tests.boot.figures import Figures
 
-CUTS = 20
+CUTS, MOST_CUTS = 5, 20  # MOST_CUTS with --long; each fifth falls into a start
 AGE_LIMIT_S = 1.0
 MOST_S = 10.0  # however busy this machine is: what is older than this was not the place of that evening
 
 pytestmark = pytest.mark.boot
 
 
-def test_it_dances_again_after_twenty_power_cuts(box: Box, figures: Figures) -> None:
-    chance = random.Random(5)
+def test_it_dances_again_after_power_cuts(
+    box: Box, figures: Figures, chance: random.Random, long_run: bool
+) -> None:
+    cuts = MOST_CUTS if long_run else CUTS
     box.power_on()
     box.await_frames()
-    for cut in range(CUTS):
+    for cut in range(cuts):
         left = _cut_somewhere(box, chance, in_the_start=cut % 5 == 4)
         box.power_on()
         first = box.await_frames()[0]
@@ -33,7 +35,7 @@ def test_it_dances_again_after_twenty_power_cuts(box: Box, figures: Figures) -> 
             age_s = _age_s(left, box.place())
             figures.note("age of the place after a power cut", age_s, limit=AGE_LIMIT_S)
             assert -1.0 < age_s < MOST_S, (left, box.place())
-    figures.note("power cuts survived", CUTS, unit=f"of {CUTS}")
+    figures.note("power cuts survived", cuts, unit=f"of {cuts}")
     box.machine.cut_power()
     box.disk.repaired()
     assert box.disk.sound()

@@ -1,4 +1,4 @@
-"""Power on, and it dances: nobody logs in, nobody presses a key."""
+"""Power on, and it dances: no login, no key press."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_all_that_belongs_to_the_box_runs_and_nothing_has_failed(box: Box) -> No
     machine.await_that(lambda: _settled(box), "the box is still starting")
     failed = machine.run("systemctl", "--failed", "--plain", "--no-legend")
     assert not failed, f"{failed}\n{machine.log()}"
-    # Five processes start at once: on a busy machine one may be late for its watchdog, and starts anew.
+    # Five processes start at once: on a busy machine one may be late for its watchdog, and is restarted.
     fell = re.findall(r"bunraku-\w+\.service: Failed with result '(?!watchdog)\w.*'", machine.log())
     assert not fell and machine.show(STAGE, "NRestarts") == "0", machine.log()
 

@@ -35,12 +35,12 @@ def test_a_killed_stage_goes_on_at_its_place(dancing: Box, figures: Figures) -> 
         before, after = dancing.pause_from(killed)
         figures.note("SIGKILL to next frame", after.at - killed, limit=KILLED_LIMIT_S)
         _goes_on(dancing, before, after)
-        if left.tick >= known.tick:  # else it had begun anew before anybody looked
+        if left.tick >= known.tick:  # else it had started over before the test looked
             _same_phrase(dancing, left, after)
 
 
 @pytest.mark.parametrize("way", ["SIGSTOP", "busy spin", "SIGSEGV"])
-def test_a_stage_that_hangs_or_crashes_is_started_anew(dancing: Box, figures: Figures, way: str) -> None:
+def test_a_stage_that_hangs_or_crashes_is_restarted(dancing: Box, figures: Figures, way: str) -> None:
     harmed = _spin(dancing) if way == "busy spin" else dancing.machine.kill(STAGE, getattr(signal, way))
     before, after = dancing.pause_from(harmed)
     limit = KILLED_LIMIT_S if way == "SIGSEGV" else HUNG_LIMIT_S
@@ -49,7 +49,7 @@ def test_a_stage_that_hangs_or_crashes_is_started_anew(dancing: Box, figures: Fi
     if way == "busy spin":  # and leaves the line at which it hung
         dancing.machine.await_that(
             lambda: 'File "' in dancing.machine.log(STAGE).partition("Fatal Python error: Aborted")[2],
-            "nobody says where it hung",
+            "the journal does not say where it hung",
         )
 
 
@@ -72,7 +72,7 @@ def _same_phrase(box: Box, left: Checkpoint, first: Seen) -> None:
     """No tick of the phrase was lost or danced twice, however long the pause was. first: frame after it."""
     now = box.place()
     assert now.phrase == left.phrase
-    if now.position_s > left.position_s:  # else it has come to its end and begun anew
+    if now.position_s > left.position_s:  # else it has come to its end and started over
         danced_s = box.danced_s(first.at, now.tick)
         assert now.position_s - left.position_s == pytest.approx(danced_s, abs=0.001), (left, now)
 

@@ -41,7 +41,7 @@ def diary(tmp_path: Path) -> Diary:
 
 
 def is_gone(pid: int) -> bool:
-    """Whether a process has ended; one that nobody waits for any more has ended, too."""
+    """Whether a process has ended; one that is waited for no longer has ended, too."""
     try:
         return "State:\tZ" in Path(f"/proc/{pid}/status").read_text()
     except OSError:
@@ -60,7 +60,7 @@ def test_it_starts_when_it_may_and_ends_with_the_context(diary: Diary) -> None:
     assert said == []
 
 
-def test_without_a_first_tick_nobody_is_started(diary: Diary) -> None:
+def test_without_a_first_tick_nothing_is_started(diary: Diary) -> None:
     with Companions([diary.child("time.sleep(60)")], print, lambda: False):
         pass
     assert diary.pids == []
@@ -90,7 +90,7 @@ def test_one_that_dies_at_once_is_tried_ever_more_slowly_and_not_said_for_ever(
     assert "4 times in a row" in said[3]
 
 
-def test_pauses_grow_and_one_that_lived_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pauses_grow_and_one_that_lived_starts_over(monkeypatch: pytest.MonkeyPatch) -> None:
     child = companions._Running(Companion("The child", ("x",), ""), lambda words: None)
     pauses = []
     now = 1000.0
@@ -102,7 +102,7 @@ def test_pauses_grow_and_one_that_lived_begins_anew(monkeypatch: pytest.MonkeyPa
     assert pauses == [0.2, 0.4, 0.8, 1.6, 2.0, 2.0, 0.2, 0.4]
 
 
-def test_one_that_dies_all_evening_takes_nobody_with_it() -> None:
+def test_one_that_dies_all_evening_takes_nothing_with_it() -> None:
     child = companions._Running(Companion("The child", ("/nowhere/at/all",), ""), lambda words: None)
     for second in range(0, 3 * 1100, 3):
         child.check(float(second))

@@ -118,7 +118,7 @@ def test_play_refuses_an_endless_network(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_play_while_its_network_hangs(tmp_path: Path, number: signal.Signals) -> None:
-    """What it had started to prove the network ends too, though nobody is left to give it up."""
+    """What it had started to prove the network ends too, though no process is left to stop it."""
     show = endless(write_show(tmp_path / "show"), 3)
     command = [sys.executable, "-m", "appliance.start", "play", "--show", show, "--box", box(tmp_path)]
     with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:

@@ -263,7 +263,7 @@ def test_a_box_that_does_not_take_it_costs_the_exit_status(
 
 
 class Clock:
-    """Time that passes only while somebody waits."""
+    """Time that passes only in a wait."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -307,7 +307,7 @@ def test_a_stage_that_dances_without_show_control_has_not_taken_it(
     assert box.obeyed == []
 
 
-def test_where_no_stage_lives_nobody_waits_for_show_control(
+def test_where_no_stage_lives_show_control_is_not_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clock = Clock()

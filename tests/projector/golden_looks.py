@@ -1,4 +1,4 @@
-"""Golden pictures of the looks: how they are drawn and compared; run as a module it draws them anew.
+"""Golden pictures of the looks: how they are drawn and compared; run as a module it draws them again.
 
 Two rasterizers that share no code, Mesa's llvmpipe and softpipe, draw these pictures with mean differences of
 up to 0.4 steps of 255 and 9 steps at the 99th percentile, after a blur of three pixels that forgives an edge

@@ -46,7 +46,7 @@ def test_without_a_change_no_file_is_written(tmp_path: Path, said: list[str]) ->
     assert not list(tmp_path.iterdir())
 
 
-def test_what_the_box_file_says_anew_goes_over_what_was_chosen_before(
+def test_what_the_box_file_newly_says_goes_over_what_was_chosen_before(
     tmp_path: Path, said: list[str]
 ) -> None:
     keep(tmp_path, said, PINNED)

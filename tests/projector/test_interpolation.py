@@ -123,7 +123,7 @@ def test_the_trail_is_the_last_moments_newest_last() -> None:
         assert world.shape == (2, 4)
 
 
-def test_a_slower_stage_is_followed_so_slowly_that_nobody_sees_it() -> None:
+def test_a_slower_stage_is_followed_so_slowly_that_it_cannot_be_seen() -> None:
     ring = stage(range(100))
     ring.frames_to_come += stage(range(100, 300), way_s=0.012).frames_to_come
     times = np.arange(11.0, 15.9, 1 / 60)

@@ -1,4 +1,4 @@
-"""Looks: the same moment makes the same picture, whoever dances, however large, whatever was drawn before."""
+"""Looks: the same moment makes the same picture, for any skeleton of any size, whatever was drawn before."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def test_no_joint_leaves_the_picture(dance: Recording, config: CameraConfig, asp
 
 
 def test_a_jump_of_the_phrase_is_still_in_the_picture(dance: Recording) -> None:
-    """Where a phrase starts anew the dancer is elsewhere from one tick to the next."""
+    """Where a phrase starts over the dancer is elsewhere from one tick to the next."""
     moment = moment_of(dance, 20.0)
     far = (moment.positions + np.float32([3.0, 0.0, -2.0])).astype(np.float32)
     jumped = Moment(moment.time_s, far, moment.world, moment.trail, moment.trail_times)

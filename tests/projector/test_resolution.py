@@ -110,7 +110,7 @@ def test_full_pictures_that_were_measured_too_short_are_measured_again() -> None
     assert len(machine.changes) == 4
 
 
-def test_another_look_is_judged_anew() -> None:
+def test_another_look_is_judged_again() -> None:
     machine = Machine(by_pixels(2.0 * PERIOD_S, fixed_s=1.95 * PERIOD_S))
     machine.dance(20, "cloud")
     machine.cost = by_pixels(5 * PERIOD_S)

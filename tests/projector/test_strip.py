@@ -47,8 +47,8 @@ def test_ten_instants_side_by_side(tmp_path: Path, look: str) -> None:
     pictures = pictures_of(out)
     assert len(pictures) == COLUMNS * ROWS
     for before, picture in pairwise(pictures):
-        assert picture.max() > 150, "nobody is to be seen"
-        assert np.abs(picture - before).max() > 50, "nobody moves"
+        assert picture.max() > 150, "no dancer is to be seen"
+        assert np.abs(picture - before).max() > 50, "the dancer does not move"
 
 
 def test_two_poses_give_two_pictures_and_black(tmp_path: Path) -> None:

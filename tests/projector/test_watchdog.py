@@ -1,4 +1,4 @@
-"""A display that hangs: noticed in time, by nobody else's fault, and the process ends with words."""
+"""A display that hangs: noticed in time, never by another's fault, and the process ends with a message."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ from appliance.projector import context as context_module
 from appliance.projector.context import GlContext, offscreen
 from appliance.projector.fallback import STAGE_UNSEEN
 from appliance.projector.keyboards import Key
+from appliance.projector.loop import Projector
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, ProjectorError
 from appliance.projector.resolution import Resolution
@@ -61,7 +62,7 @@ window.close()
 
 @contextlib.contextmanager
 def virtual_display() -> Iterator[str]:
-    """A real X server on no screen; it does not begin anew, deaf meanwhile, when a window is closed."""
+    """A real X server on no screen; it does not reset, deaf meanwhile, when a window is closed."""
     reading, writing = os.pipe()
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", str(writing), "-screen", "0", "640x480x24", "-nolisten", "tcp", "-noreset"],
@@ -215,7 +216,7 @@ def test_smaller_pictures_are_said_once_and_told_by_the_figures(
     run = Run(box, Wish("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
     monkeypatch.setattr(Resolution, "share", property(lambda _: 0.5))
     monkeypatch.setattr(Resolution, "drawn", lambda *_: True)
-    monkeypatch.setattr(run._projector, "draw", lambda *arguments: shares.append(arguments[-1]))
+    monkeypatch.setattr(Projector, "draw", lambda *arguments: shares.append(arguments[-1]))
     try:
         run.project(lambda: any("64x36 at 50%" in line for line in said))
     finally:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import write_checksums
+from tests.bundles import WINDOW, puppet_inputs, set_facts
 
 NAMES = ("hip", "chest", "lShldr", "lForeArm", "rShldr", "leftEye")
 MOVING = NAMES[:5]
@@ -51,25 +51,11 @@ def save_network(
     targets: list[int] | None = None,
 ) -> None:
     """A network with a puppet's inputs and outputs; `node` makes the poses out of the window."""
-    count = len(joints)
-    inputs = {
-        "window": (TensorProto.FLOAT, [8, count, 4]),
-        "mask": (TensorProto.BOOL, [count]),
-        "targets": (TensorProto.FLOAT, targets or [8, count, 4]),
-        "weights": (TensorProto.FLOAT, [count]),
-        "coding_iterations": (TensorProto.INT64, []),
-        "interaction_iterations": (TensorProto.INT64, []),
-    }
-    graph = helper.make_graph(
-        [helper.make_node(node, ["window"], ["poses"])],
-        "puppet",
-        [helper.make_tensor_value_info(name, *inputs[name]) for name in inputs if name != without],
-        [helper.make_tensor_value_info("poses", TensorProto.FLOAT, [8, count, 4])],
-    )
+    poses = helper.make_tensor_value_info("poses", TensorProto.FLOAT, [WINDOW, len(joints), 4])
+    inputs = [one for one in puppet_inputs(len(joints), targets) if one.name != without]
+    graph = helper.make_graph([helper.make_node(node, ["window"], ["poses"])], "puppet", inputs, [poses])
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
-    rest = json.dumps([[1.0, 0.0, 0.0, 0.0]] * count)
-    known = {"bunraku.joints": ",".join(joints), "bunraku.window": "8", "bunraku.rest": rest}
-    helper.set_model_props(model, known | (facts or {}))
+    set_facts(model, joints, **(facts or {}))
     onnx.save(model, str(path))
 
 

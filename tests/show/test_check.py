@@ -21,7 +21,7 @@ from tests.show.conftest import MOVING, NAMES, SHOW_YAML, recording, save_networ
 
 
 def only(directory: Path, repack: bool = True) -> Finding:
-    """The one finding of a bundle, packed anew so that checksums do not speak too."""
+    """The one finding of a bundle, packed again so that checksums do not speak too."""
     if repack:
         write_checksums(directory)
     findings = verify_bundle(directory)
@@ -57,7 +57,7 @@ def test_a_missing_file_is_found(bundle: Path) -> None:
     ]
 
 
-def test_a_file_without_a_checksum_is_a_warning_and_hidden_ones_are_nobodys_business(bundle: Path) -> None:
+def test_a_file_without_a_checksum_is_a_warning_and_hidden_ones_do_not_matter(bundle: Path) -> None:
     (bundle / "notes.txt").write_text("remember the gaffer tape")
     (bundle / ".DS_Store").write_text("a stick that was in another machine")
     finding = only(bundle, repack=False)
@@ -90,12 +90,12 @@ def test_faults_of_show_yaml_keep_their_lines(bundle: Path) -> None:
     ("change", "words"),
     [
         ({"joints": ("hip", "chest", "lSholder")}, ["'lSholder'", "Did you mean 'lShldr'?"]),
-        ({"facts": {"bunraku.window": "16"}}, ["16 poses long"]),
-        ({"facts": {"bunraku.joints": ""}}, ["does not say which joints"]),
-        ({"facts": {"bunraku.rest": "[[1, 0, 0]]"}}, ["rest pose"]),
-        ({"facts": {"bunraku.rest": "nonsense"}}, ["rest pose"]),
+        ({"facts": {"window": "16"}}, ["16 poses long"]),
+        ({"facts": {"joints": ""}}, ["does not say which joints"]),
+        ({"facts": {"rest": "[[1, 0, 0]]"}}, ["rest pose"]),
+        ({"facts": {"rest": "nonsense"}}, ["rest pose"]),
         ({"joints": ("hip", "chest", "lShldr", "chest", "rShldr")}, ["names a joint twice"]),
-        ({"facts": {"bunraku.joints": ",".join(NAMES)}}, ["has the shape [8, 5, 4], not [8, 6, 4]"]),
+        ({"facts": {"joints": ",".join(NAMES)}}, ["has the shape [8, 5, 4], not [8, 6, 4]"]),
         ({"without": "weights"}, ["no input 'weights'"]),
         (  # an older release exported it: one orientation a hand
             {"targets": [5, 4]},

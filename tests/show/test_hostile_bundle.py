@@ -129,7 +129,7 @@ def test_a_number_that_is_none_is_refused_with_its_line(bundle: Path, number: st
     ["[" * 100_000, f"[[1, 0, 0, {'9' * 400}]]", "[" + "[1, 0, 0, 0]," * 200_000, '{"a": 1}', "[[[]]]"],
 )
 def test_a_rest_pose_that_is_none_is_refused(bundle: Path, rest: str) -> None:
-    save_network(bundle / "puppet.onnx", facts={"bunraku.rest": rest})
+    save_network(bundle / "puppet.onnx", facts={"rest": rest})
     assert "rest pose" in about(bundle, "puppet.onnx")
     with pytest.raises(PuppetError, match="does not say what it moves"):
         Puppet(bundle / "puppet.onnx", skeleton())
@@ -146,9 +146,9 @@ def test_a_network_whose_words_are_no_text_is_refused(bundle: Path, word: bytes)
 
 def test_a_network_of_very_many_joints_is_refused_in_few_words(bundle: Path) -> None:
     names = ",".join(f"joint {number}" for number in range(100_000))
-    save_network(bundle / "puppet.onnx", facts={"bunraku.joints": names})
+    save_network(bundle / "puppet.onnx", facts={"joints": names})
     assert "more than 1000" in about(bundle, "puppet.onnx")
-    save_network(bundle / "puppet.onnx", facts={"bunraku.joints": ",".join(names.split(",")[:900])})
+    save_network(bundle / "puppet.onnx", facts={"joints": ",".join(names.split(",")[:900])})
     assert len(about(bundle, "puppet.onnx").splitlines()) < 20
 
 

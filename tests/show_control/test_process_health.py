@@ -25,46 +25,46 @@ from tests.show_control.doubles import Asker, ControlInThread, StageDouble, fact
 DMX = Fallback("dmx-away", "A wire is away.")
 
 
-def told(company: ProcessHealth, now: float) -> dict[str, tuple[str, int, bool]]:
-    return {one.name: (who, one.times, one.active) for who, one in company.fallbacks(now)}
+def told(processes: ProcessHealth, now: float) -> dict[str, tuple[str, int, bool]]:
+    return {one.name: (who, one.times, one.active) for who, one in processes.fallbacks(now)}
 
 
 def test_a_process_tells_its_fallbacks(folder: Path) -> None:
-    fallbacks, company = Fallbacks([DMX]), ProcessHealth(folder)
+    fallbacks, processes = Fallbacks([DMX]), ProcessHealth(folder)
     lights = ProcessHealthWriter(folder, "lights", fallbacks)
     lights.publish_health(10.0)
-    assert told(company, 10.0) == {}
+    assert told(processes, 10.0) == {}
     fallbacks.set("dmx-away", "The adapter is unplugged.")
     lights.publish_health(10.5)
-    assert told(company, 10.5) == {}, "once a second is enough"
+    assert told(processes, 10.5) == {}, "once a second is enough"
     lights.publish_health(11.0)
-    assert told(company, 11.0) == {"dmx-away": ("lights", 1, True)}
+    assert told(processes, 11.0) == {"dmx-away": ("lights", 1, True)}
     lights.end(11.5)
     lights.close()
-    company.close()
+    processes.close()
 
 
 def test_lights_projector_and_keeper_that_die_are_counted(folder: Path) -> None:
-    company = ProcessHealth(folder)
+    processes = ProcessHealth(folder)
     for who in ("lights", "projector", "keeper"):
         first = ProcessHealthWriter(folder, who, Fallbacks(()))
         first.publish_health(10.0)
         first.close()  # and never says that it ends
-        assert told(company, 10.0 + LATE_S) == {}
-        late = told(company, 10.1 + LATE_S)
+        assert told(processes, 10.0 + LATE_S) == {}
+        late = told(processes, 10.1 + LATE_S)
         assert late == {f"{who}-died": (who, 1, True)}
         second = ProcessHealthWriter(folder, who, Fallbacks(()))
         second.publish_health(20.0)
-        assert told(company, 20.0) == {f"{who}-died": (who, 1, False)}
+        assert told(processes, 20.0) == {f"{who}-died": (who, 1, False)}
         second.end(21.0)
         second.close()
-        assert told(company, 90.0) == {f"{who}-died": (who, 1, False)}, "who has ended is not late"
+        assert told(processes, 90.0) == {f"{who}-died": (who, 1, False)}, "who has ended is not late"
         third = ProcessHealthWriter(folder, who, Fallbacks(()))
         third.publish_health(100.0)
-        assert told(company, 100.0) == {}
+        assert told(processes, 100.0) == {}
         third.close()
         (folder / f"{who}.health").unlink()
-        company = ProcessHealth(folder)
+        processes = ProcessHealth(folder)
 
 
 def test_a_second_projector_says_nothing(folder: Path) -> None:
@@ -111,17 +111,17 @@ def test_the_keeper_tells_all_that_it_cannot_keep(folder: Path) -> None:
 
 
 def test_refused_and_put_aside_shows_are_told(folder: Path) -> None:
-    company = ProcessHealth(folder)
-    assert told(company, 1.0) == {}
+    processes = ProcessHealth(folder)
+    assert told(processes, 1.0) == {}
     aside = (Aside("a+", "Did not dance."),)
     Choice((Pair(),), ("Broken one.", "Broken two."), aside).write(folder / CHOSEN)
-    assert told(company, 1.0) == {
+    assert told(processes, 1.0) == {
         "show-refused": ("preflight", 2, True),
         "show-put-aside": ("preflight", 1, True),
     }
-    assert [one.words for _, one in company.fallbacks(1.0)] == ["Broken one. Broken two.", "Did not dance."]
+    assert [one.words for _, one in processes.fallbacks(1.0)] == ["Broken one. Broken two.", "Did not dance."]
     (folder / CHOSEN).write_bytes(b"{")
-    assert told(company, 1.0) == {}
+    assert told(processes, 1.0) == {}
 
 
 def test_a_stage_that_hangs_is_counted_once(folder: Path) -> None:

@@ -8,22 +8,21 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import yaml
 
 from appliance.sensor.keys import SensorKey, create_keys
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports
-from tests.system.processes import children_that_say, says
+from tests.system.processes import BUNRAKU, PATIENCE_S, await_that, children_that_say, says, started
 
-PATIENCE_S = 60.0  # for a machine that is busy with other things; nothing here waits without a reason
-PLAY = (sys.executable, "-m", "appliance.cli", "play")
+PLAY = (*BUNRAKU, "play")
+JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 
 
 @dataclass
@@ -58,7 +57,7 @@ class Box:
         return found
 
     def last_frames(self) -> list[list[Any]]:
-        """Those that the process, which has ended, had sent and nobody has taken yet."""
+        """Those that the process, which has ended, had sent and the test has not taken yet."""
         return [arguments for _, address, arguments in self.receiver.poll() if "frame" in address]
 
     def frame_that(self, is_wanted: Callable[[list[Any]], bool]) -> list[Any]:
@@ -90,12 +89,12 @@ class Box:
         Show control of a killed box ends by itself: while it holds the port, the next box would be refused.
         """
         companions = children_that_say(self.process.pid, "appliance.show_control")
-        self.process.send_signal(number)
-        status = self.process.wait(PATIENCE_S)
-        until = time.monotonic() + PATIENCE_S
-        while any(says(pid, "appliance.show_control") for pid in companions):
-            assert time.monotonic() < until, self.words
-            time.sleep(0.005)
+        with ending_emulators(self.process.pid):
+            self.process.send_signal(number)
+            status = self.process.wait(PATIENCE_S)
+        await_that(
+            lambda: not any(says(pid, "appliance.show_control") for pid in companions), lambda: self.words
+        )
         return status
 
 
@@ -129,31 +128,32 @@ def playing(
         try:
             yield running
         finally:
-            running.process.kill()
-            running.process.wait()
+            with ending_emulators(running.process.pid):
+                running.process.kill()
+                running.process.wait()
 
 
-def started(command: Sequence[str], words: IO[bytes] | int) -> subprocess.Popen[bytes]:
-    """A process whose words go into this file or terminal at once."""
-    return subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=words,
-        stderr=subprocess.STDOUT,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    )
+@contextlib.contextmanager
+def ending_emulators(box: int) -> Iterator[None]:
+    """A box that is killed inside leaves its emulated sensors behind."""
+    emulators = children_that_say(box, "emulate")
+    yield
+    for pid in emulators:
+        if says(pid, "emulate"):
+            os.kill(pid, signal.SIGKILL)
 
 
 def await_end_of_keeper(runtime: Path) -> None:
     """It ends with its box and lets go of its lock; a power cut would have taken it in the same moment."""
-    until = time.monotonic() + PATIENCE_S
+
+    def is_gone() -> bool:
+        with contextlib.suppress(BlockingIOError):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        return False
+
     with (runtime / "keeper.lock").open() as lock:
-        while True:
-            with contextlib.suppress(BlockingIOError):
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                return
-            assert time.monotonic() < until, "the keeper outlives its box"
-            time.sleep(0.02)
+        await_that(is_gone, "the keeper outlives its box")
 
 
 def is_free(port: int) -> bool:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import signal
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from hw_sim.dmx.artnet import ArtNetReceiver
 from hw_sim.peers import HOST
-from tests.system.box import PATIENCE_S, started
+from tests.system.processes import PATIENCE_S, Process
 
-LIGHTS = (sys.executable, "-m", "appliance.cli", "lights")
 PAN, DIMMER, PAR, SAFE = 0, 4, 20, 0.2
 RIG = {
     "fixtures": [
@@ -68,29 +65,10 @@ def node() -> Iterator[tuple[Node, int]]:
         yield Node(receiver), receiver.port
 
 
-class LightsProcess:
-    """`bunraku lights` by itself, as systemd runs it."""
+class LightsProcess(Process):
+    """`bunraku lights`."""
 
     def __init__(self, folder: Path, terminal: int | None = None) -> None:
-        self.words_file = folder / "lights.txt"
-        with self.words_file.open("ab") as words:
-            self.process = started(
-                [*LIGHTS, "--box", str(folder / "box.yaml")], words if terminal is None else terminal
-            )
-
-    def await_words(self, words: str) -> None:
-        until = time.monotonic() + PATIENCE_S
-        while words not in self.words_file.read_text():
-            assert time.monotonic() < until and self.process.poll() is None, self.words_file.read_text()
-            time.sleep(0.05)
-
-    def end(self, number: int = signal.SIGTERM) -> int:
-        self.process.send_signal(number)
-        return self.process.wait(PATIENCE_S)
-
-    def __enter__(self) -> LightsProcess:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.wait()
+        super().__init__(
+            folder / "lights.txt", "lights", "--box", str(folder / "box.yaml"), terminal=terminal
+        )

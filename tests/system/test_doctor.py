@@ -317,7 +317,7 @@ def test_displays(tmp_path: Path) -> None:
     assert "HDMI-A-2" not in found.words
 
 
-def test_a_port_that_somebody_else_has_is_wrong_and_he_is_named(tmp_path: Path) -> None:
+def test_a_port_that_another_process_holds_is_wrong_and_it_is_named(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]

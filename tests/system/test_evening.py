@@ -65,7 +65,7 @@ def test_every_believed_reading_was_measured_by_that_sensor_and_counts_once(even
 
 
 def test_what_was_believed_is_how_the_hand_stood(evening: Evening) -> None:
-    """But for its heading, which an IMU without magnetometer chooses anew at each start."""
+    """But for its heading, which an IMU without magnetometer chooses again at each start."""
     of_name = {sensor.key.name: sensor for sensor in evening.sensors}
     troubles = {(NAMES[act.sensor], act.at) for act in evening.acts if act.sensor is not None}
     compared = 0
@@ -126,7 +126,12 @@ def test_no_wearable_ever_hung_or_waited_while_linked(evening: Evening) -> None:
         assert final.longest_unfed_us < 16_000_000
         assert final.longest_linked_step_us < 20_000
     assert [final.recoveries > 0 for final in evening.finals] == [
-        *(True, True, False, False),  # a stuck bus loses no heading; who was switched off counts anew
+        *(
+            True,
+            True,
+            False,
+            False,
+        ),  # a stuck bus loses no heading; who was switched off counts from the start
         *(False, True, False, True),
     ]
 
@@ -173,7 +178,7 @@ def relay_evening() -> Iterator[tuple[LockstepSensor, _Relay, int]]:
             stage.box_off()
             stage.box_on()
             assert stage.run(3.0, until=lambda: len(stage.believed) > 100)
-            assert relay.calls, "the box that was started anew has called its sensor"
+            assert relay.calls, "the box that was restarted has called its sensor"
             stage.look = relay.act
             before = len(stage.believed)
             stage.run(10.0)

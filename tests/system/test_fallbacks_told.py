@@ -18,9 +18,10 @@ from appliance.lights.fallback import STAGE_UNSEEN as LIGHTS_SAFE
 from appliance.projector.fallback import STAGE_UNSEEN as PICTURE_BLACK
 from hw_sim.dmx.usb_pro import UsbProWidget
 from tests.bundles import write_show
-from tests.system.box import PATIENCE_S, Box, playing
+from tests.system.box import Box, playing
 from tests.system.lit import RIG, LightsProcess
-from tests.system.test_projector import projecting
+from tests.system.processes import await_that
+from tests.system.test_projector import Projection
 
 
 @pytest.fixture
@@ -40,14 +41,13 @@ def lit(show: Path, folder: Path, device: Path) -> Iterator[Box]:
 
 
 def await_told(runtime: Path, name: str, is_wanted: Callable[[Fallen], bool]) -> Fallen:
-    until = time.monotonic() + PATIENCE_S
-    with closing(ProcessHealth(runtime)) as company:
-        while True:
-            told = {one.name: one for _, one in company.fallbacks(time.monotonic())}
-            if name in told and is_wanted(told[name]):
-                return told[name]
-            assert time.monotonic() < until, told
-            time.sleep(0.05)
+    with closing(ProcessHealth(runtime)) as processes:
+
+        def found() -> list[Fallen]:
+            told = (one for _, one in processes.fallbacks(time.monotonic()))
+            return [one for one in told if one.name == name and is_wanted(one)]
+
+        return await_that(found, f"{name} was not told")[0]
 
 
 def test_a_wire_that_is_away_and_back(show: Path, tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_a_stage_that_is_lost_and_back(show: Path, tmp_path: Path) -> None:
 
 def test_a_picture_without_a_stage_and_with_one(tmp_path: Path) -> None:
     show = write_show(tmp_path / "show", hands=[])
-    with playing(show, tmp_path, "--alone") as box, projecting(tmp_path / "box.yaml", tmp_path) as projection:
+    with playing(show, tmp_path, "--alone") as box, Projection(tmp_path / "box.yaml", tmp_path) as projection:
         projection.await_dance()
         box.end(signal.SIGKILL)
         await_told(tmp_path / "runtime", PICTURE_BLACK.name, lambda one: one.active)

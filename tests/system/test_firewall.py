@@ -65,7 +65,7 @@ def test_nft_takes_the_rules_twice(tmp_path: Path) -> None:
         ["unshare", "--net", "sh", "-c", twice], capture_output=True, text=True, check=False
     )
     if "Operation not permitted" in done.stderr:
-        pytest.skip("this machine gives nobody a network of one's own")
+        pytest.skip("this machine gives no process a network of its own")
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("udp dport 9750") == 1, "the rules of before went"
     assert done.stdout.count("policy drop") == 2

@@ -197,7 +197,7 @@ def forged(facts: object, arrays: bytes) -> bytes:
         None,
     ],
 )
-def test_a_prepared_phrase_of_something_else_is_read_anew(tmp_path: Path, shapes: object) -> None:
+def test_a_prepared_phrase_of_something_else_is_read_again(tmp_path: Path, shapes: object) -> None:
     show = write_show(tmp_path / "show")
     prepare([show / "phrase.bvh"], show, FIGURE, grounded=True)
     (kept,) = (show / FOLDER).glob(f"*{SUFFIX}")
@@ -209,7 +209,9 @@ def test_a_prepared_phrase_of_something_else_is_read_anew(tmp_path: Path, shapes
 
 
 @pytest.mark.parametrize("made", [fifo, device, enormous])
-def test_a_prepared_phrase_that_is_no_file_is_read_anew(tmp_path: Path, made: Callable[[Path], None]) -> None:
+def test_a_prepared_phrase_that_is_no_file_is_read_again(
+    tmp_path: Path, made: Callable[[Path], None]
+) -> None:
     show = write_show(tmp_path / "show")
     prepare([show / "phrase.bvh"], show, FIGURE, grounded=True)
     (kept,) = (show / FOLDER).glob(f"*{SUFFIX}")

@@ -6,7 +6,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -20,13 +19,12 @@ from appliance.recorder.reading import read_journal
 from appliance.recorder.segments import segment_paths
 from tests.bundles import swaying_phrase, write_show
 from tests.show_control.doubles import Asker
-from tests.system.box import PATIENCE_S, Box, playing
-from tests.system.processes import children_that_say
+from tests.system.box import JOURNAL, Box, playing
+from tests.system.processes import BUNRAKU, PATIENCE_S, await_that, children_that_say
 from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
 
-JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 CUES = [{"name": "storm", "phrase": "slow", "iterations": [5, 4], "hands": ["lShldr"], "fade_s": 1.0}]
 
 
@@ -43,7 +41,7 @@ def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def bunraku(*arguments: str) -> str:
     """What a command says; it must succeed."""
     done = subprocess.run(
-        [sys.executable, "-m", "appliance.cli", *arguments],
+        [*BUNRAKU, *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -55,43 +53,43 @@ def bunraku(*arguments: str) -> str:
 
 def await_keeper(journal: Path, runs: int = 1) -> None:
     """Until a keeper has kept something of so many starts of the stage."""
-    until = time.monotonic() + PATIENCE_S
-    while time.monotonic() < until:
+
+    def are_kept() -> bool:
         with contextlib.suppress(JournalError):
-            if len(read_journal(journal).runs) >= runs:
-                return
-        time.sleep(0.05)
-    raise AssertionError(f"nothing of {runs} runs was kept")
+            return len(read_journal(journal).runs) >= runs
+        return False
+
+    await_that(are_kept, f"nothing of {runs} runs was kept")
 
 
 def disturb(box: Box) -> None:
     """Show control, a sensor that comes and goes, and a machine that stands still for a moment."""
-    with contextlib.closing(Asker(box.control)) as desk:
+    with contextlib.closing(Asker(box.control)) as console:
         with Wearables([box.key], box.sensors) as wearables:
             box.frame_that(lambda frame: frame[2] > 20)
-            assert desk.order("/cue", "storm")[2] == 1
-            desk.order("/sensors/neutral")
+            assert console.order("/cue", "storm")[2] == 1
+            console.order("/sensors/neutral")
             wearables.dance()
             box.frames(60)
-        desk.tell("/player/rate", -1.0)
+        console.tell("/player/rate", -1.0)
         box.process.send_signal(signal.SIGSTOP)
         time.sleep(0.15)
         box.process.send_signal(signal.SIGCONT)
         box.frames(30)
-        await_rate(box, desk, -1.0)
-        assert desk.order("/iterations", 2, 1)[2] == 1
+        await_rate(box, console, -1.0)
+        assert console.order("/iterations", 2, 1)[2] == 1
         with Wearables([box.key], box.sensors) as wearables:
             wearables.dance()
             box.frames(60)
 
 
-def await_rate(box: Box, desk: Asker, rate: float) -> None:
+def await_rate(box: Box, console: Asker, rate: float) -> None:
     """What a player streams is not answered: it is sent again until the stage has noted it."""
     until = time.monotonic() + PATIENCE_S
     with contextlib.closing(CheckpointReader(box.words_file.with_name("runtime"))) as reader:
         while (place := reader.read()) is None or place.rate != rate:
             assert time.monotonic() < until, place
-            desk.tell("/player/rate", rate)
+            console.tell("/player/rate", rate)
             box.frames(5)
 
 
@@ -144,9 +142,7 @@ def test_a_keeper_that_hangs_or_dies_costs_no_tick_of_the_journal(show: Path, tm
 
 def until_another(journal: Path) -> None:
     """Until the keeper that was started instead has begun a segment of its own."""
-    until = time.monotonic() + PATIENCE_S
-    while len(segment_paths(journal)) < 2 and time.monotonic() < until:
-        time.sleep(0.05)
+    await_that(lambda: len(segment_paths(journal)) >= 2)
 
 
 def test_a_file_in_the_place_of_the_journal_is_refused(show: Path, tmp_path: Path) -> None:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -30,21 +28,12 @@ from appliance.stage.recorder import FORMAT, KIND
 from tests.box import disks
 from tests.bundles import write_show
 from tests.recorder.night import Night
-from tests.system.box import PATIENCE_S, started
-from tests.system.processes import children
+from tests.system.processes import Process, await_that, children
 
-KEEP = (sys.executable, "-m", "appliance.cli", "keep")
 MEMORY = b'{"neutral": [], "profiles": {}}'
 
 
-def await_that(happened: Callable[[], Any], what: str) -> None:
-    until = time.monotonic() + PATIENCE_S
-    while not happened():
-        assert time.monotonic() < until, what
-        time.sleep(0.05)
-
-
-class Keeper:
+class Keeper(Process):
     """`bunraku keep`, and the stage's memory that it carries: a night as a test dances it, a place."""
 
     def __init__(self, folder: Path) -> None:
@@ -56,16 +45,7 @@ class Keeper:
         self.box_file.write_text(
             yaml.safe_dump({"runtime": "runtime", "state": "state", "journal": {"folder": "disk/journal"}})
         )
-        self.words_file = folder / "words.txt"
-        self.start()
-
-    def start(self) -> None:
-        with self.words_file.open("ab") as words:
-            self.process = started((*KEEP, "--box", str(self.box_file)), words)
-
-    @property
-    def words(self) -> str:
-        return self.words_file.read_text()
+        super().__init__(folder / "words.txt", "keep", "--box", str(self.box_file))
 
     @property
     def journal(self) -> Path:
@@ -81,32 +61,24 @@ class Keeper:
         self.position_s += 0.02
         place = Checkpoint("A show", "main", self.position_s, (0.0, 30.0))
         self.place.write(replace(place, ended=ended))
-        await_that(lambda: self.kept_place() == self.position_s, f"the place stays behind: {self.words}")
+        await_that(lambda: self.kept_place() == self.position_s, lambda: f"it stays behind: {self.words}")
 
     def kept_place(self) -> float | None:
         place = read_checkpoint(self.folder / "state" / FILE)
         return None if place is None else place.position_s
 
     def fallbacks(self) -> set[str]:
-        """Those in force, as desks hear them."""
-        with closing(ProcessHealth(self.runtime)) as company:
-            found = company.fallbacks(time.monotonic())
+        """Those in force, as consoles hear them."""
+        with closing(ProcessHealth(self.runtime)) as processes:
+            found = processes.fallbacks(time.monotonic())
         return {one.name for process, one in found if process == "keeper" and one.active}
-
-    def end(self) -> int:
-        self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(PATIENCE_S)
 
 
 @pytest.fixture
 def keeper(tmp_path: Path) -> Iterator[Keeper]:
     (tmp_path / "disk").mkdir(exist_ok=True)
-    keeper = Keeper(tmp_path)
-    try:
+    with Keeper(tmp_path) as keeper:
         yield keeper
-    finally:
-        keeper.process.kill()
-        keeper.process.wait()
 
 
 @pytest.fixture
@@ -120,13 +92,13 @@ def disk(tmp_path: Path) -> Iterator[Path]:
 
 def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Path, keeper: Keeper) -> None:
     keeper.night.dance(50)
-    await_that(lambda: keeper.kept_ticks() == 50, keeper.words)
+    await_that(lambda: keeper.kept_ticks() == 50, lambda: keeper.words)
     keeper.goes_on()
     with disks.frozen(disk):
         keeper.night.dance(50)
         for _ in range(3):
             keeper.goes_on()
-        await_that(lambda: keeper.fallbacks() == {JOURNAL_STOPPED.name}, "nobody is told")
+        await_that(lambda: keeper.fallbacks() == {JOURNAL_STOPPED.name}, "the fallback is not told")
         assert "The journal: the disk has not answered for 5 s" in keeper.words
         keeper.goes_on()
         assert keeper.end() == 0
@@ -134,8 +106,8 @@ def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Pat
         keeper.start()  # what hangs still holds nothing that this one needs
         keeper.goes_on()
         keeper.goes_on(ended=True)
-    await_that(lambda: keeper.kept_ticks() == 100, keeper.words)
-    await_that(lambda: not keeper.fallbacks(), keeper.words)
+    await_that(lambda: keeper.kept_ticks() == 100, lambda: keeper.words)
+    await_that(lambda: not keeper.fallbacks(), lambda: keeper.words)
     assert keeper.end() == 0
     (run,) = read_journal(keeper.journal).runs
     numbers = run.tick_numbers.tolist()
@@ -165,8 +137,8 @@ def test_a_file_that_does_not_answer_holds_up_its_own_mirror_alone(tmp_path: Pat
         try:
             keeper.goes_on()
             keeper.night.dance(20)
-            await_that(lambda: keeper.kept_ticks() == 20, keeper.words)
-            await_that(lambda: keeper.fallbacks() == {SENSORS_NOT_KEPT.name}, "nobody is told")
+            await_that(lambda: keeper.kept_ticks() == 20, lambda: keeper.words)
+            await_that(lambda: keeper.fallbacks() == {SENSORS_NOT_KEPT.name}, "the fallback is not told")
             keeper.goes_on(ended=True)
             assert keeper.end() == 0
         finally:
@@ -179,7 +151,7 @@ def test_a_journal_of_another_release_costs_neither_place_nor_keeper(keeper: Kee
         other.rings[0].write(b"\xff\xfe")
         other.publish()
         keeper.goes_on()
-        await_that(lambda: JOURNAL_STOPPED.name in keeper.fallbacks(), keeper.words)
+        await_that(lambda: JOURNAL_STOPPED.name in keeper.fallbacks(), lambda: keeper.words)
         keeper.goes_on()
     assert keeper.process.poll() is None
     assert "Traceback" not in keeper.words
@@ -188,12 +160,12 @@ def test_a_journal_of_another_release_costs_neither_place_nor_keeper(keeper: Kee
 def test_a_mirror_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper) -> None:
     keeper.goes_on()
     keeper.night.dance(20)
-    await_that(lambda: keeper.kept_ticks() == 20, keeper.words)
+    await_that(lambda: keeper.kept_ticks() == 20, lambda: keeper.words)
     for process in children(keeper.process.pid):
         os.kill(process, signal.SIGKILL)
     keeper.goes_on()
     keeper.night.dance(20)
-    await_that(lambda: keeper.kept_ticks() == 40, keeper.words)
+    await_that(lambda: keeper.kept_ticks() == 40, lambda: keeper.words)
     assert "has died" in keeper.words and "carried to the disk again" in keeper.words
     assert keeper.end() == 0
 

@@ -19,7 +19,7 @@ from hw_sim.peers import HOST
 from tests.bundles import write_show
 from tests.system.box import PATIENCE_S, PLAY, playing
 from tests.system.lit import DIMMER, PAN, PAR, RIG, SAFE, LightsProcess, node
-from tests.system.processes import children_that_say
+from tests.system.processes import await_that, children_that_say
 
 pytestmark = pytest.mark.realtime
 
@@ -118,7 +118,7 @@ def test_a_stage_that_hangs_brings_the_safe_look_too(tmp_path: Path) -> None:
 
 @contextlib.contextmanager
 def terminal_that_stands_still() -> Iterator[int]:
-    """Takes not one sign more, as after Ctrl-S or in a connection that is gone: whoever writes waits."""
+    """Takes no further byte, as after Ctrl-S or on a lost connection: the writer waits."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     with contextlib.suppress(BlockingIOError):
@@ -193,10 +193,7 @@ def test_a_widget_that_is_not_there_costs_the_other_wires_nothing(tmp_path: Path
 
 
 def await_levels(widget: UsbProWidget, is_wanted: Callable[[bytes], bool]) -> None:
-    until = time.monotonic() + PATIENCE_S
-    while widget.levels is None or not is_wanted(widget.levels):
-        assert time.monotonic() < until, widget.levels
-        time.sleep(0.05)
+    await_that(lambda: widget.levels is not None and is_wanted(widget.levels), lambda: f"{widget.levels}")
 
 
 def test_by_usb_the_same_levels_arrive(tmp_path: Path) -> None:

@@ -51,6 +51,6 @@ def test_from_the_network_to_the_first_reading_used(times_s: dict[str, list[floa
     assert median(times_s["network"]) <= 1.0
 
 
-def test_from_the_box_started_anew_to_readings_used_again(times_s: dict[str, list[float]]) -> None:
-    _say("box started anew to readings used again", times_s["restart"])
+def test_from_the_box_restarted_to_readings_used_again(times_s: dict[str, list[float]]) -> None:
+    _say("box restarted to readings used again", times_s["restart"])
     assert median(times_s["restart"]) <= 1.5

@@ -21,12 +21,11 @@ from appliance.recorder.reading import read_journal
 from appliance.recorder.record import LATE, NOT_FINITE
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show
-from tests.system.box import PATIENCE_S, PLAY, is_free, playing
+from tests.system.box import JOURNAL, PATIENCE_S, PLAY, is_free, playing
 from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
 
-JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 # Takes the rights away that a box needs for real time, root's too, and becomes the box.
 WITHOUT_RIGHTS = (
     sys.executable,
@@ -45,11 +44,6 @@ WITHOUT_TORCH = (
     "from appliance.cli.app import main\n"
     "main(['play', *sys.argv[1:]])",
 )
-
-
-@pytest.fixture(scope="module")
-def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_show(tmp_path_factory.mktemp("bundle") / "show")
 
 
 def test_frames_leave_on_a_grid_of_20_ms_and_carry_the_readings(show: Path, tmp_path: Path) -> None:
@@ -110,7 +104,7 @@ def test_a_port_that_is_taken_is_named_with_what_to_do(show: Path, tmp_path: Pat
         first.frames(5)
 
 
-def test_a_receiver_that_nobody_runs_does_not_disturb_the_other(show: Path, tmp_path: Path) -> None:
+def test_a_receiver_that_does_not_run_does_not_disturb_the_other(show: Path, tmp_path: Path) -> None:
     [nobody] = free_ports(1)
     with playing(show, tmp_path, more_receivers=[{"host": HOST, "port": nobody}]) as box:
         frames = box.frames(120)

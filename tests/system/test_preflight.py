@@ -196,7 +196,7 @@ def test_what_danced_before_is_chosen_before_anything_new_is_looked_at(
     assert "nobody thought of this" in said[0] and said[0] in machine.choice.refused
 
 
-def test_a_preflight_that_never_ends_holds_up_nobody(
+def test_a_preflight_that_never_ends_holds_up_nothing(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     machine.bring("Spring")
@@ -238,21 +238,19 @@ def test_a_check_that_takes_all_memory_ends_alone(machine: Machine, monkeypatch:
     assert within(60.0, check) == b"1"
 
 
-def test_a_power_cut_at_any_moment_leaves_whole_shows_alone(machine: Machine) -> None:
+def test_a_power_cut_at_any_moment_leaves_whole_shows_alone(machine: Machine, chance: random.Random) -> None:
     """Killed while it copies, checks or writes; the next one chooses what is whole."""
-    seed = random.randrange(1 << 30)
-    moments = random.Random(seed)
     machine.bring("Spring")
     machine.preflight()
     for number in range(8):
         machine.bring(f"Summer {number}")
         with subprocess.Popen([*PREFLIGHT, *machine.arguments], stdout=subprocess.DEVNULL) as process:
-            time.sleep(moments.uniform(0.02, 1.2))
+            time.sleep(chance.uniform(0.02, 1.2))
             process.send_signal(signal.SIGKILL)
         for pair in (Choice.read(machine.data / CHOSEN) or Choice()).pairs:
-            assert not checksum_problems(pair.show), f"seed {seed}"
+            assert not checksum_problems(pair.show)
     assert machine.preflight().returncode == 0
-    assert machine.dances == "Summer 7", f"seed {seed}"
+    assert machine.dances == "Summer 7"
 
 
 def late(machine: Machine, uptime_s: float) -> list[str]:
@@ -344,7 +342,7 @@ def test_what_is_given_up_is_ended_with_all_that_it_started() -> None:
     with pytest.raises(TimedOutError, match="not within"):
         within(0.5, endless)
     os.close(writing)
-    assert select.select([reading], [], [], PATIENCE_S)[0], "somebody still holds the other end"
+    assert select.select([reading], [], [], PATIENCE_S)[0], "another process still holds the other end"
     assert os.read(reading, 1) == b""
     os.close(reading)
 

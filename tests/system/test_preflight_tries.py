@@ -25,7 +25,7 @@ NEW, BEFORE = "new+", "before+"
 
 
 class Evening:
-    """The runtime folder of a box, and starts of its stage that end as somebody likes."""
+    """The runtime folder of a box, and starts of its stage that end as a test wants."""
 
     def __init__(self, folder: Path) -> None:
         self.run, self.data = folder / "run", folder / "data"
@@ -114,7 +114,7 @@ def test_a_new_show_that_once_danced_long_enough_is_tried_on(evening: Evening) -
     assert [evening.start(danced_s=None) for _ in range(3)] == [NEW, NEW, NEW]
 
 
-def test_a_good_show_may_be_killed_as_often_as_somebody_likes(evening: Evening) -> None:
+def test_a_good_show_may_be_killed_any_number_of_times(evening: Evening) -> None:
     evening.choice.with_good(NEW).write(evening.run / CHOSEN)
     assert {evening.start(danced_s=0.1) for _ in range(12)} == {NEW}
 
@@ -129,7 +129,7 @@ def test_what_comes_with_the_box_is_never_put_aside(evening: Evening) -> None:
     assert {evening.start(danced_s=None) for _ in range(8)} == {""}
 
 
-def test_other_box_files_let_the_other_processes_start_anew(evening: Evening) -> None:
+def test_other_box_files_restart_the_other_processes(evening: Evening) -> None:
     evening.start(danced_s=None)
     other = evening.run / "other.yaml"
     first, *rest = evening.choice.pairs
@@ -140,7 +140,7 @@ def test_other_box_files_let_the_other_processes_start_anew(evening: Evening) ->
 
 
 @pytest.mark.parametrize("torn", [b"", b"[1]", b'["x", "many", 0]', b"\0\0"])
-def test_a_torn_count_begins_anew(evening: Evening, torn: bytes) -> None:
+def test_a_torn_count_starts_over(evening: Evening, torn: bytes) -> None:
     (evening.run / TRIES).write_bytes(torn)
     assert evening.start(danced_s=None) == NEW
 

@@ -7,9 +7,7 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -21,29 +19,20 @@ from appliance.projector.projector_error import NO_DISPLAY, NO_PLACE
 from appliance.show.bundle import default_show_path
 from tests.bundles import write_show
 from tests.show_control.doubles import Asker
-from tests.system.box import PATIENCE_S, Box, playing
+from tests.system.box import Box, playing
+from tests.system.processes import BUNRAKU, PATIENCE_S, Process, await_that
 
-PROJECT = (sys.executable, "-m", "appliance.cli", "project")
+PROJECT = (*BUNRAKU, "project")
 SIZE = "128x72"
 
 
-class Projection:
-    """A running `bunraku project` without a display; what it shows lies in a folder of pictures."""
+class Projection(Process):
+    """`bunraku project` without a display; what it shows lies in a folder of pictures."""
 
     def __init__(self, box_file: Path, folder: Path) -> None:
         self.pictures = Path(tempfile.mkdtemp(dir=folder))
-        self.words_file = self.pictures / "words.txt"
-        with self.words_file.open("wb") as words:
-            self.process = subprocess.Popen(
-                [*PROJECT, "--box", str(box_file), "--offscreen", SIZE, "--frames", str(self.pictures)],
-                stdin=subprocess.DEVNULL,
-                stdout=words,
-                stderr=subprocess.STDOUT,
-            )
-
-    @property
-    def words(self) -> str:
-        return self.words_file.read_text()
+        shown = ("--offscreen", SIZE, "--frames", str(self.pictures))
+        super().__init__(self.pictures / "words.txt", "project", "--box", str(box_file), *shown)
 
     def newest(self) -> np.ndarray | None:
         """What is on the wall: the newest picture that is whole."""
@@ -52,42 +41,21 @@ class Projection:
             path.unlink()
         return np.asarray(Image.open(found[-1]).convert("RGB")) if found else None
 
-    def await_words(self, words: str) -> None:
-        """Until it has said this."""
-        until = time.monotonic() + PATIENCE_S
-        while words not in self.words:
-            assert time.monotonic() < until and self.process.poll() is None, self.words
-            time.sleep(0.02)
-
     def await_picture(self, is_wanted: Callable[[np.ndarray], bool]) -> None:
         """Until such a picture is on the wall."""
-        until = time.monotonic() + PATIENCE_S
-        while True:
+
+        def is_there() -> bool:
+            assert self.process.poll() is None, self.words
             picture = self.newest()
-            if picture is not None and is_wanted(picture):
-                return
-            assert time.monotonic() < until and self.process.poll() is None, self.words
-            time.sleep(0.02)
+            return picture is not None and is_wanted(picture)
+
+        await_that(is_there, lambda: self.words)
 
     def await_black(self) -> None:
         self.await_picture(lambda picture: not picture.any())
 
     def await_dance(self) -> None:
         self.await_picture(lambda picture: picture.max() > 100)
-
-    def end(self, number: int = signal.SIGTERM) -> int:
-        self.process.send_signal(number)
-        return self.process.wait(PATIENCE_S)
-
-
-@contextlib.contextmanager
-def projecting(box_file: Path, folder: Path) -> Iterator[Projection]:
-    projection = Projection(box_file, folder)
-    try:
-        yield projection
-    finally:
-        projection.process.kill()
-        projection.process.wait()
 
 
 @pytest.fixture
@@ -99,7 +67,7 @@ def box(tmp_path: Path) -> Iterator[Box]:
 def test_started_first_it_waits_in_the_dark_and_outlives_two_stages(tmp_path: Path) -> None:
     box_file = tmp_path / "box.yaml"
     box_file.write_text("runtime: runtime\n")  # as in the box file that the box gets
-    with projecting(box_file, tmp_path) as projection:
+    with Projection(box_file, tmp_path) as projection:
         projection.await_black()
         with playing(write_show(tmp_path / "show", hands=[]), tmp_path) as box:
             projection.await_dance()
@@ -117,7 +85,7 @@ def test_started_first_it_waits_in_the_dark_and_outlives_two_stages(tmp_path: Pa
 
 
 def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path: Path) -> None:
-    with projecting(tmp_path / "box.yaml", tmp_path) as projection:
+    with Projection(tmp_path / "box.yaml", tmp_path) as projection:
         projection.await_dance()
         projection.process.send_signal(signal.SIGSTOP)
         hung = box.frames(100)
@@ -126,7 +94,7 @@ def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path
         projection.await_dance()
         assert projection.end(signal.SIGKILL) == -signal.SIGKILL
         box.frames(25)
-    with projecting(tmp_path / "box.yaml", tmp_path) as projection:
+    with Projection(tmp_path / "box.yaml", tmp_path) as projection:
         projection.await_dance()
         assert projection.end(signal.SIGINT) == 0
     box.frames(5)
@@ -135,7 +103,7 @@ def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path
 
 def test_panic_and_alignment_by_osc(box: Box, tmp_path: Path) -> None:
     with (
-        projecting(tmp_path / "box.yaml", tmp_path) as projection,
+        Projection(tmp_path / "box.yaml", tmp_path) as projection,
         contextlib.closing(Asker(box.control)) as asker,
     ):
         projection.await_dance()
@@ -151,7 +119,7 @@ def test_panic_and_alignment_by_osc(box: Box, tmp_path: Path) -> None:
         done, words = asker.order("/projector/corner", 1, 1.0, 1.0)[2:]
         assert not done and "fold" in words
         projection.end()
-    with projecting(tmp_path / "box.yaml", tmp_path) as projection:
+    with Projection(tmp_path / "box.yaml", tmp_path) as projection:
         projection.await_picture(lambda seen: seen[40:].max() > 100 and not seen[:36].any())
 
 

@@ -21,14 +21,13 @@ from appliance.sensor.keys import SensorKey, load_keys
 from appliance.sensor.link import open_link
 from appliance.sensor.provisioning.wearable_console import WearableConsole
 from hw_sim.firmware_library import State
-from tests.bundles import write_show
 from tests.system.bench import NETWORK, PASSWORD, Bench
 from tests.system.box import PATIENCE_S, Box, playing
+from tests.system.processes import BUNRAKU, await_that
 from tests.system.snoop import Snoop
 
 pytestmark = pytest.mark.realtime
 
-BUNRAKU = (sys.executable, "-m", "appliance.cli")
 ON_A_TERMINAL = (
     sys.executable,
     "-c",
@@ -36,11 +35,6 @@ ON_A_TERMINAL = (
     "os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0)\n"
     "os.execv(sys.argv[1], sys.argv[1:])",
 )
-
-
-@pytest.fixture(scope="module")
-def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_show(tmp_path_factory.mktemp("bundle") / "show")
 
 
 def bunraku(*words: str, stdin: str = "", status: int = 0) -> str:
@@ -128,10 +122,7 @@ def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: P
             )
             assert listed(box) == {}
             box.await_words("but not left-wrist of this show: the dancer moves freely there")
-            until = time.monotonic() + PATIENCE_S
-            while spare.state == State.LINKED:
-                assert time.monotonic() < until
-                time.sleep(0.05)
+            await_that(lambda: spare.state != State.LINKED)
         assert box.end() == 0
 
 
@@ -167,7 +158,7 @@ def test_a_new_board_s_readings_are_believed_by_cable(tmp_path: Path) -> None:
     assert (state.state, state.way, state.firmware) == ("linked", bench.device, "1.0.0")
 
 
-def test_provisioned_anew_the_old_key_is_nowhere_in_the_flash(tmp_path: Path) -> None:
+def test_provisioned_again_the_old_key_is_nowhere_in_the_flash(tmp_path: Path) -> None:
     keys = []
     with Bench() as bench:
         for _ in range(2):

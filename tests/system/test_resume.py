@@ -6,7 +6,6 @@ import json
 import shutil
 import signal
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,17 +14,12 @@ import pytest
 
 from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, packed, read_checkpoint
 from appliance.box.record import SlotFile
-from tests.bundles import write_show
-from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
+from tests.system.box import Box, await_end_of_keeper, playing
+from tests.system.processes import await_that
 
 PLAY = (sys.executable, "-m", "appliance.start", "play")
 PHRASE_S, TICK_S = 3.0, 0.02
 NO_REALTIME = {"realtime": {"enabled": False}, "control": None, "state": "state"}
-
-
-@pytest.fixture(scope="module")
-def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_show(tmp_path_factory.mktemp("resume") / "show")
 
 
 def place_in(folder: Path) -> Checkpoint:
@@ -147,10 +141,7 @@ def test_a_box_without_a_journal_keeps_its_place_on_the_disk_too(show: Path, tmp
 def await_carried(folder: Path) -> None:
     """Until the keeper has brought another place to the disk: it works, however busy the machine is."""
     before = read_checkpoint(folder / "state" / FILE)
-    until = time.monotonic() + PATIENCE_S
-    while read_checkpoint(folder / "state" / FILE) == before:
-        assert time.monotonic() < until
-        time.sleep(0.02)
+    await_that(lambda: read_checkpoint(folder / "state" / FILE) != before)
 
 
 def _as_of_another_boot(path: Path, place: Checkpoint) -> None:

@@ -20,19 +20,14 @@ from appliance.recorder.reading import read_journal
 from hw_sim.emulator import Sent
 from tests.bundles import FIGURE, MOVING, write_show
 from tests.hw_sim.null_modem import NullModem
-from tests.system.box import PATIENCE_S, Box, await_end_of_keeper, playing
+from tests.system.box import JOURNAL, PATIENCE_S, Box, await_end_of_keeper, playing
+from tests.system.processes import await_that
 from tests.system.wearables import Wearables
 
 pytestmark = pytest.mark.realtime
 
-JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 SHOULDER = FIGURE.index("lShldr")
 EIGHT = [f"hand-{number}" for number in range(8)]
-
-
-@pytest.fixture(scope="module")
-def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_show(tmp_path_factory.mktemp("bundle") / "show")
 
 
 def reading(above: int = -1) -> Callable[[list[Any]], bool]:
@@ -100,7 +95,7 @@ def test_switched_on_it_is_used_and_standing_still_gives_the_neutral_pose(show: 
     assert np.median(np.abs((dancing["targets"][:, 0] * hands).sum(1)[fluent])) > 0.9995
 
 
-def test_killed_and_started_anew_it_uses_the_readings_and_the_neutral_pose_again(
+def test_killed_and_restarted_it_uses_the_readings_and_the_neutral_pose_again(
     show: Path, tmp_path: Path
 ) -> None:
     with playing(show, tmp_path) as box:
@@ -123,10 +118,7 @@ def test_after_a_power_cut_the_neutral_pose_is_used_again(show: Path, tmp_path: 
     with playing(show, tmp_path) as box, Wearables([box.key], box.sensors) as wearables:
         box.await_words("neutral pose taken")
         wearables.dance()
-        until = time.monotonic() + PATIENCE_S
-        while not (tmp_path / "sensors.memory").exists():
-            assert time.monotonic() < until
-            time.sleep(0.02)
+        await_that((tmp_path / "sensors.memory").exists)
         box.end(signal.SIGKILL)
         await_end_of_keeper(tmp_path / "runtime")
         shutil.rmtree(tmp_path / "runtime")
@@ -182,7 +174,7 @@ def test_switched_off_and_on_its_joint_goes_on_without_standing_still(show: Path
             assert box.end() == 0
 
 
-def test_a_double_tap_takes_the_neutral_pose_anew(show: Path, tmp_path: Path) -> None:
+def test_a_double_tap_takes_the_neutral_pose_again(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path) as box:
         box.frames(1)
         with Wearables(

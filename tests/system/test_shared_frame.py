@@ -7,9 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +17,9 @@ from appliance.outputs.frame_reader import FrameReader
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports
 from hw_sim.posistagenet import PsnReceiver
-from tests.bundles import FIGURE, write_show
-from tests.system.box import PATIENCE_S, PLAY, playing
+from tests.bundles import FIGURE
+from tests.system.box import PLAY, playing
+from tests.system.processes import PATIENCE_S, await_that
 
 pytestmark = pytest.mark.realtime
 
@@ -31,25 +30,11 @@ mkdir -m 700 "$1/runtime" && mount -t tmpfs -o size=16k,mode=700 none "$1/runtim
 """
 
 
-@pytest.fixture(scope="module")
-def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_show(tmp_path_factory.mktemp("bundle") / "show")
-
-
-def await_that(is_so: Callable[[float], Any]) -> Any:
-    """What `is_so(now)` gives once it gives something; fails after a long time."""
-    until = time.monotonic() + PATIENCE_S
-    while not (found := is_so(now := time.monotonic())):
-        assert now < until, "it never came to that"
-        time.sleep(0.01)
-    return found
-
-
-def test_frames_facts_and_health_are_there_for_whoever_reads(show: Path, tmp_path: Path) -> None:
+def test_frames_facts_and_health_are_there_for_each_reader(show: Path, tmp_path: Path) -> None:
     reader = FrameReader(tmp_path / "runtime")
     assert reader.state(time.monotonic()) == "absent"
     with playing(show, tmp_path, "--alone", settings={"limits": {"late_ms": 20}}) as box:
-        await_that(lambda now: reader.state(now) == "fresh")
+        await_that(lambda: reader.state(time.monotonic()) == "fresh")
         facts = reader.facts
         assert facts is not None and facts.pid == box.process.pid and facts.skeleton.names == FIGURE.names
         assert facts.show_directory == show and facts.box_file == tmp_path / "box.yaml"
@@ -66,13 +51,13 @@ def test_frames_facts_and_health_are_there_for_whoever_reads(show: Path, tmp_pat
         assert [frame.tick for frame in seen] == sorted({frame.tick for frame in seen})
         assert all(0.0 < frame.left - frame.frame_time < PATIENCE_S for frame in seen)
 
-        health = await_that(lambda now: (reader.health() or {}).get("ticks", 0) > 100 and reader.health())
+        health = await_that(lambda: (reader.health() or {}).get("ticks", 0) > 100 and reader.health())
         assert health["state"] == "dancing" and health["phrase"] == "main"
         assert health["rate_hz"] > 0 and health["tick_p50_ms"] > 0
         assert health["sensors"][0][:3] == ["left-wrist", f"{box.key.device_id:08x}", "absent"]
         assert [one["dropped"] for one in health["receivers"]] == [0]
         assert box.end() == 0
-    await_that(lambda now: reader.state(now) == "absent")
+    await_that(lambda: reader.state(time.monotonic()) == "absent")
 
 
 def test_a_stage_that_hangs_is_stale_one_that_died_is_not_alive_and_the_next_is_found(
@@ -80,22 +65,22 @@ def test_a_stage_that_hangs_is_stale_one_that_died_is_not_alive_and_the_next_is_
 ) -> None:
     reader = FrameReader(tmp_path / "runtime")
     with playing(show, tmp_path, "--alone") as box:
-        await_that(lambda now: reader.state(now) == "fresh")
+        await_that(lambda: reader.state(time.monotonic()) == "fresh")
         box.process.send_signal(signal.SIGSTOP)
-        await_that(lambda now: reader.state(now) == "stale")
+        await_that(lambda: reader.state(time.monotonic()) == "stale")
         assert reader.is_alive(time.monotonic())
         box.process.send_signal(signal.SIGCONT)
-        await_that(lambda now: reader.state(now) == "fresh")
+        await_that(lambda: reader.state(time.monotonic()) == "fresh")
         assert reader.generation == 1
 
         box.end(signal.SIGKILL)
-        await_that(lambda now: not reader.is_alive(now))
+        await_that(lambda: not reader.is_alive(time.monotonic()))
         assert reader.state(time.monotonic()) == "stale"
         last = reader.newest(time.monotonic())
         assert last is not None
 
         box.kill_and_restart()
-        await_that(lambda now: reader.state(now) == "fresh")
+        await_that(lambda: reader.state(time.monotonic()) == "fresh")
         assert reader.generation == 2
         assert box.end() == 0
 

@@ -26,12 +26,11 @@ from appliance.recorder.reading import read_journal
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show
 from tests.show_control.doubles import Asker, until
-from tests.system.box import PATIENCE_S, PLAY, Box, is_free, playing
+from tests.system.box import JOURNAL, PATIENCE_S, PLAY, Box, is_free, playing
 from tests.system.processes import children_that_say
 
 pytestmark = pytest.mark.realtime
 
-JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 CUES: list[dict[str, Any]] = [
     {"name": "calm", "iterations": [2, 1], "look": "lines", "fade_s": 0.1},
     {"name": "storm", "iterations": [4, 3], "hands": [], "look": "ink", "master": 0.5, "fade_s": 0.1},
@@ -251,7 +250,7 @@ def test_panic_works_while_the_stage_spins(show: Path, tmp_path: Path) -> None:
         box.process.kill()
 
 
-def test_a_killed_box_leaves_nobody_behind_and_panic_is_in_force_when_it_comes_back(
+def test_a_killed_box_leaves_no_process_behind_and_panic_is_in_force_when_it_comes_back(
     show: Path, tmp_path: Path
 ) -> None:
     with playing(show, tmp_path) as box:
@@ -437,7 +436,7 @@ def test_what_is_wrong_with_its_settings_is_one_clear_line(
 def test_a_window_that_nobody_reads_and_a_stopped_terminal_hold_up_no_panic(
     show: Path, tmp_path: Path
 ) -> None:
-    """Who reads what the box says may stop reading: a full pipe stops nobody."""
+    """A reader of what the box says may stop reading: a full pipe stops no process."""
     reading, writing = os.pipe()
     [port] = free_ports(1)
     (tmp_path / "box.yaml").write_text(yaml.safe_dump({"runtime": "runtime", "control": {"port": port}}))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import shutil
 import subprocess
 import sys
@@ -22,14 +21,12 @@ from hw_sim.posistagenet import PsnReceiver
 from tests.system import namespace, olad
 from tests.system.namespace import Namespace
 from tests.system.olad import Olad
-from tests.system.processes import children
+from tests.system.processes import BUNRAKU, PATIENCE_S, children_that_say, started
 
 SENSOR = "left-wrist"
 STAND_STILL_S = 20.0  # the neutral pose takes 1.5 s; a busy machine makes pauses, and it begins again
 LAMPS = {1: ("lHand", 2.0), 2: ("rFoot", 1.0)}  # universe: the joint whose height it shows, metres of full
 ART_NET_IN = {"2-1-I-0": 1, "2-1-I-1": 2}
-BUNRAKU = (sys.executable, "-m", "appliance.cli")
-PATIENCE_S = 60.0
 
 
 def why_not() -> str | None:
@@ -59,9 +56,9 @@ class Venue:
     def pids(self) -> dict[str, int]:
         """All processes by name, the stage's companions among them."""
         found = {name: process.pid for name, process in self.processes.items()}
-        for pid in children(found["stage"]):
-            words = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b".", b"\0").split(b"\0")
-            found |= {name: pid for name in ("control", "lights") if name.encode() in words}
+        for name, word in (("control", "appliance.show_control"), ("lights", "lights")):
+            for pid in children_that_say(found["stage"], word):
+                found[name] = pid
         return found
 
     def lost(self, name: str) -> int:
@@ -177,13 +174,7 @@ def _sockets(port: int) -> list[str]:
 
 def _start(opened: contextlib.ExitStack, command: Sequence[str], words: Path) -> subprocess.Popen[bytes]:
     with words.open("wb") as out:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=out,
-            stderr=subprocess.STDOUT,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )
+        process = started(command, out)
     opened.callback(_stop, process)
     return process
 

@@ -27,7 +27,7 @@ class Audience:
         self._socket.close()
 
     def forget(self) -> None:
-        """What came until now, also what nobody has read yet."""
+        """What came until now, read or not."""
         self._socket.setblocking(False)
         while True:
             try:

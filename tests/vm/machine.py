@@ -1,4 +1,4 @@
-"""A whole machine in software: the real image starts in qemu, somebody sits at its serial console."""
+"""A whole machine in software: the real image starts in qemu, with a user at its serial console."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Machine:
 
 
 class Console:
-    """The serial console, with somebody who reads everything and types."""
+    """The serial console: everything is read, and commands are typed."""
 
     def __init__(self, path: Path, log: Path) -> None:
         self.path, self.log = path, log
@@ -139,7 +139,7 @@ class Console:
         self._line.sendall(words.encode())
 
     def log_in(self, within_s: float = 600.0) -> None:
-        """Logs in as root, as the image lets whoever stands at the rack."""
+        """Logs in as root, which the image allows at the rack."""
         self.wait_for(r"login: ", within_s)
         self.type("root\n")
         self.wait_for(r"# ", 120.0)
