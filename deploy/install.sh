@@ -223,7 +223,7 @@ check_signature() {
 # A stick with an old release is taken by mistake, or brings back a fault that was mended.
 check_age() {
     local now
-    [[ $older = no && -n $(current) ]] || return 0
+    [[ $older = no && -f $releases/$(current)/release ]] || return 0
     now=$(fact "$releases/$(current)" version)
     in_root dpkg --compare-versions "$version" ge "$now" ||
         fail "bunraku $version in $source is older than $now, which dances. Nothing was changed. Is it the right" \
