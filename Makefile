@@ -13,14 +13,17 @@ LENGTH ?=
 WORKERS = $(shell cores=$$(nproc); echo $$((cores < 3 ? cores + 1 : 4)))
 BESIDE = --numprocesses=$(WORKERS) --dist=loadfile --no-loadscope-reorder
 
+# Debian 13's clang is 19, Debian 12's is 14.
+CLANG := $(if $(filter trixie,$(shell . /etc/os-release 2>/dev/null && echo $$VERSION_CODENAME)),19,14)
+
 # What is needed from the system, as package:command or package:file (where the package brings no command).
 DEBIAN_FOR_FIRMWARE := cmake:cmake g++:g++ make:make
 DEBIAN_FOR_GL := libgl1-mesa-dri:/usr/lib/*/dri/swrast_dri.so libegl1:/usr/lib/*/libEGL.so.1 \
     libgles2:/usr/lib/*/libGLESv2.so.2 libgbm1:/usr/lib/*/libgbm.so.1
 DEBIAN_FOR_TESTS := $(DEBIAN_FOR_FIRMWARE) $(DEBIAN_FOR_GL) liblo-tools:oscdump iproute2:ip \
     ola:olad xvfb:Xvfb \
-    doctest-dev:/usr/include/doctest/doctest.h cppcheck:cppcheck clang-14:clang++-14 \
-    libclang-rt-14-dev:/usr/lib/llvm-14/lib/clang/*/lib/linux/libclang_rt.fuzzer-* \
+    doctest-dev:/usr/include/doctest/doctest.h cppcheck:cppcheck clang-$(CLANG):clang++-$(CLANG) \
+    libclang-rt-$(CLANG)-dev:/usr/lib/llvm-$(CLANG)/lib/clang/*/lib/linux/libclang_rt.fuzzer-* \
     gcc-arm-none-eabi:arm-none-eabi-g++ libnewlib-arm-none-eabi:/usr/lib/arm-none-eabi/newlib/nano.specs \
     qemu-system-arm:qemu-system-arm systemd:systemd-analyze shellcheck:shellcheck openssh-client:ssh-keygen
 
@@ -79,11 +82,11 @@ firmware-test: debian-for-tests firmware ## the wearable: host tests, analysis, 
 	@echo "Wearable: on an emulated Cortex-M0"
 	@$(call build,firmware-m0,dance)
 	@echo "Wearable: fuzzing for $(FUZZ_SECONDS) s"
-	@$(call build,firmware-fuzz,all,-DBUNRAKU_FUZZ=ON -DCMAKE_CXX_COMPILER=clang++-14)
+	@$(call build,firmware-fuzz,all,-DBUNRAKU_FUZZ=ON -DCMAKE_CXX_COMPILER=clang++-$(CLANG))
 	@firmware/fuzz/run.sh build/firmware-fuzz $(FUZZ_SECONDS)
 
 fuzz-corpus: debian-for-tests ## fuzz the wearable (FUZZ_SECONDS) and keep the inputs that reach new code
-	@$(call build,firmware-fuzz,all,-DBUNRAKU_FUZZ=ON -DCMAKE_CXX_COMPILER=clang++-14)
+	@$(call build,firmware-fuzz,all,-DBUNRAKU_FUZZ=ON -DCMAKE_CXX_COMPILER=clang++-$(CLANG))
 	@firmware/fuzz/run.sh build/firmware-fuzz $(FUZZ_SECONDS) keep
 
 # $(1) the folder under build/, $(2) the target, $(3) how it is configured.

@@ -14,6 +14,7 @@ Usage: install.sh [FOLDER]         install the release in FOLDER (left out: wher
 
   --root DIR             work on the root file system in DIR (an image) instead of this machine's
   --until-power-off      keep the release in memory: on a box made from the image, for a trial
+  --older                take a release that is older than the one that dances
   --key FINGERPRINT      take a release signed with this key (SHA256:...) and no other, whatever this box knows
   --unsigned             do not ask who made the release. It gives up all protection against a foreign stick:
                          whoever wrote it has this box. For releases that you have made yourself.
@@ -53,6 +54,7 @@ STAYS_S=3
 DANCES_WITHIN_S=120
 DANCES_FOR_S=5
 POWER_ONS_TRIED=5
+HEAD_BYTES=1048576 # of SHA256SUMS, its signature, and `release`; real ones have a hundredth of that
 signed_as=bunraku-release # a signature that the same key made for something else counts for nothing
 once=/run/bunraku-release # bunraku-release.service looks for it
 home=/opt/bunraku
@@ -61,7 +63,7 @@ stick=/media/bunraku/bunraku/release
 units=usr/lib/systemd/system
 users=system/usr/lib/sysusers.d/bunraku.conf
 root='' action=install source='' chosen='' purge=no fleeting=no part='' fresh=no
-head='' key='' unsigned=no
+head='' key='' unsigned=no older=no
 
 read_options() {
     while [ $# -gt 0 ]; do
@@ -88,6 +90,7 @@ read_options() {
             shift
             ;;
         --unsigned) unsigned=yes ;;
+        --older) older=yes ;;
         -h | --help) usage && exit 0 ;;
         -*) fail "unknown option '$1'. See install.sh --help." ;;
         *) source=$1 ;;
@@ -165,17 +168,23 @@ begin() {
 # Nothing of a release is believed before its signature has been checked. What a stick says may change between two
 # looks, so that a copy is looked at.
 check_source() {
+    local file
     [[ -f $source/release && -f $source/SHA256SUMS ]] ||
         fail "no release in $source. Name the folder that 'make release' wrote; on a stick it is bunraku/release."
     head=$(mktemp -d)
-    cp "$source/release" "$source/SHA256SUMS" "$head/"
-    [ ! -f "$source/SHA256SUMS.sig" ] || cp "$source/SHA256SUMS.sig" "$head/"
+    for file in release SHA256SUMS SHA256SUMS.sig; do
+        [ ! -f "$source/$file" ] || take "$source/$file" "$head/$file" "$HEAD_BYTES" ||
+            fail "$file could not be read from $source. Nothing was changed. Copy the release to the stick again."
+    done
     check_signature
     (cd "$head" && grep '  \./release$' SHA256SUMS | sha256sum --check --strict --status) ||
         fail "the file 'release' in $source is damaged. Nothing was changed. Copy the release to the stick anew."
     version=$(fact "$head" version)
     [[ $version =~ ^[0-9A-Za-z.+]+$ ]] || fail "the release in $source has no version. Copy it to the stick anew."
 }
+
+# One file of a stick, which may hold anything: not through a link, at most $3 bytes, without waiting for a pipe.
+take() { dd if="$1" of="$2" bs=1M count="$3" iflag=nofollow,nonblock,fullblock,count_bytes status=none; }
 
 signature() { ssh-keygen -Y "$@" -n "$signed_as" -s "$head/SHA256SUMS.sig" <"$head/SHA256SUMS" 2>/dev/null; }
 
@@ -211,8 +220,18 @@ check_signature() {
             "Ask its maker to sign it with deploy/release/sign."
 }
 
+# A stick with an old release is taken by mistake, or brings back a fault that was mended.
+check_age() {
+    local now
+    [[ $older = no && -f $releases/$(current)/release ]] || return 0
+    now=$(fact "$releases/$(current)" version)
+    in_root dpkg --compare-versions "$version" ge "$now" ||
+        fail "bunraku $version in $source is older than $now, which dances. Nothing was changed. Is it the right" \
+            "stick? A release that this box still has comes back with --use (--list names them); this one with --older."
+}
+
 check_machine() {
-    local python arch have needs
+    local python arch have
     arch=$(in_root dpkg --print-architecture) || fail "this is neither Debian nor Raspberry Pi OS."
     [ "$arch" = "$(fact "$head" architecture)" ] ||
         fail "this box is $arch, the release is for $(fact "$head" architecture). Take the release for $arch."
@@ -242,21 +261,23 @@ belongs_to_root() { [ "$(stat -c %u:%a "$@" | sort -u)" = 0:755 ]; }
 # ---- a release of its own beside the others
 
 copy_and_verify() {
-    local file from
+    local file from left=$((needs << 20)) # a file that has grown on the stick does not fill the disk
     from=$(realpath "$source")
     mkdir -p "$part"
     mkdir -m 700 "$part/source" # root may read files that are not for everybody
-    install -m 644 "$head/SHA256SUMS" "$part/source/"
     while read -r _ file; do
         file=${file#./}
         [ "$(realpath -m "$source/$file")" = "$from/$file" ] ||
             fail "the release in $source leads out of its folder by '$file', which no release does. Nothing was" \
                 "installed. Do not use this stick."
-        install -D -m 644 "$source/$file" "$part/source/$file" ||
+        mkdir -p "$(dirname "$part/source/$file")"
+        take "$source/$file" "$part/source/$file" "$left" ||
             fail "$file could not be read from $source. Is the stick still in? The box dances as before."
-    done <"$part/source/SHA256SUMS"
-    (cd "$part/source" && sha256sum --check --strict --quiet SHA256SUMS >&2) ||
+        left=$((left - $(stat -c %s "$part/source/$file")))
+    done <"$head/SHA256SUMS"
+    (cd "$part/source" && sha256sum --check --strict --quiet "$head/SHA256SUMS" >&2) ||
         fail "files of the release are damaged (named above). Copy it to the stick anew. The box dances as before."
+    install -m 644 "$head/SHA256SUMS" "$part/source/"
 }
 
 # A wheel is an archive of what lies in site-packages; each was checked against its sum before.
@@ -336,6 +357,7 @@ for module in pkgutil.walk_packages(appliance.__path__, "appliance."):
 install_release() {
     local number
     check_source
+    check_age
     check_machine
     name=$version
     if [ -d "$releases/$name" ] && ! cmp -s "$releases/$name/SHA256SUMS" "$head/SHA256SUMS"; then

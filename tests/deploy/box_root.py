@@ -132,6 +132,26 @@ class BoxRoot:
         )
 
 
+def refused(box: BoxRoot, *words: str | Path) -> str:
+    """What is said; the box has what it had."""
+    before = box.current, files_of(box)
+    done = box.install(*words)
+    assert done.returncode == 1, done.stdout
+    assert (box.current, files_of(box)) == before
+    return done.stderr
+
+
+def files_of(box: BoxRoot) -> list[str]:
+    folder = box.path / "opt/bunraku"
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path != folder / "releases")
+
+
+def taken(box: BoxRoot, *words: str | Path) -> str:
+    done = box.install(*words)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def run(*words: str) -> str:
     """What a command prints that has to do what it should."""
     done = subprocess.run(words, capture_output=True, text=True)

@@ -67,7 +67,7 @@ def test_two_releases_before_the_current_one_stay_and_each_can_be_used(
     box: BoxRoot, make_release: MakeRelease
 ) -> None:
     for version in ("0.9.0", "1.2.0", "1.10.0"):  # the order of installation counts, not the number
-        assert box.install(make_release(version)).returncode == 0
+        assert box.install("--older", make_release(version)).returncode == 0
     assert box.install("--list").stdout == "  0.9.0\n  1.2.0\n* 1.10.0\n"
     assert box.install("--rollback").returncode == 0
     assert box.current == "1.2.0"
