@@ -1,24 +1,30 @@
-"""The show state: whether the audience sees anything, how bright, in which look. All processes read it."""
+"""The show state: what show control wants picture, lights and dance to be. All processes read it."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from appliance.box.block import BlockReader, BlockWriter
+from appliance.box.block import BlockWriter
+from appliance.box.ring_file import RingFileReader
 from appliance.pose.foreign_file import plain_json
 
 FILE, KIND = "show_state", "show_state"
-LARGEST = 8192  # bytes; the longest names of a show fit, whatever they are written in
+LARGEST = 16384  # bytes; the longest names of a show fit, in any script
 
 
 @dataclass(frozen=True, slots=True)
 class ShowState:
-    """What show control has set. Times are monotonic seconds of this machine; names are those of the show.
+    """What show control has declared; times are monotonic seconds of this machine, names are the show's.
 
-    look, lights: "" is the show's first. Fades run by themselves: readers ask with the moment that they draw.
+    look, lights: "" is the show's first. Fades run by themselves: readers pass the time at which they draw.
+
+    The stage applies each part of the dance once. `*_set` and the numbers in `hands` are the generation that
+    declared a part (0: none did), `generation` is the newest; it grows as long as the machine runs, even if
+    the file is deleted. These parts are for the show called `show`: a stage with another show ignores them.
     """
 
     panic: bool = False
@@ -38,7 +44,19 @@ class ShowState:
     lights_before: str = ""
     lights_since: float = 0.0
     lights_fade_s: float = 0.0
-    cue: str = ""  # the newest that was carried out; "": none yet
+    cue: str = ""  # the newest; "": none yet
+    show: str = ""
+    generation: int = 0
+    phrase: str = ""
+    phrase_fade_s: float = 0.0
+    phrase_set: int = 0
+    coding: int = 0
+    interaction: int = 0
+    iterations_fade_s: float = 0.0
+    iterations_set: int = 0
+    rate: float | None = None  # None: the show's
+    rate_set: int = 0
+    hands: Mapping[str, tuple[bool, int]] = field(default_factory=dict)  # by joint: holds, generation
 
     def level(self, now: float) -> float:
         """0..1: what dimmers and the picture are multiplied with."""
@@ -48,7 +66,11 @@ class ShowState:
 
     def is_safe(self, now: float) -> bool:
         """Whether lights show their safe look: at once on panic, and when stopped as soon as it is dark."""
-        return self.panic or (not self.going and self.going_level(now) <= 0.0)
+        return self.panic or self.stands(now)
+
+    def stands(self, now: float) -> bool:
+        """Whether the phrase stands still: stopped, and faded out."""
+        return not self.going and self.going_level(now) <= 0.0
 
     def master_level(self, now: float) -> float:
         """0..1: the master's fader on its way."""
@@ -89,6 +111,51 @@ class ShowState:
         before = self.lights if self.lights_mix(now) >= 0.5 else self.lights_before
         return replace(self, lights=lights, lights_before=before, lights_since=now, lights_fade_s=fade_s)
 
+    def with_cue(self, cue: str, now: float) -> ShowState:
+        """The newest cue; what it calls up is declared part by part."""
+        return replace(self, generation=self._next_generation(now), cue=cue)
+
+    def with_phrase(self, phrase: str, now: float, fade_s: float) -> ShowState:
+        """Call a phrase; calling the same one again is another call."""
+        number = self._next_generation(now)
+        return replace(self, generation=number, phrase=phrase, phrase_fade_s=fade_s, phrase_set=number)
+
+    def with_iterations(self, coding: int, interaction: int, now: float, fade_s: float = 0.0) -> ShowState:
+        """Other coding and interaction iterations."""
+        number = self._next_generation(now)
+        return replace(
+            self,
+            generation=number,
+            coding=coding,
+            interaction=interaction,
+            iterations_fade_s=fade_s,
+            iterations_set=number,
+        )
+
+    def with_rate(self, rate: float | None, now: float) -> ShowState:
+        """Another speed of the phrase; None: the show's."""
+        number = self._next_generation(now)
+        return replace(self, generation=number, rate=rate, rate_set=number)
+
+    def with_hands(self, holds: Mapping[str, bool], now: float) -> ShowState:
+        """Let the hands of these joints hold, or let go."""
+        number = self._next_generation(now)
+        hands = {**self.hands, **{joint: (held, number) for joint, held in holds.items()}}
+        return replace(self, generation=number, hands=hands)
+
+    def for_show(self, show: str) -> ShowState:
+        """Without the cue and the dance of another show."""
+        if show == self.show:
+            return self
+        none: dict[str, Any] = {
+            "phrase_set": 0,
+            "iterations_set": 0,
+            "rate": None,
+            "rate_set": 0,
+            "hands": {},
+        }
+        return replace(self, show=show, cue="", phrase="", **none)
+
     def settled(self, now: float) -> ShowState:
         """With fades that began in the future done: the machine's clock has started anew since."""
         late = max(self.going_since, self.master_since, self.look_since, self.lights_since) > now
@@ -96,40 +163,52 @@ class ShowState:
             return self
         return replace(self, going_fade_s=0.0, master_fade_s=0.0, look_fade_s=0.0, lights_fade_s=0.0)
 
+    def _next_generation(self, now: float) -> int:
+        """Nanoseconds since the machine started, so that a new file never repeats an earlier number."""
+        return max(self.generation + 1, int(1e9 * now))
+
+
+_FIELDS = tuple(one.name for one in fields(ShowState))
+
 
 class ShowStateReader:
     """Reads the show state of a runtime folder; before one is written the defaults hold: the show runs.
+
+    An unchanged state costs a stat and eight bytes.
 
     A file that is gone stays in force until another one is written: panic stays panic when the folder is
     emptied, and what is dark does not flash up while a box ends.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._block = BlockReader(folder / FILE, KIND)
-        self._payload: bytes | None = None
-        self._house = ShowState()
+        self._file = RingFileReader(folder / FILE, KIND, 1, "show control")
+        self._sequence = 0
+        self._show_state = ShowState()
 
     def read(self) -> ShowState:
-        """How the show state is now. Never waits, never raises."""
-        payload = self._block.read()
-        if payload is not None and payload != self._payload:
-            self._payload, self._house = payload, _parsed(payload)
-        return self._house
+        """The newest show state, the same object until it changes. Never waits, never raises."""
+        if self._file.look():
+            self._sequence = 0
+        for ring in self._file.rings:
+            if ring.newest_sequence() != self._sequence and (newest := ring.newest()):
+                self._sequence, self._show_state = newest[0], _parsed(newest[1])
+        return self._show_state
 
     def close(self) -> None:
         """Let go of the file."""
-        self._block.close()
+        self._file.close()
 
 
 class ShowStateWriter:
-    """Show control's end: the file outlives it, so that panic stays panic. Raises OSError without a place."""
+    """Show control's end: the file outlives it, so that panic stays panic. Raises OSError."""
 
     def __init__(self, folder: Path) -> None:
         self._block = BlockWriter(folder / FILE, KIND, LARGEST)
 
     def write(self, show_state: ShowState) -> None:
-        """Publish; readers see it when they look next."""
-        self._block.write(json.dumps(asdict(show_state)).encode())
+        """Publish; readers have it from their next read on."""
+        values = {name: getattr(show_state, name) for name in _FIELDS}
+        self._block.write(json.dumps(values, ensure_ascii=False).encode())
 
     def close(self) -> None:
         """Let go of the file; it stays."""
@@ -150,9 +229,9 @@ def _part(now: float, since: float, fade_s: float) -> float:
 
 def _parsed(payload: bytes) -> ShowState:
     """A show state of another version of this program keeps what both know."""
-    known = {one.name for one in fields(ShowState)}
     try:
         values: dict[str, Any] = plain_json(payload)
-        return ShowState(**{name: value for name, value in values.items() if name in known})
+        values["hands"] = {joint: (held, number) for joint, (held, number) in values.get("hands", {}).items()}
+        return ShowState(**{name: value for name, value in values.items() if name in _FIELDS})
     except (ValueError, TypeError, AttributeError):
         return ShowState()

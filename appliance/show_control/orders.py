@@ -31,21 +31,19 @@ _NONSENSE = (ValueError, KeyError, TypeError, AttributeError, OverflowError, Rec
 class Order:
     """One thing to do, within its bounds; names that only the show knows are the receiver's to check.
 
-    For the stage:  start, stop, jump (s), rate (r), excerpt (start s[, end s]), iterations (coding,
-    interaction), hold (x, y, z, angle; text: joint), release (text: joint), hand (0|1; text: joint: the hand
-    of that joint lets go or holds), phrase (fade s; text: its name), cue (text: its name), neutral, heading,
-    strobe (text: the sensor or ""), reload (keys).
+    For the stage:  jump (s), excerpt (start s[, end s]), hold (x, y, z, angle; text: joint), release (text:
+    joint), neutral, heading, strobe (text: the sensor or ""), reload (keys).
     For the projector:  corner (number 1..4, x, y), corners (x1, y1 .. x4, y4), corners/reset, brightness (b),
     mirror (0|1), grid (0|1), info (0|1).
 
-    text: a joint may be a number. keys: what a reload has read. ask: who waits for an answer; 0: nobody.
+    keys: what a reload has read. ask: who waits for an answer; 0: nobody.
     quiet: the asker is told of a refusal alone, not that it was done (streams of orders).
     until: monotonic seconds; after it it is not to be done: the asker is told so a moment later.
     """
 
     name: str
     values: tuple[float, ...] = ()
-    text: str | int = ""
+    text: str = ""
     keys: Mapping[str, SensorKey] = field(default_factory=dict, compare=False, repr=False)
     ask: int = field(default=0, compare=False)
     quiet: bool = field(default=False, compare=False)
@@ -189,7 +187,7 @@ def _parsed(received: bytes) -> Order | None:
         return Order(
             name=str(values["name"]),
             values=_finite(values["values"]),
-            text=values["text"] if isinstance(values["text"], int) else str(values["text"]),
+            text=str(values["text"]),
             keys=_keys(values.get("keys", {})),
             ask=int(values["ask"]),
             quiet=bool(values["quiet"]),

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from pathlib import Path
 
 from appliance.box.clock import Slot, TickClock
 from appliance.box.notify import Notifier
 from appliance.box.realtime import enter_realtime, leave_realtime
 from appliance.box.show_state import ShowStateReader
-from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
+from appliance.recorder.record import CHANGE, JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
 from appliance.sensor.link import SensorState
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.show_control.orders import Order, OrderInbox
 from appliance.stage.admission import Admission
 from appliance.stage.admission_cache import admitted
-from appliance.stage.carry_out import carry_out, resume
+from appliance.stage.carry_out import carry_out
 from appliance.stage.fallback import StageFallbacks
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.phase_lock import PhaseLock
 from appliance.stage.phrase_cache import MEMORY
+from appliance.stage.reconcile import Reconciler
 from appliance.stage.recorder import Recorder
 from appliance.stage.resume import Resumption
 from appliance.stage.sensor_fit import SensorFit
@@ -70,32 +71,35 @@ class Stage:
             opened.callback(self.resuming.close)
             self.memory = SensorMemory(box.state_folder, say, self.sharing.noted)
             opened.callback(self.memory.close)
-            self.cast: StageParts = assemble(
+            self.parts: StageParts = assemble(
                 show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY
             )
-            opened.callback(self.cast.close)
+            opened.callback(self.parts.close)
             self.inbox = _open_inbox(self.sharing.folder)
             opened.callback(self.inbox.close)
             self.recorder = self._open_recorder()
             if self.recorder is not None:
                 opened.callback(self.recorder.close)
+            show_state = ShowStateReader(self.sharing.folder)
+            opened.callback(show_state.close)
             self.admission: Admission = admitted(
-                self.sharing.folder, self.cast, show, box, self.resuming.comes_back
+                self.sharing.folder, self.parts, show, box, self.resuming.comes_back
             )
             self._closing = opened.pop_all()
         self.iterations = Iterations(
             self.admission.coding, self.admission.interaction, self.admission.most_coding
         )
+        self.reconciler = Reconciler(show.config.name, self.parts, self.iterations, show_state)
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
-        self.wearing = SensorFit(self.cast, self.memory, self._tell_people)
-        self._resume()
-        self.tick = Tick(self.cast, self.wearing, self.iterations, latest_start_s)
+        self.wearing = SensorFit(self.parts, self.memory, self._tell_people)
+        self._resume(TickClock().now())
+        self.tick = Tick(self.parts, self.wearing, self.iterations, latest_start_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
-        self.lock = PhaseLock() if box.phase_lock and self.cast.primary else None
-        self.watch = Watch(self.cast)
-        self.fallbacks = StageFallbacks(self.cast, self.admission)
+        self.lock = PhaseLock() if box.phase_lock and self.parts.primary else None
+        self.watch = Watch(self.parts)
+        self.fallbacks = StageFallbacks(self.parts, self.admission)
 
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
         """Tick until `stopped` says so or the seconds are over; this thread is the real-time one."""
@@ -122,10 +126,10 @@ class Stage:
         begun = clock.now()
         self.health.begin(begun)
         facts = facts_of(self.show, self.box_file, self.iterations, begun, self.rehearsal)
-        self.sharing.begin(self.cast, facts, self.say)
+        self.sharing.begin(self.parts, facts, self.say)
         self.fallbacks.begin(begun, self.resuming, self.sharing.complaint, self.recorder is not None)
         self._tell(begun)
-        self.resuming.begin(self.cast, self.iterations)
+        self.resuming.begin(self.reconciler)
         if self.recorder is not None:
             self.recorder.keyframe(self.tick.state())
         clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
@@ -136,6 +140,7 @@ class Stage:
             self._comes_from_stop = slot.skipped >= _HUNG_SLOTS and not self._comes_from_stop
             self.tick.run(slot)
             self._note(slot)
+            self._reconcile(slot.started)
             self._obey(slot.started, clock.now)
             if self.recorder is not None and self.recorder.wants_keyframe:
                 self.recorder.keyframe(self.tick.state())
@@ -159,21 +164,34 @@ class Stage:
         self.notifier.ping(slot.started)
         if not self._comes_from_stop:
             self.fallbacks.watch(slot.started)
-        self.resuming.note(self.cast, self.iterations, slot.tick)
+        self.resuming.note(self.reconciler, slot.tick)
         if self.recorder is not None:
             flags = late * LATE | tick.frame.late * RESENT | tick.network_failed * NOT_FINITE
-            self.recorder.note_tick(slot, tick, flags | self.cast.motion.jumped * JUMPED)
+            self.recorder.note_tick(slot, tick, flags | self.parts.motion.jumped * JUMPED)
 
     def _follow_sensor(self, slot: Slot) -> float:
         """The phase lock's correction to the next period, seconds."""
-        newest = self.cast.newest_primary
+        newest = self.parts.newest_primary
         if self.lock is None or newest is None:
             return 0.0
-        for arrival in self.cast.link.arrivals(newest.sensor):
+        for arrival in self.parts.link.arrivals(newest.sensor):
             self.lock.observe(arrival)
         if slot.started - newest.arrival > _FORGET_PHASE_S:
             self.lock.forget()
         return self.lock.shift_s(slot.deadline)
+
+    def _reconcile(self, now: float) -> None:
+        """Apply what show control has declared since the last time."""
+        change = self.reconciler.pending(now)
+        if change is None:
+            return
+        words = self.reconciler.apply(change)
+        if self.recorder is not None:
+            self.recorder.event(CHANGE, now, change=change.noted(), cue=self.reconciler.cue, words=words)
+        self.resuming.note(self.reconciler, self.tick.frame.tick)  # before anybody is told
+        if words:
+            self.say(words)
+        self._tell(now)
 
     def _obey(self, started: float, monotonic: Callable[[], float]) -> None:
         """Carry out what show control has asked for meanwhile, and tell it what came of that.
@@ -187,17 +205,17 @@ class Stage:
             return
         done: list[tuple[Order, bool, str]] = []
         while len(done) < _ORDERS_A_TICK and (order := self.inbox.take()) is not None:
+            self._reconcile(started)  # what was declared before this order was sent comes before it
             done.append((order, *self._carry_out(order, monotonic())))
         if done:
-            self.resuming.note(self.cast, self.iterations, self.tick.frame.tick)  # before anybody is told
+            self.resuming.note(self.reconciler, self.tick.frame.tick)  # before anybody is told
         if any(not order.quiet for order, _, _ in done):
             self._tell(started)  # whoever asks next hears of it
         for answer in done:
             self.inbox.answer(*answer)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
-        usual_rate = self.show.config.motion.rate
-        done, words = carry_out(order, self.cast, self.iterations, self.wearing, usual_rate, now)
+        done, words = carry_out(order, self.parts, self.wearing, now)
         if self.recorder is not None:
             asked = {"name": order.name, "values": order.values, "text": order.text}
             self.recorder.event(ORDER, now, order=asked, done=done, words=words)
@@ -205,22 +223,21 @@ class Stage:
             self.say(words)
         return done, words
 
-    def _resume(self) -> None:
-        """After a crash or a power cut: go on where the show was, or else in the cue that is in force."""
-        words = [self.resuming.complaint, self.resuming.go_on(self.cast, self.iterations)]
+    def _resume(self, now: float) -> None:
+        """After a crash or a power cut: go on where the show was, or else with what is declared."""
+        words = [self.resuming.complaint, self.resuming.go_on(self.reconciler, now)]
         if not self.resuming.went_on:
-            with closing(ShowStateReader(self.sharing.folder)) as show_state:
-                words.append(resume(show_state.read().cue, self.cast, self.iterations))
+            words.append(self.reconciler.begin(now))
         for sentence in filter(None, words):
             self.say(sentence)
 
     def _tell(self, now: float) -> list[SensorState]:
         """How the box is, for whoever reads the shared frame; gives how the sensors are."""
-        states = self.cast.link.states(now)
+        states = self.parts.link.states(now)
         roster = roster_lines(states, self.wearing.neutral_of)
         age_s, locked = self._sensor_age_s(now), self._is_locked
         fallbacks = self.fallbacks.told(now)
-        self.sharing.tell(now, self.health, self.cast, self.iterations, age_s, locked, roster, fallbacks)
+        self.sharing.tell(now, self.health, self.reconciler, age_s, locked, roster, fallbacks)
         return states
 
     def _tell_people(self, words: str) -> None:
@@ -231,8 +248,8 @@ class Stage:
 
     def _sensor_age_s(self, now: float) -> float | None:
         """None: the show has no sensor."""
-        primary = self.cast.primary
-        return None if primary is None else self.cast.worn[primary][0].silent_s(now)
+        primary = self.parts.primary
+        return None if primary is None else self.parts.worn[primary][0].silent_s(now)
 
     @property
     def _is_locked(self) -> bool:
@@ -249,13 +266,13 @@ class Stage:
         self.say(line)
         for sentence in self.watch.news(now, self._tell(now)):
             self._tell_people(sentence)
-        for imu_id, offsets in self.cast.link.take_profiles():
+        for imu_id, offsets in self.parts.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)
 
     def _open_recorder(self) -> Recorder | None:
         """The flight recorder, unless there is no memory for it: that does not stop the show."""
         try:
-            return Recorder(self.sharing.noted, facts_of_run(self.show, list(self.cast.worn)))
+            return Recorder(self.sharing.noted, facts_of_run(self.show, list(self.parts.worn)))
         except OSError as error:
             self.say(
                 f"{self.sharing.noted}: no journal can be noted there ({error.strerror}). The dance goes on "

@@ -430,7 +430,7 @@ def test_who_is_heard_is_asked_though_another_sensor_is_silent(evening: Evening)
     stage.dance(1.0)
     assert stage.wearing.take_neutral(None, stage.now)
     assert not stage.wearing.take_neutral("right-wrist", stage.now)
-    assert stage.cast.link.wants_neutral == {SENSOR}
+    assert stage.parts.link.wants_neutral == {SENSOR}
 
 
 def test_the_poses_of_all_joints_of_a_sensor_are_kept_in_one_write(
@@ -463,4 +463,4 @@ def test_sensors_do_not_mind_each_other(evening: Evening) -> None:
         stage.hear(multiply(about_up(stage.sequence * 2.0), about_front(9.0)), sensor="right-wrist")
         stage.hear(about_up(0.0), sensor="stranger")
     assert stage.taken() == 1 and stage.taken("right-wrist") == 0
-    assert stage.cast.link.wants_neutral == {"right-wrist"}
+    assert stage.parts.link.wants_neutral == {"right-wrist"}
