@@ -92,9 +92,36 @@ def test_what_is_urgent_keeps_its_order_and_the_rest_follows_in_its_own(
         desk.tell(address, *((1,) if address in ("/blackout", "/master") else ()))
     for _ in sent:
         process.turn()
-    urgent = [one for one in sent if one in URGENT]
+    urgent = panic_first([one for one in sent if one in URGENT])
     rest = ["/pong" if one == "/ping" else one for one in sent if one not in URGENT]
     assert heard(desk) == urgent + rest, f"seed {seed}"
+
+
+def panic_first(sent: list[str]) -> list[str]:
+    """Each /panic before all that is urgent but an earlier /go."""
+    done: list[str] = []
+    waiting: list[str] = []
+    for one in sent:
+        (done if one == "/panic" and "/go" not in waiting else waiting).append(one)
+    return done + waiting
+
+
+@pytest.mark.parametrize(
+    ("before", "answered"),
+    [
+        (["/stop", "/blackout"], ["/panic", "/stop", "/blackout"]),
+        (["/stop", "/go"], ["/stop", "/go", "/panic"]),
+    ],
+)
+def test_panic_comes_before_what_is_urgent_but_for_a_go_that_would_lift_it(
+    process: ControlProcess, desk: Asker, before: list[str], answered: list[str]
+) -> None:
+    for address in before:
+        desk.tell(address, 1)
+    desk.tell("/panic")
+    process.turn()
+    assert heard(desk) == answered
+    assert process.handler.show_state.panic
 
 
 def test_a_bundle_with_an_urgent_message_goes_first_as_a_whole(process: ControlProcess, desk: Asker) -> None:
