@@ -19,8 +19,7 @@ Datagram = tuple[bytes, Address]
 class Intake:
     """Empties the port's socket at each step, so that the kernel drops nothing urgent.
 
-    First comes /panic, then what else is urgent, then the rest. /panic never overtakes a /go, which would lift
-    it.
+    First comes /panic, then what else is urgent, then the rest; /panic overtakes no /go, which would lift it.
 
     dropped: how many datagrams gave way.
     """
