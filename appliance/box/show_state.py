@@ -13,7 +13,7 @@ from appliance.box.ring_file import RingFileReader
 from appliance.pose.foreign_file import plain_json
 
 FILE, KIND = "show_state", "show_state"
-LARGEST = 16384  # bytes; the longest names of a show fit, in any script
+LARGEST = 8192  # bytes; the longest names of a show fit, in any script
 
 
 @dataclass(frozen=True, slots=True)

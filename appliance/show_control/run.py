@@ -1,4 +1,4 @@
-"""Show control as a process: the port, the show state, orders and the heartbeat, until it is told to end."""
+"""Show control as a process: the port, the show state, orders and the heartbeat, until a stop signal."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from appliance.show_control.port import Port
 from appliance.show_control.settings import Settings
 from appliance.show_control.stage_observer import StageObserver
 
-_LONGEST_SLEEP_S = 0.25  # a stage that was started anew is found so soon
+_LONGEST_SLEEP_S = 0.25  # a restarted stage is found within this
 _AT_ONCE = 16  # datagrams; then answers, heartbeat and signals have their turn
-_REST_S = 0.002  # after so many at once: a flood leaves the processor to others
+_REST_S = 0.002  # after as many: a flood leaves the processor to others
 
 
 class ControlProcess:
@@ -76,9 +76,9 @@ class ControlProcess:
         notifier.stopping()
 
     def turn(self) -> None:
-        """What waits, urgent commands first and no more than _AT_ONCE, and what is due.
+        """Handle up to _AT_ONCE datagrams, urgent ones first, and what is due.
 
-        The clock is read after each datagram has come: this process may have been held up while it took it.
+        The clock is read after each datagram: this process may have been held up while it received one.
         """
         taken = 0
         while taken < _AT_ONCE and (found := self._intake.take()) is not None:
@@ -97,7 +97,7 @@ class ControlProcess:
             time.sleep(_REST_S)
 
     def conclusion(self) -> str:
-        """What was refused, in a sentence; empty when nothing was."""
+        """How many commands were refused, in a sentence; empty when none was."""
         refused = self.handler.refused + self.port.too_large
         if not refused:
             return ""
@@ -105,7 +105,7 @@ class ControlProcess:
         return f"Commands: {refused} refused, the last one: {reason}"
 
     def close(self) -> None:
-        """Free the port and the show state; what is in force stays in force."""
+        """Free the port and the show state, which stays in force."""
         self._closing.close()
 
     def _sleep_s(self, now: float) -> float:
@@ -129,7 +129,7 @@ def control(settings: Settings, say: Callable[[str], None]) -> int:
 
 
 def _left_in_force(folder: Path, now: float) -> ShowState:
-    """What an earlier show control left in force: panic stays panic."""
+    """The show state of an earlier show control: panic stays panic."""
     with contextlib.closing(ShowStateReader(folder)) as reader:
         return reader.read().settled(now)
 

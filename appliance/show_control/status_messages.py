@@ -1,4 +1,4 @@
-"""What show control tells: answers to questions, and the status that goes out once a second."""
+"""Status messages: answers to questions, and the status that goes out once a second."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Status(NamedTuple):
 def status(
     show_state: ShowState, observer: StageObserver, refused: int, strangers: int, now: float
 ) -> Status:
-    """What the stage last said about itself, and what show control sees of one that hangs or is not there."""
+    """The stage's last report, and what show control sees of a stage that hangs or is absent."""
     stage, health, facts = observer.state(now), observer.health(), observer.facts
     if stage == "absent":
         health = {}

@@ -92,7 +92,7 @@ class Stage:
         self.reconciler = Reconciler(show.config.name, self.parts, self.iterations, show_state)
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
-        self.wearing = SensorFit(self.parts, self.memory, self._tell_people)
+        self.wearing = SensorFit(self.parts, self.memory, self._say_and_note)
         self._resume(TickClock().now())
         self.tick = Tick(self.parts, self.wearing, self.iterations, latest_start_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
@@ -128,7 +128,7 @@ class Stage:
         facts = facts_of(self.show, self.box_file, self.iterations, begun, self.rehearsal)
         self.sharing.begin(self.parts, facts, self.say)
         self.fallbacks.begin(begun, self.resuming, self.sharing.complaint, self.recorder is not None)
-        self._tell(begun)
+        self._publish_health(begun)
         self.resuming.begin(self.reconciler)
         if self.recorder is not None:
             self.recorder.keyframe(self.tick.state())
@@ -141,7 +141,7 @@ class Stage:
             self.tick.run(slot)
             self._note(slot)
             self._reconcile(slot.started)
-            self._obey(slot.started, clock.now)
+            self._take_orders(slot.started, clock.now)
             if self.recorder is not None and self.recorder.wants_keyframe:
                 self.recorder.keyframe(self.tick.state())
             shift_s = self._follow_sensor(slot)
@@ -188,17 +188,17 @@ class Stage:
         words = self.reconciler.apply(change)
         if self.recorder is not None:
             self.recorder.event(CHANGE, now, change=change.noted(), cue=self.reconciler.cue, words=words)
-        self.resuming.note(self.reconciler, self.tick.frame.tick)  # before anybody is told
+        self.resuming.note(self.reconciler, self.tick.frame.tick)  # before it is reported
         if words:
             self.say(words)
-        self._tell(now)
+        self._publish_health(now)
 
-    def _obey(self, started: float, monotonic: Callable[[], float]) -> None:
-        """Carry out what show control has asked for meanwhile, and tell it what came of that.
+    def _take_orders(self, started: float, monotonic: Callable[[], float]) -> None:
+        """Carry out orders that have come meanwhile, and answer them.
 
-        Right after a stop, also one within this tick (it began at `started`), nothing is taken: what is known
-        of the sensors is old, and the next tick has heard them. Where every tick takes so long, orders are
-        what may mend it.
+        None is taken right after a stop, also one within this tick, which began at `started`: the readings are
+        old, and the next tick has newer ones. A box whose every tick takes that long still takes orders: they
+        may mend it.
         """
         was_held_up, self._held_up = self._held_up, monotonic() - started > _LONGEST_TICK_S
         if self._comes_from_stop or (self._held_up and not was_held_up):
@@ -208,9 +208,9 @@ class Stage:
             self._reconcile(started)  # what was declared before this order was sent comes before it
             done.append((order, *self._carry_out(order, monotonic())))
         if done:
-            self.resuming.note(self.reconciler, self.tick.frame.tick)  # before anybody is told
+            self.resuming.note(self.reconciler, self.tick.frame.tick)  # before it is reported
         if any(not order.quiet for order, _, _ in done):
-            self._tell(started)  # whoever asks next hears of it
+            self._publish_health(started)  # the next question is answered with it
         for answer in done:
             self.inbox.answer(*answer)
 
@@ -231,17 +231,17 @@ class Stage:
         for sentence in filter(None, words):
             self.say(sentence)
 
-    def _tell(self, now: float) -> list[SensorState]:
-        """How the box is, for whoever reads the shared frame; gives how the sensors are."""
+    def _publish_health(self, now: float) -> list[SensorState]:
+        """Publish how the box is in the shared frame; gives the states of the sensors."""
         states = self.parts.link.states(now)
         roster = roster_lines(states, self.wearing.neutral_of)
         age_s, locked = self._sensor_age_s(now), self._is_locked
         fallbacks = self.fallbacks.told(now)
-        self.sharing.tell(now, self.health, self.reconciler, age_s, locked, roster, fallbacks)
+        self.sharing.publish_health(now, self.health, self.reconciler, age_s, locked, roster, fallbacks)
         return states
 
-    def _tell_people(self, words: str) -> None:
-        """Say it, and note in the journal that it was said after this tick."""
+    def _say_and_note(self, words: str) -> None:
+        """Say it on the terminal, and note that in the journal."""
         self.say(words)
         if self.recorder is not None:
             self.recorder.event(SAID, self._now, words=words)
@@ -264,8 +264,8 @@ class Stage:
         line = "  ".join(filter(None, (line, self.fallbacks.all.line(now))))
         self.notifier.status(line)
         self.say(line)
-        for sentence in self.watch.news(now, self._tell(now)):
-            self._tell_people(sentence)
+        for sentence in self.watch.news(now, self._publish_health(now)):
+            self._say_and_note(sentence)
         for imu_id, offsets in self.parts.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)
 

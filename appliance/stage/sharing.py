@@ -1,4 +1,4 @@
-"""What the stage shares with the box's other processes: facts once, each frame, once a second its health."""
+"""What the stage shares with the box's other processes: facts once, every frame, its health once a second."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Sharing:
             )
             say(self.complaint)
 
-    def tell(
+    def publish_health(
         self,
         now: float,
         health: Health,
@@ -88,7 +88,7 @@ class Sharing:
         sensors: Sequence[Sequence[Any]],
         fallbacks: Sequence[Sequence[Any]] = (),
     ) -> None:
-        """How the box is, after the frame has left; docs/outputs.md lists the keys.
+        """Publish how the box is, after the frame has left; docs/outputs.md lists the keys.
 
         `sensors`: a line of the roster for each; `fallbacks`: those that ever happened; `sensor_age_s`: None
         without a sensor, infinite if unheard.

@@ -448,14 +448,14 @@ def test_watching_goes_on_until_it_is_ended(box: ControlClient) -> None:
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     seen = 0
     ends_at = time.monotonic() + 60.0
-    tell = box.control.process.handler._tell
+    tell = box.control.process.handler._send
 
     def counted(asker: Address, message: Message) -> None:
         nonlocal seen
         seen += message[0] == "/sensors/end"
         tell(asker, message)
 
-    box.control.process.handler._tell = counted
+    box.control.process.handler._send = counted
     while seen < 3:
         assert time.monotonic() < ends_at
         time.sleep(0.01)

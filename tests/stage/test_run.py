@@ -154,10 +154,10 @@ def test_a_tick_that_was_held_up_leaves_orders_to_the_next_one(evening: Evening)
     evening.inbox.waiting = [Order("heading")]
     began = evening.time.now
     evening.time.work(0.3)
-    evening.stage._obey(began, evening.time.monotonic)
+    evening.stage._take_orders(began, evening.time.monotonic)
     assert evening.inbox.waiting and not evening.inbox.answers
     evening.stage._comes_from_stop = True
-    evening.stage._obey(evening.time.now, evening.time.monotonic)
+    evening.stage._take_orders(evening.time.now, evening.time.monotonic)
     assert evening.inbox.waiting and not evening.inbox.answers
     evening.dance(0.1)
     assert [(name, done) for name, done, _ in evening.inbox.answers] == [("heading", True)]
@@ -182,7 +182,7 @@ def test_what_was_declared_before_an_order_comes_before_it(evening: Evening) -> 
     with closing(ShowStateWriter(evening.runtime)) as writer:
         writer.write(ShowState(show="A test").with_phrase("other", evening.time.now, 0.5))
     evening.inbox.waiting = [Order("jump", (0.5,))]
-    evening.stage._obey(evening.time.now, evening.time.monotonic)
+    evening.stage._take_orders(evening.time.now, evening.time.monotonic)
     assert evening.stage.parts.motion.going_on == ("other", pytest.approx(0.5))
 
 
@@ -196,7 +196,7 @@ def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(
     monkeypatch.setattr(evening.stage.recorder, "event", lambda kind, now, **facts: noted.append(now))
     evening.inbox.waiting, evening.inbox.held_up_s = [Order("neutral"), Order("heading")], 0.3
     began = evening.time.now
-    evening.stage._obey(began, evening.time.monotonic)
+    evening.stage._take_orders(began, evening.time.monotonic)
     assert noted == pytest.approx([began + 0.3, began + 0.6])
     (_, asked, _), (_, reset, words) = evening.inbox.answers
     assert (asked, reset) == (True, False)  # the reading is of before both stops, and by now too old
