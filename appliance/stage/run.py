@@ -196,9 +196,9 @@ class Stage:
     def _take_orders(self, started: float, monotonic: Callable[[], float]) -> None:
         """Carry out orders that have come meanwhile, and answer them.
 
-        None is taken right after a stop, also one within this tick, which began at `started`: the readings are
-        old, and the next tick has newer ones. A box whose every tick takes that long still takes orders: they
-        may mend it.
+        None is taken right after a stop, also within this tick, which began at `started`: its readings are old,
+        and the next tick has newer ones. A box whose every tick takes that long still takes orders: they may
+        mend it.
         """
         was_held_up, self._held_up = self._held_up, monotonic() - started > _LONGEST_TICK_S
         if self._comes_from_stop or (self._held_up and not was_held_up):
