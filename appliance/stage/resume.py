@@ -14,14 +14,14 @@ TRIES = 5  # starts from one place without a frame: then it is the place that is
 
 
 class Resumption:
-    """Knows where the show was, and keeps where it is: some microseconds a tick, and never a disk.
+    """Reads the last checkpoint and writes the next ones: some microseconds a tick, and never to a disk.
 
-    went_on: whether this start is one of them; restarts, power_cuts: how often this show went on after one;
-    complaint: why no place is kept, else "".
+    restarts, power_cuts: how often this show went on after one; went_on: whether it does so in this start;
+    complaint: why no checkpoint is written, else "".
     """
 
     def __init__(self, show: str, runtime: Path, state: Path | None, wanted: Resume) -> None:
-        """runtime: the folder where the box's processes meet; state: the one on the disk, if there is one."""
+        """runtime: the folder of the box's processes; state: the one on the disk, if there is one."""
         self._show, self._boot = show, boot_id()
         self.complaint = ""
         self.went_on = False
@@ -41,11 +41,11 @@ class Resumption:
 
     @property
     def comes_back(self) -> bool:
-        """Whether a stage danced here since the machine was switched on, and did not end as it should."""
+        """Whether a stage danced here since the machine was switched on, and was not ended."""
         return self._found is not None and not self._after_power_cut
 
     def go_on(self, reconciler: Reconciler, now: float) -> str:
-        """Before the first tick: put the dance where the show was. Gives what to say about it, or ""."""
+        """Before the first tick: put the dance where the show was. A sentence about it, or ""."""
         place = self._found
         if place is None:
             return ""
@@ -68,18 +68,18 @@ class Resumption:
         where += f" at {place.position_s:.1f} s of the phrase '{place.phrase}'"
         return f"{why} the show goes on{where}. {words}".rstrip()
 
-    def begin(self, reconciler: Reconciler) -> None:
-        """Right before the first tick: a start from here is tried."""
+    def write_start(self, reconciler: Reconciler) -> None:
+        """Right before the first tick: count this start."""
         tries = min(self._found.tries + 1, TRIES) if self._found and self._found.tries < TRIES else 1
         self._write(replace(self._place(reconciler, -1), tries=tries))
 
-    def note(self, reconciler: Reconciler, tick: int) -> None:
+    def write_checkpoint(self, reconciler: Reconciler, tick: int) -> None:
         """The frame of this tick has left, and the dance has moved on: the next frame begins here."""
         if self._writer is not None:
             self._write(self._place(reconciler, tick))
 
-    def end(self) -> None:
-        """The show ends as it should: the next one begins at the beginning."""
+    def write_end(self) -> None:
+        """The show was ended: the next one begins at the beginning."""
         if self._now is not None:
             self._write(replace(self._now, ended=True))
 
@@ -93,7 +93,7 @@ class Resumption:
         if place.show != self._show:
             raise ValueError(f"Before, the show was '{place.show}'.")
         parts = reconciler.parts
-        # A power cut took what was declared, also that the phrase stands: nobody would let it go on.
+        # A power cut took the show state, so nothing would start a phrase that stood.
         rate = place.rate or (reconciler.rate if self._after_power_cut else 0.0)
         standing = place.x, place.z, place.heading
         now_rate = 0.0 if reconciler.stands(now) else rate
@@ -139,7 +139,7 @@ class Resumption:
 
 
 def _found(runtime: Path, state: Path | None, wanted: Resume, boot: str) -> tuple[Checkpoint | None, bool]:
-    """Where the show was, None: nowhere; and whether the machine has started anew since."""
+    """The checkpoint to go on from, if any; and whether the machine was restarted since."""
     if wanted == "never":
         return None, False
     reader = CheckpointReader(runtime)

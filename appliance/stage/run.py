@@ -129,7 +129,7 @@ class Stage:
         self.sharing.begin(self.parts, facts, self.say)
         self.fallbacks.begin(begun, self.resuming, self.sharing.complaint, self.recorder is not None)
         self._publish_health(begun)
-        self.resuming.begin(self.reconciler)
+        self.resuming.write_start(self.reconciler)
         if self.recorder is not None:
             self.recorder.keyframe(self.tick.state())
         clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
@@ -147,7 +147,7 @@ class Stage:
             shift_s = self._follow_sensor(slot)
             if self.health.is_due(slot.started) and not self._comes_from_stop:
                 self._report(slot.started)
-        self.resuming.end()
+        self.resuming.write_end()
         self.notifier.stopping()
 
     def _note(self, slot: Slot) -> None:
@@ -164,7 +164,7 @@ class Stage:
         self.notifier.ping(slot.started)
         if not self._comes_from_stop:
             self.fallbacks.watch(slot.started)
-        self.resuming.note(self.reconciler, slot.tick)
+        self.resuming.write_checkpoint(self.reconciler, slot.tick)
         if self.recorder is not None:
             flags = late * LATE | tick.frame.late * RESENT | tick.network_failed * NOT_FINITE
             self.recorder.note_tick(slot, tick, flags | self.parts.motion.jumped * JUMPED)
@@ -188,7 +188,7 @@ class Stage:
         words = self.reconciler.apply(change)
         if self.recorder is not None:
             self.recorder.event(CHANGE, now, change=change.noted(), cue=self.reconciler.cue, words=words)
-        self.resuming.note(self.reconciler, self.tick.frame.tick)  # before it is reported
+        self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
         if words:
             self.say(words)
         self._publish_health(now)
@@ -196,9 +196,9 @@ class Stage:
     def _take_orders(self, started: float, monotonic: Callable[[], float]) -> None:
         """Carry out orders that have come meanwhile, and answer them.
 
-        None is taken right after a stop, also within this tick, which began at `started`: its readings are old,
-        and the next tick has newer ones. A box whose every tick takes that long still takes orders: they may
-        mend it.
+        None is taken right after a stop, nor when one was within this tick, which began at `started`: its
+        readings are old, and the next tick has newer ones. A box whose every tick takes that long still takes
+        orders: they may mend it.
         """
         was_held_up, self._held_up = self._held_up, monotonic() - started > _LONGEST_TICK_S
         if self._comes_from_stop or (self._held_up and not was_held_up):
@@ -208,7 +208,7 @@ class Stage:
             self._reconcile(started)  # what was declared before this order was sent comes before it
             done.append((order, *self._carry_out(order, monotonic())))
         if done:
-            self.resuming.note(self.reconciler, self.tick.frame.tick)  # before it is reported
+            self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
         if any(not order.quiet for order, _, _ in done):
             self._publish_health(started)  # the next question is answered with it
         for answer in done:

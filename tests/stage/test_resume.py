@@ -84,7 +84,7 @@ def window_of(motion: Playback) -> tuple[np.ndarray, np.ndarray]:
 def goes_on(dance: Reconciler, runtime: Path, again: Reconciler) -> str:
     """Note where a dance is, and resume another one there; gives what was said."""
     with closing(Resumption("A test", runtime, None, "always")) as noting:
-        noting.note(dance, 7)
+        noting.write_checkpoint(dance, 7)
     with closing(Resumption("A test", runtime, None, "always")) as resuming:
         return resuming.go_on(again, NOW)
 
@@ -323,11 +323,11 @@ def test_counts_go_on_until_the_show_is_ended(dance_of: Callable[[], Reconciler]
         resuming, dance = Resumption("A test", runtime, None, "always"), dance_of()
         resuming.go_on(dance, NOW)
         assert resuming.restarts == start
-        resuming.note(dance, 1)
+        resuming.write_checkpoint(dance, 1)
         resuming.close()
     resuming = Resumption("A test", runtime, None, "always")
-    resuming.note(dance_of(), 2)
-    resuming.end()
+    resuming.write_checkpoint(dance_of(), 2)
+    resuming.write_end()
     resuming.close()
     resuming = Resumption("A test", runtime, None, "always")
     assert not resuming.comes_back and resuming.restarts == 0
@@ -344,7 +344,7 @@ def test_a_place_from_which_no_frame_ever_leaves_is_given_up(
         dance = dance_of()
         resuming = Resumption("A test", runtime, None, "always")
         words = resuming.go_on(dance, NOW)
-        resuming.begin(dance)  # and no note: it died in its first tick
+        resuming.write_start(dance)  # and no note: it died in its first tick
         resuming.close()
         begun.append(dance.parts.motion.position_s)
     assert begun == pytest.approx([2.0] * TRIES + [0.0], abs=1e-3)
@@ -361,9 +361,9 @@ def test_one_frame_is_enough_to_come_back_as_often_as_it_takes(
     for _ in range(2 * TRIES):
         resuming, dance = Resumption("A test", runtime, None, "always"), dance_of()
         assert "goes on" in resuming.go_on(dance, NOW)
-        resuming.begin(dance)
+        resuming.write_start(dance)
         dance.parts.motion.advance()
-        resuming.note(dance, 0)
+        resuming.write_checkpoint(dance, 0)
         resuming.close()
     assert dance.parts.motion.position_s == pytest.approx(2.0 + 2 * TRIES * TICK_S, abs=0.01)
 
@@ -373,9 +373,9 @@ def test_without_room_for_it_the_dance_goes_on(dance_of: Callable[[], Reconciler
     resuming, dance = Resumption("A test", runtime, None, "always"), dance_of()
     assert resuming.go_on(dance, NOW) == ""
     assert "cannot be kept" in resuming.complaint and "`runtime:`" in resuming.complaint
-    resuming.begin(dance)
-    resuming.note(dance, 0)
-    resuming.end()
+    resuming.write_start(dance)
+    resuming.write_checkpoint(dance, 0)
+    resuming.write_end()
     resuming.close()
 
 
