@@ -15,6 +15,8 @@ from appliance.pose.foreign_file import plain_json
 FILE, KIND = "show_state", "show_state"
 LARGEST = 8192  # bytes; the longest names of a show fit, in any script
 
+Part = tuple[int, str, tuple[float, ...]]  # the generation that declared it, a text, numbers
+
 
 @dataclass(frozen=True, slots=True)
 class ShowState:
@@ -22,9 +24,10 @@ class ShowState:
 
     look, lights: "" is the show's first. Fades run by themselves: readers pass the time at which they draw.
 
-    The stage applies each part of the dance once. `*_set` and the numbers in `hands` are the generation that
-    declared a part (0: none did), `generation` is the newest; it grows as long as the machine runs, even if
-    the file is deleted. These parts are for the show called `show`: a stage with another show ignores them.
+    dance: what the stage applies, each part once, in this order: `phrase` (name; fade in seconds),
+    `iterations` (coding, interaction, fade in seconds), `rate` (of playback; none: the show's), `hand JOINT`
+    (joint; 1 holds). A stage with another show than `show` ignores it. generation: the newest that declared
+    something for the dance, in nanoseconds since the machine started; it never goes back.
     """
 
     panic: bool = False
@@ -47,16 +50,7 @@ class ShowState:
     cue: str = ""  # the newest; "": none yet
     show: str = ""
     generation: int = 0
-    phrase: str = ""
-    phrase_fade_s: float = 0.0
-    phrase_set: int = 0
-    coding: int = 0
-    interaction: int = 0
-    iterations_fade_s: float = 0.0
-    iterations_set: int = 0
-    rate: float | None = None  # None: the show's
-    rate_set: int = 0
-    hands: Mapping[str, tuple[bool, int]] = field(default_factory=dict)  # by joint: holds, generation
+    dance: Mapping[str, Part] = field(default_factory=dict)
 
     def level(self, now: float) -> float:
         """0..1: what dimmers and the picture are multiplied with."""
@@ -111,50 +105,16 @@ class ShowState:
         before = self.lights if self.lights_mix(now) >= 0.5 else self.lights_before
         return replace(self, lights=lights, lights_before=before, lights_since=now, lights_fade_s=fade_s)
 
-    def with_cue(self, cue: str, now: float) -> ShowState:
-        """The newest cue; what it calls up is declared part by part."""
-        return replace(self, generation=self._next_generation(now), cue=cue)
-
-    def with_phrase(self, phrase: str, now: float, fade_s: float) -> ShowState:
-        """Call a phrase; calling the same one again is another call."""
-        number = self._next_generation(now)
-        return replace(self, generation=number, phrase=phrase, phrase_fade_s=fade_s, phrase_set=number)
-
-    def with_iterations(self, coding: int, interaction: int, now: float, fade_s: float = 0.0) -> ShowState:
-        """Other coding and interaction iterations."""
-        number = self._next_generation(now)
-        return replace(
-            self,
-            generation=number,
-            coding=coding,
-            interaction=interaction,
-            iterations_fade_s=fade_s,
-            iterations_set=number,
-        )
-
-    def with_rate(self, rate: float | None, now: float) -> ShowState:
-        """Another speed of the phrase; None: the show's."""
-        number = self._next_generation(now)
-        return replace(self, generation=number, rate=rate, rate_set=number)
-
-    def with_hands(self, holds: Mapping[str, bool], now: float) -> ShowState:
-        """Let the hands of these joints hold, or let go."""
-        number = self._next_generation(now)
-        hands = {**self.hands, **{joint: (held, number) for joint, held in holds.items()}}
-        return replace(self, generation=number, hands=hands)
+    def with_dance(self, now: float, parts: Mapping[str, tuple[str, tuple[float, ...]]]) -> ShowState:
+        """Declare parts of the dance; a part that is declared as it is already is applied once more."""
+        number = max(self.generation + 1, int(1e9 * now))  # a new file never repeats an earlier number
+        others = {name: part for name, part in self.dance.items() if name not in parts}
+        declared = {name: (number, *part) for name, part in parts.items()}
+        return replace(self, generation=number, dance=others | declared)
 
     def for_show(self, show: str) -> ShowState:
         """Without the cue and the dance of another show."""
-        if show == self.show:
-            return self
-        none: dict[str, Any] = {
-            "phrase_set": 0,
-            "iterations_set": 0,
-            "rate": None,
-            "rate_set": 0,
-            "hands": {},
-        }
-        return replace(self, show=show, cue="", phrase="", **none)
+        return self if show == self.show else replace(self, show=show, cue="", dance={})
 
     def settled(self, now: float) -> ShowState:
         """With fades that began in the future done: the machine's clock has started anew since."""
@@ -162,10 +122,6 @@ class ShowState:
         if not late:
             return self
         return replace(self, going_fade_s=0.0, master_fade_s=0.0, look_fade_s=0.0, lights_fade_s=0.0)
-
-    def _next_generation(self, now: float) -> int:
-        """Nanoseconds since the machine started, so that a new file never repeats an earlier number."""
-        return max(self.generation + 1, int(1e9 * now))
 
 
 _FIELDS = tuple(one.name for one in fields(ShowState))
@@ -231,7 +187,8 @@ def _parsed(payload: bytes) -> ShowState:
     """A show state of another version of this program keeps what both know."""
     try:
         values: dict[str, Any] = plain_json(payload)
-        values["hands"] = {joint: (held, number) for joint, (held, number) in values.get("hands", {}).items()}
+        parts = values.get("dance", {}).items()
+        values["dance"] = {name: (number, text, tuple(given)) for name, (number, text, given) in parts}
         return ShowState(**{name: value for name, value in values.items() if name in _FIELDS})
     except (ValueError, TypeError, AttributeError):
         return ShowState()

@@ -103,9 +103,8 @@ def _line(number: int, run: Run) -> str:
 
 def _event_line(event: dict[str, Any], begun: float) -> str:
     """When, in seconds of the run, and what."""
-    asked, change = event.get("order", {}), {"cue": event.get("cue", ""), **event.get("change", {})}
+    asked = event.get("order", {})
     words = [str(word) for word in (asked.get("name", ""), asked.get("text", ""), *asked.get("values", ()))]
-    words += [f"{name} {value}" for name, value in change.items() if value != ""]
     words += [str(event.get("words", ""))] + ["(refused)"] * (event.get("done") is False)
     return f"   {event['now'] - begun:9.2f} s  {event['kind']}: {' '.join(filter(None, words))}"
 

@@ -18,8 +18,7 @@ from appliance.show.show import Show
 LATE, NOT_FINITE, JUMPED, RESENT = 1, 2, 4, 8  # flags of a tick; RESENT: it sent the last pose once more
 SECTIONS = ("drain", "motion", "puppeteers", "puppet", "blend", "figure", "send")
 TICK, EVENT = 1, 2  # kinds of entries
-ORDER = "order"  # kind of the event that show control asked for something once, and what came of it
-CHANGE = "change"  # kind of the event that the dance changed to what show control has declared
+ORDER = "order"  # kind of the event that show control asked for something, and what came of it
 # What facts, events and ticks raise that no box wrote.
 DAMAGED = (ValueError, LookupError, ArithmeticError, TypeError, AttributeError, RecursionError, struct.error)
 _LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970: the year 5138

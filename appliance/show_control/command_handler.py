@@ -17,9 +17,8 @@ from appliance.show_control.port import Address
 from appliance.show_control.sensor_roster import END as ROSTER_END
 from appliance.show_control.sensor_roster import SENSOR, roster_messages
 from appliance.show_control.show_state_commands import (
-    DANCE_DECLARATIONS,
     DECLARATIONS,
-    NO_STAGE_YET,
+    SHOWS_RATE,
     in_cue,
     joint_name,
     let_go,
@@ -111,7 +110,7 @@ class CommandHandler:
         facts = self._observer.facts
         if facts is not None and self._observer.generation != self._generation:
             self._generation, self._is_new_stage = self._observer.generation, True
-            self._declare(of_this_show(self.show_state, facts))
+            self._publish_changed(of_this_show(self.show_state, facts))
         if self._is_new_stage and facts is not None and (health := self._observer.health()):
             self._is_new_stage = False
             self._adopt(facts, str(health.get("cue", "")), now)
@@ -129,7 +128,7 @@ class CommandHandler:
         cue = next((cue for cue in facts.cues if cue["name"] == name), None)
         if cue is not None and not self.show_state.cue:
             parts = [part for part in ("look", "lights") if not getattr(self.show_state, part)]
-            self._declare(in_cue(self.show_state, {**cue, "fade_s": 0.0}, parts, now))
+            self._publish_changed(in_cue(self.show_state, {**cue, "fade_s": 0.0}, parts, now))
 
     def _carry_out(self, command: Command, asker: Address, now: float) -> None:
         """Raises ValueError for what cannot be done."""
@@ -139,13 +138,7 @@ class CommandHandler:
         elif words := let_go(command):
             self._send(asker, (REPLY, address, 0, words))  # not done, and nothing was refused
         elif address in DECLARATIONS:
-            show_state, words = DECLARATIONS[address](self.show_state, command, observer.facts, now)
-            if address == "/go" and self.show_state.going and observer.state(now) == "stopped":
-                show_state = show_state.with_rate(None, now)
-            self._declare(show_state)
-            self._reply(asker, address, True, words)
-        elif address in DANCE_DECLARATIONS:
-            self._declare_dance(command, asker, now)
+            self._declare(command, asker, now)
         elif address in QUESTIONS:
             for message in told(address, self.show_state, observer, self.status(0, now), now):
                 self._send(asker, message)
@@ -154,20 +147,19 @@ class CommandHandler:
         else:
             self._order(command, asker, now)
 
-    def _declare_dance(self, command: Command, asker: Address, now: float) -> None:
-        """Reply once the dance follows."""
-        address, facts = command.address, self._observer.facts
-        if facts is None:
-            raise ValueError(NO_STAGE_YET)
-        show_state = self.show_state.for_show(facts.show_name)
-        show_state, words = DANCE_DECLARATIONS[address](show_state, command, facts, now)
-        self._declare(show_state)
-
-        def reply(done: bool, words: str) -> None:
-            if not (done and address.startswith(_STREAMS)):
-                self._reply(asker, address, done, words)
-
-        self.acknowledgements.expect(show_state.generation, words, now, reply)
+    def _declare(self, command: Command, asker: Address, now: float) -> None:
+        """Reply at once; about the dance once it follows."""
+        address, observer = command.address, self._observer
+        before = of_this_show(self.show_state, observer.facts)
+        show_state, words = DECLARATIONS[address](before, command, observer.facts, now)
+        if address == "/go" and before.going and observer.state(now) == "stopped":
+            show_state = show_state.with_dance(now, SHOWS_RATE)
+        self._publish_changed(show_state)
+        reply = partial(self._reply, asker, address)
+        if address == "/go" or show_state.generation == before.generation:
+            reply(True, words)
+        else:
+            self.acknowledgements.expect(show_state.generation, words, now, reply)
 
     def _order(self, command: Command, asker: Address, now: float) -> None:
         place, name = ORDERS[command.address]
@@ -183,13 +175,15 @@ class CommandHandler:
         for message in roster_messages(self._observer.health(), key_file, now):
             self._send(asker, message)
 
-    def _declare(self, show_state: ShowState) -> None:
+    def _publish_changed(self, show_state: ShowState) -> None:
         if show_state != self.show_state:
             self._publish(show_state)
             self.show_state = show_state
 
     def _reply(self, asker: Address, address: str, done: bool, words: str) -> None:
-        """Tell who asked what came of it."""
+        """Reply to a command; to one of a stream only that it is not done."""
+        if done and address.startswith(_STREAMS):
+            return
         if not done:
             self._refuse(words)
         reply = SENSORS_REPLY if address.startswith("/sensors/") else REPLY

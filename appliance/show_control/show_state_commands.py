@@ -11,11 +11,12 @@ from appliance.outputs.shared_frame import Facts
 from appliance.show.config_error import did_you_mean
 from appliance.show_control.command import Command
 
-NO_STAGE_YET = "No stage has danced on this box yet: nothing is changed. Start it: bunraku play."
 STOP_FADE_S = 2.0
 GO_FADE_S = 1.0
 LOOK_FADE_S = 2.0  # of looks and lights, where a command gives none
 PHRASE_FADE_S = 2.0
+
+SHOWS_RATE: dict[str, tuple[str, tuple[float, ...]]] = {"rate": ("", ())}
 
 Declared = tuple[ShowState, str]  # the next show state, and a sentence
 Declaration = Callable[[ShowState, Command, "Facts | None", float], Declared]
@@ -23,8 +24,8 @@ Declaration = Callable[[ShowState, Command, "Facts | None", float], Declared]
 
 def _go(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     dark = show_state.panic or not show_state.going
-    if not show_state.going or show_state.rate == 0.0:
-        show_state = show_state.with_rate(None, now)
+    if not show_state.going or show_state.dance.get("rate", (0, "", ()))[2] == (0.0,):
+        show_state = show_state.with_dance(now, SHOWS_RATE)
     if show_state.panic:
         show_state = replace(show_state, panic=False, going=True, going_since=now, going_fade_s=GO_FADE_S)
     elif not show_state.going:
@@ -73,51 +74,44 @@ def _lights(show_state: ShowState, command: Command, facts: Facts | None, now: f
     return show_state.with_lights(name, now, fade_s), f"The lights {name} come over {fade_s:g} s."
 
 
-def _cue(show_state: ShowState, command: Command, facts: Facts, now: float) -> Declared:
+def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    facts = _danced(facts)
     cues = {str(cue["name"]): cue for cue in facts.cues}
     name = known("cue", command.text, [*cues]) if command.text else next_cue(show_state.cue, [*cues])
     cue, fade_s = cues[name], float(cues[name]["fade_s"])
+    parts: dict[str, tuple[str, tuple[float, ...]]] = {}
     if cue.get("phrase") is not None:
-        show_state = show_state.with_phrase(cue["phrase"], now, fade_s)
-    if cue.get("iterations") is not None:
-        coding, interaction = cue["iterations"]
-        show_state = show_state.with_iterations(coding, interaction, now, fade_s)
+        parts["phrase"] = cue["phrase"], (fade_s,)
     if cue.get("hands") is not None:
-        show_state = show_state.with_hands({joint: joint in cue["hands"] for joint in held(facts)}, now)
-    return in_cue(show_state, cue, PARTS, now).with_cue(name, now), f"Cue {name}."
+        parts |= {f"hand {joint}": (joint, (float(joint in cue["hands"]),)) for joint in _held(facts)}
+    if cue.get("iterations") is not None:
+        parts["iterations"] = "", (*map(float, cue["iterations"]), fade_s)
+    return in_cue(show_state, cue, PARTS, now).with_dance(now, parts), f"Cue {name}."
 
 
-def _phrase(show_state: ShowState, command: Command, facts: Facts, now: float) -> Declared:
-    name = known("phrase", command.text, facts.phrases)
-    fade_s = command.values[0] if command.values else PHRASE_FADE_S
-    return show_state.with_phrase(name, now, fade_s), ""
+def _phrase(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    name = known("phrase", command.text, _danced(facts).phrases)
+    return show_state.with_dance(now, {"phrase": (name, command.values or (PHRASE_FADE_S,))}), ""
 
 
-def _iterations(show_state: ShowState, command: Command, facts: Facts, now: float) -> Declared:
-    coding, interaction = (int(value) for value in command.values)
-    return show_state.with_iterations(coding, interaction, now), ""
+def _iterations(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    _danced(facts)
+    return show_state.with_dance(now, {"iterations": ("", command.values)}), ""
 
 
-def _hold(show_state: ShowState, command: Command, facts: Facts, now: float) -> Declared:
-    joint, holds, joints = joint_name(command.text, facts), bool(command.values[0]), held(facts)
-    if joint not in joints:
-        cure = did_you_mean(joint, joints) if joints else "Give it some under `hands` in its show.yaml."
+def _hold(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    joint, held = joint_name(command.text, facts), _held(_danced(facts))
+    if joint not in held:
+        cure = did_you_mean(joint, held) if held else "Give it some under `hands` in its show.yaml."
         raise ValueError(f"No hand of this show holds '{joint}'. {cure}")
-    return show_state.with_hands({joint: holds}, now), (
-        f"The hand of {joint} {'holds' if holds else 'lets go'}."
-    )
+    words = f"The hand of {joint} {'holds' if command.values[0] else 'lets go'}."
+    return show_state.with_dance(now, {f"hand {joint}": (joint, command.values)}), words
 
 
-def _start(show_state: ShowState, command: Command, facts: Facts, now: float) -> Declared:
-    return show_state.with_rate(None, now), ""
-
-
-def _halt(show_state: ShowState, command: Command, facts: Facts, now: float) -> Declared:
-    return show_state.with_rate(0.0, now), ""
-
-
-def _rate(show_state: ShowState, command: Command, facts: Facts, now: float) -> Declared:
-    return show_state.with_rate(command.values[0], now), ""
+def _rate(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    _danced(facts)
+    rate = (0.0,) if command.address == "/player/stop" else command.values
+    return show_state.with_dance(now, {"rate": ("", rate)}), ""
 
 
 DECLARATIONS: dict[str, Declaration] = {
@@ -128,15 +122,12 @@ DECLARATIONS: dict[str, Declaration] = {
     "/master": _master,
     "/look": _look,
     "/lights": _lights,
-}
-# The stage reports when the dance follows these.
-DANCE_DECLARATIONS: dict[str, Callable[[ShowState, Command, Facts, float], Declared]] = {
     "/cue": _cue,
     "/phrase": _phrase,
     "/iterations": _iterations,
     "/hold": _hold,
-    "/player/start": _start,
-    "/player/stop": _halt,
+    "/player/start": _rate,
+    "/player/stop": _rate,
     "/player/rate": _rate,
 }
 
@@ -167,8 +158,10 @@ def in_cue(show_state: ShowState, cue: Mapping[str, Any], parts: Iterable[str], 
     return replace(show_state, cue=cue["name"])
 
 
-def of_this_show(show_state: ShowState, facts: Facts) -> ShowState:
+def of_this_show(show_state: ShowState, facts: Facts | None) -> ShowState:
     """Without the dance of another show, and without names that this one does not know."""
+    if facts is None:
+        return show_state
     show_state = show_state.for_show(facts.show_name)
     return replace(
         show_state,
@@ -180,21 +173,24 @@ def of_this_show(show_state: ShowState, facts: Facts) -> ShowState:
     )
 
 
-def held(facts: Facts) -> list[str]:
-    """The joints that hands of the show hold."""
-    return [facts.skeleton.names[joint] for joint in facts.held]
-
-
 def joint_name(joint: str | int, facts: Facts | None) -> str:
     """A joint's name; commands may give its number in the skeleton. Raises ValueError."""
     if isinstance(joint, str):
         return joint
-    if facts is None:
-        raise ValueError(NO_STAGE_YET)
-    names = facts.skeleton.names
+    names = _danced(facts).skeleton.names
     if not 0 <= joint < len(names):
         raise ValueError(f"There is no joint {joint}: this skeleton has joints 0 to {len(names) - 1}.")
     return names[joint]
+
+
+def _danced(facts: Facts | None) -> Facts:
+    if facts is None:
+        raise ValueError("No stage has danced on this box yet: nothing is changed. Start it: bunraku play.")
+    return facts
+
+
+def _held(facts: Facts) -> list[str]:
+    return [facts.skeleton.names[joint] for joint in facts.held]
 
 
 def known(kind: str, name: str | int, names: Sequence[str] | None) -> str:

@@ -1,11 +1,13 @@
-"""Carries out orders between two ticks: jumps, orientations from elsewhere, requests about sensors."""
+"""Carries out orders between two ticks, those that follow from the show state as well."""
 
 from __future__ import annotations
 
 from appliance.dancer.puppeteers import Remote
+from appliance.pose import quaternion
 from appliance.sensor.link import SensorLink
 from appliance.show.config_error import did_you_mean
 from appliance.show_control.orders import Order
+from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.stage_parts import StageParts
 
@@ -15,27 +17,42 @@ STROBE_S = 10.0
 Outcome = tuple[bool, str]
 
 
-def carry_out(order: Order, parts: StageParts, wearing: SensorFit, now: float) -> Outcome:
+def carry_out(
+    order: Order, parts: StageParts, iterations: Iterations, wearing: SensorFit, now: float
+) -> Outcome:
     """Carry out any order: whether it was done, and a sentence where there is something to say about it."""
     if order.name in SENSOR_ORDERS:
         return obey_for_sensors(order, parts, wearing, now)
-    return obey(order, parts)
+    return obey(order, parts, iterations)
 
 
-def obey(order: Order, parts: StageParts) -> Outcome:
+def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
     """Carry out an order that is not about sensors."""
+    motion, words = parts.motion, ""
     try:
         if order.name in ("hold", "release"):
             _turn(order, parts)
+        elif order.name == "hand":
+            _enable(order, parts)
+        elif order.name == "iterations":
+            coding, interaction, *fade_s = order.values
+            words = iterations.ask(int(coding), int(interaction), *fade_s)
+            if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.hands.puppeteers):
+                words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
+        elif order.name == "phrase":
+            if not motion.play(order.text, *order.values):
+                words = f"The phrase '{order.text}' plays already, and goes on."
+        elif order.name == "rate":
+            motion.rate = order.values[0]
         elif order.name == "jump":
-            parts.motion.jump(order.values[0])
+            motion.jump(order.values[0])
         elif order.name == "excerpt":
-            parts.motion.excerpt(*order.values)
+            motion.excerpt(*order.values)
         else:
             raise ValueError(f"The stage knows no order '{order.name}'.")
     except ValueError as error:
         return False, str(error)
-    return True, ""
+    return True, words
 
 
 def obey_for_sensors(order: Order, parts: StageParts, wearing: SensorFit, now: float) -> Outcome:
@@ -82,6 +99,27 @@ def _require_heard(names: list[str], link: SensorLink, now: float) -> None:
             raise ValueError(f"The box knows no sensor '{name}'. {did_you_mean(name, list(states))}")
     if not any(states[name] in ("linked", "greeted") for name in names):
         raise ValueError(f"Sensor {', '.join(names)} is silent. Switch it on, and look at its battery.")
+
+
+def _enable(order: Order, parts: StageParts) -> None:
+    """Let a hand hold or let go; one by OSC without an orientation yet holds its joint where it is."""
+    for puppeteer in parts.hands.puppeteers:
+        if puppeteer.joint == order.text:
+            puppeteer.enabled = bool(order.values[0])
+            if puppeteer.enabled and isinstance(puppeteer, Remote):
+                puppeteer.hold_here(_orientation(puppeteer.joint, parts).tolist())
+
+
+def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
+    """Where a joint is now, local to its parent; before the first tick where the phrase has it."""
+    place = parts.skeleton.index(joint)
+    parent, world = parts.skeleton.parents[place], parts.grounding.figure.world
+    here: quaternion.Array = world[place]
+    if not here.any():
+        here = parts.motion.window()[0][place]
+    elif parent >= 0:
+        here = quaternion.multiply(quaternion.inverse(world[parent]), here)
+    return here
 
 
 def _turn(order: Order, parts: StageParts) -> None:

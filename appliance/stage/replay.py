@@ -1,4 +1,4 @@
-"""Dances a run of a journal again: its slots, readings, changes and orders through the same tick."""
+"""Dances a run of a journal again: its slots, readings and orders through the same tick."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from appliance.dancer.slerp import FloatArray
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import unpacked
 from appliance.recorder.reading import Run
-from appliance.recorder.record import CHANGE, DAMAGED, NOT_FINITE, ORDER
+from appliance.recorder.record import DAMAGED, NOT_FINITE, ORDER
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show
@@ -21,7 +21,6 @@ from appliance.show_control.orders import Order
 from appliance.stage.carry_out import carry_out
 from appliance.stage.comparison import Comparison
 from appliance.stage.iterations import Iterations
-from appliance.stage.reconcile import Change, apply
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import assemble
@@ -80,8 +79,6 @@ class Replay:
                 yield danced
             elif events[number]["kind"] == ORDER:
                 self._obey(events[number], comparison)
-            elif events[number]["kind"] == CHANGE:
-                self._apply(events[number])
 
     def _restore(self, keyframe: bytes) -> None:
         try:
@@ -128,14 +125,8 @@ class Replay:
         except DAMAGED as error:
             raise JournalError(f"An order is of another release, or damaged ({error}).") from error
         self._link.answers(order.text, done_then)
-        done, _ = carry_out(order, self.tick.parts, self._wearing, now)
+        done, _ = carry_out(order, self.tick.parts, self.tick.iterations, self._wearing, now)
         comparison.note_order(order.name, done_then, done)
-
-    def _apply(self, event: dict[str, Any]) -> None:
-        try:
-            apply(Change.from_journal(event["change"]), self.tick.parts, self.tick.iterations)
-        except DAMAGED as error:
-            raise JournalError(f"A change is of another release, or damaged ({error}).") from error
 
 
 class _RecordedPuppet(Puppet):

@@ -10,7 +10,7 @@ from appliance.box.clock import Slot, TickClock
 from appliance.box.notify import Notifier
 from appliance.box.realtime import enter_realtime, leave_realtime
 from appliance.box.show_state import ShowStateReader
-from appliance.recorder.record import CHANGE, JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
+from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
 from appliance.sensor.link import SensorState
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
@@ -182,16 +182,12 @@ class Stage:
 
     def _reconcile(self, now: float) -> None:
         """Apply what show control has declared since the last time."""
-        change = self.reconciler.pending(now)
-        if change is None:
-            return
-        words = self.reconciler.apply(change)
-        if self.recorder is not None:
-            self.recorder.event(CHANGE, now, change=change.noted(), cue=self.reconciler.cue, words=words)
-        self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
-        if words:
-            self.say(words)
-        self._publish_health(now)
+        before, orders = self.reconciler.generation, self.reconciler.pending(now)
+        if orders or self.reconciler.generation != before:
+            words = [self._carry_out(order, now)[1] for order in orders]
+            self.reconciler.words = " ".join(filter(None, words))
+            self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
+            self._publish_health(now)
 
     def _take_orders(self, started: float, monotonic: Callable[[], float]) -> None:
         """Carry out orders that have come meanwhile, and answer them.
@@ -215,7 +211,7 @@ class Stage:
             self.inbox.answer(*answer)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
-        done, words = carry_out(order, self.parts, self.wearing, now)
+        done, words = carry_out(order, self.parts, self.iterations, self.wearing, now)
         if self.recorder is not None:
             asked = {"name": order.name, "values": order.values, "text": order.text}
             self.recorder.event(ORDER, now, order=asked, done=done, words=words)

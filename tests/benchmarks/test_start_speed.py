@@ -118,7 +118,7 @@ def test_reading_the_show_state(tmp_path: Path, measured: Callable[..., Any]) ->
     parts = assemble(load_show(default_show_path()), box)
     with closing(ShowStateWriter(tmp_path)) as writer, closing(ShowStateReader(tmp_path)) as reader:
         reconciler = Reconciler("A show", parts, Iterations(10, 9, 20), reader)
-        writer.write(ShowState(show="A show").with_cue("storm", 1.0))
-        assert reconciler.pending(1.0) is not None
+        writer.write(ShowState(show="A show").with_dance(1.0, {}))
+        assert not reconciler.pending(1.0) and reconciler.generation
         measured("reading it", READ_GROUP, reference=True)(lambda: reconciler.pending(1.0))
     parts.close()

@@ -20,8 +20,7 @@ from tests.recorder.night import Night
 def recorded(tmp_path: Path) -> Path:
     night = Night(write_show(tmp_path / "show"), tmp_path / "runtime")
     night.dance(30)
-    night.order("jump", 0.5)
-    night.command("/player/rate", 0.5)
+    night.order("rate", 0.5)
     night.recorder.event("said", 1000.5, words="The network gives poses again.")
     night.dance(20, late_s=0.012)
     return night.kept(tmp_path / "journal")
@@ -94,8 +93,7 @@ def test_on_a_box_it_is_the_journal_of_what_was_chosen(
 
 def test_a_list_tells_what_happened(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert bunraku("journal", "list", "--journal", str(recorded), "--events") == 0
-    run, order, change, said = capsys.readouterr().out.splitlines()
+    run, order, said = capsys.readouterr().out.splitlines()
     assert "A test: 1 s, 20 late" in run
-    assert order.endswith("0.58 s  order: jump 0.5")
-    assert change.endswith("0.58 s  change: rate 0.5")
+    assert order.endswith("0.58 s  order: rate 0.5")
     assert said.endswith("said: The network gives poses again.")

@@ -8,13 +8,13 @@ from pathlib import Path
 from appliance.box.clock import TICK_S, Slot
 from appliance.box.show_state import ShowState
 from appliance.keeper.journal_carrier import JournalCarrier
-from appliance.recorder.record import CHANGE, JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
+from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.show_control.command import Command
 from appliance.show_control.orders import Order
-from appliance.show_control.show_state_commands import DANCE_DECLARATIONS
+from appliance.show_control.show_state_commands import DECLARATIONS
 from appliance.stage.carry_out import carry_out
 from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler
@@ -64,22 +64,21 @@ class Night:
 
     def order(self, name: str, *values: float, text: str = "") -> tuple[bool, str]:
         """What show control asks for, after the last tick."""
-        now, order = self.slot.started, Order(name, tuple(values), text)
-        done, words = carry_out(order, self.parts, self.wearing, now)
-        asked = {"name": name, "values": order.values, "text": text}
-        self.recorder.event(ORDER, now, order=asked, done=done, words=words)
-        return done, words
+        return self._carry_out(Order(name, tuple(values), text), self.slot.started)
 
-    def command(self, address: str, *values: float, text: str = "") -> str:
+    def command(self, address: str, *values: float, text: str = "") -> None:
         """What show control declares at a command; the dance follows after the last tick."""
         now, facts = self.slot.started, facts_of(self.show, None, self.tick.iterations, 0.0)
         command = Command(address, values, text)
-        self._declared.now, _ = DANCE_DECLARATIONS[address](self._declared.now, command, facts, now)
-        change = self.reconciler.pending(now)
-        assert change is not None
-        words = self.reconciler.apply(change)
-        self.recorder.event(CHANGE, now, change=change.noted(), cue=self.reconciler.cue, words=words)
-        return words
+        self._declared.now, _ = DECLARATIONS[address](self._declared.now, command, facts, now)
+        for order in self.reconciler.pending(now):
+            self._carry_out(order, now)
+
+    def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
+        done, words = carry_out(order, self.parts, self.tick.iterations, self.wearing, now)
+        asked = {"name": order.name, "values": order.values, "text": order.text}
+        self.recorder.event(ORDER, now, order=asked, done=done, words=words)
+        return done, words
 
     def carrier(self, folder: Path, minutes: float = 30.0) -> JournalCarrier:
         """Who keeps this night in a folder."""

@@ -47,7 +47,7 @@ def whole(show: Path, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     folder = tmp_path_factory.mktemp("night")
     night = Night(show, folder / "runtime")
     night.dance(20)
-    night.order("jump", 0.5)
+    night.order("rate", 0.5)
     night.dance(5)
     (segment,) = segment_paths(night.kept(folder / "journal"))
     return segment.read_bytes()

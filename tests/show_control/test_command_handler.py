@@ -17,13 +17,19 @@ from appliance.show_control import order_dispatch
 from appliance.show_control.command import FORMS
 from appliance.show_control.command_handler import ORDERS
 from appliance.show_control.orders import Order
-from appliance.show_control.show_state_commands import DANCE_DECLARATIONS, DECLARATIONS
+from appliance.show_control.show_state_commands import DECLARATIONS
 from appliance.show_control.status_messages import QUESTIONS
 from tests.show_control.doubles import Asker, ControlInThread, InboxDouble, StageDouble, facts, until
 
 
 def show_state(folder: Path) -> ShowState:
     return ShowStateReader(folder).read()
+
+
+def declared(folder: Path, part: str) -> tuple[object, ...]:
+    """What is declared for a part of the dance: a text, and numbers; nothing before it is."""
+    _, text, numbers = show_state(folder).dance.get(part, (0, "", ()))
+    return (text, *numbers) if part in show_state(folder).dance else ()
 
 
 def test_ping(asker: Asker) -> None:
@@ -92,22 +98,22 @@ def test_stop_fades_then_the_phrase_stands_until_go(folder: Path, stage: StageDo
 def test_after_go_the_phrase_plays_at_the_shows_rate(folder: Path, stage: StageDouble, asker: Asker) -> None:
     asker.tell("/player/rate", 2.0)
     asker.ask("/go")
-    assert show_state(folder).rate == 2.0  # it goes on already
+    assert declared(folder, "rate") == ("", 2.0)  # it goes on already
     asker.ask("/stop", 0)
     asker.ask("/go")
-    assert show_state(folder).rate is None
+    assert declared(folder, "rate") == ("",)
     asker.tell("/player/stop")
-    until(lambda: show_state(folder).rate == 0.0)
+    until(lambda: declared(folder, "rate") == ("", 0.0))
     asker.ask("/go")
-    assert show_state(folder).rate is None
+    assert declared(folder, "rate") == ("",)
 
 
 def test_go_starts_a_show_that_stands_by_itself(folder: Path, stage: StageDouble, asker: Asker) -> None:
     asker.ask("/go")
-    assert show_state(folder).rate_set == 0
+    assert declared(folder, "rate") == ()
     stage.tell(state="stopped")
-    until(lambda: asker.ask("/go")[2] == 1 and show_state(folder).rate_set > 0)
-    assert show_state(folder).rate is None
+    until(lambda: asker.ask("/go")[2] == 1 and declared(folder, "rate") != ())
+    assert declared(folder, "rate") == ("",)
 
 
 def test_blackout_is_dark_without_panic_and_go_does_not_lift_it(folder: Path, asker: Asker) -> None:
@@ -167,13 +173,14 @@ def test_a_cue_declares_picture_lights_and_dance_and_is_answered_when_the_dance_
     now = show_state(folder)
     assert (now.cue, now.look, now.lights, now.master) == ("storm", "ink", "cold", 0.5)
     assert (now.look_fade_s, now.lights_fade_s, now.master_fade_s) == (4.0, 4.0, 4.0)
-    assert (now.phrase, now.phrase_fade_s, now.hands["lShldr"][0]) == ("quiet", 4.0, False)
-    assert (now.coding, now.interaction, now.iterations_fade_s) == (12, 11, 4.0)
-    phrase_set = now.phrase_set
+    assert declared(folder, "phrase") == ("quiet", 4.0)
+    assert declared(folder, "hand lShldr") == ("lShldr", 0.0)
+    assert declared(folder, "iterations") == ("", 12.0, 11.0, 4.0)
+    dance = now.dance
     assert asker.ask("/cue", 1)[2] == 1
     now = show_state(folder)
     assert (now.cue, now.look, now.lights, now.master) == ("1", "lines", "cold", 0.5)
-    assert (now.phrase, now.phrase_set, now.coding) == ("quiet", phrase_set, 12)  # what it leaves out stays
+    assert now.dance == dance  # what it leaves out stays
 
 
 def test_a_command_again_is_declared_again(folder: Path, stage: StageDouble, asker: Asker) -> None:
@@ -181,7 +188,7 @@ def test_a_command_again_is_declared_again(folder: Path, stage: StageDouble, ask
     generations = []
     for message in (("/phrase", "quiet"), ("/phrase", "quiet"), ("/cue", "storm"), ("/cue", "storm")):
         assert asker.ask(*message)[2] == 1
-        generations.append(show_state(folder).phrase_set)
+        generations.append(show_state(folder).dance["phrase"][0])
     assert generations == sorted(set(generations))
 
 
@@ -228,7 +235,7 @@ def test_what_is_declared_while_the_stage_is_away_is_in_force_and_the_reply_says
     words = "does not answer. The dance follows" if lives else "The dance begins with this"
     reply = asker.ask("/cue", "storm")
     assert reply[:3] == ["/reply", "/cue", 0] and words in reply[3]
-    assert (show_state(folder).cue, show_state(folder).phrase) == ("storm", "quiet")
+    assert show_state(folder).cue == "storm" and declared(folder, "phrase") == ("quiet", 4.0)
 
 
 def test_what_is_said_after_a_cue_wins_over_it(folder: Path, stage: StageDouble, asker: Asker) -> None:
@@ -250,32 +257,31 @@ def test_cues_follow_each_other(folder: Path, stage: StageDouble, asker: Asker) 
 
 
 @pytest.mark.parametrize(
-    ("message", "declared"),
+    ("message", "part", "wanted"),
     [
-        (("/phrase", "quiet"), {"phrase": "quiet", "phrase_fade_s": 2.0}),
-        (("/phrase", "quiet", 0), {"phrase": "quiet", "phrase_fade_s": 0.0}),
-        (("/iterations", 12, 11), {"coding": 12, "interaction": 11, "iterations_fade_s": 0.0}),
+        (("/phrase", "quiet"), "phrase", ("quiet", 2.0)),
+        (("/phrase", "quiet", 0), "phrase", ("quiet", 0.0)),
+        (("/iterations", 12, 11), "iterations", ("", 12.0, 11.0)),
     ],
 )
 def test_what_persists_of_the_dance_is_declared_and_answered_when_the_stage_follows(
-    folder: Path, stage: StageDouble, asker: Asker, message: tuple[str], declared: dict[str, object]
+    folder: Path, stage: StageDouble, asker: Asker, message: tuple[str], part: str, wanted: tuple[object, ...]
 ) -> None:
     stage.remark = "So it is."
     assert asker.ask(*message) == ["/reply", message[0], 1, "So it is."]
-    now = show_state(folder)
-    assert {name: getattr(now, name) for name in declared} == declared
+    assert declared(folder, part) == wanted
     assert stage.orders == []
 
 
 def test_hands_are_declared_by_name_or_number(folder: Path, stage: StageDouble, asker: Asker) -> None:
     assert asker.ask("/hold", "lShldr", 0) == ["/reply", "/hold", 1, "The hand of lShldr lets go."]
-    assert show_state(folder).hands["lShldr"][0] is False
+    assert declared(folder, "hand lShldr") == ("lShldr", 0.0)
     assert asker.ask("/hold", 2, 1) == ["/reply", "/hold", 1, "The hand of lShldr holds."]
-    assert show_state(folder).hands["lShldr"][0] is True
+    assert declared(folder, "hand lShldr") == ("lShldr", 1.0)
     assert "Did you mean 'lShldr'?" in asker.ask("/hold", "lSholder", 1)[3]
     assert "No hand of this show holds 'Chest'" in asker.ask("/hold", "Chest", 1)[3]
     assert "There is no joint 99" in asker.ask("/hold", 99, 1)[3]
-    assert list(show_state(folder).hands) == ["lShldr"]
+    assert list(show_state(folder).dance) == ["hand lShldr"]
 
 
 @pytest.mark.parametrize(
@@ -305,9 +311,9 @@ def test_streams_are_answered_when_refused_alone(folder: Path, stage: StageDoubl
     until(lambda: len(stage.orders) == 4)
     assert [order.name for order in stage.orders] == ["excerpt", "hold", "jump", "release"]
     assert stage.orders[-1].text == "lShldr"
-    assert show_state(folder).rate == -1.0
+    assert declared(folder, "rate") == ("", -1.0)
     asker.tell("/player/stop")
-    until(lambda: show_state(folder).rate == 0.0)
+    until(lambda: declared(folder, "rate") == ("", 0.0))
     stage.obeys = False
     assert asker.ask("/ping") == ["/pong"]
 
@@ -401,7 +407,7 @@ def test_a_flood_of_declarations_leaves_the_newest_in_force(
     stage.obeys = True
     assert other.ask("/iterations", 7, 6)[2] == 1
     other.close()
-    assert (show_state(folder).coding, show_state(folder).interaction) == (7, 6)
+    assert declared(folder, "iterations") == ("", 7.0, 6.0)
     assert "this one gets no answer" in control.process.handler.reason
 
 
@@ -520,12 +526,12 @@ def test_what_was_in_force_stays_in_force_over_a_restart_and_is_said(folder: Pat
 def test_names_that_another_show_has_left_are_forgotten(folder: Path) -> None:
     writer = ShowStateWriter(folder)
     left = ShowState(panic=True, cue="storm", look="ink", lights="cold", look_before="lines")
-    writer.write(left.with_phrase("quiet", 1.0, 0.0).with_hands({"lShldr": False}, 1.0))
+    writer.write(left.with_dance(1.0, {"phrase": ("quiet", (0.0,))}))
     writer.close()
     control = ControlInThread(folder)
     with StageDouble(folder, facts(looks=("ink", "glass"), cues=(), lights=())):
         generation = show_state(folder).generation
-        now = ShowState(panic=True, look="ink", show="A test", generation=generation, phrase_fade_s=0.0)
+        now = ShowState(panic=True, look="ink", show="A test", generation=generation)
         until(lambda: show_state(folder) == now)
     control.close()
 
@@ -554,5 +560,5 @@ def test_a_stage_that_hangs_holds_up_no_answer(
 
 
 def test_each_command_is_carried_out_somewhere() -> None:
-    tables = (ORDERS, DECLARATIONS, DANCE_DECLARATIONS, QUESTIONS)
+    tables = (ORDERS, DECLARATIONS, QUESTIONS)
     assert set(FORMS) == {"/ping", "/sensors/list"}.union(*tables)

@@ -137,7 +137,7 @@ def test_a_stage_that_does_not_follow_is_told_once_and_the_cue_stays_in_force(
     process.turn()
     assert asker.hear()[:3] == ["/reply", "/cue", 0]  # type: ignore[index]
     declared = process.handler.show_state
-    assert (declared.cue, declared.look, declared.phrase) == ("storm", "ink", "quiet")
+    assert (declared.cue, declared.look, declared.dance["phrase"][1]) == ("storm", "ink", "quiet")
     report(stage, declared.generation)
     process.turn()
     assert process.handler.show_state == declared
@@ -171,8 +171,8 @@ def test_another_show_does_not_get_what_was_declared_for_the_one_before(
         clock.now += 0.3
         process.turn()
         now = process.handler.show_state
-        assert (now.show, now.cue, now.phrase_set, now.hands, now.look) == ("Another", "", 0, {}, "ink")
+        assert (now.show, now.cue, now.dance, now.look) == ("Another", "", {}, "ink")
         asker.tell("/iterations", 4, 3)
         process.turn()
         now = process.handler.show_state
-        assert (now.show, now.coding, now.iterations_set) == ("Another", 4, now.generation)
+        assert (now.show, now.dance) == ("Another", {"iterations": (now.generation, "", (4.0, 3.0))})

@@ -15,12 +15,14 @@ from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
 from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey, obey_for_sensors
+from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import StageParts, assemble
 from tests.bundles import write_show
 
 BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+ITERATIONS = Iterations(3, 2, 8)
 
 
 @pytest.fixture
@@ -32,15 +34,15 @@ def parts(tmp_path: Path) -> Iterator[StageParts]:
 
 
 def test_playback_jumps_and_plays_excerpts(parts: StageParts) -> None:
-    assert obey(Order("jump", (1.5,)), parts) == (True, "")
+    assert obey(Order("jump", (1.5,)), parts, ITERATIONS) == (True, "")
     parts.motion.advance()
     assert parts.motion.jumped
-    done, words = obey(Order("excerpt", (2.0, 2.04)), parts)
+    done, words = obey(Order("excerpt", (2.0, 2.04)), parts, ITERATIONS)
     assert not done and "from 2 s to 2.04 s" in words
 
 
 def test_a_joint_is_held_and_released_by_osc(parts: StageParts) -> None:
-    assert obey(Order("hold", (1.0, 0.0, 0.0, np.pi / 2), "lShldr"), parts) == (True, "")
+    assert obey(Order("hold", (1.0, 0.0, 0.0, np.pi / 2), "lShldr"), parts, ITERATIONS) == (True, "")
     for tick in range(100):
         parts.hands.pull(10.0 + 0.02 * tick, parts.puppet.select(parts.motion.window()))
     place = parts.hand_places[0]
@@ -48,7 +50,7 @@ def test_a_joint_is_held_and_released_by_osc(parts: StageParts) -> None:
         quaternion.angle_between(parts.hands.targets[0, place], np.array([0.5**0.5, 0.5**0.5, 0, 0])) < 1e-3
     )
     assert parts.hands.weights[place] == 1.0
-    assert obey(Order("release", (), "lShldr"), parts) == (True, "")
+    assert obey(Order("release", (), "lShldr"), parts, ITERATIONS) == (True, "")
     for tick in range(100):
         parts.hands.pull(12.0 + 0.02 * tick, parts.puppet.select(parts.motion.window()))
     assert parts.hands.weights[place] == 0.0
@@ -61,7 +63,7 @@ def test_a_joint_that_no_hand_holds_by_osc_is_refused_in_words(parts: StageParts
         (Order("hold", (0.0, 0.0, 0.0, 1.0), "lShldr"), "no rotation"),
         (Order("dance"), "knows no order 'dance'"),
     ]:
-        done, said = obey(order, parts)
+        done, said = obey(order, parts, ITERATIONS)
         assert not done and words in said
 
 

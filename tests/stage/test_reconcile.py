@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -24,9 +23,11 @@ from appliance.pose.bvh import write_bvh
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
 from appliance.show.show import Show, load_show
 from appliance.show_control.command import Command
-from appliance.show_control.show_state_commands import DANCE_DECLARATIONS
+from appliance.show_control.orders import Order
+from appliance.show_control.show_state_commands import DECLARATIONS
+from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
-from appliance.stage.reconcile import Change, Reconciler, apply
+from appliance.stage.reconcile import Reconciler
 from appliance.stage.run import Stage
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
@@ -72,6 +73,12 @@ def show(tmp_path: Path) -> Show:
     return load_show(folder)
 
 
+def follow(reconciler: Reconciler, now: float = NOW) -> str:
+    """Let the dance follow what is declared; gives what it says about it."""
+    orders = reconciler.pending(now)
+    return " ".join(filter(None, (obey(one, reconciler.parts, reconciler.iterations)[1] for one in orders)))
+
+
 @pytest.fixture
 def parts(show: Show) -> Iterator[StageParts]:
     parts = assemble(show, BOX)
@@ -100,12 +107,9 @@ def command(show: Show, iterations: Iterations, declared: Declared, reconciler: 
     facts = facts_of(show, None, iterations, NOW)
 
     def command(address: str, *values: float, text: str = "") -> str:
-        declare = DANCE_DECLARATIONS[address]
-        declared.now, _ = declare(declared.now, Command(address, values, text), facts, NOW)
-        change = reconciler.pending(NOW)
-        assert change is not None
-        words = reconciler.apply(change)
-        assert reconciler.pending(NOW) is None
+        declared.now, _ = DECLARATIONS[address](declared.now, Command(address, values, text), facts, NOW)
+        words = follow(reconciler)
+        assert not reconciler.pending(NOW)
         return words
 
     return command
@@ -168,22 +172,28 @@ def test_what_a_cue_leaves_out_stays(
 def test_nothing_is_pending_before_anything_is_declared_and_of_another_show(
     reconciler: Reconciler, declared: Declared
 ) -> None:
-    assert reconciler.pending(NOW) is None
-    declared.now = replace(declared.now.with_phrase("slow", NOW, 0.0), show="Another")
-    assert reconciler.pending(NOW) is None
+    assert not reconciler.pending(NOW)
+    declared.now = replace(declared.now.with_dance(NOW, {"phrase": ("slow", (0.0,))}), show="Another")
+    assert not reconciler.pending(NOW) and reconciler.generation == 0
 
 
-def test_what_several_commands_declared_meanwhile_is_one_change(
+def test_of_what_several_commands_declared_meanwhile_the_newest_counts(
     reconciler: Reconciler, declared: Declared
 ) -> None:
-    """After a stall; of several that set the same, the last counts."""
-    now = (
-        declared.now.with_phrase("slow", NOW, 1.0)
-        .with_iterations(5, 4, NOW)
-        .with_hands({"Chest": False}, NOW)
-    )
-    declared.now = now.with_rate(2.0, NOW).with_iterations(6, 5, NOW, 0.5)
-    assert reconciler.pending(NOW) == Change(("slow", 1.0), (6, 5, 0.5), ((1, False),), 2.0)
+    """After a stall, in the order in which they came."""
+    for parts in (
+        {"iterations": ("", (5.0, 4.0)), "rate": ("", (3.0,))},
+        {"phrase": ("slow", (1.0,)), "hand Chest": ("Chest", (0.0,))},
+        {"rate": ("", (2.0,))},
+        {"iterations": ("", (6.0, 5.0, 0.5))},
+    ):
+        declared.now = declared.now.with_dance(NOW, parts)
+    assert list(reconciler.pending(NOW)) == [
+        Order("phrase", (1.0,), "slow"),
+        Order("hand", (0.0,), "Chest"),
+        Order("iterations", (6.0, 5.0, 0.5)),
+        Order("rate", (2.0,)),
+    ]
     assert reconciler.generation == declared.now.generation
 
 
@@ -201,30 +211,31 @@ def test_a_part_is_applied_once_so_that_what_came_after_it_stays(
 def test_a_phrase_that_the_show_lost_changes_nothing_and_is_told(
     parts: StageParts, reconciler: Reconciler, declared: Declared
 ) -> None:
-    declared.now = declared.now.with_phrase("slwo", NOW, 0.0).with_rate(0.5, NOW)
-    change = reconciler.pending(NOW)
-    assert change is not None and "Did you mean 'slow'?" in reconciler.apply(change)
+    parts_declared = {"phrase": ("slwo", (0.0,)), "rate": ("", (0.5,))}
+    declared.now = declared.now.with_dance(NOW, parts_declared)
+    assert "Did you mean 'slow'?" in follow(reconciler)
     parts.motion.advance()
     assert (parts.motion.rate, parts.motion.jumped) == (0.5, False)
-    assert reconciler.pending(NOW) is None
+    assert not reconciler.pending(NOW)
 
 
 def test_a_stopped_show_stands_once_it_is_dark_and_goes_on_at_its_rate(
     parts: StageParts, reconciler: Reconciler, declared: Declared, command: Commanded
 ) -> None:
     def rate_at(now: float) -> float:
-        if (change := reconciler.pending(now)) is not None:
-            reconciler.apply(change)
+        follow(reconciler, now)
         return parts.motion.rate
 
     command("/player/rate", 0.5)
     declared.now = declared.now.with_going(False, NOW, 2.0)
     assert [rate_at(NOW + t) for t in (0.0, 1.9, 2.0, 3.0)] == [0.5, 0.5, 0.0, 0.0]
-    declared.now = declared.now.with_rate(-1.0, NOW)  # in the dark it stands, and goes on so
+    declared.now = declared.now.with_dance(
+        NOW, {"rate": ("", (-1.0,))}
+    )  # in the dark it stands, and goes on so
     assert rate_at(NOW + 4.0) == 0.0
     declared.now = declared.now.with_going(True, NOW + 5.0, 1.0)
     assert rate_at(NOW + 5.0) == -1.0
-    declared.now = declared.now.with_rate(None, NOW)
+    declared.now = declared.now.with_dance(NOW, {"rate": ("", ())})
     assert rate_at(NOW + 6.0) == 1.0
 
 
@@ -232,15 +243,9 @@ def test_a_show_that_stands_by_itself_can_be_started(parts: StageParts, iteratio
     parts.motion.rate = 0.0
     declared = Declared()
     reconciler = Reconciler("A test", parts, iterations, declared)  # type: ignore[arg-type]
-    assert reconciler.pending(NOW) is None
-    declared.now = declared.now.with_rate(None, NOW)
-    assert reconciler.pending(NOW) == Change(rate=1.0)
-
-
-def test_a_change_is_noted_and_read_back() -> None:
-    change = Change(("slow", 1.0), (6, 5, 0.5), ((1, False), (0, True)), 2.0)
-    assert Change.from_journal(json.loads(json.dumps(change.noted()))) == change
-    assert Change.from_journal(Change().noted()) == Change() and Change().noted() == {}
+    assert not reconciler.pending(NOW)
+    declared.now = declared.now.with_dance(NOW, {"rate": ("", ())})
+    assert reconciler.pending(NOW) == [Order("rate", (1.0,))]
 
 
 def test_a_phrase_is_called_with_its_own_fade(parts: StageParts, command: Commanded) -> None:
@@ -294,7 +299,7 @@ def test_a_kept_joint_holds_and_lets_go(tmp_path: Path) -> None:
     parts = assemble(load_show(write_show(tmp_path / "kept", [{"kept": True, "joint": "Chest"}])), BOX)
     place = parts.hand_places[0]
     for holds, begins in ((True, 0), (False, 60), (True, 120)):
-        apply(Change(hands=((0, holds),)), parts, Iterations(3, 3, 8))
+        obey(Order("hand", (float(holds),), "Chest"), parts, Iterations(3, 3, 8))
         for tick in range(60):
             window = parts.puppet.select(parts.motion.window())
             parts.hands.pull(10.0 + 0.02 * (begins + tick), window)
@@ -318,8 +323,9 @@ def test_a_cue_shows_no_jump(command: Commanded, tick: Tick) -> None:
 def test_a_stage_without_a_checkpoint_begins_with_what_is_declared(
     parts: StageParts, iterations: Iterations, reconciler: Reconciler, declared: Declared
 ) -> None:
-    now = declared.now.with_phrase("slow", NOW, 2.0).with_iterations(12, 11, NOW, 2.0)
-    declared.now = now.with_hands({"lShldr": False, "Chest": True}, NOW).with_cue("storm", NOW)
+    called = {"phrase": ("slow", (2.0,)), "iterations": ("", (12.0, 11.0, 2.0))}
+    hands = {"hand lShldr": ("lShldr", (0.0,)), "hand Chest": ("Chest", (1.0,))}
+    declared.now = replace(declared.now.with_dance(NOW, called | hands), cue="storm")
     sentence = reconciler.begin(NOW)
     assert "goes on in the cue 'storm'" in sentence and "at most 8 fit" in sentence
     assert (reconciler.cue, parts.motion.phrase, parts.motion.position_s) == ("storm", "slow", 0.0)
@@ -333,7 +339,8 @@ def test_a_stage_without_a_checkpoint_begins_with_what_is_declared(
 
 
 @pytest.mark.parametrize(
-    "show_state", [ShowState(), ShowState(show="Another", cue="storm").with_rate(0.5, NOW)]
+    "show_state",
+    [ShowState(), ShowState(show="Another", cue="storm").with_dance(NOW, {"rate": ("", (0.5,))})],
 )
 def test_with_nothing_declared_for_this_show_it_begins_as_it_does(
     parts: StageParts,
@@ -358,7 +365,7 @@ def test_the_stage_begins_with_the_show_state_of_its_folder(show: Show, box: Box
     for cue, phrase in (("storm", "slow"), ("", "main")):
         with closing(ShowStateWriter(box.runtime)) as writer:
             declared = ShowState(show="A test", cue=cue)
-            writer.write(declared.with_phrase(phrase, NOW, 0.0) if cue else declared)
+            writer.write(declared.with_dance(NOW, {"phrase": (phrase, (0.0,))}) if cue else declared)
         said: list[str] = []
         stage = Stage(show, box, said.append)
         with closing(stage):
@@ -374,7 +381,7 @@ def test_the_dance_follows_within_a_tick_reports_it_and_notes_it_before(show: Sh
         closing(CheckpointReader(box.runtime)) as checkpoint,
         closing(FrameReader(box.runtime)) as frames,
     ):
-        declared = ShowState(show="A test").with_phrase("slow", time.monotonic(), 1.0).with_cue("storm", 0.0)
+        declared = ShowState(show="A test", cue="storm").with_dance(NOW, {"phrase": ("slow", (1.0,))})
         ticks: list[int] = []
 
         def follows() -> bool:
@@ -392,12 +399,12 @@ def test_the_dance_follows_within_a_tick_reports_it_and_notes_it_before(show: Sh
         assert health["cue"] == place.cue == "storm"
         assert (place.phrase, place.applied) == ("slow", declared.generation)
         reads = [stage.reconciler.pending(time.monotonic()) for _ in range(100)]
-        assert reads == [None] * 100
+        assert reads == [[]] * 100
 
 
 def test_an_unchanged_show_state_leaves_nothing_to_the_collector(show: Show, box: BoxConfig) -> None:
     with closing(ShowStateWriter(box.runtime)) as writer, closing(Stage(show, box, print)) as stage:
-        writer.write(ShowState(show="A test").with_rate(1.0, NOW))
+        writer.write(ShowState(show="A test").with_dance(NOW, {"rate": ("", (1.0,))}))
         stage.reconciler.pending(NOW)
         gc.collect()
         gc.disable()

@@ -20,8 +20,10 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
 from appliance.show.show import Show, load_show
+from appliance.show_control.orders import Order
+from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
-from appliance.stage.reconcile import Change, Reconciler
+from appliance.stage.reconcile import Reconciler
 from appliance.stage.resume import TRIES, Resumption
 from appliance.stage.run import Stage
 from appliance.stage.stage_parts import assemble
@@ -81,6 +83,11 @@ def window_of(motion: Playback) -> tuple[np.ndarray, np.ndarray]:
     return motion.window().copy(), motion.roots().copy()
 
 
+def do(dance: Reconciler, *orders: Order) -> None:
+    for order in orders:
+        assert obey(order, dance.parts, dance.iterations)[0]
+
+
 def goes_on(dance: Reconciler, runtime: Path, again: Reconciler) -> str:
     """Note where a dance is, and resume another one there; gives what was said."""
     with closing(Resumption("A test", runtime, None, "always")) as noting:
@@ -95,7 +102,7 @@ def test_the_very_next_pose_comes_next_at_its_place_on_the_stage(
     dance_of: Callable[[], Reconciler], runtime: Path, ticks: int, rate: float
 ) -> None:
     before, after = dance_of(), dance_of()
-    before.apply(Change(phrase=("walk", 0.5)))
+    do(before, Order("phrase", (0.5,), "walk"))
     before.rate = before.parts.motion.rate = rate
     for _ in range(200 + ticks):
         before.parts.motion.advance()
@@ -119,7 +126,7 @@ def test_a_phrase_that_was_just_asked_for_is_the_one_that_comes_back(
     before, after = dance_of(), dance_of()
     for _ in range(50):
         before.parts.motion.advance()
-    before.apply(Change(phrase=("walk", 1.0)))
+    do(before, Order("phrase", (1.0,), "walk"))
     for _ in range(ticks):
         before.parts.motion.advance()
     goes_on(before, runtime, after)
@@ -131,7 +138,8 @@ def test_excerpt_rate_iterations_hands_and_cue_come_back(
     dance_of: Callable[[], Reconciler], runtime: Path
 ) -> None:
     before, after = dance_of(), dance_of()
-    before.apply(Change(("walk", 0.2), (6, 5, 0.2), ((0, False), (1, True)), 0.5))
+    do(before, Order("phrase", (0.2,), "walk"), Order("iterations", (6.0, 5.0, 0.2)), Order("rate", (0.5,)))
+    do(before, Order("hand", (0.0,), "lShldr"))
     before.cue, before.rate, before.generation = "storm", 0.5, 77
     before.parts.motion.excerpt(1.0, 3.0)
     for _ in range(80):
@@ -157,18 +165,22 @@ def test_what_was_declared_while_the_stage_was_away_follows_and_what_it_followed
     dance_of: Callable[[], Reconciler], runtime: Path, generation: int, is_applied: bool
 ) -> None:
     before, after = dance_of(), dance_of()
-    declared = ShowState(show="A test").with_phrase("walk", NOW, 0.5)
+    declared = ShowState(show="A test").with_dance(NOW, {"phrase": ("walk", (0.5,))})
     declare(runtime, declared)
     for _ in range(10):
-        if (change := before.pending(NOW)) is not None:
-            before.apply(change)
+        do(before, *before.pending(NOW))
         before.parts.motion.advance()
     before.parts.motion.excerpt(1.0, 3.0)
     if is_applied:
-        declare(runtime, declared.with_phrase("walk", NOW, 0.5).with_iterations(6, 5, NOW))
+        declare(
+            runtime,
+            declared.with_dance(NOW, {"phrase": ("walk", (0.5,))}).with_dance(
+                NOW, {"iterations": ("", (6.0, 5.0))}
+            ),
+        )
     goes_on(before, runtime, after)
-    change = Change(phrase=("walk", 0.5), iterations=(6, 5, 0.0))
-    assert after.pending(NOW) == (change if is_applied else None)
+    orders = [Order("phrase", (0.5,), "walk"), Order("iterations", (6.0, 5.0))]
+    assert after.pending(NOW) == (orders if is_applied else [])
 
 
 def test_after_a_power_cut_all_that_is_declared_is_new(
@@ -176,11 +188,11 @@ def test_after_a_power_cut_all_that_is_declared_is_new(
 ) -> None:
     """Its generations count from the machine's start."""
     put(runtime, replace(PLACE, boot="another", applied=10**15, cue="storm"))
-    declare(runtime, ShowState(show="A test").with_iterations(6, 5, NOW))
+    declare(runtime, ShowState(show="A test").with_dance(NOW, {"iterations": ("", (6.0, 5.0))}))
     dance = dance_of()
     with closing(Resumption("A test", runtime, None, "always")) as resuming:
         assert "After a power cut" in resuming.go_on(dance, NOW)
-    assert dance.pending(NOW) == Change(iterations=(6, 5, 0.0))
+    assert dance.pending(NOW) == [Order("iterations", (6.0, 5.0))]
     assert dance.cue == "storm"
 
 
@@ -192,18 +204,17 @@ def test_a_show_that_stands_comes_back_standing(
     for tick in range(100):
         if tick == 50:
             stopped = ShowState(show="A test", going=by != "stop")
-            declare(runtime, stopped if by == "stop" else stopped.with_rate(0.0, NOW))
-        if (change := before.pending(NOW)) is not None:
-            before.apply(change)
+            declare(runtime, stopped if by == "stop" else stopped.with_dance(NOW, {"rate": ("", (0.0,))}))
+        do(before, *before.pending(NOW))
         before.parts.motion.advance()
     goes_on(before, runtime, after)
-    assert after.parts.motion.rate == 0.0 and after.pending(NOW) is None
+    assert after.parts.motion.rate == 0.0 and not after.pending(NOW)
     for _ in range(20):
         after.parts.motion.advance()
     assert after.parts.motion.position_s == pytest.approx(before.parts.motion.position_s, abs=2e-3)
     if by == "stop":
         declare(runtime, ShowState(show="A test"))
-        assert after.pending(NOW) == Change(rate=1.0)
+        assert after.pending(NOW) == [Order("rate", (1.0,))]
 
 
 @pytest.mark.parametrize(("boot", "rate"), [("another", 1.0), (boot_id(), 0.0)])
@@ -405,7 +416,7 @@ def test_the_whole_stage_goes_on_where_it_was(show: Show, box: BoxConfig) -> Non
 
 def test_a_place_goes_before_what_was_declared_before_it(show: Show, box: BoxConfig, runtime: Path) -> None:
     """The cue was called, and another part of the phrase after it."""
-    declared = ShowState(show="A test").with_phrase("walk", NOW, 0.0).with_cue("storm", NOW)
+    declared = ShowState(show="A test", cue="storm").with_dance(NOW, {"phrase": ("walk", (0.0,))})
     declare(runtime, declared)
     place = replace(PLACE, excerpt=(1.0, 3.0), cue="storm", applied=declared.generation, boot=boot_id())
     put(runtime, place)
