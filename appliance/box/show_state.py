@@ -24,10 +24,10 @@ class ShowState:
 
     look, lights: "" is the show's first. Fades run by themselves: readers pass the time at which they draw.
 
-    dance: what the stage applies, each part once, in this order: `phrase` (name; fade in seconds),
-    `iterations` (coding, interaction, fade in seconds), `rate` (of playback; none: the show's), `hand JOINT`
-    (joint; 1 holds). A stage with another show than `show` ignores it. generation: the newest that declared
-    something for the dance, in nanoseconds since the machine started; it never goes back.
+    dance: what the stage applies, each part once, in this order: `cue` (name), `phrase` (name; fade in
+    seconds), `iterations` (coding, interaction, fade in seconds), `rate` (of playback; none: the show's),
+    `hand JOINT` (joint; 1 holds). A stage with another show than `show` ignores it.
+    generation: the newest that declared something for the dance, in nanoseconds since the machine started.
     """
 
     panic: bool = False

@@ -79,7 +79,7 @@ def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: floa
     cues = {str(cue["name"]): cue for cue in facts.cues}
     name = known("cue", command.text, [*cues]) if command.text else next_cue(show_state.cue, [*cues])
     cue, fade_s = cues[name], float(cues[name]["fade_s"])
-    parts: dict[str, tuple[str, tuple[float, ...]]] = {}
+    parts: dict[str, tuple[str, tuple[float, ...]]] = {"cue": (name, ())}
     if cue.get("phrase") is not None:
         parts["phrase"] = cue["phrase"], (fade_s,)
     if cue.get("hands") is not None:
