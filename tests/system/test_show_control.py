@@ -261,6 +261,7 @@ def test_a_cue_called_while_the_dance_is_away_is_in_force_when_it_comes_back(
         process(control, tmp_path / "control.txt"),
         asking(box) as asker,
     ):
+        await_status(asker, state="dancing")
         assert asker.order("/cue", "calm")[2] == 1
         box.end(signal.SIGKILL)
         await_status(asker, state="absent")
