@@ -1,4 +1,4 @@
-"""The place of the dance: what a restarted stage must know to continue where the last one was."""
+"""The checkpoint of the dance: what a restarted stage needs to go on where the last one was."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from appliance.box.record import Record, SlotFile
 from appliance.pose.foreign_file import plain_json
 
-LARGEST = 4000  # bytes of a packed place; one slot on the disk is a page of 4096
+LARGEST = 4000  # bytes of a packed checkpoint; one slot on the disk is a page of 4096
 PLACE = Record("place", "place", LARGEST)
 FILE = PLACE.name
 
@@ -25,10 +25,11 @@ class Checkpoint:
     """Where a show is, right before its next tick.
 
     phrase, position_s: which pose comes next; excerpt: first and last second of the part that plays;
-    rate: its speed; x, z (metres), heading (radians about +Y): where the phrase's root stands on the stage;
-    strayed: how far grounding has moved the figure from there (metres); let_go: joints whose hands were told
-    to let go; boot: the machine's boot id; tick: of the last frame; restarts, power_cuts: how often the show
-    went on after one; ended: the show was ended as it should; tries: starts from here of which no frame left.
+    rate: its speed while the show goes; x, z (metres), heading (radians about +Y): where the phrase's root
+    stands on the stage; strayed: how far grounding has moved the figure from there (metres); let_go: joints
+    whose hands have let go; applied: the generation of the show state that all this follows; boot: the
+    machine's boot id; tick: of the last frame; restarts, power_cuts: how often the show went on after one;
+    ended: the show was ended as it should; tries: starts from here that produced no frame.
     """
 
     show: str
@@ -50,6 +51,7 @@ class Checkpoint:
     power_cuts: int = 0
     ended: bool = False
     tries: int = 0
+    applied: int = 0
 
 
 def packed(place: Checkpoint) -> bytes:
@@ -70,7 +72,7 @@ def packed(place: Checkpoint) -> bytes:
         _ENDED * place.ended,
         place.tries,
     )
-    payload = numbers + _names(place.show, place.phrase, place.cue, place.let_go, place.boot)
+    payload = numbers + _names(place.show, place.phrase, place.cue, place.let_go, place.boot, place.applied)
     if len(payload) > LARGEST:
         raise ValueError(f"A place of {len(payload)} bytes is longer than {LARGEST}.")
     return payload
@@ -82,7 +84,7 @@ def unpacked(payload: bytes) -> Checkpoint | None:
         tick, position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, *small = (
             _NUMBERS.unpack_from(payload)
         )
-        show, phrase, cue, let_go, boot = plain_json(payload[_NUMBERS.size :])
+        show, phrase, cue, let_go, boot, applied = plain_json(payload[_NUMBERS.size :])
         place = Checkpoint(
             str(show),
             str(phrase),
@@ -103,6 +105,7 @@ def unpacked(payload: bytes) -> Checkpoint | None:
             small[3],
             bool(small[4] & _ENDED),
             small[5],
+            int(applied),
         )
     except (struct.error, ValueError, TypeError):
         return None

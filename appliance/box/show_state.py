@@ -1,24 +1,33 @@
-"""The show state: whether the audience sees anything, how bright, in which look. All processes read it."""
+"""The show state: what show control wants picture, lights and dance to be. All processes read it."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from appliance.box.block import BlockReader, BlockWriter
+from appliance.box.block import BlockWriter
+from appliance.box.ring_file import RingFileReader
 from appliance.pose.foreign_file import plain_json
 
 FILE, KIND = "show_state", "show_state"
-LARGEST = 8192  # bytes; the longest names of a show fit, whatever they are written in
+LARGEST = 8192  # bytes; the longest names of a show fit, in any script
+
+Part = tuple[int, str, tuple[float, ...]]  # the generation that declared it, a text, numbers
 
 
 @dataclass(frozen=True, slots=True)
 class ShowState:
-    """What show control has set. Times are monotonic seconds of this machine; names are those of the show.
+    """What show control has declared; times are monotonic seconds of this machine, names are the show's.
 
-    look, lights: "" is the show's first. Fades run by themselves: readers ask with the moment that they draw.
+    look, lights: "" is the show's first. Fades run by themselves: readers pass the time at which they draw.
+
+    dance: what the stage applies, each part once, in this order: `cue` (name), `phrase` (name; fade in
+    seconds), `iterations` (coding, interaction, fade in seconds), `rate` (of playback; none: the show's),
+    `hand JOINT` (joint; 1 holds). A stage with another show than `show` ignores it.
+    generation: the newest that declared something for the dance, in nanoseconds since the machine started.
     """
 
     panic: bool = False
@@ -38,7 +47,10 @@ class ShowState:
     lights_before: str = ""
     lights_since: float = 0.0
     lights_fade_s: float = 0.0
-    cue: str = ""  # the newest that was carried out; "": none yet
+    cue: str = ""  # the newest; "": none yet
+    show: str = ""
+    generation: int = 0
+    dance: Mapping[str, Part] = field(default_factory=dict)
 
     def level(self, now: float) -> float:
         """0..1: what dimmers and the picture are multiplied with."""
@@ -48,7 +60,11 @@ class ShowState:
 
     def is_safe(self, now: float) -> bool:
         """Whether lights show their safe look: at once on panic, and when stopped as soon as it is dark."""
-        return self.panic or (not self.going and self.going_level(now) <= 0.0)
+        return self.panic or self.stands(now)
+
+    def stands(self, now: float) -> bool:
+        """Whether the phrase stands still: stopped, and faded out."""
+        return not self.going and self.going_level(now) <= 0.0
 
     def master_level(self, now: float) -> float:
         """0..1: the master's fader on its way."""
@@ -89,6 +105,17 @@ class ShowState:
         before = self.lights if self.lights_mix(now) >= 0.5 else self.lights_before
         return replace(self, lights=lights, lights_before=before, lights_since=now, lights_fade_s=fade_s)
 
+    def with_dance(self, now: float, parts: Mapping[str, tuple[str, tuple[float, ...]]]) -> ShowState:
+        """Declare parts of the dance; a part that is declared as it is already is applied once more."""
+        number = max(self.generation + 1, int(1e9 * now))  # a new file never repeats an earlier number
+        others = {name: part for name, part in self.dance.items() if name not in parts}
+        declared = {name: (number, *part) for name, part in parts.items()}
+        return replace(self, generation=number, dance=others | declared)
+
+    def for_show(self, show: str) -> ShowState:
+        """Without the cue and the dance of another show."""
+        return self if show == self.show else replace(self, show=show, cue="", dance={})
+
     def settled(self, now: float) -> ShowState:
         """With fades that began in the future done: the machine's clock has started anew since."""
         late = max(self.going_since, self.master_since, self.look_since, self.lights_since) > now
@@ -97,39 +124,47 @@ class ShowState:
         return replace(self, going_fade_s=0.0, master_fade_s=0.0, look_fade_s=0.0, lights_fade_s=0.0)
 
 
+_FIELDS = tuple(one.name for one in fields(ShowState))
+
+
 class ShowStateReader:
     """Reads the show state of a runtime folder; before one is written the defaults hold: the show runs.
+
+    An unchanged state costs a stat and eight bytes.
 
     A file that is gone stays in force until another one is written: panic stays panic when the folder is
     emptied, and what is dark does not flash up while a box ends.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._block = BlockReader(folder / FILE, KIND)
-        self._payload: bytes | None = None
-        self._house = ShowState()
+        self._file = RingFileReader(folder / FILE, KIND, 1, "show control")
+        self._sequence = 0
+        self._show_state = ShowState()
 
     def read(self) -> ShowState:
-        """How the show state is now. Never waits, never raises."""
-        payload = self._block.read()
-        if payload is not None and payload != self._payload:
-            self._payload, self._house = payload, _parsed(payload)
-        return self._house
+        """The newest show state, the same object until it changes. Never waits, never raises."""
+        if self._file.look():
+            self._sequence = 0
+        for ring in self._file.rings:
+            if ring.newest_sequence() != self._sequence and (newest := ring.newest()):
+                self._sequence, self._show_state = newest[0], _parsed(newest[1])
+        return self._show_state
 
     def close(self) -> None:
         """Let go of the file."""
-        self._block.close()
+        self._file.close()
 
 
 class ShowStateWriter:
-    """Show control's end: the file outlives it, so that panic stays panic. Raises OSError without a place."""
+    """Show control's end: the file outlives it, so that panic stays panic. Raises OSError."""
 
     def __init__(self, folder: Path) -> None:
         self._block = BlockWriter(folder / FILE, KIND, LARGEST)
 
     def write(self, show_state: ShowState) -> None:
-        """Publish; readers see it when they look next."""
-        self._block.write(json.dumps(asdict(show_state)).encode())
+        """Publish; readers have it from their next read on."""
+        values = {name: getattr(show_state, name) for name in _FIELDS}
+        self._block.write(json.dumps(values, ensure_ascii=False).encode())
 
     def close(self) -> None:
         """Let go of the file; it stays."""
@@ -150,9 +185,10 @@ def _part(now: float, since: float, fade_s: float) -> float:
 
 def _parsed(payload: bytes) -> ShowState:
     """A show state of another version of this program keeps what both know."""
-    known = {one.name for one in fields(ShowState)}
     try:
         values: dict[str, Any] = plain_json(payload)
-        return ShowState(**{name: value for name, value in values.items() if name in known})
+        parts = values.get("dance", {}).items()
+        values["dance"] = {name: (number, text, tuple(given)) for name, (number, text, given) in parts}
+        return ShowState(**{name: value for name, value in values.items() if name in _FIELDS})
     except (ValueError, TypeError, AttributeError):
         return ShowState()

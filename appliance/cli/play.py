@@ -238,25 +238,25 @@ def _new_folder(journal: Path) -> Path:
 def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) -> list[str]:
     show = stage.show
     hands = ", ".join(f"{hand.sensor or hand.kind} holds {hand.joint}" for hand in show.config.hands)
-    receivers = ", ".join(receiver.name for receiver in stage.cast.outputs.receivers) or "nobody"
+    receivers = ", ".join(receiver.name for receiver in stage.parts.outputs.receivers) or "nobody"
     lines = [
         f"{show.config.name}: {hands or 'no hands, the dancer moves freely'}.",
         f"The dance goes to {receivers}.",
         _inputs(stage, control),
         stage.admission.sentence(),
     ]
-    lines += stage.cast.complaints
+    lines += stage.parts.complaints
     lines += map(str, show.idle_hands())
     if emulate:
         lines.append(_REHEARSAL)
     else:
-        lines += reach(list(stage.cast.worn), stage.box)
+        lines += reach(list(stage.parts.worn), stage.box)
     return lines
 
 
 def _inputs(stage: Stage, control: socket.socket | None) -> str:
     """Where sensors and commands arrive."""
-    sensors = ", ".join(intake.name for intake in stage.cast.link.intakes) or "no port"
+    sensors = ", ".join(intake.name for intake in stage.parts.link.intakes) or "no port"
     if control is not None:
         commands = "on " + ":".join(map(str, control.getsockname()))
     else:
@@ -270,8 +270,8 @@ def _conclusion(stage: Stage) -> list[str]:
     lines = [
         f"Danced {health.ticks} ticks: late {health.late}, longest tick {health.worst_ms:.1f} ms{trouble}."
     ]
-    if stage.cast.worn:
-        lines.append(_readings(stage.cast.link.counts))
+    if stage.parts.worn:
+        lines.append(_readings(stage.parts.link.counts))
     return lines
 
 

@@ -106,7 +106,7 @@ FORMS: dict[str, Form] = {
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One message that keeps to its form. `text`: what it is about; a joint may be a number; "" left out."""
+    """One message in a valid form. `text`: what it is about, a joint also by number; "": left out."""
 
     address: str
     values: tuple[float, ...] = ()
@@ -115,7 +115,7 @@ class Command:
 
 def command(address: str, arguments: Sequence[object]) -> Command:
     """The command in one message. Raises ValueError with one clear sentence."""
-    if address == "/panic":  # whatever a desk or a bridge puts behind it; 0 alone is a button that is let go
+    if address == "/panic":  # with any arguments; 0 alone is a button that is let go
         return Command(address, (0.0,) if list(arguments) == [0] else ())
     if not is_readable([address, *arguments]):
         raise ValueError("A command has no control characters in it.")
@@ -131,7 +131,7 @@ def command(address: str, arguments: Sequence[object]) -> Command:
 
 
 def _text(form: Form, arguments: Sequence[object]) -> tuple[str | int | None, list[int | float]]:
-    """What the command is about (None: it does not say), and its numbers."""
+    """What the command is about (None: not given), and its numbers."""
     text: str | int | None = ""
     if form.text and arguments:
         text, arguments = _name(form, arguments[0]), arguments[1:]

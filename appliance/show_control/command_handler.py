@@ -1,32 +1,30 @@
-"""The desk: every command that came in, carried out here, in the show state, or by stage and projector."""
+"""The command handler: every command becomes a declaration in the show state, an order or an answer."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from appliance.box.show_state import ShowState
+from appliance.show_control.acknowledgements import Acknowledgements
 from appliance.show_control.command import Command, command
 from appliance.show_control.key_file import KeyFile
-from appliance.show_control.order_dispatch import OrderDispatch, Then
+from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.orders import Order, Place
 from appliance.show_control.packet import Message, messages_in, readable
 from appliance.show_control.port import Address
 from appliance.show_control.sensor_roster import END as ROSTER_END
 from appliance.show_control.sensor_roster import SENSOR, roster_messages
 from appliance.show_control.show_state_commands import (
-    CHANGES,
-    PARTS,
+    DECLARATIONS,
+    SHOWS_RATE,
     in_cue,
-    known,
+    joint_name,
     let_go,
-    next_cue,
     of_this_show,
 )
 from appliance.show_control.stage_observer import StageObserver
-from appliance.show_control.standstill import Standstill
 from appliance.show_control.status_messages import END, QUESTIONS, STATUS, Status, status, told
 
 if TYPE_CHECKING:
@@ -34,23 +32,15 @@ if TYPE_CHECKING:
     from appliance.sensor.keys import SensorKey
 
 REPLY, SENSORS_REPLY, PONG = "/reply", "/sensors/reply", "/pong"
-PHRASE_FADE_S = 2.0
 # What a box sends is never answered: two boxes would go on answering each other for ever.
 _ANSWERS = frozenset((REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END))
 _LISTED = ("/cues/", "/phrases/", "/looks/", "/hands/", "/fallbacks/")
 _ONCE_A_BUNDLE = frozenset((*QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
 _STREAMS = ("/player/", "/mocap/")  # answered only when refused, or when nobody carried them out
-_BY_HAND = ("/player/start", "/player/stop", "/player/rate")
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
 
-_ORDERS: Mapping[str, tuple[Place, str]] = {
-    "/phrase": ("stage", "phrase"),
-    "/iterations": ("stage", "iterations"),
-    "/hold": ("stage", "hand"),
-    "/player/start": ("stage", "start"),
-    "/player/stop": ("stage", "stop"),
+ORDERS: Mapping[str, tuple[Place, str]] = {
     "/player/jump": ("stage", "jump"),
-    "/player/rate": ("stage", "rate"),
     "/player/excerpt": ("stage", "excerpt"),
     "/mocap/setjointrot": ("stage", "hold"),
     "/mocap/releasejoint": ("stage", "release"),
@@ -69,16 +59,8 @@ _ORDERS: Mapping[str, tuple[Place, str]] = {
 }
 
 
-class _Undone(NamedTuple):
-    """A cue that the stage of this generation did not do, as far as it said so."""
-
-    cue: str
-    generation: int
-    then: Then
-
-
 class CommandHandler:
-    """`tell` sends a message to who asked; `publish` shows the show state to all who read it.
+    """Declares what is to persist, dispatches orders for the rest, and replies.
 
     refused: commands that were not carried out; reason: why the last one was not.
     """
@@ -86,32 +68,27 @@ class CommandHandler:
     def __init__(
         self,
         show_state: ShowState,
-        sight: StageObserver,
-        errands: OrderDispatch,
+        observer: StageObserver,
+        dispatch: OrderDispatch,
         keys: KeyFile,
-        tell: Callable[[Address, Message], None],
+        send: Callable[[Address, Message], None],
         publish: Callable[[ShowState], None],
-        monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self.show_state = show_state
         self.refused = 0
         self.reason = ""
-        self._sight, self._errands, self._keys = sight, errands, keys
-        self._tell, self._publish, self._monotonic = tell, publish, monotonic
-        self._standstill = Standstill(sight, errands)
+        self.acknowledgements = Acknowledgements(observer)
+        self._observer, self._dispatch, self._keys = observer, dispatch, keys
+        self._send, self._publish = send, publish
         self._generation = -1
         self._is_new_stage = False
-        self._began_in = ""  # the cue in which the newest stage began
-        self._undone: _Undone | None = None  # the newest cue, if it was not done
-        self._heard = 0
-        self._set_by = dict.fromkeys(PARTS, 0)  # the newest command that has set it
 
-    def hear(self, received: bytes, asker: Address, now: float) -> None:
+    def handle_datagram(self, received: bytes, asker: Address, now: float) -> None:
         """Carry out what one datagram asks for; never raises, whatever it is."""
         try:
             messages = messages_in(received)
         except ValueError as error:
-            self._end(asker, "", False, str(error))
+            self._reply(asker, "", False, str(error))
             return
         once: set[str] = set()
         for address, arguments in messages:
@@ -125,121 +102,92 @@ class CommandHandler:
                     once.add(address)
                 self._carry_out(command(address, arguments), asker, now)
             except ValueError as error:
-                self._end(asker, address, False, str(error))
+                self._reply(asker, address, False, str(error))
 
-    def look(self, now: float) -> None:
+    def follow_stage(self, now: float) -> None:
         """What has to be done without any command; call it often."""
-        self._sight.state(now)
-        facts = self._sight.facts
-        if facts is not None and self._sight.generation != self._generation:
-            self._generation = self._sight.generation
-            self._set(of_this_show(self.show_state, facts))
-            self._is_new_stage, self._began_in = True, ""
-        if self._is_new_stage and facts is not None and (health := self._sight.health()):
-            self._is_new_stage, self._began_in = False, str(health.get("cue", ""))
-            self._come_back(facts, self._began_in, now)
-        self._catch_up()
-        self._standstill.look(self.show_state, now)
+        self._observer.state(now)
+        facts = self._observer.facts
+        if facts is not None and self._observer.generation != self._generation:
+            self._generation, self._is_new_stage = self._observer.generation, True
+            self._publish_changed(of_this_show(self.show_state, facts))
+        if self._is_new_stage and facts is not None and (health := self._observer.health()):
+            self._is_new_stage = False
+            self._adopt(facts, str(health.get("cue", "")), now)
+        self.acknowledgements.send_due(now)
 
     def status(self, strangers: int, now: float) -> Status:
         """How the box is."""
-        return status(self.show_state, self._sight, self.refused, strangers, now)
+        return status(self.show_state, self._observer, self.refused, strangers, now)
 
-    def _come_back(self, facts: Facts, name: str, now: float) -> None:
-        """After a power cut the stage goes on in its cue: so do picture and lights, if nobody said another.
+    def _adopt(self, facts: Facts, name: str, now: float) -> None:
+        """After a power cut the stage goes on in its cue: picture and lights too, unless declared since.
 
-        Its master stays aside: whoever switches the box on wants to see something.
+        Its master is left out: a box that was switched on shows something.
         """
         cue = next((cue for cue in facts.cues if cue["name"] == name), None)
         if cue is not None and not self.show_state.cue:
-            parts = [part for part in ("look", "lights") if not self._set_by[part]]
-            self._set(in_cue(self.show_state, {**cue, "fade_s": 0.0}, parts, now))
+            parts = [part for part in ("look", "lights") if not getattr(self.show_state, part)]
+            self._publish_changed(in_cue(self.show_state, {**cue, "fade_s": 0.0}, parts, now))
 
-    def _catch_up(self) -> None:
-        """A stage that died before it answered had done its cue if the next one goes on in it."""
-        undone = self._undone
-        if undone is None or undone.generation == self._generation:
-            return
-        if undone.cue == self._began_in != self.show_state.cue:
-            undone.then(True, "The stage was started anew in it.")
-
-    def _carry_out(self, order: Command, asker: Address, now: float) -> None:
+    def _carry_out(self, command: Command, asker: Address, now: float) -> None:
         """Raises ValueError for what cannot be done."""
-        self._heard += 1
-        address = order.address
+        address, observer = command.address, self._observer
         if address == "/ping":
-            self._tell(asker, (PONG,))
-        elif words := let_go(order):
-            self._tell(asker, (REPLY, address, 0, words))  # not done, and nothing was refused
-        elif address in CHANGES:
-            self._change(order, asker, now)
+            self._send(asker, (PONG,))
+        elif words := let_go(command):
+            self._send(asker, (REPLY, address, 0, words))  # not done, and nothing was refused
+        elif address in DECLARATIONS:
+            self._declare(command, asker, now)
         elif address in QUESTIONS:
-            for message in told(address, self.show_state, self._sight, self.status(0, now), now):
-                self._tell(asker, message)
+            for message in told(address, self.show_state, observer, self.status(0, now), now):
+                self._send(asker, message)
         elif address == "/sensors/list":
-            self._tell_roster(asker, now)
-        elif address == "/cue":
-            self._cue(order, asker, now)
+            self._send_roster(asker, now)
         else:
-            self._pass_on(order, asker, now)
+            self._order(command, asker, now)
 
-    def _change(self, order: Command, asker: Address, now: float) -> None:
-        show_state, words = CHANGES[order.address](self.show_state, order, self._sight.facts, now)
-        if order.address == "/go":
-            self._standstill.go(self.show_state, now)
-        self._set(show_state)
-        self._set_by |= {part: self._heard for part in PARTS if order.address == f"/{part}"}
-        self._end(asker, order.address, True, words)
+    def _declare(self, command: Command, asker: Address, now: float) -> None:
+        """Reply at once; about the dance once it follows."""
+        address, observer = command.address, self._observer
+        before = of_this_show(self.show_state, observer.facts)
+        show_state, words = DECLARATIONS[address](before, command, observer.facts, now)
+        if address == "/go" and before.going and observer.state(now) == "stopped":
+            show_state = show_state.with_dance(now, SHOWS_RATE)
+        self._publish_changed(show_state)
+        reply = partial(self._reply, asker, address)
+        if address == "/go" or show_state.generation == before.generation:
+            reply(True, words)
+        else:
+            self.acknowledgements.expect(show_state.generation, words, now, reply)
 
-    def _cue(self, order: Command, asker: Address, now: float) -> None:
-        """The stage first; then picture and lights follow, where nothing newer was said about them."""
-        facts = self._sight.facts
-        names = None if facts is None else [cue["name"] for cue in facts.cues]
-        name = known("cue", order.text, names) if order.text else next_cue(self.show_state, facts)
-        cue = next(cue for cue in facts.cues if cue["name"] == name) if facts else {}
-        heard, generation = self._heard, self._generation
+    def _order(self, command: Command, asker: Address, now: float) -> None:
+        place, name = ORDERS[command.address]
+        text = joint_name(command.text, self._observer.facts)
+        keys = self._keys.keys() if command.address == "/sensors/reload" else _no_keys()
+        order = Order(name, command.values, text, keys, quiet=command.address.startswith(_STREAMS))
+        self._dispatch.dispatch_order(place, order, now, partial(self._reply, asker, command.address))
 
-        def then(done: bool, words: str) -> None:
-            self._undone = None if done else _Undone(name, generation, then)
-            if done:
-                parts = [part for part in PARTS if self._set_by[part] <= heard]
-                self._set_by |= dict.fromkeys(parts, heard)
-                self._set(in_cue(self.show_state, cue, parts, self._monotonic()))
-            self._end(asker, "/cue", done, f"Cue {name}. {words}".rstrip() if done else words)
-
-        self._errands.begin("stage", Order("cue", text=name), now, then)
-
-    def _pass_on(self, command: Command, asker: Address, now: float) -> None:
-        place, name = _ORDERS[command.address]
-        values, text, keys = command.values, command.text, _no_keys()
-        if command.address == "/phrase":
-            text = known("phrase", text, self._sight.facts.phrases if self._sight.facts else None)
-            values = values or (PHRASE_FADE_S,)
-        elif command.address == "/sensors/reload":
-            keys = self._keys.keys()
-        elif command.address in _BY_HAND:
-            self._standstill.leave()
-        order = Order(name, values, text, keys, quiet=command.address.startswith(_STREAMS))
-        self._errands.begin(place, order, now, partial(self._end, asker, command.address))
-
-    def _tell_roster(self, asker: Address, now: float) -> None:
-        if not self._sight.lives(now):
+    def _send_roster(self, asker: Address, now: float) -> None:
+        if not self._observer.lives(now):
             raise ValueError(_NO_STAGE)
         key_file = str(self._keys.path or "")
-        for message in roster_messages(self._sight.health(), key_file, now):
-            self._tell(asker, message)
+        for message in roster_messages(self._observer.health(), key_file, now):
+            self._send(asker, message)
 
-    def _set(self, show_state: ShowState) -> None:
+    def _publish_changed(self, show_state: ShowState) -> None:
         if show_state != self.show_state:
-            self.show_state = show_state
             self._publish(show_state)
+            self.show_state = show_state
 
-    def _end(self, asker: Address, address: str, done: bool, words: str) -> None:
-        """Tell who asked what came of it."""
+    def _reply(self, asker: Address, address: str, done: bool, words: str) -> None:
+        """Reply to a command; to one of a stream only that it is not done."""
+        if done and address.startswith(_STREAMS):
+            return
         if not done:
             self._refuse(words)
         reply = SENSORS_REPLY if address.startswith("/sensors/") else REPLY
-        self._tell(asker, (reply, address, int(done), words or "Done."))
+        self._send(asker, (reply, address, int(done), words or "Done."))
 
     def _refuse(self, reason: str) -> None:
         self.refused += 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from appliance.box.show_state import ShowState
 
-_PAUSE_S = 0.5  # a fader or a button that somebody plays with never floods the terminal
+_PAUSE_S = 0.5  # a fader that moves all the time never floods the terminal
 
 
 def held_back(show_state: ShowState) -> str:

@@ -1,4 +1,4 @@
-"""The heartbeat: once a second `/bunraku/status` to everyone that the box file lists."""
+"""The heartbeat: once a second `/bunraku/status` to every listener in the box file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ EVERY_S = 1.0
 
 
 class Heartbeat:
-    """Beats on a grid of its own, whatever the stage does; who is not there misses it, and nobody else."""
+    """Beats on a grid of its own, whatever the stage does; a listener that is away delays no other."""
 
     def __init__(self, listeners: Sequence[Listener], now: float) -> None:
         self._listeners = tuple(listeners)
@@ -24,7 +24,7 @@ class Heartbeat:
         self.due = now if listeners else float("inf")  # monotonic seconds
 
     def beat(self, status: Status, now: float) -> None:
-        """Send it; after a stall the grid begins anew, and nothing is sent twice."""
+        """Send it; after a stall the grid starts over, and nothing is sent twice."""
         self.due = self.due + EVERY_S if self.due + EVERY_S > now else now + EVERY_S
         message = datagram((STATUS, *status))
         for listener in self._listeners:

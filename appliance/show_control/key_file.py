@@ -1,4 +1,4 @@
-"""The sensors' key file as show control reads it: when somebody asks, and only when it has changed."""
+"""The sensors' key file: show control reads it on request, and only after it has changed."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 
 
 class KeyFile:
-    """Who may take part; the stage never reads a file itself."""
+    """Keys of the sensors that the box admits; the stage itself never reads a file."""
 
     def __init__(self, path: Path | None) -> None:
         self.path = path
         self._read: tuple[object, Mapping[str, SensorKey] | str] | None = None
 
     def keys(self) -> Mapping[str, SensorKey]:
-        """What it holds, however often somebody asks. Raises ValueError with a sentence for who asked."""
+        """The keys in it. Raises ValueError with a sentence for people."""
         stamp = self._stamp()
         if self._read is None or self._read[0] != stamp:
             try:

@@ -1,6 +1,6 @@
-"""Orders: what show control asks of the stage, the projector and the lights, and what they answer.
+"""Orders: what show control asks the stage, the projector and the lights to do once, and their answers.
 
-Unix datagrams in JSON through sockets in the runtime folder; nobody waits for anybody.
+Unix datagrams in JSON through sockets in the runtime folder; no end ever blocks.
 """
 
 from __future__ import annotations
@@ -20,32 +20,30 @@ if TYPE_CHECKING:
     from appliance.sensor.keys import SensorKey
 
 Place = Literal["stage", "projector", "lights"]
-Delivery = Literal["sent", "full", "absent"]  # full: too many wait there already; absent: nobody is there
+Delivery = Literal["sent", "full", "absent"]  # full: the receiver's socket is; absent: there is no receiver
 ANSWERS = "control"
 _LARGEST = 65536
-# What reading a datagram raises that nobody of this box has sent.
+# What parsing raises for a datagram that no process of this box sent.
 _NONSENSE = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One thing to do, within its bounds; names that only the show knows are the receiver's to check.
+    """One thing to do, within its bounds; the receiver checks names that only the show knows.
 
-    For the stage:  start, stop, jump (s), rate (r), excerpt (start s[, end s]), iterations (coding,
-    interaction), hold (x, y, z, angle; text: joint), release (text: joint), hand (0|1; text: joint: the hand
-    of that joint lets go or holds), phrase (fade s; text: its name), cue (text: its name), neutral, heading,
-    strobe (text: the sensor or ""), reload (keys).
+    For the stage:  jump (s), excerpt (start s[, end s]), hold (x, y, z, angle; text: joint), release (text:
+    joint), neutral, heading, strobe (text: the sensor or ""), reload (keys).
     For the projector:  corner (number 1..4, x, y), corners (x1, y1 .. x4, y4), corners/reset, brightness (b),
     mirror (0|1), grid (0|1), info (0|1).
 
-    text: a joint may be a number. keys: what a reload has read. ask: who waits for an answer; 0: nobody.
-    quiet: the asker is told of a refusal alone, not that it was done (streams of orders).
-    until: monotonic seconds; after it it is not to be done: the asker is told so a moment later.
+    keys: those that a reload has read. ask: number of the answer that is waited for; 0: none.
+    quiet: only a refusal is answered (streams of orders). until: monotonic seconds, after which the order
+    is void.
     """
 
     name: str
     values: tuple[float, ...] = ()
-    text: str | int = ""
+    text: str = ""
     keys: Mapping[str, SensorKey] = field(default_factory=dict, compare=False, repr=False)
     ask: int = field(default=0, compare=False)
     quiet: bool = field(default=False, compare=False)
@@ -54,7 +52,7 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of an order: whether it was done, and a sentence for whoever asked."""
+    """What became of an order: whether it was done, and a sentence for people."""
 
     ask: int
     done: bool
@@ -62,21 +60,21 @@ class Answer:
 
 
 class OrderInbox:
-    """A place's end: orders wait in its socket until it takes them. Raises OSError without a place for it."""
+    """The receiver's end: orders wait in its socket. Raises OSError where the folder takes no socket."""
 
     def __init__(self, folder: Path, place: Place, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._socket = _Mailbox(folder, place)
         self._monotonic = monotonic
 
     def fileno(self) -> int:
-        """For whoever sleeps until something comes."""
+        """To poll for orders."""
         return self._socket.fileno()
 
     def take(self) -> Order | None:
-        """The oldest order that is still wanted, or None; never blocks, never raises.
+        """The oldest order that is not void, or None; never blocks, never raises.
 
-        The clock is read after the order has come: a process that hung for a while in the middle of its turn
-        still holds a time of before.
+        The clock is read after the order was received: a process that hung in the middle of its turn would
+        compare with an old time.
         """
         while (received := self._socket.take()) is not None:
             order = _parsed(received)
@@ -85,28 +83,28 @@ class OrderInbox:
         return None
 
     def answer(self, order: Order, done: bool, words: str) -> None:
-        """Tell who asked, if anyone waits; never blocks, never raises."""
+        """Send the answer, if one is waited for; never blocks, never raises."""
         if order.ask:
             answer = {"ask": order.ask, "done": done, "words": words}
             self._socket.send(ANSWERS, json.dumps(answer).encode())
 
     def close(self) -> None:
-        """Take no more."""
+        """Remove the socket."""
         self._socket.close()
 
 
 class OrderSender:
-    """Show control's end. Raises OSError without a place for its socket."""
+    """Show control's end. Raises OSError where the folder takes no socket."""
 
     def __init__(self, folder: Path) -> None:
         self._socket = _Mailbox(folder, ANSWERS)
 
     def fileno(self) -> int:
-        """For whoever sleeps until an answer comes."""
+        """To poll for answers."""
         return self._socket.fileno()
 
     def send(self, to: Place, order: Order) -> Delivery:
-        """Hand it over; never blocks, never raises."""
+        """Send an order; never blocks, never raises."""
         return self._socket.send(to, _payload(order))
 
     def take(self) -> Answer | None:
@@ -118,7 +116,7 @@ class OrderSender:
         return None
 
     def close(self) -> None:
-        """Take no more."""
+        """Remove the socket."""
         self._socket.close()
 
 
@@ -183,13 +181,13 @@ def _payload(order: Order) -> bytes:
 
 
 def _parsed(received: bytes) -> Order | None:
-    """The order in a datagram; None for what nobody of this box has sent."""
+    """The order in a datagram; None for anything else."""
     try:
         values = json.loads(received)
         return Order(
             name=str(values["name"]),
             values=_finite(values["values"]),
-            text=values["text"] if isinstance(values["text"], int) else str(values["text"]),
+            text=str(values["text"]),
             keys=_keys(values.get("keys", {})),
             ask=int(values["ask"]),
             quiet=bool(values["quiet"]),

@@ -1,4 +1,4 @@
-"""The control port: datagrams of those who may command the box; strangers are dropped and counted."""
+"""The control port: takes datagrams from permitted senders; drops and counts all others."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def open_port(host: str, port: int) -> socket.socket:
 
 
 class Port:
-    """Takes over a bound socket. `senders`: addresses and networks besides this machine that may command.
+    """Takes over a bound socket. `senders`: addresses and networks that may command, beside this machine.
 
-    strangers: how many datagrams came from somebody else. too_large: how many were no command by their size.
+    strangers: datagrams from any other sender. too_large: datagrams that are longer than any command.
     """
 
     def __init__(self, bound: socket.socket, senders: Sequence[str] = ()) -> None:
@@ -50,16 +50,16 @@ class Port:
         self._said_at = float("-inf")
 
     def fileno(self) -> int:
-        """For whoever sleeps until something comes."""
+        """To poll for datagrams."""
         return self._socket.fileno()
 
     def take(self) -> tuple[bytes, Address] | None:
-        """The oldest datagram, empty when it is not to be taken; None: none waits. Never blocks or raises."""
+        """The oldest datagram, empty if it is dropped; None: none waits. Never blocks, never raises."""
         try:
             received, sender = self._socket.recvfrom(LARGEST_DATAGRAM + 1)
         except BlockingIOError:
             return None
-        except OSError:  # an asker who is gone again, told by the kernel
+        except OSError:  # the kernel reports that an earlier reply reached nobody
             return b"", ("", 0)
         if not self._may_command(sender[0]):
             self.strangers += 1
@@ -71,12 +71,12 @@ class Port:
         return received, sender
 
     def dropped(self) -> int:
-        """How many datagrams the kernel dropped, because too many waited."""
+        """How many datagrams the kernel dropped because the socket was full."""
         told = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * (_DROPS + 1))
         return int(struct.unpack_from("=I", told, 4 * _DROPS)[0])
 
     def send(self, to: Address, message: Message) -> None:
-        """Tell somebody; dropped when the network does not take it at once."""
+        """Send a message; it is dropped when the network does not take it at once."""
         with contextlib.suppress(OSError, ValueError):  # ValueError: a text that OSC cannot carry
             self._socket.sendto(datagram(message), to)
 

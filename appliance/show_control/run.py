@@ -1,4 +1,4 @@
-"""Show control as a process: the port, the show state, orders and the heartbeat, until it is told to end."""
+"""Show control as a process: the port, the show state, orders and the heartbeat, until a stop signal."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from appliance.show_control.port import Port
 from appliance.show_control.settings import Settings
 from appliance.show_control.stage_observer import StageObserver
 
-_LONGEST_SLEEP_S = 0.25  # a stage that was started anew is found so soon
+_LONGEST_SLEEP_S = 0.25  # a restarted stage is found within this
 _AT_ONCE = 16  # datagrams; then answers, heartbeat and signals have their turn
-_REST_S = 0.002  # after so many at once: a flood leaves the processor to others
+_REST_S = 0.002  # after as many: a flood leaves the processor to others
 
 
 class ControlProcess:
@@ -42,19 +42,19 @@ class ControlProcess:
             self.port = Port(socket.socket(fileno=settings.descriptor), settings.senders)
             opened.callback(self.port.close)
             self._intake = Intake(self.port)
-            show_state = _house_left(folder, now)
+            show_state = _left_in_force(folder, now)
             writer = ShowStateWriter(folder)
             opened.callback(writer.close)
             sender = OrderSender(folder)
             opened.callback(sender.close)
-            self.sight = StageObserver(folder)
-            opened.callback(self.sight.close)
-            self._errands = OrderDispatch(sender)
+            self.observer = StageObserver(folder)
+            opened.callback(self.observer.close)
+            self._dispatch = OrderDispatch(sender)
             self._heartbeat = Heartbeat(settings.heartbeat, now)
             opened.callback(self._heartbeat.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
-            self.desk = CommandHandler(
-                show_state, self.sight, self._errands, keys, self.port.send, writer.write, monotonic
+            self.handler = CommandHandler(
+                show_state, self.observer, self._dispatch, keys, self.port.send, writer.write
             )
             self._poll = select.poll()
             for one in (self.port, sender):
@@ -76,43 +76,43 @@ class ControlProcess:
         notifier.stopping()
 
     def turn(self) -> None:
-        """What waits, urgent commands first and no more than _AT_ONCE, and what is due.
+        """Handle up to _AT_ONCE datagrams, urgent ones first, and what is due.
 
-        The clock is read after each datagram has come: this process may have been held up while it took it.
+        The clock is read after each datagram: this process may have been held up while it received one.
         """
         taken = 0
         while taken < _AT_ONCE and (found := self._intake.take()) is not None:
             taken += 1
-            self.desk.hear(*found, self._monotonic())
-        self._errands.go_on(self._monotonic())
+            self.handler.handle_datagram(*found, self._monotonic())
+        self._dispatch.exchange(self._monotonic())
         now = self._monotonic()
-        self.sight.note_dropped(self._intake.dropped + self.port.dropped(), now)
-        self.desk.look(now)
+        self.observer.note_dropped(self._intake.dropped + self.port.dropped(), now)
+        self.handler.follow_stage(now)
         if now >= self._heartbeat.due:
-            self._heartbeat.beat(self.desk.status(self.port.strangers, now), now)
-        for words in (self.port.news(now), self._news.look(self.desk.show_state, now)):
+            self._heartbeat.beat(self.handler.status(self.port.strangers, now), now)
+        for words in (self.port.news(now), self._news.look(self.handler.show_state, now)):
             if words:
                 self._say(words)
         if taken == _AT_ONCE:
             time.sleep(_REST_S)
 
     def conclusion(self) -> str:
-        """What was refused, in a sentence; empty when nothing was."""
-        refused = self.desk.refused + self.port.too_large
+        """How many commands were refused, in a sentence; empty when none was."""
+        refused = self.handler.refused + self.port.too_large
         if not refused:
             return ""
-        reason = self.desk.reason or "A datagram was too long for a command."
+        reason = self.handler.reason or "A datagram was too long for a command."
         return f"Commands: {refused} refused, the last one: {reason}"
 
     def close(self) -> None:
-        """Free the port and the show state; what is in force stays in force."""
+        """Free the port and the show state, which stays in force."""
         self._closing.close()
 
     def _sleep_s(self, now: float) -> float:
         if not self._intake.is_empty:
             return 0.0
-        due = min(self._heartbeat.due, self._errands.due(now), now + _LONGEST_SLEEP_S)
-        return max(due - now, 0.0)
+        due = [self._heartbeat.due, self._dispatch.due(now), self.handler.acknowledgements.due(now)]
+        return max(min(*due, now + _LONGEST_SLEEP_S) - now, 0.0)
 
 
 def control(settings: Settings, say: Callable[[str], None]) -> int:
@@ -128,8 +128,8 @@ def control(settings: Settings, say: Callable[[str], None]) -> int:
     return 0
 
 
-def _house_left(folder: Path, now: float) -> ShowState:
-    """What an earlier show control left in force: panic stays panic."""
+def _left_in_force(folder: Path, now: float) -> ShowState:
+    """The show state of an earlier show control: panic stays panic."""
     with contextlib.closing(ShowStateReader(folder)) as reader:
         return reader.read().settled(now)
 

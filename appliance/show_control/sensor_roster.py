@@ -1,4 +1,4 @@
-"""The roster: every sensor as the stage saw it last, as it is told to whoever asks over the control port."""
+"""The roster: every sensor as the stage last saw it, as messages of the control port."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class RosterLine(NamedTuple):
 
 
 def roster_messages(health: Mapping[str, Any], key_file: str, now: float) -> Iterator[Message]:
-    """What `/sensors/list` tells: a message for each sensor, and one to end with.
+    """The answer to `/sensors/list`: a message for each sensor, and one to end with.
 
     `health` as the stage wrote it; empty while it starts.
     """

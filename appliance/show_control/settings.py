@@ -1,4 +1,4 @@
-"""What show control needs to know of a box file, as it is handed to its process."""
+"""The settings of a box file that show control needs, as its process gets them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What the commands of show control make of the show state: functions from one state to the next."""
+"""What each command declares: functions from one show state to the next."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,12 +14,18 @@ from appliance.show_control.command import Command
 STOP_FADE_S = 2.0
 GO_FADE_S = 1.0
 LOOK_FADE_S = 2.0  # of looks and lights, where a command gives none
+PHRASE_FADE_S = 2.0
 
-Change = Callable[[ShowState, Command, "Facts | None", float], tuple[ShowState, str]]
+SHOWS_RATE: dict[str, tuple[str, tuple[float, ...]]] = {"rate": ("", ())}
+
+Declared = tuple[ShowState, str]  # the next show state, and a sentence
+Declaration = Callable[[ShowState, Command, "Facts | None", float], Declared]
 
 
-def _go(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> tuple[ShowState, str]:
+def _go(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     dark = show_state.panic or not show_state.going
+    if not show_state.going or show_state.dance.get("rate", (0, "", ()))[2] == (0.0,):
+        show_state = show_state.with_dance(now, SHOWS_RATE)
     if show_state.panic:
         show_state = replace(show_state, panic=False, going=True, going_since=now, going_fade_s=GO_FADE_S)
     elif not show_state.going:
@@ -29,7 +35,7 @@ def _go(show_state: ShowState, command: Command, facts: Facts | None, now: float
     return show_state, "The show goes on: picture and lights come back." if dark else "The show goes on."
 
 
-def _stop(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> tuple[ShowState, str]:
+def _stop(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     fade_s = command.values[0] if command.values else STOP_FADE_S
     if not show_state.going and show_state.going_level(now) <= 0.0:
         return show_state, "The show stands still already. /go lets it go on."
@@ -39,42 +45,76 @@ def _stop(show_state: ShowState, command: Command, facts: Facts | None, now: flo
     return show_state.with_going(False, now, fade_s), words
 
 
-def _panic(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> tuple[ShowState, str]:
+def _panic(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     words = "The picture is black, and the lights show their safe look. /go lifts it."
     return replace(show_state, panic=True), words
 
 
-def _blackout(
-    show_state: ShowState, command: Command, facts: Facts | None, now: float
-) -> tuple[ShowState, str]:
+def _blackout(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     if command.values[0]:
         return replace(show_state, blackout=True), "Dark; the dance goes on. /blackout 0 lifts it."
     return replace(show_state, blackout=False), "Picture and lights are as bright as master says."
 
 
-def _master(
-    show_state: ShowState, command: Command, facts: Facts | None, now: float
-) -> tuple[ShowState, str]:
+def _master(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     master, *fade = command.values
     show_state = show_state.with_master(master, now, fade[0] if fade else 0.0)
     return show_state, f"Master goes to {100 * master:.0f} %."
 
 
-def _look(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> tuple[ShowState, str]:
+def _look(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     name = known("look", command.text, facts.looks if facts else None)
     fade_s = command.values[0] if command.values else LOOK_FADE_S
     return show_state.with_look(name, now, fade_s), f"The look {name} comes over {fade_s:g} s."
 
 
-def _lights(
-    show_state: ShowState, command: Command, facts: Facts | None, now: float
-) -> tuple[ShowState, str]:
+def _lights(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     name = known("set of light mappings", command.text, facts.lights if facts else None)
     fade_s = command.values[0] if command.values else LOOK_FADE_S
     return show_state.with_lights(name, now, fade_s), f"The lights {name} come over {fade_s:g} s."
 
 
-CHANGES: dict[str, Change] = {
+def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    facts = _danced(facts)
+    cues = {str(cue["name"]): cue for cue in facts.cues}
+    name = known("cue", command.text, [*cues]) if command.text else next_cue(show_state.cue, [*cues])
+    cue, fade_s = cues[name], float(cues[name]["fade_s"])
+    parts: dict[str, tuple[str, tuple[float, ...]]] = {"cue": (name, ())}
+    if cue.get("phrase") is not None:
+        parts["phrase"] = cue["phrase"], (fade_s,)
+    if cue.get("hands") is not None:
+        parts |= {f"hand {joint}": (joint, (float(joint in cue["hands"]),)) for joint in _held(facts)}
+    if cue.get("iterations") is not None:
+        parts["iterations"] = "", (*map(float, cue["iterations"]), fade_s)
+    return in_cue(show_state, cue, PARTS, now).with_dance(now, parts), f"Cue {name}."
+
+
+def _phrase(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    name = known("phrase", command.text, _danced(facts).phrases)
+    return show_state.with_dance(now, {"phrase": (name, command.values or (PHRASE_FADE_S,))}), ""
+
+
+def _iterations(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    _danced(facts)
+    return show_state.with_dance(now, {"iterations": ("", command.values)}), ""
+
+
+def _hold(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    joint, held = joint_name(command.text, facts), _held(_danced(facts))
+    if joint not in held:
+        cure = did_you_mean(joint, held) if held else "Give it some under `hands` in its show.yaml."
+        raise ValueError(f"No hand of this show holds '{joint}'. {cure}")
+    words = f"The hand of {joint} {'holds' if command.values[0] else 'lets go'}."
+    return show_state.with_dance(now, {f"hand {joint}": (joint, command.values)}), words
+
+
+def _rate(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    _danced(facts)
+    rate = (0.0,) if command.address == "/player/stop" else command.values
+    return show_state.with_dance(now, {"rate": ("", rate)}), ""
+
+
+DECLARATIONS: dict[str, Declaration] = {
     "/go": _go,
     "/stop": _stop,
     "/panic": _panic,
@@ -82,6 +122,13 @@ CHANGES: dict[str, Change] = {
     "/master": _master,
     "/look": _look,
     "/lights": _lights,
+    "/cue": _cue,
+    "/phrase": _phrase,
+    "/iterations": _iterations,
+    "/hold": _hold,
+    "/player/start": _rate,
+    "/player/stop": _rate,
+    "/player/rate": _rate,
 }
 
 _LET_GO = {
@@ -95,11 +142,11 @@ def let_go(command: Command) -> str:
     return _LET_GO.get(command.address, "") if command.values == (0.0,) else ""
 
 
-PARTS = ("look", "lights", "master")  # of the show state, that cues set
+PARTS = ("look", "lights", "master")  # what audience sees of a cue beside the dance
 
 
-def in_cue(show_state: ShowState, cue: Mapping[str, Any], parts: Collection[str], now: float) -> ShowState:
-    """The show state in a cue that the stage has fired: of PARTS only `parts` that the cue names."""
+def in_cue(show_state: ShowState, cue: Mapping[str, Any], parts: Iterable[str], now: float) -> ShowState:
+    """The show state in a cue, without its dance: of `parts` those that the cue names."""
     fade_s = float(cue["fade_s"])
     wanted = {part: cue[part] for part in parts if cue.get(part) is not None}
     if "look" in wanted:
@@ -111,8 +158,11 @@ def in_cue(show_state: ShowState, cue: Mapping[str, Any], parts: Collection[str]
     return replace(show_state, cue=cue["name"])
 
 
-def of_this_show(show_state: ShowState, facts: Facts) -> ShowState:
-    """A show state that another show has left: names that this one does not know are forgotten."""
+def of_this_show(show_state: ShowState, facts: Facts | None) -> ShowState:
+    """Without the dance of another show, and without names that this one does not know."""
+    if facts is None:
+        return show_state
+    show_state = show_state.for_show(facts.show_name)
     return replace(
         show_state,
         look=show_state.look if show_state.look in facts.looks else "",
@@ -121,6 +171,26 @@ def of_this_show(show_state: ShowState, facts: Facts) -> ShowState:
         lights_before=show_state.lights_before if show_state.lights_before in facts.lights else "",
         cue=show_state.cue if show_state.cue in [cue["name"] for cue in facts.cues] else "",
     )
+
+
+def joint_name(joint: str | int, facts: Facts | None) -> str:
+    """A joint's name; commands may give its number in the skeleton. Raises ValueError."""
+    if isinstance(joint, str):
+        return joint
+    names = _danced(facts).skeleton.names
+    if not 0 <= joint < len(names):
+        raise ValueError(f"There is no joint {joint}: this skeleton has joints 0 to {len(names) - 1}.")
+    return names[joint]
+
+
+def _danced(facts: Facts | None) -> Facts:
+    if facts is None:
+        raise ValueError("No stage has danced on this box yet: nothing is changed. Start it: bunraku play.")
+    return facts
+
+
+def _held(facts: Facts) -> list[str]:
+    return [facts.skeleton.names[joint] for joint in facts.held]
 
 
 def known(kind: str, name: str | int, names: Sequence[str] | None) -> str:
@@ -135,12 +205,11 @@ def known(kind: str, name: str | int, names: Sequence[str] | None) -> str:
     return str(name)
 
 
-def next_cue(show_state: ShowState, facts: Facts | None) -> str:
-    """The one after the cue in force, in the order of show.yaml; the first one at the beginning."""
-    names = [str(cue["name"]) for cue in facts.cues] if facts else []
+def next_cue(cue: str, names: Sequence[str]) -> str:
+    """The one after this cue in show.yaml; the first one at the beginning. Raises ValueError."""
     if not names:
         raise ValueError("This show has no cues: show.yaml names them.")
-    place = names.index(show_state.cue) + 1 if show_state.cue in names else 0
+    place = names.index(cue) + 1 if cue in names else 0
     if place == len(names):
-        raise ValueError(f"{show_state.cue} was the last cue. Name one, like /cue {names[0]}.")
+        raise ValueError(f"{cue} was the last cue. Name one, like /cue {names[0]}.")
     return names[place]

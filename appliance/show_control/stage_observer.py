@@ -1,4 +1,4 @@
-"""What show control sees of the stage: in the shared frame, without ever asking it."""
+"""What show control sees of the stage in the shared frame."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ class StageObserver:
 
     def __init__(self, folder: Path) -> None:
         self._reader = FrameReader(folder)
-        self._company = ProcessHealth(folder)
-        self._seen = Fallbacks((STAGE_HUNG, COMMANDS_DROPPED))
+        self._process_health = ProcessHealth(folder)
+        self._fallbacks = Fallbacks((STAGE_HUNG, COMMANDS_DROPPED))
 
     def state(self, now: float) -> StageState:
         """hung: the process lives, but no frame came for half a second; absent: no process, or none yet."""
         frames = self._reader.state(now)
         is_hung = frames == "stale" and self._reader.is_alive(now)
-        self._seen.set(STAGE_HUNG.name, is_hung)
+        self._fallbacks.set(STAGE_HUNG.name, is_hung)
         if frames == "fresh":
             return "stopped" if self.health().get("state") == "stopped" else "dancing"
         return "hung" if is_hung else "absent"
@@ -38,15 +38,20 @@ class StageObserver:
         """What the stage last said about itself; empty before it did."""
         return self._reader.health() or {}
 
+    def applied(self) -> tuple[int, str]:
+        """The generation of the show state that the dance follows, and what the stage says about it."""
+        generation, words = self.health().get("applied", (0, ""))
+        return int(generation), str(words)
+
     def note_dropped(self, total: int, now: float) -> None:
         """How many datagrams at the control port gave way, since it was opened."""
-        self._seen.follow(COMMANDS_DROPPED.name, total, now)
+        self._fallbacks.follow(COMMANDS_DROPPED.name, total, now)
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
         """Process and fallback, of all processes of the box, as far as they ever happened."""
-        own = [("control", one) for one in self._seen.happened(now)]
+        own = [("control", one) for one in self._fallbacks.happened(now)]
         stage = fallen(self.health().get("fallbacks")) if self.state(now) != "absent" else ()
-        return [*(("stage", one) for one in stage), *own, *self._company.fallbacks(now)]
+        return [*(("stage", one) for one in stage), *own, *self._process_health.fallbacks(now)]
 
     @property
     def facts(self) -> Facts | None:
@@ -61,4 +66,4 @@ class StageObserver:
     def close(self) -> None:
         """Let go of the shared frame."""
         self._reader.close()
-        self._company.close()
+        self._process_health.close()

@@ -1,4 +1,4 @@
-"""What show control tells: answers to questions, and the status that goes out once a second."""
+"""Status messages: answers to questions, and the status that goes out once a second."""
 
 from __future__ import annotations
 
@@ -43,9 +43,11 @@ class Status(NamedTuple):
     fallbacks: int
 
 
-def status(show_state: ShowState, sight: StageObserver, refused: int, strangers: int, now: float) -> Status:
-    """What the stage last said about itself, and what show control sees of one that hangs or is not there."""
-    stage, health, facts = sight.state(now), sight.health(), sight.facts
+def status(
+    show_state: ShowState, observer: StageObserver, refused: int, strangers: int, now: float
+) -> Status:
+    """The stage's last report, and what show control sees of a stage that hangs or is absent."""
+    stage, health, facts = observer.state(now), observer.health(), observer.facts
     if stage == "absent":
         health = {}
     return Status(
@@ -71,49 +73,49 @@ def status(show_state: ShowState, sight: StageObserver, refused: int, strangers:
         uptime_s=_known(health.get("uptime_s")),
         refused=refused,
         strangers=strangers,
-        fallbacks=sum(one.active for _, one in sight.fallbacks(now)),
+        fallbacks=sum(one.active for _, one in observer.fallbacks(now)),
     )
 
 
 def told(
-    question: str, show_state: ShowState, sight: StageObserver, now_status: Status, now: float
+    question: str, show_state: ShowState, observer: StageObserver, now_status: Status, now: float
 ) -> Iterator[Message]:
     """The answer to one of QUESTIONS: a message for each thing, and one to end with."""
     if question == "/status":
         answers: list[Message] = [(STATUS, *now_status)]
     else:
-        answers = list(_LISTS[question](now_status, sight, now))
+        answers = list(_LISTS[question](now_status, observer, now))
     yield from answers
     yield END, question, len(answers)
 
 
-def _cues(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
-    for cue in sight.facts.cues if sight.facts else ():
+def _cues(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
+    for cue in observer.facts.cues if observer.facts else ():
         yield "/cues/cue", str(cue["name"]), int(cue["name"] == status.cue)
 
 
-def _phrases(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
-    for name in sight.facts.phrases if sight.facts else ():
+def _phrases(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
+    for name in observer.facts.phrases if observer.facts else ():
         yield "/phrases/phrase", name, int(name == status.phrase)
 
 
-def _looks(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
-    for name in sight.facts.looks if sight.facts else ():
+def _looks(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
+    for name in observer.facts.looks if observer.facts else ():
         yield "/looks/look", name, int(name == status.look)
 
 
-def _hands(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
-    facts = sight.facts
+def _hands(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
+    facts = observer.facts
     if facts is None:
         return
-    let_go = sight.health().get("let_go", ())
+    let_go = observer.health().get("let_go", ())
     for joint, who in zip(facts.held, facts.hands, strict=True):
         name = facts.skeleton.names[joint]
         yield "/hands/hand", name, who, int(name not in let_go)
 
 
-def _fallbacks(status: Status, sight: StageObserver, now: float) -> Iterator[Message]:
-    for who, one in sight.fallbacks(now):
+def _fallbacks(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
+    for who, one in observer.fallbacks(now):
         yield "/fallbacks/fallback", one.name, who, one.times, int(one.active), one.words[:_LONGEST_WORDS]
 
 

@@ -17,7 +17,7 @@ from appliance.stage.stage_parts import StageParts, admission, warm_up
 _LARGEST = 4096
 
 
-def admitted(folder: Path, cast: StageParts, show: Show, box: BoxConfig, comes_back: bool) -> Admission:
+def admitted(folder: Path, parts: StageParts, show: Show, box: BoxConfig, comes_back: bool) -> Admission:
     """Measure what fits the tick's budget; a stage that `comes_back` takes what was measured before it.
 
     It takes what was measured with the same network, iterations, hands, budget and priority, since the
@@ -26,9 +26,9 @@ def admitted(folder: Path, cast: StageParts, show: Show, box: BoxConfig, comes_b
     record = admission_record(show, box)
     before = _read(record, folder) if comes_back else None
     if before is not None:
-        warm_up(cast, show, before)
+        warm_up(parts, show, before)
         return before
-    measured = admission(cast, show, box)
+    measured = admission(parts, show, box)
     with contextlib.suppress(OSError), contextlib.closing(record.writer(folder)) as block:
         block.write(json.dumps(asdict(measured)).encode())
     return measured

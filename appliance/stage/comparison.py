@@ -65,7 +65,7 @@ class Comparison:
         found = Difference(
             int(recorded["tick"]),
             float(recorded["frame_time"]) - self._begun,
-            tick.cast.skeleton.names[joint],
+            tick.parts.skeleton.names[joint],
             float(degrees[joint]),
             metres,
             words,

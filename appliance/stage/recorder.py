@@ -60,7 +60,7 @@ class Recorder:
 
     def note_tick(self, slot: Slot, tick: Tick, flags: int) -> None:
         """The frame of this slot has left: one copy into the memory."""
-        frame, field, cast = tick.frame, self._field, tick.cast
+        frame, field, parts = tick.frame, self._field, tick.parts
         ENTRY.pack_into(self._log.payload, 0, TICK)
         field["tick"][0] = slot.tick
         field["frame_time"][0] = slot.deadline
@@ -72,9 +72,9 @@ class Recorder:
         field["coding_iterations"][0] = tick.iterations.coding
         field["interaction_iterations"][0] = tick.iterations.interaction
         field["sections_ms"][0] = tick.sections_ms
-        for hand, place in enumerate(cast.hand_places):
-            field["targets"][0, hand] = cast.hands.targets[0, place]
-            field["weights"][0, hand] = cast.hands.weights[place]
+        for hand, place in enumerate(parts.hand_places):
+            field["targets"][0, hand] = parts.hands.targets[0, place]
+            field["weights"][0, hand] = parts.hands.weights[place]
         field["root"][0] = frame.root
         field["pose"][0] = frame.pose
         self._note_readings(tick)

@@ -1,4 +1,4 @@
-"""Dances a run of a journal again: its slots, readings and orders through the same tick, frame by frame."""
+"""Dances a run of a journal again: its slots, readings and orders through the same tick."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ class Replay:
 
     def __init__(self, run: Run, show: Show) -> None:
         self.skipped = 0
-        self._run, self._usual_rate = run, show.config.motion.rate
-        cast = assemble(show, _NO_PORTS)
+        self._run = run
+        parts = assemble(show, _NO_PORTS)
         hands = [hand["joint"] for hand in run.header["hands"]]
-        if cast.skeleton.names != run.skeleton.names or hands != [hand.joint for hand in show.config.hands]:
+        if parts.skeleton.names != run.skeleton.names or hands != [hand.joint for hand in show.config.hands]:
             raise JournalError(
                 f"{show.directory}: this show has another figure or other hands than the recorded one "
                 f"('{run.header['show']}'). Name its bundle: --show DIR."
             )
-        cast.link = self._link = _RecordedLink(run)
-        cast.puppet = self._puppet = _RecordedPuppet(show)
-        self._wearing = SensorFit(cast, SensorMemory(None, _nobody), _nobody)
-        self.tick = Tick(cast, self._wearing, Iterations(1, 0, 1), 0.0)
+        parts.link = self._link = _RecordedLink(run)
+        parts.puppet = self._puppet = _RecordedPuppet(show)
+        self._wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
+        self.tick = Tick(parts, self._wearing, Iterations(1, 0, 1), 0.0)
 
     @property
     def forced(self) -> int:
@@ -119,14 +119,13 @@ class Replay:
         comparison.look(recorded, self.tick)
 
     def _obey(self, event: dict[str, Any], comparison: Comparison) -> None:
-        cast = self.tick.cast
         try:
             asked, now, done_then = event["order"], float(event["now"]), bool(event["done"])
             order = Order(asked["name"], tuple(map(float, asked["values"])), asked["text"])
         except DAMAGED as error:
             raise JournalError(f"An order is of another release, or damaged ({error}).") from error
         self._link.answers(order.text, done_then)
-        done, _ = carry_out(order, cast, self.tick.iterations, self._wearing, self._usual_rate, now)
+        done, _ = carry_out(order, self.tick.parts, self.tick.iterations, self._wearing, now)
         comparison.note_order(order.name, done_then, done)
 
 

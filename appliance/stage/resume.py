@@ -1,4 +1,4 @@
-"""Going on: the place of the dance is noted after each frame, and a stage that starts anew begins there."""
+"""Resumption: the stage writes a checkpoint after each frame, and a restarted stage goes on from it."""
 
 from __future__ import annotations
 
@@ -14,21 +14,20 @@ from appliance.box.checkpoint import (
     read_checkpoint,
 )
 from appliance.show.box import Resume
-from appliance.stage.iterations import Iterations
-from appliance.stage.stage_parts import StageParts
+from appliance.stage.reconcile import Reconciler
 
 TRIES = 5  # starts from one place without a frame: then it is the place that is wrong
 
 
 class Resumption:
-    """Knows where the show was, and keeps where it is: some microseconds a tick, and never a disk.
+    """Reads the last checkpoint and writes the next ones: some microseconds a tick, and never to a disk.
 
-    went_on: whether this start is one of them; restarts, power_cuts: how often this show went on after one;
-    complaint: why no place is kept, else "".
+    restarts, power_cuts: how often this show went on after one; went_on: whether it does so in this start;
+    complaint: why no checkpoint is written, else "".
     """
 
     def __init__(self, show: str, runtime: Path, state: Path | None, wanted: Resume) -> None:
-        """runtime: the folder where the box's processes meet; state: the one on the disk, if there is one."""
+        """runtime: the folder of the box's processes; state: the one on the disk, if there is one."""
         self._show, self._boot = show, boot_id()
         self.complaint = ""
         self.went_on = False
@@ -48,11 +47,11 @@ class Resumption:
 
     @property
     def comes_back(self) -> bool:
-        """Whether a stage danced here since the machine was switched on, and did not end as it should."""
+        """Whether a stage danced here since the machine was switched on, and was not ended."""
         return self._found is not None and not self._after_power_cut
 
-    def go_on(self, cast: StageParts, iterations: Iterations) -> str:
-        """Before the first tick: put the cast where the show was. Gives what to say about it, or ""."""
+    def go_on(self, reconciler: Reconciler, now: float) -> str:
+        """Before the first tick: put the dance where the show was. A sentence about it, or ""."""
         place = self._found
         if place is None:
             return ""
@@ -67,26 +66,26 @@ class Resumption:
                 "ended without a frame. The show begins at the beginning. Export its journal for us."
             )
         try:
-            words = self._take(place, cast, iterations)
+            words = self._take(place, reconciler, now)
         except ValueError as error:
             return f"{why}: the show begins at the beginning. {error}"
         self.went_on = True
-        where = f" in the cue '{place.cue}'" if cast.cue else ""
+        where = f" in the cue '{place.cue}'" if place.cue else ""
         where += f" at {place.position_s:.1f} s of the phrase '{place.phrase}'"
         return f"{why} the show goes on{where}. {words}".rstrip()
 
-    def begin(self, cast: StageParts, iterations: Iterations) -> None:
-        """Right before the first tick: a start from here is tried."""
+    def write_start(self, reconciler: Reconciler) -> None:
+        """Right before the first tick: count this start."""
         tries = min(self._found.tries + 1, TRIES) if self._found and self._found.tries < TRIES else 1
-        self._write(replace(self._place(cast, iterations, -1), tries=tries))
+        self._write(replace(self._place(reconciler, -1), tries=tries))
 
-    def note(self, cast: StageParts, iterations: Iterations, tick: int) -> None:
-        """The frame of this tick has left, and the cast has moved on: here the next one begins."""
+    def write_checkpoint(self, reconciler: Reconciler, tick: int) -> None:
+        """The frame of this tick has left, and the dance has moved on: the next frame begins here."""
         if self._writer is not None:
-            self._write(self._place(cast, iterations, tick))
+            self._write(self._place(reconciler, tick))
 
-    def end(self) -> None:
-        """The show ends as it should: the next one begins at the beginning."""
+    def write_end(self) -> None:
+        """The show was ended: the next one begins at the beginning."""
         if self._now is not None:
             self._write(replace(self._now, ended=True))
 
@@ -95,41 +94,44 @@ class Resumption:
         if self._writer is not None:
             self._writer.close()
 
-    def _take(self, place: Checkpoint, cast: StageParts, iterations: Iterations) -> str:
+    def _take(self, place: Checkpoint, reconciler: Reconciler, now: float) -> str:
         """Raises ValueError where this show has no such place."""
         if place.show != self._show:
             raise ValueError(f"Before, the show was '{place.show}'.")
-        # What has stopped the phrase went with the power, and nobody would order it to start.
-        rate = place.rate or (cast.motion.rate if self._after_power_cut else 0.0)
-        cast.motion.start_at(
-            place.phrase, place.excerpt, place.position_s, rate, (place.x, place.z, place.heading)
-        )
-        cast.grounding.strayed = place.strayed
-        for puppeteer in cast.hands.puppeteers:
+        parts = reconciler.parts
+        # A power cut took the show state, so nothing would start a phrase that stood.
+        rate = place.rate or (reconciler.rate if self._after_power_cut else 0.0)
+        standing = place.x, place.z, place.heading
+        now_rate = 0.0 if reconciler.stands(now) else rate
+        parts.motion.start_at(place.phrase, place.excerpt, place.position_s, now_rate, standing)
+        parts.grounding.strayed = place.strayed
+        for puppeteer in parts.hands.puppeteers:
             puppeteer.enabled = puppeteer.joint not in place.let_go
-        cast.cue = place.cue if place.cue in cast.cues else ""
-        return iterations.ask(place.coding, place.interaction)
+        reconciler.cue, reconciler.rate = place.cue, rate
+        reconciler.generation = 0 if self._after_power_cut else place.applied
+        return reconciler.iterations.ask(place.coding, place.interaction)
 
-    def _place(self, cast: StageParts, iterations: Iterations, tick: int) -> Checkpoint:
-        motion = cast.motion
+    def _place(self, reconciler: Reconciler, tick: int) -> Checkpoint:
+        motion, hands = reconciler.parts.motion, reconciler.parts.hands
         phrase, position_s = motion.going_on
-        coding, interaction = iterations.asked
+        coding, interaction = reconciler.iterations.asked
         return Checkpoint(
             self._show,
             phrase,
             position_s,
             motion.excerpt_s,
-            motion.rate,
+            reconciler.rate,
             *motion.standing,
-            cast.grounding.strayed,
+            reconciler.parts.grounding.strayed,
             coding,
             interaction,
-            cast.cue,
-            tuple([puppeteer.joint for puppeteer in cast.hands.puppeteers if not puppeteer.enabled]),
+            reconciler.cue,
+            tuple([puppeteer.joint for puppeteer in hands.puppeteers if not puppeteer.enabled]),
             self._boot,
             tick,
             self.restarts,
             self.power_cuts,
+            applied=reconciler.generation,
         )
 
     def _write(self, place: Checkpoint) -> None:
@@ -143,7 +145,7 @@ class Resumption:
 
 
 def _found(runtime: Path, state: Path | None, wanted: Resume, boot: str) -> tuple[Checkpoint | None, bool]:
-    """Where the show was, None: nowhere; and whether the machine has started anew since."""
+    """The checkpoint to go on from, if any; and whether the machine was restarted since."""
     if wanted == "never":
         return None, False
     reader = CheckpointReader(runtime)

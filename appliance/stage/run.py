@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from pathlib import Path
 
 from appliance.box.clock import Slot, TickClock
@@ -16,11 +16,12 @@ from appliance.show.show import Show
 from appliance.show_control.orders import Order, OrderInbox
 from appliance.stage.admission import Admission
 from appliance.stage.admission_cache import admitted
-from appliance.stage.carry_out import carry_out, resume
+from appliance.stage.carry_out import carry_out
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.phase_lock import PhaseLock
 from appliance.stage.phrase_cache import MEMORY
+from appliance.stage.reconcile import Reconciler
 from appliance.stage.recorder import Recorder
 from appliance.stage.resume import Resumption
 from appliance.stage.sensor_fit import SensorFit
@@ -68,31 +69,34 @@ class Stage:
             opened.callback(self.resuming.close)
             self.memory = SensorMemory(box.state_folder, say, self.sharing.noted)
             opened.callback(self.memory.close)
-            self.cast: StageParts = assemble(
+            self.parts: StageParts = assemble(
                 show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY
             )
-            opened.callback(self.cast.close)
+            opened.callback(self.parts.close)
             self.inbox = _open_inbox(self.sharing.folder)
             opened.callback(self.inbox.close)
             self.recorder = self._open_recorder()
             if self.recorder is not None:
                 opened.callback(self.recorder.close)
+            show_state = ShowStateReader(self.sharing.folder)
+            opened.callback(show_state.close)
             self.admission: Admission = admitted(
-                self.sharing.folder, self.cast, show, box, self.resuming.comes_back
+                self.sharing.folder, self.parts, show, box, self.resuming.comes_back
             )
             self._closing = opened.pop_all()
         self.iterations = Iterations(
             self.admission.coding, self.admission.interaction, self.admission.most_coding
         )
+        self.reconciler = Reconciler(show.config.name, self.parts, self.iterations, show_state)
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
-        self.wearing = SensorFit(self.cast, self.memory, self._tell_people)
-        self._resume()
-        self.tick = Tick(self.cast, self.wearing, self.iterations, latest_start_s)
+        self.wearing = SensorFit(self.parts, self.memory, self._say_and_note)
+        self._resume(TickClock().now())
+        self.tick = Tick(self.parts, self.wearing, self.iterations, latest_start_s)
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
-        self.lock = PhaseLock() if box.phase_lock and self.cast.primary else None
-        self.watch = Watch(self.cast, self.admission)
+        self.lock = PhaseLock() if box.phase_lock and self.parts.primary else None
+        self.watch = Watch(self.parts, self.admission)
 
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
         """Tick until `stopped` says so or the seconds are over; this thread is the real-time one."""
@@ -119,10 +123,10 @@ class Stage:
         begun = clock.now()
         self.health.begin(begun)
         facts = facts_of(self.show, self.box_file, self.iterations, begun, self.rehearsal)
-        self.sharing.begin(self.cast, facts, self.say)
+        self.sharing.begin(self.parts, facts, self.say)
         self.watch.note_start(begun, self.resuming, self.sharing.complaint, self.recorder is not None)
-        self._tell(begun)
-        self.resuming.begin(self.cast, self.iterations)
+        self._publish_health(begun)
+        self.resuming.write_start(self.reconciler)
         if self.recorder is not None:
             self.recorder.keyframe(self.tick.state())
         clock.begin(self.lead_s + _FIRST_FRAME_IN_S)
@@ -133,13 +137,14 @@ class Stage:
             self._comes_from_stop = slot.skipped >= _HUNG_SLOTS and not self._comes_from_stop
             self.tick.run(slot)
             self._note(slot)
-            self._obey(slot.started, clock.now)
+            self._reconcile(slot.started)
+            self._take_orders(slot.started, clock.now)
             if self.recorder is not None and self.recorder.wants_keyframe:
                 self.recorder.keyframe(self.tick.state())
             shift_s = self._follow_sensor(slot)
             if self.health.is_due(slot.started) and not self._comes_from_stop:
                 self._report(slot.started)
-        self.resuming.end()
+        self.resuming.write_end()
         self.notifier.stopping()
 
     def _note(self, slot: Slot) -> None:
@@ -156,45 +161,54 @@ class Stage:
         self.notifier.ping(slot.started)
         if not self._comes_from_stop:
             self.watch.count_silences(slot.started)
-        self.resuming.note(self.cast, self.iterations, slot.tick)
+        self.resuming.write_checkpoint(self.reconciler, slot.tick)
         if self.recorder is not None:
             flags = late * LATE | tick.frame.late * RESENT | tick.network_failed * NOT_FINITE
-            self.recorder.note_tick(slot, tick, flags | self.cast.motion.jumped * JUMPED)
+            self.recorder.note_tick(slot, tick, flags | self.parts.motion.jumped * JUMPED)
 
     def _follow_sensor(self, slot: Slot) -> float:
         """The phase lock's correction to the next period, seconds."""
-        newest = self.cast.newest_primary
+        newest = self.parts.newest_primary
         if self.lock is None or newest is None:
             return 0.0
-        for arrival in self.cast.link.arrivals(newest.sensor):
+        for arrival in self.parts.link.arrivals(newest.sensor):
             self.lock.observe(arrival)
         if slot.started - newest.arrival > _FORGET_PHASE_S:
             self.lock.forget()
         return self.lock.shift_s(slot.deadline)
 
-    def _obey(self, started: float, monotonic: Callable[[], float]) -> None:
-        """Carry out what show control has asked for meanwhile, and tell it what came of that.
+    def _reconcile(self, now: float) -> None:
+        """Apply what show control has declared since the last time."""
+        before, orders = self.reconciler.generation, self.reconciler.pending(now)
+        if orders or self.reconciler.generation != before:
+            words = [self._carry_out(order, now)[1] for order in orders]
+            self.reconciler.words = " ".join(filter(None, words))
+            self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
+            self._publish_health(now)
 
-        Right after a stop, also one within this tick (it began at `started`), nothing is taken: what is known
-        of the sensors is old, and the next tick has heard them. Where every tick takes so long, orders are
-        what may mend it.
+    def _take_orders(self, started: float, monotonic: Callable[[], float]) -> None:
+        """Carry out orders that have come meanwhile, and answer them.
+
+        None is taken right after a stop, nor when one was within this tick, which began at `started`: its
+        readings are old, and the next tick has newer ones. A box whose every tick takes that long still takes
+        orders: they may mend it.
         """
         was_held_up, self._held_up = self._held_up, monotonic() - started > _LONGEST_TICK_S
         if self._comes_from_stop or (self._held_up and not was_held_up):
             return
         done: list[tuple[Order, bool, str]] = []
         while len(done) < _ORDERS_A_TICK and (order := self.inbox.take()) is not None:
+            self._reconcile(started)  # what was declared before this order was sent comes before it
             done.append((order, *self._carry_out(order, monotonic())))
         if done:
-            self.resuming.note(self.cast, self.iterations, self.tick.frame.tick)  # before anybody is told
+            self.resuming.write_checkpoint(self.reconciler, self.tick.frame.tick)  # before it is reported
         if any(not order.quiet for order, _, _ in done):
-            self._tell(started)  # whoever asks next hears of it
+            self._publish_health(started)  # the next question is answered with it
         for answer in done:
             self.inbox.answer(*answer)
 
     def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
-        usual_rate = self.show.config.motion.rate
-        done, words = carry_out(order, self.cast, self.iterations, self.wearing, usual_rate, now)
+        done, words = carry_out(order, self.parts, self.iterations, self.wearing, now)
         if self.recorder is not None:
             asked = {"name": order.name, "values": order.values, "text": order.text}
             self.recorder.event(ORDER, now, order=asked, done=done, words=words)
@@ -202,32 +216,31 @@ class Stage:
             self.say(words)
         return done, words
 
-    def _resume(self) -> None:
-        """After a crash or a power cut: go on where the show was, or else in the cue that is in force."""
-        words = [self.resuming.complaint, self.resuming.go_on(self.cast, self.iterations)]
+    def _resume(self, now: float) -> None:
+        """After a crash or a power cut: go on where the show was, or else with what is declared."""
+        words = [self.resuming.complaint, self.resuming.go_on(self.reconciler, now)]
         if not self.resuming.went_on:
-            with closing(ShowStateReader(self.sharing.folder)) as show_state:
-                words.append(resume(show_state.read().cue, self.cast, self.iterations))
+            words.append(self.reconciler.begin(now))
         for sentence in filter(None, words):
             self.say(sentence)
 
-    def _tell(self, now: float) -> None:
-        """How the box is, for readers of the shared frame."""
-        roster = roster_lines(self.cast.link.states(now), self.wearing.neutral_of)
+    def _publish_health(self, now: float) -> None:
+        """Publish how the box is in the shared frame."""
+        roster = roster_lines(self.parts.link.states(now), self.wearing.neutral_of)
         age_s, locked = self._sensor_age_s(now), self._is_locked
         fallbacks = self.watch.fallbacks.happened(now)
-        self.sharing.tell(now, self.health, self.cast, self.iterations, age_s, locked, roster, fallbacks)
+        self.sharing.publish_health(now, self.health, self.reconciler, age_s, locked, roster, fallbacks)
 
-    def _tell_people(self, words: str) -> None:
-        """Say it, and note in the journal that it was said after this tick."""
+    def _say_and_note(self, words: str) -> None:
+        """Say it on the terminal, and note that in the journal."""
         self.say(words)
         if self.recorder is not None:
             self.recorder.event(SAID, self._now, words=words)
 
     def _sensor_age_s(self, now: float) -> float | None:
         """None: the show has no sensor."""
-        primary = self.cast.primary
-        return None if primary is None else self.cast.worn[primary][0].silent_s(now)
+        primary = self.parts.primary
+        return None if primary is None else self.parts.worn[primary][0].silent_s(now)
 
     @property
     def _is_locked(self) -> bool:
@@ -237,21 +250,21 @@ class Stage:
         """Once a second, after the frame has left."""
         times = self.iterations
         self.health.look(now)
-        news = self.watch.check(now, self.health, self.cast.link.states(now))
+        news = self.watch.check(now, self.health, self.parts.link.states(now))
         line = self.health.line(times.coding, times.interaction, self._sensor_age_s(now), self._is_locked)
         line = "  ".join(filter(None, (line, self.watch.fallbacks.line(now))))
         self.notifier.status(line)
         self.say(line)
-        self._tell(now)
+        self._publish_health(now)
         for sentence in news:
-            self._tell_people(sentence)
-        for imu_id, offsets in self.cast.link.take_profiles():
+            self._say_and_note(sentence)
+        for imu_id, offsets in self.parts.link.take_profiles():
             self.memory.keep_profile(imu_id, offsets)
 
     def _open_recorder(self) -> Recorder | None:
         """The flight recorder, unless there is no memory for it: that does not stop the show."""
         try:
-            return Recorder(self.sharing.noted, facts_of_run(self.show, list(self.cast.worn)))
+            return Recorder(self.sharing.noted, facts_of_run(self.show, list(self.parts.worn)))
         except OSError as error:
             self.say(
                 f"{self.sharing.noted}: no journal can be noted there ({error.strerror}). The dance goes on "

@@ -34,14 +34,14 @@ class SensorFit:
     lost, and carried over from where the joint was. Another wearable under the same name does not.
     """
 
-    def __init__(self, cast: StageParts, memory: SensorMemory, say: Callable[[str], None]) -> None:
-        self._link = cast.link
+    def __init__(self, parts: StageParts, memory: SensorMemory, say: Callable[[str], None]) -> None:
+        self._link = parts.link
         self._memory = memory
         self._say = say
         self._news: list[str] = []
         self._wearers = {
-            name: SensorBinding(name, [WornHand(joint, cast.mountings[joint.joint]) for joint in joints])
-            for name, joints in cast.worn.items()
+            name: SensorBinding(name, [WornHand(joint, parts.mountings[joint.joint]) for joint in joints])
+            for name, joints in parts.worn.items()
         }
         for wearer in self._wearers.values():
             for hand in wearer.hands:

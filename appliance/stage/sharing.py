@@ -1,4 +1,4 @@
-"""What the stage shares with the box's other processes: facts once, each frame, once a second its health."""
+"""What the stage shares with the box's other processes: facts once, every frame, its health once a second."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
+from appliance.stage.reconcile import Reconciler
 from appliance.stage.stage_error import StageError
 from appliance.stage.stage_parts import StageParts
 from appliance.stage.thermometer import Thermometer
@@ -65,10 +66,10 @@ class Sharing:
         self._thermometer = Thermometer()
         self.complaint = ""
 
-    def begin(self, cast: StageParts, facts: Facts, say: Callable[[str], None]) -> None:
+    def begin(self, parts: StageParts, facts: Facts, say: Callable[[str], None]) -> None:
         """From now on frames are shared, if the folder has room for them; without it, the dance goes on."""
         try:
-            cast.outputs.share(FrameWriter(self.folder, facts))
+            parts.outputs.share(FrameWriter(self.folder, facts))
         except OSError as error:
             self.complaint = (
                 f"{self.folder}: the frames cannot be shared ({error.strerror}). The dance goes on to all "
@@ -77,44 +78,45 @@ class Sharing:
             )
             say(self.complaint)
 
-    def tell(
+    def publish_health(
         self,
         now: float,
         health: Health,
-        cast: StageParts,
-        iterations: Iterations,
+        reconciler: Reconciler,
         sensor_age_s: float | None,
         locked: bool,
         sensors: Sequence[Sequence[Any]],
         fallbacks: Sequence[Sequence[Any]] = (),
     ) -> None:
-        """How the box is, after the frame has left; docs/outputs.md lists the keys.
+        """Publish how the box is, after the frame has left; docs/outputs.md lists the keys.
 
         `sensors`: a line of the roster for each; `fallbacks`: those that ever happened; `sensor_age_s`: None
         without a sensor, infinite if unheard.
         """
+        parts, iterations = reconciler.parts, reconciler.iterations
         told = health.snapshot(now)
         told |= {
-            "state": "dancing" if cast.motion.rate else "stopped",
+            "state": "dancing" if parts.motion.rate else "stopped",
             "sensor_age_s": None if sensor_age_s in (None, float("inf")) else sensor_age_s,
             "locked": locked,
             "coding": iterations.coding,
             "interaction": iterations.interaction,
-            "phrase": cast.motion.phrase,
-            "position_s": cast.motion.position_s,
-            "cue": cast.cue,
-            "let_go": [puppeteer.joint for puppeteer in cast.hands.puppeteers if not puppeteer.enabled],
+            "phrase": parts.motion.phrase,
+            "position_s": parts.motion.position_s,
+            "cue": reconciler.cue,
+            "applied": [reconciler.generation, reconciler.words],
+            "let_go": [puppeteer.joint for puppeteer in parts.hands.puppeteers if not puppeteer.enabled],
             "looked_at": now,
             "sensors": sensors,
             "temperature_c": self._thermometer.celsius(),
             "receivers": [
                 {"name": one.name, "sent": one.sent, "dropped": one.dropped, "error": one.last_error}
-                for one in cast.outputs.receivers
+                for one in parts.outputs.receivers
             ],
-            "complaints": cast.complaints,
+            "complaints": parts.complaints,
             "fallbacks": fallbacks,
         }
-        cast.outputs.publish_health(told)
+        parts.outputs.publish_health(told)
 
     def close(self) -> None:
         """Give the place back, after the outputs were closed."""

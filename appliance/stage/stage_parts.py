@@ -1,4 +1,4 @@
-"""The cast of a show: every part that a tick joins, made from a show bundle and a box file."""
+"""The parts of a stage: every part that a tick joins, made from a show bundle and a box file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,6 @@ from appliance.sensor.neutral import Mounting, joint_from_reading
 from appliance.sensor.state import restored_reading
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import ConfigError
-from appliance.show.cues import CueConfig
 from appliance.show.posistagenet import misfits
 from appliance.show.show import HandConfig, Show
 from appliance.stage.admission import Admission, admit
@@ -39,8 +38,7 @@ class StageParts:
     """Everything that dances, hears and speaks.
 
     `hand_places`: where the hands' joints stand among the moving ones; `worn`: which joints a sensor holds;
-    `mountings`: how it is worn for each of these joints; `complaints`: why sensors are not let in;
-    `cue`: the newest that was carried out, "" for none yet.
+    `mountings`: how it is worn for each of these joints; `complaints`: why sensors are not let in.
     """
 
     skeleton: Skeleton
@@ -49,7 +47,6 @@ class StageParts:
     blending: Blending
     grounding: Grounding
     hands: Hands
-    cues: dict[str, CueConfig]
     hand_places: list[int]
     worn: dict[str, list[WornSensor]]
     mountings: dict[str, Mounting]
@@ -57,7 +54,6 @@ class StageParts:
     link: SensorLink
     outputs: Outputs
     complaints: tuple[str, ...] = ()
-    cue: str = ""
     newest_primary: SensorReading | None = field(default=None)
 
     def hear(self, reading: SensorReading) -> None:
@@ -74,17 +70,15 @@ class StageParts:
             "blending": self.blending.state(),
             "grounding": self.grounding.state(),
             "hands": self.hands.state(),
-            "cue": self.cue,
             "newest_primary": self.newest_primary,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the cast of the same show did that gave this state."""
+        """Go on from a state that parts of the same show gave."""
         self.motion.restore(state["motion"])
         self.blending.restore(state["blending"])
         self.grounding.restore(state["grounding"])
         self.hands.restore(state["hands"])
-        self.cue = state["cue"]
         self.newest_primary = restored_reading(state["newest_primary"])
 
     def close(self) -> None:
@@ -127,7 +121,6 @@ def assemble(
         blending=Blending(len(puppet.joints), puppet.window, show.config.dancer.hop),
         grounding=Grounding(show.skeleton, floor),
         hands=Hands(puppeteers, puppet.joints, puppet.window),
-        cues={cue.name: cue for cue in show.config.cues},
         hand_places=[puppet.joints.index(hand.joint) for hand in show.config.hands],
         worn=worn,
         mountings=mountings,
@@ -138,12 +131,12 @@ def assemble(
     )
 
 
-def admission(cast: StageParts, show: Show, box: BoxConfig) -> Admission:
+def admission(parts: StageParts, show: Show, box: BoxConfig) -> Admission:
     """Measure the show's iterations on this machine with the first window and all hands of the show.
 
     Raises StageError where the network fails.
     """
-    dance = _dance(cast, show.network)
+    dance = _dance(parts, show.network)
     dancer = show.config.dancer
     with borrowed_priority(box.realtime.priority if box.realtime.enabled else None):
         return admit(
@@ -151,20 +144,20 @@ def admission(cast: StageParts, show: Show, box: BoxConfig) -> Admission:
         )
 
 
-def warm_up(cast: StageParts, show: Show, admitted: Admission) -> None:
+def warm_up(parts: StageParts, show: Show, admitted: Admission) -> None:
     """Let the network run once as the first tick will: its first run takes several times as long."""
-    _dance(cast, show.network)(admitted.coding, admitted.interaction)
+    _dance(parts, show.network)(admitted.coding, admitted.interaction)
 
 
-def _dance(cast: StageParts, network: Path) -> Callable[[int, int], object]:
+def _dance(parts: StageParts, network: Path) -> Callable[[int, int], object]:
     """Runs the puppet with the first window and all hands of the show; its poses go nowhere."""
-    window = cast.puppet.select(cast.motion.window()).copy()
-    mask, targets, weights = cast.hands.mask.copy(), cast.hands.targets, cast.hands.weights
-    mask[cast.hand_places] = True
+    window = parts.puppet.select(parts.motion.window()).copy()
+    mask, targets, weights = parts.hands.mask.copy(), parts.hands.targets, parts.hands.weights
+    mask[parts.hand_places] = True
 
     def dance(coding: int, interaction: int) -> object:
         try:
-            return cast.puppet.dance(window, mask, targets, weights, coding, interaction)
+            return parts.puppet.dance(window, mask, targets, weights, coding, interaction)
         except Exception as error:  # onnxruntime has a class of its own for every way to fail
             raise StageError(
                 f"{network}: the network fails at {coding} coding iterations ({str(error)[:200]}). "

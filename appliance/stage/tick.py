@@ -22,7 +22,7 @@ DRAIN, MOTION, HANDS, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
 
 
 class Tick:
-    """Runs the cast once a slot. Nothing here waits, logs, or allocates for the collector.
+    """Runs the stage's parts once a slot. Nothing here waits, logs, or allocates for the collector.
 
     A tick that starts so late that its frame could not leave in time does not dance: it sends the last pose
     again, marked late. The phrase stands still meanwhile, so nothing is jumped over and nothing is replayed.
@@ -31,18 +31,18 @@ class Tick:
 
     def __init__(
         self,
-        cast: StageParts,
+        parts: StageParts,
         wearing: SensorFit,
         iterations: Iterations,
         latest_start_s: float,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.cast = cast
+        self.parts = parts
         self.wearing = wearing
         self.iterations = iterations
         self.latest_start_s = latest_start_s
-        self.frame = JointFrame(len(cast.skeleton))
-        self.frame.pose[:] = cast.motion.window()[0]
+        self.frame = JointFrame(len(parts.skeleton))
+        self.frame.pose[:] = parts.motion.window()[0]
         self.network_failed = False
         self.readings: Sequence[SensorReading] = ()
         self.sections_ms: NDArray[np.float32] = np.zeros(len(SECTIONS), np.float32)
@@ -52,32 +52,32 @@ class Tick:
 
     def run(self, slot: Slot) -> None:
         """Everything from the sensors' datagrams to the receivers'."""
-        cast, frame, ends, now = self.cast, self.frame, self._section_ends, self._monotonic
+        parts, frame, ends, now = self.parts, self.frame, self._section_ends, self._monotonic
         frame.tick, frame.frame_time = slot.tick, slot.deadline
         frame.late = slot.lateness_s > self.latest_start_s
 
-        self.readings = cast.link.drain(slot.started)
+        self.readings = parts.link.drain(slot.started)
         for reading in self.readings:
             self.wearing.hear(reading)
-            cast.hear(reading)
+            parts.hear(reading)
         ends[DRAIN] = ends[MOTION] = ends[HANDS] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
 
         if not frame.late:
-            window = cast.puppet.select(cast.motion.window())
+            window = parts.puppet.select(parts.motion.window())
             ends[MOTION] = now()
-            cast.hands.pull(slot.started, window)
+            parts.hands.pull(slot.started, window)
             ends[HANDS] = now()
-            if cast.blending.is_due:
+            if parts.blending.is_due:
                 self._regenerate(window)
             ends[PUPPET] = now()
             if not self.network_failed:
-                frame.pose[:] = cast.motion.window()[0]
-                cast.puppet.restore(cast.blending.take(), frame.pose)
+                frame.pose[:] = parts.motion.window()[0]
+                parts.puppet.restore(parts.blending.take(), frame.pose)
             ends[BLEND] = now()
             self._stand()
             ends[FIGURE] = now()
 
-        cast.outputs.publish_frame(frame)
+        parts.outputs.publish_frame(frame)
         ends[SEND] = now()
 
     def warm_up(self) -> None:
@@ -86,19 +86,19 @@ class Tick:
         In 18 ms of pause the caches cool down: ten iterations of the default then took 1.45 ms (p50) and 2.1
         (p99), after this 1.1 and 1.5, against 0.87 and 1.3 back to back.
         """
-        cast, hands = self.cast, self.cast.hands
-        if cast.blending.is_due:
-            window = cast.puppet.select(cast.motion.window())
-            cast.puppet.dance(window, hands.mask, hands.targets, hands.weights, 1, 0)
+        parts, hands = self.parts, self.parts.hands
+        if parts.blending.is_due:
+            window = parts.puppet.select(parts.motion.window())
+            parts.puppet.dance(window, hands.mask, hands.targets, hands.weights, 1, 0)
 
     def after(self, slot: Slot) -> float:
         """What can wait until the frame has left: the motion moves on, sensors are answered and looked at,
         times are noted. The cost of what came before, in ms.
         """
         if not self.frame.late:
-            self.cast.motion.advance()
+            self.parts.motion.advance()
             self.iterations.advance()
-        self.cast.link.send_due(self._monotonic())
+        self.parts.link.send_due(self._monotonic())
         self.wearing.look(slot.started)
         begin = slot.started
         for section, end in enumerate(self._section_ends):
@@ -112,7 +112,7 @@ class Tick:
         """
         frame = self.frame
         return {
-            "cast": self.cast.state(),
+            "parts": self.parts.state(),
             "wearing": self.wearing.state(),
             "iterations": self.iterations.state(),
             "latest_start_s": self.latest_start_s,
@@ -124,7 +124,7 @@ class Tick:
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the tick of the same show did that gave this state."""
         frame = self.frame
-        self.cast.restore(state["cast"])
+        self.parts.restore(state["parts"])
         self.wearing.restore(state["wearing"])
         self.iterations.restore(state["iterations"])
         self.latest_start_s, self.network_failed = state["latest_start_s"], state["network_failed"]
@@ -134,21 +134,21 @@ class Tick:
 
     def _regenerate(self, window: NDArray[np.float32]) -> None:
         """Let the puppet dance a window and blend it in; the frame names the reading that went into it."""
-        cast, frame, hands, times = self.cast, self.frame, self.cast.hands, self.iterations
-        poses = cast.puppet.dance(
+        parts, frame, hands, times = self.parts, self.frame, self.parts.hands, self.iterations
+        poses = parts.puppet.dance(
             window, hands.mask, hands.targets, hands.weights, times.coding, times.interaction
         )
-        self.network_failed = cast.puppet.is_broken
+        self.network_failed = parts.puppet.is_broken
         if not self.network_failed:
-            cast.blending.add(poses)
-        if cast.newest_primary is not None:
-            frame.sensor_sequence = cast.newest_primary.sequence
-            frame.sensor_arrival = cast.newest_primary.arrival
+            parts.blending.add(poses)
+        if parts.newest_primary is not None:
+            frame.sensor_sequence = parts.newest_primary.sequence
+            frame.sensor_arrival = parts.newest_primary.arrival
 
     def _stand(self) -> None:
         """Put the pose on the floor and into the world."""
-        cast, frame, motion = self.cast, self.frame, self.cast.motion
-        figure = cast.grounding.stand(frame.pose, motion.roots()[0], motion.lift, motion.rest_heights)
+        parts, frame, motion = self.parts, self.frame, self.parts.motion
+        figure = parts.grounding.stand(frame.pose, motion.roots()[0], motion.lift, motion.rest_heights)
         frame.world[:] = figure.world
         frame.positions[:] = figure.positions
-        frame.root[:] = cast.grounding.root
+        frame.root[:] = parts.grounding.root

@@ -24,16 +24,16 @@ _FOREIGN = ("length", "magic", "version", "kind", "device", "tag", "old_session"
 class Watch:
     """Checks for silent sensors at each tick, for all else once a second, after the frame has left."""
 
-    def __init__(self, cast: StageParts, admission: Admission) -> None:
-        self._cast = cast
+    def __init__(self, parts: StageParts, admission: Admission) -> None:
+        self._parts = parts
         self.fallbacks = Fallbacks(rows.OF_THE_STAGE)
-        self._worn = [joints[0] for joints in cast.worn.values()]
+        self._worn = [joints[0] for joints in parts.worn.values()]
         self._silent = [False] * len(self._worn)
         self._dropped: dict[str, int] = {}
         self._ways: dict[str, str] = {}
         self._said: set[tuple[str, str]] = set()  # what is so, and was said
         self.fallbacks.set(rows.ITERATIONS_LOWERED.name, "" if admission.fits else admission.sentence())
-        self.fallbacks.set(rows.NOT_LET_IN.name, " ".join(cast.complaints))
+        self.fallbacks.set(rows.NOT_LET_IN.name, " ".join(parts.complaints))
 
     def count_silences(self, now: float) -> None:
         """At each tick: sensors that have just fallen silent. Some microseconds, without allocating."""
@@ -64,7 +64,10 @@ class Watch:
 
         now: monotonic seconds; sensors: as the link sees them at this moment.
         """
-        before, self._dropped = self._dropped, {one.name: one.dropped for one in self._cast.outputs.receivers}
+        before, self._dropped = (
+            self._dropped,
+            {one.name: one.dropped for one in self._parts.outputs.receivers},
+        )
         gone = {name for name, dropped in self._dropped.items() if dropped > before.get(name, 0)}
         self._update_fallbacks(now, health, bool(gone))
         return [
@@ -74,7 +77,7 @@ class Watch:
         ]
 
     def _update_fallbacks(self, now: float, health: Health, is_receiver_gone: bool) -> None:
-        every, counts = self.fallbacks, self._cast.link.counts
+        every, counts = self.fallbacks, self._parts.link.counts
         every.hold(rows.SENSOR_SILENT.name, any(self._silent))
         every.follow(rows.READING_REFUSED.name, counts.get("norm", 0), now)
         every.follow(rows.PACKET_REFUSED.name, sum(counts.get(one, 0) for one in _FOREIGN), now)
@@ -82,7 +85,7 @@ class Watch:
         every.follow(rows.TICK_SKIPPED.name, health.skipped, now)
         every.follow(rows.OVER_BUDGET.name, health.over_budget, now)
         every.follow(rows.NETWORK_FAILED.name, health.not_finite, now)
-        intakes = self._cast.link.intakes
+        intakes = self._parts.link.intakes
         cables = filter(None, (getattr(one, "trouble", None) for one in intakes))
         every.set(rows.CABLE_AWAY.name, " ".join(cables))
         is_absent = any(getattr(one, "address_is_absent", False) for one in intakes)
@@ -101,7 +104,7 @@ class Watch:
         name, way_before = sensor.name, self._ways.get(sensor.name)
         if sensor.state == "linked" and sensor.way and sensor.way != way_before:
             self._ways[name] = sensor.way
-            joints = ", ".join(puppeteer.joint for puppeteer in self._cast.worn.get(name, ()))
+            joints = ", ".join(puppeteer.joint for puppeteer in self._parts.worn.get(name, ()))
             no_joint = "no joint of this show"
             yield (
                 f"Sensor {name} now speaks by {sensor.way}. The dance goes on."
@@ -117,7 +120,7 @@ class Watch:
 
     def _silence_news(self, now: float, known: set[str]) -> Iterator[str]:
         """known: sensors that have a key; a revoked one is silent for good, and that was said."""
-        for name, joints in self._cast.worn.items():
+        for name, joints in self._parts.worn.items():
             silent_s = joints[0].silent_s(now)
             was_said = ("silent", name) in self._said
             is_silent = silent_s > SILENT_S and (was_said or (silent_s < math.inf and name in known))
@@ -130,7 +133,7 @@ class Watch:
 
     def _output_news(self, gone: set[str]) -> Iterator[str]:
         """What a person should know of the receivers, and of the network."""
-        for receiver in self._cast.outputs.receivers:
+        for receiver in self._parts.outputs.receivers:
             is_gone = receiver.name in gone
             if self._changes("gone", receiver.name, is_gone):
                 yield (
@@ -139,7 +142,7 @@ class Watch:
                     if is_gone
                     else f"Receiver {receiver.name} gets the dance again."
                 )
-        is_broken = self._cast.puppet.is_broken
+        is_broken = self._parts.puppet.is_broken
         if self._changes("network", "", is_broken):
             yield (
                 "The network gives poses that are not numbers. The dancer holds the last good pose. "

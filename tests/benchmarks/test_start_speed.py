@@ -6,16 +6,19 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
+from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.bundle import default_show_path
 from appliance.show.show import load_show
 from appliance.stage.iterations import Iterations
+from appliance.stage.reconcile import Reconciler
 from appliance.stage.resume import Resumption
 from appliance.stage.stage_parts import assemble
 from hw_sim.osc_receiver import OscReceiver
@@ -23,6 +26,7 @@ from hw_sim.peers import HOST
 
 GROUP = "bunraku play, the default show: start of the process -> first frame"
 NOTE_GROUP = "the place of the dance, noted after each frame"
+READ_GROUP = "the show state, read at each tick"
 ROUNDS = 7
 _PATIENCE_S = 30.0
 
@@ -101,7 +105,20 @@ def test_the_return_by_the_whole_parser(starts: Callable[..., Starts], measured:
 def test_noting_the_place(tmp_path: Path, measured: Callable[..., Any]) -> None:
     box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
     parts = assemble(load_show(default_show_path()), box)
-    resuming, iterations = Resumption("A show", tmp_path, None, "always"), Iterations(10, 9, 20)
-    measured("noting it", NOTE_GROUP, reference=True)(lambda: resuming.note(parts, iterations, 1))
+    resuming = Resumption("A show", tmp_path, None, "always")
+    reconciler = Reconciler("A show", parts, Iterations(10, 9, 20), ShowStateReader(tmp_path))
+    measured("noting it", NOTE_GROUP, reference=True)(lambda: resuming.write_checkpoint(reconciler, 1))
     resuming.close()
+    parts.close()
+
+
+def test_reading_the_show_state(tmp_path: Path, measured: Callable[..., Any]) -> None:
+    """Once a tick: nothing new is declared in nearly all of them."""
+    box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+    parts = assemble(load_show(default_show_path()), box)
+    with closing(ShowStateWriter(tmp_path)) as writer, closing(ShowStateReader(tmp_path)) as reader:
+        reconciler = Reconciler("A show", parts, Iterations(10, 9, 20), reader)
+        writer.write(ShowState(show="A show").with_dance(1.0, {}))
+        assert not reconciler.pending(1.0) and reconciler.generation
+        measured("reading it", READ_GROUP, reference=True)(lambda: reconciler.pending(1.0))
     parts.close()

@@ -63,7 +63,7 @@ class ControlClient:
         }
         self.box_file.write_text(yaml.safe_dump(settings))
         self.stage.__enter__()
-        until(lambda: self.control.process.desk.status(0, time.monotonic()).state == "dancing")
+        until(lambda: self.control.process.handler.status(0, time.monotonic()).state == "dancing")
 
     @property
     def obeyed(self) -> list[Order]:
@@ -215,10 +215,10 @@ def test_commands_reach_the_box_and_its_answer_is_printed(
 def test_a_stage_that_was_held_up_in_the_middle_of_a_command_is_believed_in_the_end(
     box: ControlClient,
 ) -> None:
-    desk = box.control.process.desk
+    handler = box.control.process.handler
 
     def late(order: Order) -> tuple[bool, str]:
-        until(lambda: desk.refused == 1)  # by then it was said that the stage does not answer
+        until(lambda: handler.refused == 1)  # by then it was said that the stage does not answer
         return True, "It is."
 
     box.stage.answer = late
@@ -448,14 +448,14 @@ def test_watching_goes_on_until_it_is_ended(box: ControlClient) -> None:
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     seen = 0
     ends_at = time.monotonic() + 60.0
-    tell = box.control.process.desk._tell
+    tell = box.control.process.handler._send
 
     def counted(asker: Address, message: Message) -> None:
         nonlocal seen
         seen += message[0] == "/sensors/end"
         tell(asker, message)
 
-    box.control.process.desk._tell = counted
+    box.control.process.handler._send = counted
     while seen < 3:
         assert time.monotonic() < ends_at
         time.sleep(0.01)

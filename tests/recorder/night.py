@@ -6,18 +6,23 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from appliance.box.clock import TICK_S, Slot
+from appliance.box.show_state import ShowState
 from appliance.keeper.journal import MirroredJournal
 from appliance.keeper.mirror import Mirror
 from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, facts_of_run
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import load_show
+from appliance.show_control.command import Command
 from appliance.show_control.orders import Order
+from appliance.show_control.show_state_commands import DECLARATIONS
 from appliance.stage.carry_out import carry_out
 from appliance.stage.iterations import Iterations
+from appliance.stage.reconcile import Reconciler
 from appliance.stage.recorder import Recorder
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
+from appliance.stage.sharing import facts_of
 from appliance.stage.stage_parts import assemble
 from appliance.stage.tick import Tick
 
@@ -31,11 +36,14 @@ class Night:
     def __init__(self, show: Path, runtime: Path, begins_at: float = 1000.0) -> None:
         runtime.mkdir(mode=0o700, exist_ok=True, parents=True)
         self.runtime, self.show, self.said = runtime, load_show(show), list[str]()
-        self.cast = assemble(self.show, BOX)
-        self.heard = self.cast.link = _Heard()
-        self.wearing = SensorFit(self.cast, SensorMemory(None, self.said.append), self.said.append)
-        self.tick = Tick(self.cast, self.wearing, Iterations(3, 2, 10), LATEST_START_S)
-        self.recorder = Recorder(runtime, facts_of_run(self.show, list(self.cast.worn)))
+        self.parts = assemble(self.show, BOX)
+        self.heard = self.parts.link = _Heard()
+        self.wearing = SensorFit(self.parts, SensorMemory(None, self.said.append), self.said.append)
+        self.tick = Tick(self.parts, self.wearing, Iterations(3, 2, 10), LATEST_START_S)
+        self._declared = _Declared(self.show.config.name)
+        name, iterations = self.show.config.name, self.tick.iterations
+        self.reconciler = Reconciler(name, self.parts, iterations, self._declared)
+        self.recorder = Recorder(runtime, facts_of_run(self.show, list(self.parts.worn)))
         self.slot = Slot(-1, begins_at, begins_at)
         self.recorder.keyframe(self.tick.state())
 
@@ -57,10 +65,19 @@ class Night:
 
     def order(self, name: str, *values: float, text: str = "") -> tuple[bool, str]:
         """What show control asks for, after the last tick."""
-        now, rate = self.slot.started, self.show.config.motion.rate
-        order = Order(name, tuple(values), text)
-        done, words = carry_out(order, self.cast, self.tick.iterations, self.wearing, rate, now)
-        asked = {"name": name, "values": order.values, "text": text}
+        return self._carry_out(Order(name, tuple(values), text), self.slot.started)
+
+    def command(self, address: str, *values: float, text: str = "") -> None:
+        """What show control declares at a command; the dance follows after the last tick."""
+        now, facts = self.slot.started, facts_of(self.show, None, self.tick.iterations, 0.0)
+        command = Command(address, values, text)
+        self._declared.now, _ = DECLARATIONS[address](self._declared.now, command, facts, now)
+        for order in self.reconciler.pending(now):
+            self._carry_out(order, now)
+
+    def _carry_out(self, order: Order, now: float) -> tuple[bool, str]:
+        done, words = carry_out(order, self.parts, self.tick.iterations, self.wearing, now)
+        asked = {"name": order.name, "values": order.values, "text": order.text}
         self.recorder.event(ORDER, now, order=asked, done=done, words=words)
         return done, words
 
@@ -75,7 +92,7 @@ class Night:
 
     def _flags(self) -> int:
         flags = self.tick.frame.late * (LATE | RESENT) | self.tick.network_failed * NOT_FINITE
-        return flags | self.cast.motion.jumped * JUMPED
+        return flags | self.parts.motion.jumped * JUMPED
 
 
 def reading(
@@ -88,6 +105,16 @@ def reading(
         *(boot_nonce, taps),
         wearable=wearable,
     )
+
+
+class _Declared:
+    """The show state as the test declares it."""
+
+    def __init__(self, show: str) -> None:
+        self.now = ShowState(show=show)
+
+    def read(self) -> ShowState:
+        return self.now
 
 
 class _Heard(SensorLink):

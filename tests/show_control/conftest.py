@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from appliance.sensor.keys import create_keys
-from appliance.show_control import order_dispatch as errands
+from appliance.show_control import order_dispatch
 from tests.show_control.doubles import Asker, ControlInThread, StageDouble
 
 
@@ -34,7 +34,7 @@ def stage(folder: Path) -> Iterator[StageDouble]:
 @pytest.fixture
 def control(folder: Path, key_file: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ControlInThread]:
     """Its orders live for as long as a busy machine may hold up a double; test_orders has the real time."""
-    monkeypatch.setattr(errands, "PATIENCE_S", 15.0)
+    monkeypatch.setattr(order_dispatch, "PATIENCE_S", 15.0)
     control = ControlInThread(folder, key_file)
     yield control
     control.close()

@@ -18,6 +18,7 @@ from typing import Any
 from pythonosc.osc_message import OscMessage
 
 from appliance.box.notify import Notifier
+from appliance.box.show_state import ShowStateReader
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show_control.orders import Order, OrderInbox, Place
@@ -31,7 +32,16 @@ HOST = "127.0.0.1"
 PATIENCE_S = 20.0
 CUES: tuple[dict[str, Any], ...] = (
     {"name": "1", "look": "lines", "lights": None, "master": None, "fade_s": 0.0},
-    {"name": "storm", "look": "ink", "lights": "cold", "master": 0.5, "fade_s": 4.0},
+    {
+        "name": "storm",
+        "look": "ink",
+        "lights": "cold",
+        "master": 0.5,
+        "fade_s": 4.0,
+        "phrase": "quiet",
+        "iterations": [12, 11],
+        "hands": [],
+    },
 )
 
 
@@ -68,8 +78,9 @@ class Clock:
 
 
 class StageDouble:
-    """A context. `dances`: whether frames come; `obeys`: whether it takes orders; `answer`: what it makes of
-    one. `orders` are those that it took."""
+    """A context. `dances`: whether frames come; `obeys`: whether it takes orders and follows the show state;
+    `answer`: what it makes of an order; `remark`: what it says about a change; `orders`: those that it took.
+    """
 
     def __init__(self, folder: Path, show: Facts | None = None) -> None:
         self.dances = True
@@ -77,6 +88,9 @@ class StageDouble:
         self.answer: Callable[[Order], tuple[bool, str]] = lambda order: (True, f"{order.name} it is.")
         self.orders: list[Order] = []
         self.told: dict[str, Any] = {"state": "dancing", "rate_hz": 50.0}
+        self.remark = ""
+        self._show_state = ShowStateReader(folder)
+        self._telling = threading.Lock()
         self._writer = FrameWriter(folder, show or facts())
         self._inbox = OrderInbox(folder, "stage")
         self._frame = JointFrame(len(FIGURE))
@@ -96,16 +110,21 @@ class StageDouble:
         self._thread.join()
         self._inbox.close()
         self._writer.close()
+        self._show_state.close()
 
     def tell(self, **health: Any) -> None:
         """Say this about itself from now on."""
-        self.told |= health
-        self._writer.write_health(self.told)
+        with self._telling:
+            self.told |= health
+            self._writer.write_health(self.told)
 
     def _live(self) -> None:
         while not self._is_over.wait(0.005):
             if self.dances:
                 self._share()
+            generation = self._show_state.read().generation
+            if self.obeys and generation != self.told.get("applied", [0])[0]:
+                self.tell(applied=[generation, self.remark])
             while self.obeys and (order := self._inbox.take()) is not None:
                 self.orders.append(order)
                 self._inbox.answer(order, *self.answer(order))

@@ -30,26 +30,28 @@ def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
     def tell(to: Address, message: Message) -> None:
         told.append(len(datagram(message)))
 
-    errands = OrderDispatch(sender)
-    desk = CommandHandler(ShowState(), StageObserver(folder), errands, KeyFile(key_file), tell, writer.write)
+    dispatch = OrderDispatch(sender)
+    handler = CommandHandler(
+        ShowState(), StageObserver(folder), dispatch, KeyFile(key_file), tell, writer.write
+    )
     reader = ShowStateReader(folder)
     now = time.monotonic()
     for number, received in enumerate(datagrams(3, COUNT)):
-        desk.hear(received[:LARGEST_DATAGRAM], SOMEBODY, now + number / 1000)
+        handler.handle_datagram(received[:LARGEST_DATAGRAM], SOMEBODY, now + number / 1000)
         if number % 100 == 0:
             now = time.monotonic() - number / 1000
-            errands.go_on(now + number / 1000)
-            desk.look(now + number / 1000)
-        assert 0.0 <= desk.show_state.level(now) <= 1.0
-    assert all(len(way.waiting) <= WAITING for way in errands._ways.values())
+            dispatch.exchange(now + number / 1000)
+            handler.follow_stage(now + number / 1000)
+        assert 0.0 <= handler.show_state.level(now) <= 1.0
+    assert all(len(way.waiting) <= WAITING for way in dispatch._ways.values())
     show_state = reader.read()
-    assert show_state == desk.show_state
+    assert show_state == handler.show_state
     assert all(
         math.isfinite(value) for value in (show_state.master, show_state.going_since, show_state.look_since)
     )
     assert 0.0 <= show_state.master <= 1.0
     assert show_state.look in ("", "plaster", "lines", "ink", "cloud")
-    assert desk.refused > COUNT / 2
+    assert handler.refused > COUNT / 2
     assert len(told) > COUNT / 2
     assert max(told) < 1500  # an answer is no weapon
     assert stage.orders  # some of them were commands

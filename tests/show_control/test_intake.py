@@ -12,9 +12,6 @@ import pytest
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.show_control.intake import URGENT
 from appliance.show_control.intake import WAITING as DATAGRAMS_WAITING
-from appliance.show_control.order_dispatch import AT_ONCE, EVERY_S
-from appliance.show_control.order_dispatch import WAITING as ORDERS_WAITING
-from appliance.show_control.orders import OrderInbox
 from appliance.show_control.packet import messages_in
 from appliance.show_control.port import LARGEST_DATAGRAM, open_port
 from appliance.show_control.run import ControlProcess
@@ -81,7 +78,7 @@ def test_what_is_urgent_is_answered_first_however_much_has_come_before_it(
     desk.tell("/stop", 1.0)
     desk.tell("/blackout", 1)
     process.turn()
-    show_state = process.desk.show_state
+    show_state = process.handler.show_state
     assert (show_state.panic, show_state.going, show_state.blackout) == (False, False, True)
     assert heard(desk)[:4] == ["/panic", "/go", "/stop", "/blackout"]
 
@@ -95,9 +92,36 @@ def test_what_is_urgent_keeps_its_order_and_the_rest_follows_in_its_own(
         desk.tell(address, *((1,) if address in ("/blackout", "/master") else ()))
     for _ in sent:
         process.turn()
-    urgent = [one for one in sent if one in URGENT]
+    urgent = panic_first([one for one in sent if one in URGENT])
     rest = ["/pong" if one == "/ping" else one for one in sent if one not in URGENT]
     assert heard(desk) == urgent + rest, f"seed {seed}"
+
+
+def panic_first(sent: list[str]) -> list[str]:
+    """Each /panic before all that is urgent but an earlier /go."""
+    done: list[str] = []
+    waiting: list[str] = []
+    for one in sent:
+        (done if one == "/panic" and "/go" not in waiting else waiting).append(one)
+    return done + waiting
+
+
+@pytest.mark.parametrize(
+    ("before", "answered"),
+    [
+        (["/stop", "/blackout"], ["/panic", "/stop", "/blackout"]),
+        (["/stop", "/go"], ["/stop", "/go", "/panic"]),
+    ],
+)
+def test_panic_comes_before_what_is_urgent_but_for_a_go_that_would_lift_it(
+    process: ControlProcess, desk: Asker, before: list[str], answered: list[str]
+) -> None:
+    for address in before:
+        desk.tell(address, 1)
+    desk.tell("/panic")
+    process.turn()
+    assert heard(desk) == answered
+    assert process.handler.show_state.panic
 
 
 def test_a_bundle_with_an_urgent_message_goes_first_as_a_whole(process: ControlProcess, desk: Asker) -> None:
@@ -111,14 +135,14 @@ def test_a_bundle_with_an_urgent_message_goes_first_as_a_whole(process: ControlP
 def test_what_comes_while_others_are_carried_out_goes_before_the_next_of_them(
     process: ControlProcess, desk: Asker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    hear = process.desk.hear
+    hear = process.handler.handle_datagram
 
     def slowly(received: bytes, *others: object) -> None:
         hear(received, *others)  # type: ignore[arg-type]
         if received == message("/ping"):
             desk.tell("/panic")
 
-    monkeypatch.setattr(process.desk, "hear", slowly)
+    monkeypatch.setattr(process.handler, "handle_datagram", slowly)
     for address in ("/ping", "/status", "/status"):
         desk.tell(address)
     process.turn()
@@ -135,14 +159,14 @@ def test_of_too_many_the_oldest_give_way_are_counted_and_the_status_says_so(
     process.turn()
     answers = heard(desk)
     assert answers[0] == "/panic"
-    [dropped] = [one for _, one in process.sight.fallbacks(NOW) if one.name == "commands-dropped"]
+    [dropped] = [one for _, one in process.observer.fallbacks(NOW) if one.name == "commands-dropped"]
     assert (dropped.times, dropped.active) == (SENT + 1, True)
     for _ in range(DATAGRAMS_WAITING):
         process.turn()
         answers += heard(desk)
     assert answers.count("/nonsense") == DATAGRAMS_WAITING - 1
     assert "/bunraku/status" in answers
-    assert process.desk.status(0, NOW).fallbacks == 1
+    assert process.handler.status(0, NOW).fallbacks == 1
 
 
 def test_what_the_kernel_dropped_is_counted_too(process: ControlProcess, desk: Asker) -> None:
@@ -150,31 +174,5 @@ def test_what_the_kernel_dropped_is_counted_too(process: ControlProcess, desk: A
         for _ in range(1000):
             desk.tell("/ping")
     process.turn()
-    [dropped] = [one for _, one in process.sight.fallbacks(NOW) if one.name == "commands-dropped"]
+    [dropped] = [one for _, one in process.observer.fallbacks(NOW) if one.name == "commands-dropped"]
     assert dropped.times >= process.port.dropped()
-
-
-def test_a_show_that_goes_on_is_the_stages_next_order_however_many_wait(
-    folder: Path, process: ControlProcess, desk: Asker, clock: Clock
-) -> None:
-    with closing(OrderInbox(folder, "stage", clock)) as inbox:
-        desk.tell("/stop", 0)
-        process.turn()
-        assert names(inbox) == ["stop"]
-        for _ in range(ORDERS_WAITING + SENT):
-            desk.tell("/player/jump", 1.0)
-        for _ in range(ORDERS_WAITING + SENT):
-            process.turn()
-        desk.tell("/go")
-        for _ in range(ORDERS_WAITING + SENT):
-            desk.tell("/player/jump", 2.0)
-        for _ in range(ORDERS_WAITING + SENT):
-            process.turn()
-        assert names(inbox) == ["jump"] * (AT_ONCE - 1)
-        clock.now += EVERY_S
-        process.turn()
-        assert names(inbox) == ["start"] + ["jump"] * (AT_ONCE - 1)
-
-
-def names(inbox: OrderInbox) -> list[str]:
-    return [order.name for order in iter(inbox.take, None)]

@@ -53,12 +53,11 @@ def inbox(folder: Path, clock: Clock) -> Iterator[OrderInbox]:
 @pytest.mark.parametrize(
     "order",
     [
-        Order("start"),
+        Order("heading"),
         Order("jump", (12.5,), ask=7, until=NOW),
         Order("hold", (0.0, 1.0, 0.0, 1.5), "lShldr", quiet=True),
-        Order("hold", (0.0, 1.0, 0.0, 1.5), 3),
         Order("reload", keys={"left-wrist": KEY}),
-        Order("cue", text="Größe 'x' \" \\ 雪"),
+        Order("strobe", text="Größe 'x' \" \\ 雪"),
     ],
 )
 def test_an_order_arrives_whole(sender: OrderSender, inbox: OrderInbox, order: Order) -> None:
@@ -74,11 +73,11 @@ def test_an_order_arrives_whole(sender: OrderSender, inbox: OrderInbox, order: O
 
 
 def test_an_answer_comes_back_to_who_asked(sender: OrderSender, inbox: OrderInbox) -> None:
-    inbox.answer(Order("start"), False, "nobody waits")
+    inbox.answer(Order("heading"), False, "nobody waits")
     assert sender.take() is None
-    inbox.answer(Order("start", ask=1, quiet=True), True, "done")
-    inbox.answer(Order("start", ask=2, quiet=True), False, "no")
-    inbox.answer(Order("start", ask=3), True, "yes")
+    inbox.answer(Order("heading", ask=1, quiet=True), True, "done")
+    inbox.answer(Order("heading", ask=2, quiet=True), False, "no")
+    inbox.answer(Order("heading", ask=3), True, "yes")
     assert [sender.take() for _ in range(4)] == [
         Answer(1, True, "done"),
         Answer(2, False, "no"),
@@ -90,10 +89,10 @@ def test_an_answer_comes_back_to_who_asked(sender: OrderSender, inbox: OrderInbo
 def test_what_its_asker_no_longer_waits_for_is_not_done(
     sender: OrderSender, inbox: OrderInbox, clock: Clock
 ) -> None:
-    sender.send("stage", Order("stop", until=NOW))
-    sender.send("stage", Order("start", until=NOW + 1.0))
+    sender.send("stage", Order("neutral", until=NOW))
+    sender.send("stage", Order("heading", until=NOW + 1.0))
     clock.now += 0.5
-    assert inbox.take() == Order("start")
+    assert inbox.take() == Order("heading")
     assert inbox.take() is None
 
 
@@ -121,8 +120,8 @@ def test_what_is_no_order_is_passed_over(folder: Path, inbox: OrderInbox, datagr
             somebody.sendto(datagram, f"/proc/self/fd/{descriptor}/stage.sock")
             os.close(descriptor)
     sender = OrderSender(folder)
-    assert sender.send("stage", Order("start")) == "sent"
-    assert inbox.take() == Order("start")
+    assert sender.send("stage", Order("heading")) == "sent"
+    assert inbox.take() == Order("heading")
     sender.close()
 
 
@@ -155,13 +154,13 @@ def test_who_was_killed_leaves_a_socket_that_the_next_one_takes_over(
     killed.send_signal(signal.SIGKILL)
     killed.wait()
     assert (folder / "stage.sock").exists()
-    assert sender.send("stage", Order("start")) == "absent"
+    assert sender.send("stage", Order("heading")) == "absent"
     inbox = OrderInbox(folder, "stage")
-    assert sender.send("stage", Order("start")) == "sent"
+    assert sender.send("stage", Order("heading")) == "sent"
     successor = OrderInbox(folder, "stage")
     inbox.close()  # the first one leaves its successor's socket alone
-    assert sender.send("stage", Order("stop")) == "sent"
-    assert successor.take() == Order("stop")
+    assert sender.send("stage", Order("neutral")) == "sent"
+    assert successor.take() == Order("neutral")
     successor.close()
     assert not (folder / "stage.sock").exists()
 
@@ -170,8 +169,8 @@ def test_a_folder_with_a_long_name_will_do(tmp_path: Path) -> None:
     deep = tmp_path / ("a" * 100) / ("b" * 100)
     deep.mkdir(parents=True)
     inbox, sender = OrderInbox(deep, "stage"), OrderSender(deep)
-    assert sender.send("stage", Order("start")) == "sent"
-    assert inbox.take() == Order("start")
+    assert sender.send("stage", Order("heading")) == "sent"
+    assert inbox.take() == Order("heading")
     inbox.close()
     sender.close()
 
@@ -182,7 +181,7 @@ def test_without_a_place_for_the_socket_it_says_so(tmp_path: Path) -> None:
 
 
 class Heard:
-    """What came of errands: whether it was done, in words."""
+    """What came of dispatch: whether it was done, in words."""
 
     def __init__(self) -> None:
         self.all: list[tuple[bool, str]] = []
@@ -194,9 +193,9 @@ class Heard:
 def test_a_flood_reaches_the_stage_at_four_a_tick_and_the_oldest_gives_way(
     sender: OrderSender, inbox: OrderInbox
 ) -> None:
-    errands, heard = OrderDispatch(sender), Heard()
+    dispatch, heard = OrderDispatch(sender), Heard()
     for number in range(500):
-        errands.begin("stage", Order("jump", (float(number),), quiet=True), NOW, heard)
+        dispatch.dispatch_order("stage", Order("jump", (float(number),), quiet=True), NOW, heard)
     taken = []
     for turn in range(1, 30):
         got = []
@@ -204,7 +203,7 @@ def test_a_flood_reaches_the_stage_at_four_a_tick_and_the_oldest_gives_way(
             got.append(order.values[0])
         assert len(got) <= AT_ONCE
         taken += got
-        errands.go_on(NOW + turn * EVERY_S)
+        dispatch.exchange(NOW + turn * EVERY_S)
     assert taken[:AT_ONCE] == [0.0, 1.0, 2.0, 3.0]
     assert taken[AT_ONCE:] == [float(number) for number in range(500 - WAITING, 500)]
     assert len(heard.all) == 500 - WAITING - AT_ONCE
@@ -214,33 +213,33 @@ def test_a_flood_reaches_the_stage_at_four_a_tick_and_the_oldest_gives_way(
 def test_a_stage_that_does_not_answer_is_told_after_half_a_second_and_once(
     sender: OrderSender, inbox: OrderInbox, clock: Clock
 ) -> None:
-    errands, heard = OrderDispatch(sender), Heard()
-    errands.begin("stage", Order("cue", text="storm"), NOW, heard)
-    errands.go_on(NOW + PATIENCE_S + ANSWER_S)
+    dispatch, heard = OrderDispatch(sender), Heard()
+    dispatch.dispatch_order("stage", Order("strobe", text="storm"), NOW, heard)
+    dispatch.exchange(NOW + PATIENCE_S + ANSWER_S)
     assert heard.all == []
-    assert errands.due(NOW) == pytest.approx(NOW + PATIENCE_S + ANSWER_S)
-    errands.go_on(NOW + PATIENCE_S + ANSWER_S + 0.01)
+    assert dispatch.due(NOW) == pytest.approx(NOW + PATIENCE_S + ANSWER_S)
+    dispatch.exchange(NOW + PATIENCE_S + ANSWER_S + 0.01)
     [(done, words)] = heard.all
     assert not done
     assert "The stage does not answer, and nothing is changed" in words
-    assert errands.due(NOW) == math.inf
+    assert dispatch.due(NOW) == math.inf
     clock.now += PATIENCE_S + 0.02
     assert inbox.take() is None  # as it was told
-    errands.go_on(NOW + 1.0)
+    dispatch.exchange(NOW + 1.0)
     assert len(heard.all) == 1
 
 
 def test_what_is_carried_out_at_the_last_moment_is_told_as_done(
     sender: OrderSender, inbox: OrderInbox, clock: Clock
 ) -> None:
-    errands, heard = OrderDispatch(sender), Heard()
-    errands.begin("stage", Order("cue", text="storm"), NOW, heard)
+    dispatch, heard = OrderDispatch(sender), Heard()
+    dispatch.dispatch_order("stage", Order("strobe", text="storm"), NOW, heard)
     clock.now += PATIENCE_S
     order = inbox.take()
     assert order is not None
-    errands.go_on(clock.now + 0.02)  # before the answer
+    dispatch.exchange(clock.now + 0.02)  # before the answer
     inbox.answer(order, True, "Cue storm.")
-    errands.go_on(clock.now + 0.03)
+    dispatch.exchange(clock.now + 0.03)
     assert heard.all == [(True, "Cue storm.")]
 
 
@@ -263,17 +262,17 @@ def test_what_was_told_as_not_done_is_corrected_when_it_was_done_after_all(
     corrected: list[tuple[bool, str]],
 ) -> None:
     """The stage was held up in the middle of the order, which it had taken in time."""
-    errands, heard = OrderDispatch(sender), Heard()
-    errands.begin("stage", Order("cue", text="storm", quiet=quiet), NOW, heard)
+    dispatch, heard = OrderDispatch(sender), Heard()
+    dispatch.dispatch_order("stage", Order("strobe", text="storm", quiet=quiet), NOW, heard)
     order = inbox.take()
     assert order is not None
     for now in (order.until + ANSWER_S + 0.01, order.until + late_s - 0.01):
-        errands.go_on(now)
+        dispatch.exchange(now)
     [(told, words)] = heard.all
     assert not told and "does not answer" in words
     for _ in range(2):
         inbox.answer(order, done, "Cue storm.")
-        errands.go_on(order.until + late_s)
+        dispatch.exchange(order.until + late_s)
     assert heard.all[1:] == corrected
 
 
@@ -283,54 +282,54 @@ def test_an_answer_to_a_show_control_that_died_is_not_taken_for_one_to_the_next(
     orders, heard = [], Heard()
     for _ in range(2):
         sender = OrderSender(folder)
-        errands = OrderDispatch(sender)
-        errands.begin("stage", Order("cue", text="storm"), NOW, heard)
+        dispatch = OrderDispatch(sender)
+        dispatch.dispatch_order("stage", Order("strobe", text="storm"), NOW, heard)
         orders.append(inbox.take())
         if len(orders) == 1:
             sender.close()
     before, now = orders
     assert before is not None and now is not None
     inbox.answer(before, True, "what the first one asked for")
-    errands.go_on(NOW)
+    dispatch.exchange(NOW)
     assert heard.all == []
     inbox.answer(now, True, "Cue storm.")
-    errands.go_on(NOW)
+    dispatch.exchange(NOW)
     assert heard.all == [(True, "Cue storm.")]
     sender.close()
 
 
 def test_what_waits_for_a_full_socket_is_told_too(sender: OrderSender, inbox: OrderInbox) -> None:
-    while sender.send("stage", Order("start", until=NOW)) == "sent":
+    while sender.send("stage", Order("heading", until=NOW)) == "sent":
         pass
-    errands, heard = OrderDispatch(sender), Heard()
-    errands.begin("stage", Order("start"), NOW, heard)
-    errands.go_on(NOW + PATIENCE_S + 0.1)
+    dispatch, heard = OrderDispatch(sender), Heard()
+    dispatch.dispatch_order("stage", Order("heading"), NOW, heard)
+    dispatch.exchange(NOW + PATIENCE_S + 0.1)
     assert [done for done, _ in heard.all] == [False]
     assert "does not answer" in heard.all[0][1]
 
 
 def test_of_quiet_orders_refusals_and_silence_are_told_alone(sender: OrderSender, inbox: OrderInbox) -> None:
-    errands, heard, quiet = OrderDispatch(sender), Heard(), Heard()
-    errands.begin("stage", Order("cue", text="storm"), NOW, heard)
-    errands.begin("stage", Order("rate", (1.0,), quiet=True), NOW, quiet)
-    errands.begin("stage", Order("rate", (9.0,), quiet=True), NOW, quiet)
-    errands.begin("stage", Order("jump", (1.0,), quiet=True), NOW, quiet)
+    dispatch, heard, quiet = OrderDispatch(sender), Heard(), Heard()
+    dispatch.dispatch_order("stage", Order("strobe", text="storm"), NOW, heard)
+    dispatch.dispatch_order("stage", Order("jump", (1.0,), quiet=True), NOW, quiet)
+    dispatch.dispatch_order("stage", Order("jump", (9.0,), quiet=True), NOW, quiet)
+    dispatch.dispatch_order("stage", Order("jump", (1.0,), quiet=True), NOW, quiet)
     for done in (True, True, False):
         order = inbox.take()
         assert order is not None
         inbox.answer(order, done, f"{order.name} {done}")
-    until(lambda: (errands.go_on(NOW), bool(quiet.all))[1])
-    errands.go_on(NOW + 1.0)
-    assert heard.all == [(True, "cue True")]
+    until(lambda: (dispatch.exchange(NOW), bool(quiet.all))[1])
+    dispatch.exchange(NOW + 1.0)
+    assert heard.all == [(True, "strobe True")]
     refused, silent = quiet.all
-    assert refused == (False, "rate False")
+    assert refused == (False, "jump False")
     assert not silent[0] and "does not answer" in silent[1]
 
 
 def test_without_anybody_there_it_is_told_at_once(sender: OrderSender) -> None:
-    errands, heard = OrderDispatch(sender), Heard()
+    dispatch, heard = OrderDispatch(sender), Heard()
     for place in ("stage", "projector", "lights"):
-        errands.begin(place, Order("x"), NOW, heard)
+        dispatch.dispatch_order(place, Order("x"), NOW, heard)
     assert [done for done, _ in heard.all] == [False] * 3
     for (_, words), cure in zip(
         heard.all, ("bunraku play", "bunraku project", "bunraku lights"), strict=True

@@ -117,7 +117,7 @@ def test_over_a_network_the_listed_are_heard_and_strangers_change_nothing(
         for _ in range(50):
             asker.tell("/panic")
         until(lambda: control.process.port.strangers == 50 or asker.hear(0.0) is not None)
-        assert control.process.desk.show_state.panic == may
+        assert control.process.handler.show_state.panic == may
         assert control.process.port.strangers == (0 if may else 50)
         until(lambda: may or bool(control.said))
         strangers = ["10.77.0.2" in words for words in control.said if "Panic" not in words]

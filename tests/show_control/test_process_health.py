@@ -58,7 +58,7 @@ def test_lights_projector_and_keeper_that_die_are_counted(folder: Path) -> None:
         assert told(processes, 20.0) == {f"{who}-died": (who, 1, False)}
         second.end(21.0)
         second.close()
-        assert told(processes, 90.0) == {f"{who}-died": (who, 1, False)}, "who has ended is not late"
+        assert told(processes, 90.0) == {f"{who}-died": (who, 1, False)}, "what has ended is not late"
         third = ProcessHealthWriter(folder, who, Fallbacks(()))
         third.publish_health(100.0)
         assert told(processes, 100.0) == {}

@@ -1,4 +1,4 @@
-"""Show control that is held up in the middle of its turn, and a stage that dies or answers too late."""
+"""Show control that is held up in the middle of its turn, and a stage that dies or follows too late."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from appliance.show_control.port import open_port
 from appliance.show_control.run import ControlProcess
 from appliance.show_control.settings import Settings
 from tests.show_control.doubles import HOST, Asker, Clock, facts
-
-GIVEN_UP_S = PATIENCE_S + ANSWER_S + 0.1
 
 
 @pytest.fixture
@@ -68,38 +66,20 @@ def called(inbox: OrderInbox) -> Order:
     return order
 
 
-def call(cue: str, process: ControlProcess, inbox: OrderInbox, asker: Asker) -> Order:
-    """Ask for a cue: what the stage is ordered, and has taken."""
-    asker.tell("/cue", cue)
-    process.turn()
-    return called(inbox)
-
-
-def begin(folder: Path, cue: str) -> FrameWriter:
-    """A stage that goes on in a cue."""
-    stage = FrameWriter(folder, facts())
-    stage.write_health({"state": "dancing", "cue": cue})
-    return stage
+def report(stage: FrameWriter, generation: int, words: str = "") -> None:
+    """The stage says which show state its dance follows."""
+    stage.write_health({"state": "dancing", "applied": [generation, words]})
 
 
 def test_a_command_is_carried_out_however_long_it_was_held_up_before(
     process: ControlProcess, clock: Clock, inbox: OrderInbox, asker: Asker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hold_up(process, clock, 5.0, monkeypatch)
-    asker.tell("/iterations", 5, 4)
+    asker.tell("/sensors/heading")
     process.turn()
     inbox.answer(called(inbox), True, "")
     process.turn()
-    assert asker.hear() == ["/reply", "/iterations", 1, "Done."]
-
-
-def test_what_follows_from_a_command_is_ordered_from_now_on_too(
-    process: ControlProcess, clock: Clock, inbox: OrderInbox, asker: Asker, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    hold_up(process, clock, 5.0, monkeypatch)
-    asker.tell("/stop", 0)
-    process.turn()
-    assert inbox.take() == Order("stop")
+    assert asker.hear() == ["/sensors/reply", "/sensors/heading", 1, "Done."]
 
 
 @pytest.mark.parametrize(
@@ -109,6 +89,7 @@ def test_what_follows_from_a_command_is_ordered_from_now_on_too(
         (("/master", 0.5, 3.0), "master_since"),
         (("/look", "ink", 4.0), "look_since"),
         (("/lights", "cold", 4.0), "lights_since"),
+        (("/cue", "storm"), "look_since"),
     ],
 )
 def test_a_fade_begins_when_its_command_has_come(
@@ -123,87 +104,75 @@ def test_a_fade_begins_when_its_command_has_come(
     asker.tell(*command)
     began = clock.now
     process.turn()
-    assert getattr(process.desk.show_state, since) == began + 5.0
+    assert getattr(process.handler.show_state, since) == began + 5.0
 
 
-def test_the_fades_of_a_cue_begin_when_the_stage_has_answered(
-    process: ControlProcess, clock: Clock, inbox: OrderInbox, asker: Asker
+def test_a_command_is_answered_when_the_stage_follows_the_newest_or_what_came_before_it(
+    process: ControlProcess, stage: FrameWriter, asker: Asker
 ) -> None:
-    order = call("storm", process, inbox, asker)
-    clock.now += PATIENCE_S
-    inbox.answer(order, True, "")
     process.turn()
-    show_state = process.desk.show_state
-    assert (show_state.look_since, show_state.lights_since, show_state.master_since) == (clock.now,) * 3
+    generations = []
+    for message in (("/iterations", 12, 11), ("/hold", "lShldr", 0), ("/cue", "storm")):
+        asker.tell(*message)
+        process.turn()
+        generations.append(process.handler.show_state.generation)
+    report(stage, generations[0], "At most 8 fit.")
+    process.turn()
+    assert asker.hear() == ["/reply", "/iterations", 1, "At most 8 fit."]
+    report(stage, generations[2], "The phrase plays already.")
+    process.turn()
+    assert asker.hear() == ["/reply", "/hold", 1, "The hand of lShldr lets go."]
+    assert asker.hear() == ["/reply", "/cue", 1, "Cue storm. The phrase plays already."]
 
 
-def test_a_cue_that_is_answered_too_late_is_followed_and_told_but_for_what_was_set_meanwhile(
-    process: ControlProcess, clock: Clock, inbox: OrderInbox, asker: Asker
+def test_a_stage_that_does_not_follow_is_told_once_and_the_cue_stays_in_force(
+    process: ControlProcess, clock: Clock, stage: FrameWriter, asker: Asker
 ) -> None:
-    order = call("storm", process, inbox, asker)
-    clock.now += GIVEN_UP_S
-    asker.tell("/look", "lines")
-    process.turn()
-    assert asker.hear()[:3] == ["/reply", "/look", 1]  # type: ignore[index]
-    assert asker.hear()[:3] == ["/reply", "/cue", 0]  # type: ignore[index]
-    assert process.desk.show_state.cue == ""
-    inbox.answer(order, True, "")
-    process.turn()
-    assert asker.hear() == ["/reply", "/cue", 1, "Cue storm."]
-    show_state = process.desk.show_state
-    assert (show_state.cue, show_state.look, show_state.lights, show_state.master) == (
-        "storm",
-        "lines",
-        "cold",
-        0.5,
-    )
-
-
-@pytest.mark.parametrize("away_s", [0.2, 3.0])
-@pytest.mark.parametrize(("began_in", "followed"), [("storm", "storm"), ("1", "1"), ("", "1")])
-def test_a_cue_is_followed_if_the_stage_died_before_it_answered_and_the_next_one_goes_on_in_it(
-    folder: Path,
-    process: ControlProcess,
-    clock: Clock,
-    stage: FrameWriter,
-    inbox: OrderInbox,
-    asker: Asker,
-    away_s: float,
-    began_in: str,
-    followed: str,
-) -> None:
-    inbox.answer(call("1", process, inbox, asker), True, "")
-    process.turn()
-    assert asker.hear()[3] == "Cue 1."  # type: ignore[index]
-    call("storm", process, inbox, asker)
-    stage.close()
-    clock.now += away_s
-    process.turn()
-    with closing(begin(folder, began_in)):
-        for _ in range(2):
-            clock.now += GIVEN_UP_S
-            process.turn()
-    assert asker.hear()[:3] == ["/reply", "/cue", 0]  # type: ignore[index]
-    assert process.desk.show_state.cue == followed
-    if followed == "storm":
-        assert asker.hear()[:3] == ["/reply", "/cue", 1]  # type: ignore[index]
-        assert (process.desk.show_state.look, process.desk.show_state.master) == ("ink", 0.5)
-
-
-def test_a_cue_that_nobody_has_done_is_not_followed_though_a_stage_once_began_in_it(
-    folder: Path, process: ControlProcess, clock: Clock, stage: FrameWriter, inbox: OrderInbox, asker: Asker
-) -> None:
-    stage.write_health({"state": "dancing", "cue": "storm"})
-    process.turn()
-    inbox.answer(call("1", process, inbox, asker), True, "")
     asker.tell("/cue", "storm")
     process.turn()
-    clock.now += GIVEN_UP_S
+    clock.now += PATIENCE_S + ANSWER_S
+    process.turn()
+    assert asker.hear(0.1) is None
+    clock.now += 0.1
+    process.turn()
+    assert asker.hear()[:3] == ["/reply", "/cue", 0]  # type: ignore[index]
+    declared = process.handler.show_state
+    assert (declared.cue, declared.look, declared.dance["phrase"][1]) == ("storm", "ink", "quiet")
+    report(stage, declared.generation)
+    process.turn()
+    assert process.handler.show_state == declared
+    assert asker.hear(0.1) is None
+
+
+def test_the_next_stage_answers_for_one_that_died(
+    folder: Path, process: ControlProcess, clock: Clock, stage: FrameWriter, asker: Asker
+) -> None:
+    asker.tell("/cue", "storm")
     process.turn()
     stage.close()
+    clock.now += 0.3
     with closing(FrameWriter(folder, facts())) as next_one:
-        for _ in range(2):
-            clock.now += GIVEN_UP_S
-            process.turn()
-            assert process.desk.show_state.cue == "1"
-            next_one.write_health({"state": "dancing", "cue": "1"})
+        process.turn()
+        report(next_one, process.handler.show_state.generation)
+        process.turn()
+    assert asker.hear() == ["/reply", "/cue", 1, "Cue storm."]
+    assert process.handler.show_state.cue == "storm"
+
+
+def test_another_show_does_not_get_what_was_declared_for_the_one_before(
+    folder: Path, process: ControlProcess, clock: Clock, stage: FrameWriter, asker: Asker
+) -> None:
+    asker.tell("/cue", "storm")
+    process.turn()
+    stage.close()
+    clock.now += 0.3
+    with closing(FrameWriter(folder, facts(show_name="Another", looks=("ink",)))):
+        process.turn()
+        clock.now += 0.3
+        process.turn()
+        now = process.handler.show_state
+        assert (now.show, now.cue, now.dance, now.look) == ("Another", "", {}, "ink")
+        asker.tell("/iterations", 4, 3)
+        process.turn()
+        now = process.handler.show_state
+        assert (now.show, now.dance) == ("Another", {"iterations": (now.generation, "", (4.0, 3.0))})

@@ -58,22 +58,22 @@ def eventful(night: Night) -> Night:
     night.dance(30, reading(TURNED))
     night.order("hold", 0.0, 0.0, 1.0, 0.7, text="Chest")
     night.dance(200, reading(OTHER))
-    night.order("cue", text="storm")
+    night.command("/cue", text="storm")
     night.dance(40, reading(TURNED))
     night.dance(70)  # the sensor falls silent
-    night.order("cue", text="no such cue")
+    night.command("/hold", 1.0, text="Chest")
     night.dance(50, reading(OTHER, boot_nonce=2))  # and is switched on again
-    night.order("rate", -1.5)
+    night.command("/player/rate", -1.5)
     night.dance(3, reading(OTHER, boot_nonce=2), late_s=0.012)
     night.order("jump", 1.2)
     night.dance(100, reading(TURNED, boot_nonce=2, taps=1))
-    night.order("iterations", 7.0, 6.0)
+    night.command("/iterations", 7.0, 6.0)
     night.dance(20, reading(TURNED, boot_nonce=2, taps=1))
     night.order("excerpt", 0.5, 2.5)
     night.order("heading")
-    night.order("iterations", 4.0, 3.0)
+    night.command("/iterations", 4.0, 3.0)
     night.dance(400, reading(OTHER, boot_nonce=3, wearable=2))  # a spare under the same name
-    night.order("cue", text="calm")
+    night.command("/cue", text="calm")
     night.dance(30, reading(OTHER, boot_nonce=3, wearable=2))
     return night
 

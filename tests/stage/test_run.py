@@ -7,8 +7,11 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+import yaml
 
 from appliance.box.clock import TICK_S, TickClock
+from appliance.box.show_state import ShowState, ShowStateWriter
+from appliance.pose.bvh import write_bvh
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, SensorsConfig
 from appliance.show.show import load_show
@@ -16,7 +19,7 @@ from appliance.show_control.orders import Order
 from appliance.stage import run
 from appliance.stage.fallback import SENSOR_SILENT
 from appliance.stage.run import Stage
-from tests.bundles import write_show
+from tests.bundles import swaying_phrase, write_show
 from tests.fake_clock import FakeTime
 
 RAISED = (0.8, 0.6, 0.0, 0.0)
@@ -64,6 +67,7 @@ class Evening:
     """A whole stage on a clock that sleeps too long where it is told to: `stops`, seconds by tick."""
 
     def __init__(self, bundle: Path, runtime: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.runtime = runtime
         self.time, self.cable = FakeTime(self._overshoot_s), Cable()
         self.stops: dict[int, float] = {}
         self.each_s = 0.0
@@ -79,8 +83,8 @@ class Evening:
             run, "TickClock", lambda: TickClock(monotonic=self.time.monotonic, sleep=self.time.sleep)
         )
         self.stage = Stage(load_show(bundle), box, self.said.append)
-        self.stage.cast.link.close()
-        self.stage.cast.link = self.cable
+        self.stage.parts.link.close()
+        self.stage.parts.link = self.cable
         self.stage.tick._monotonic = self.time.monotonic
         self.stage.lead_s = 0.0  # one sleep a tick
         self.inbox = Inbox(self.time)
@@ -97,7 +101,7 @@ class Evening:
 
     @property
     def _weight(self) -> float:
-        return float(self.stage.cast.hands.weights[self.stage.cast.hand_places[0]])
+        return float(self.stage.parts.hands.weights[self.stage.parts.hand_places[0]])
 
     def _overshoot_s(self) -> float:
         return self.each_s + self.stops.get(self.stage.health.ticks, 0.0)
@@ -105,7 +109,13 @@ class Evening:
 
 @pytest.fixture(scope="module")
 def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_show(tmp_path_factory.mktemp("show"))
+    folder = write_show(tmp_path_factory.mktemp("show"))
+    write_bvh(folder / "other.bvh", swaying_phrase(4.0))
+    config = yaml.safe_load((folder / "show.yaml").read_text()) | {
+        "motion": {"phrases": {"other": "other.bvh"}}
+    }
+    (folder / "show.yaml").write_text(yaml.safe_dump(config))
+    return folder
 
 
 @pytest.fixture
@@ -133,7 +143,7 @@ def test_a_sensor_that_falls_silent_is_told_of_on_a_slow_machine_too(evening: Ev
     evening.each_s = each_s
     evening.stage.dance(1.0, lambda: False)
     evening.cable.drain(evening.time.now)
-    evening.stage.cast.hear(SensorReading("left-wrist", RAISED, 1, 0, 0.0, evening.time.now, 90, 255))
+    evening.stage.parts.hear(SensorReading("left-wrist", RAISED, 1, 0, 0.0, evening.time.now, 90, 255))
     evening.cable.talks = False
     evening.stage.dance(4.0, lambda: False)
     assert evening.silences >= 1
@@ -146,10 +156,10 @@ def test_a_tick_that_was_held_up_leaves_orders_to_the_next_one(evening: Evening)
     evening.inbox.waiting = [Order("heading")]
     began = evening.time.now
     evening.time.work(0.3)
-    evening.stage._obey(began, evening.time.monotonic)
+    evening.stage._take_orders(began, evening.time.monotonic)
     assert evening.inbox.waiting and not evening.inbox.answers
     evening.stage._comes_from_stop = True
-    evening.stage._obey(evening.time.now, evening.time.monotonic)
+    evening.stage._take_orders(evening.time.now, evening.time.monotonic)
     assert evening.inbox.waiting and not evening.inbox.answers
     evening.dance(0.1)
     assert [(name, done) for name, done, _ in evening.inbox.answers] == [("heading", True)]
@@ -158,11 +168,24 @@ def test_a_tick_that_was_held_up_leaves_orders_to_the_next_one(evening: Evening)
 def test_a_box_whose_every_tick_takes_too_long_can_be_told_to_do_less(evening: Evening) -> None:
     evening.each_s = 0.11
     evening.dance(2.0)
-    evening.inbox.waiting = [Order("iterations", (1.0, 1.0)), Order("heading")]
+    evening.inbox.waiting = [Order("jump", (1.0,)), Order("heading")]
+    with closing(ShowStateWriter(evening.runtime)) as writer:
+        writer.write(ShowState(show="A test").with_dance(evening.time.now, {"iterations": ("", (1.0, 1.0))}))
     run_tick = evening.stage.tick.run
     evening.stage.tick.run = lambda slot: (run_tick(slot), evening.time.work(0.11))[0]  # type: ignore[method-assign]
     evening.dance(2.0)
-    assert [(name, done) for name, done, _ in evening.inbox.answers][:1] == [("iterations", True)]
+    assert [(name, done) for name, done, _ in evening.inbox.answers][:1] == [("jump", True)]
+    assert evening.stage.iterations.asked == (1, 1)
+
+
+def test_what_was_declared_before_an_order_comes_before_it(evening: Evening) -> None:
+    """Also where it was declared after the tick had read the show state."""
+    evening.dance(1.0)
+    with closing(ShowStateWriter(evening.runtime)) as writer:
+        writer.write(ShowState(show="A test").with_dance(evening.time.now, {"phrase": ("other", (0.5,))}))
+    evening.inbox.waiting = [Order("jump", (0.5,))]
+    evening.stage._take_orders(evening.time.now, evening.time.monotonic)
+    assert evening.stage.parts.motion.going_on == ("other", pytest.approx(0.5))
 
 
 def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(
@@ -175,7 +198,7 @@ def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(
     monkeypatch.setattr(evening.stage.recorder, "event", lambda kind, now, **facts: noted.append(now))
     evening.inbox.waiting, evening.inbox.held_up_s = [Order("neutral"), Order("heading")], 0.3
     began = evening.time.now
-    evening.stage._obey(began, evening.time.monotonic)
+    evening.stage._take_orders(began, evening.time.monotonic)
     assert noted == pytest.approx([began + 0.3, began + 0.6])
     (_, asked, _), (_, reset, words) = evening.inbox.answers
     assert (asked, reset) == (True, False)  # the reading is of before both stops, and by now too old

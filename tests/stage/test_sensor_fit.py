@@ -48,11 +48,11 @@ def multiply(a: Orientation, b: Orientation) -> Orientation:
 class Stage:
     """What SensorFit joins, without ports: readings come from the test, at 50 Hz of its own time."""
 
-    def __init__(self, cast: StageParts, memory: SensorMemory) -> None:
+    def __init__(self, parts: StageParts, memory: SensorMemory) -> None:
         self.said: list[str] = []
-        self.cast = cast
+        self.parts = parts
         self.memory = memory
-        self.wearing = SensorFit(cast, memory, self.said.append)
+        self.wearing = SensorFit(parts, memory, self.said.append)
         self.now = 100.0
         self.sequence = 0
 
@@ -77,8 +77,8 @@ class Stage:
 
     def take(self, reading: SensorReading) -> None:
         self.wearing.hear(reading)
-        self.cast.hear(reading)
-        self.cast.hands.pull(self.now, self.cast.puppet.select(self.cast.motion.window()))
+        self.parts.hear(reading)
+        self.parts.hands.pull(self.now, self.parts.puppet.select(self.parts.motion.window()))
         self.wearing.look(self.now)
 
     def stand(self, seconds: float, orientation: Orientation, **reading: int | str) -> None:
@@ -93,15 +93,15 @@ class Stage:
     def silence(self, seconds: float) -> None:
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
-            self.cast.hands.pull(self.now, self.cast.puppet.select(self.cast.motion.window()))
+            self.parts.hands.pull(self.now, self.parts.puppet.select(self.parts.motion.window()))
             self.wearing.look(self.now)
 
     def target(self, joint: str = "lShldr") -> np.ndarray:
-        return self.cast.hands.targets[0, self.cast.puppet.joints.index(joint)].copy()
+        return self.parts.hands.targets[0, self.parts.puppet.joints.index(joint)].copy()
 
     @property
     def wants(self) -> bool:
-        return SENSOR in self.cast.link.wants_neutral
+        return SENSOR in self.parts.link.wants_neutral
 
     def taken(self, sensor: str = SENSOR) -> int:
         return self.said.count(f"Sensor {sensor}: neutral pose taken. Dance.")
@@ -118,19 +118,19 @@ def memory() -> SensorMemory:
 
 @pytest.fixture
 def evening(tmp_path: Path, memory: SensorMemory) -> Iterator[Evening]:
-    casts: list[StageParts] = []
+    all_parts: list[StageParts] = []
 
     def begun(hands: list[dict[str, object]] | None = None) -> Stage:
         """The box is switched on; what it remembers of before stays."""
-        show = load_show(write_show(tmp_path / f"show{len(casts)}", hands or [HAND]))
-        casts.append(
+        show = load_show(write_show(tmp_path / f"show{len(all_parts)}", hands or [HAND]))
+        all_parts.append(
             assemble(show, BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[])))
         )
-        return Stage(casts[-1], memory)
+        return Stage(all_parts[-1], memory)
 
     yield begun
-    for cast in casts:
-        cast.close()
+    for parts in all_parts:
+        parts.close()
 
 
 def test_stood_still_for_a_breath_the_neutral_pose_is_taken_once(evening: Evening) -> None:
@@ -430,7 +430,7 @@ def test_who_is_heard_is_asked_though_another_sensor_is_silent(evening: Evening)
     stage.dance(1.0)
     assert stage.wearing.take_neutral(None, stage.now)
     assert not stage.wearing.take_neutral("right-wrist", stage.now)
-    assert stage.cast.link.wants_neutral == {SENSOR}
+    assert stage.parts.link.wants_neutral == {SENSOR}
 
 
 def test_the_poses_of_all_joints_of_a_sensor_are_kept_in_one_write(
@@ -463,4 +463,4 @@ def test_sensors_do_not_mind_each_other(evening: Evening) -> None:
         stage.hear(multiply(about_up(stage.sequence * 2.0), about_front(9.0)), sensor="right-wrist")
         stage.hear(about_up(0.0), sensor="stranger")
     assert stage.taken() == 1 and stage.taken("right-wrist") == 0
-    assert stage.cast.link.wants_neutral == {"right-wrist"}
+    assert stage.parts.link.wants_neutral == {"right-wrist"}

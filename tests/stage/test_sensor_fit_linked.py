@@ -60,10 +60,10 @@ class Evening:
     def box_on(self) -> None:
         """The stage around the link that the show has now; it remembers what was kept."""
         box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
-        self.cast = assemble(self._bundle, box)
-        self.cast.link = self.show.link
+        self.parts = assemble(self._bundle, box)
+        self.parts.link = self.show.link
         self.said: list[str] = []
-        self.wearing = SensorFit(self.cast, self.memory, self.said.append)
+        self.wearing = SensorFit(self.parts, self.memory, self.said.append)
 
     def restart_box(self) -> None:
         self.close()
@@ -71,16 +71,16 @@ class Evening:
         self.box_on()
 
     def run(self, seconds: float) -> None:
-        place = self.cast.puppet.joints.index("lShldr")
+        place = self.parts.puppet.joints.index("lShldr")
         for _ in range(round(seconds / TICK_S)):
             for reading in self.show.run(TICK_S):
                 self.wearing.hear(reading)
-                self.cast.hear(reading)
+                self.parts.hear(reading)
                 self.newest = reading
-            self.cast.hands.pull(self.show.now, self.cast.puppet.select(self.cast.motion.window()))
+            self.parts.hands.pull(self.show.now, self.parts.puppet.select(self.parts.motion.window()))
             self.wearing.look(self.show.now)
             if self.newest is not None:
-                self.errors.append(self._error(self.newest, self.cast.hands.targets[0, place]))
+                self.errors.append(self._error(self.newest, self.parts.hands.targets[0, place]))
             if self.lights[-1:] != [self.device.light]:
                 self.lights.append(self.device.light)
 
@@ -90,7 +90,7 @@ class Evening:
         return float(np.degrees(quaternion.angle_between(target, true / np.linalg.norm(true))))
 
     def close(self) -> None:
-        self.cast.close()
+        self.parts.close()
 
 
 @pytest.fixture

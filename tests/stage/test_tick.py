@@ -47,12 +47,12 @@ def stage(tmp_path: Path, receiver: OscReceiver) -> Iterator[Callable[..., Tick]
         return Tick(casts[-1], worn(casts[-1]), Iterations(3, 2, 10), latest_start_s=0.005)
 
     yield made
-    for cast in casts:
-        cast.close()
+    for parts in casts:
+        parts.close()
 
 
-def worn(cast: StageParts) -> SensorFit:
-    return SensorFit(cast, SensorMemory(None, print), print)
+def worn(parts: StageParts) -> SensorFit:
+    return SensorFit(parts, SensorMemory(None, print), print)
 
 
 def dance(tick: Tick, slots: range, late_s: float = 0.0, heard: tuple[float, ...] | None = None) -> None:
@@ -61,7 +61,7 @@ def dance(tick: Tick, slots: range, late_s: float = 0.0, heard: tuple[float, ...
         if heard is not None:
             reading = SensorReading("left-wrist", heard, number, 0, deadline, deadline - 0.001, 90, 255)
             tick.wearing.hear(reading)
-            tick.cast.hear(reading)
+            tick.parts.hear(reading)
         slot = Slot(number, deadline, deadline + late_s)
         tick.run(slot)
         tick.after(slot)
@@ -87,7 +87,7 @@ def test_without_hands_the_phrase_itself_is_danced(stage: Callable[..., Tick], r
     tick = stage(hands=[])
     expected = []
     for number in range(60):
-        expected.append(tick.cast.motion.window()[0].copy())
+        expected.append(tick.parts.motion.window()[0].copy())
         dance(tick, range(number, number + 1))
     np.testing.assert_allclose(poses(receiver), expected, atol=1e-5)
 
@@ -127,9 +127,9 @@ def test_a_late_tick_sends_the_last_pose_marked_late_and_the_phrase_waits(
 ) -> None:
     tick = stage(hands=[])
     dance(tick, range(30))
-    before = tick.cast.motion.position_s
+    before = tick.parts.motion.position_s
     dance(tick, range(30, 31), late_s=0.006)
-    assert tick.cast.motion.position_s == before
+    assert tick.parts.motion.position_s == before
     dance(tick, range(31, 32))
     sent = receiver.poll(1.0)
     marks = [arguments for _, address, arguments in sent if address == "/bunraku/frame"]
@@ -179,8 +179,8 @@ def test_a_tick_makes_nothing_for_the_collector(stage: Callable[..., Tick]) -> N
 
 def test_section_times_add_up_to_the_cost(stage: Callable[..., Tick]) -> None:
     ticking = iter(np.arange(0.0, 100.0, 0.001).tolist())
-    cast = stage(hands=[]).cast
-    tick = Tick(cast, worn(cast), Iterations(3, 2, 10), 0.005, monotonic=lambda: next(ticking))
+    parts = stage(hands=[]).parts
+    tick = Tick(parts, worn(parts), Iterations(3, 2, 10), 0.005, monotonic=lambda: next(ticking))
     slot = Slot(0, 0.0, 0.0)
     tick.run(slot)
     cost_ms = tick.after(slot)

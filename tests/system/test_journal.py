@@ -76,20 +76,19 @@ def disturb(box: Box) -> None:
         time.sleep(0.15)
         box.process.send_signal(signal.SIGCONT)
         box.frames(30)
-        await_rate(box, console, -1.0)
+        await_rate(box, -1.0)
         assert console.order("/iterations", 2, 1)[2] == 1
         with Wearables([box.key], box.sensors) as wearables:
             wearables.dance()
             box.frames(60)
 
 
-def await_rate(box: Box, console: Asker, rate: float) -> None:
-    """What a player streams is not answered: it is sent again until the stage has noted it."""
+def await_rate(box: Box, rate: float) -> None:
+    """What a player streams is not answered: until the stage has noted it."""
     until = time.monotonic() + PATIENCE_S
     with contextlib.closing(CheckpointReader(box.words_file.with_name("runtime"))) as reader:
         while (place := reader.read()) is None or place.rate != rate:
             assert time.monotonic() < until, place
-            console.tell("/player/rate", rate)
             box.frames(5)
 
 

@@ -183,12 +183,13 @@ def test_real_osc_tools_command_the_box_and_hear_its_heartbeat(show: Path, tmp_p
 
 def test_cues_stop_and_go_reach_the_dance_and_are_answered(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path, settings=JOURNAL) as box, asking(box) as asker:
-        assert asker.order("/cue")[2:] == [1, "Cue calm."]
-        assert asker.order("/cue")[2:] == [1, "Cue storm."]
-        assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0]
+        assert asker.order("/cue", "calm")[2:] == [1, "Cue calm."]
+        with contextlib.closing(Asker(box.control)) as other:
+            other.tell("/cue")
         await_status(asker, state="dancing", coding=4, interaction=3, cue="storm", look="ink", level=0.5)
+        assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0]
         assert "Did you mean 'storm'?" in asker.ask("/cue", "strom")[3]
-        assert "Did you mean 'lShldr'?" in asker.order("/hold", "lSholder", 1)[3]
+        assert "Did you mean 'lShldr'?" in asker.ask("/hold", "lSholder", 1)[3]
         assert asker.order("/hold", "lShldr", 1)[2] == 1
         asker.ask("/stop", 0)
         await_status(asker, state="stopped")
@@ -227,14 +228,13 @@ def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(
         await_status(asker, state="hung")
         assert status(asker)["panic"] == 1
         assert "The stage does not answer" in asker.ask("/cue", "storm")[3]
-        assert "The stage does not answer" in asker.ask("/iterations", 9, 9)[3]
+        assert "The stage does not answer" in asker.ask("/iterations", 5, 4)[3]
+        assert "The stage does not answer" in asker.ask("/sensors/heading")[3]
         box.receiver.poll()
         box.process.send_signal(signal.SIGCONT)
         box.frames(20)
-        await_status(asker, state="panic")
+        await_status(asker, state="panic", cue="storm", coding=5, interaction=4)  # declared while it hung
         assert show_state(tmp_path).panic
-        now = status(asker)
-        assert (now["cue"], now["coding"]) == ("", 3)  # what was told not to be done is not done later
         assert asker.ask("/go")[2] == 1
         await_status(asker, state="dancing")
         assert box.end() == 0
@@ -248,6 +248,29 @@ def test_panic_works_while_the_stage_spins(show: Path, tmp_path: Path) -> None:
         assert asker.ask("/panic")[2] == 1
         assert show_state(tmp_path).panic
         box.process.kill()
+
+
+def test_a_cue_called_while_the_dance_is_away_is_in_force_when_it_comes_back(
+    show: Path, tmp_path: Path
+) -> None:
+    """Show control is a unit of its own, and outlives the stage."""
+    control = [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")]
+    with (
+        playing(show, tmp_path, "--alone") as box,
+        process(control, tmp_path / "control.txt"),
+        asking(box) as asker,
+    ):
+        await_status(asker, state="dancing")
+        assert asker.order("/cue", "calm")[2] == 1
+        box.end(signal.SIGKILL)
+        await_status(asker, state="absent")
+        assert "The dance begins with this" in asker.ask("/cue", "storm")[3]
+        assert status(asker)["look"] == "ink"
+        box.kill_and_restart()
+        await_status(asker, state="dancing", cue="storm", coding=4, interaction=3)
+        assert asker.ask_all("/hands")[0] == ["/hands/hand", "lShldr", "left-wrist", 0]
+        box.await_words("the show goes on in the cue 'calm'")
+        assert box.end() == 0
 
 
 def test_a_killed_box_leaves_no_process_behind_and_panic_is_in_force_when_it_comes_back(
