@@ -69,12 +69,14 @@ class MirroredProof:
     recovered = "That the show has danced is kept now."
 
     def __init__(self, runtime: Path, chosen: Path) -> None:
-        self._frames = FrameReader(runtime)
-        self._chosen = chosen
+        self._runtime, self._chosen = runtime, chosen
+        self._frames: FrameReader | None = None  # opened by the process that copies
         self._proven: tuple[int, str] | None = None
 
     def copy(self, now: float) -> None:
         """As Mirrored; while a preflight reads a stick it waits for another turn."""
+        if self._frames is None:
+            self._frames = FrameReader(self._runtime)
         newest, facts = self._frames.newest(now), self._frames.facts
         if newest is None or facts is None or facts.rehearsal or newest.left - facts.started < PROVEN_S:
             return
@@ -95,7 +97,8 @@ class MirroredProof:
 
     def close(self) -> None:
         """Release the shared frame."""
-        self._frames.close()
+        if self._frames is not None:
+            self._frames.close()
 
     def _is_noted(self, identity: str) -> bool:
         try:

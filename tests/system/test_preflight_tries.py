@@ -13,12 +13,13 @@ import pytest
 from appliance.box.durable import alone_in
 from appliance.cli.run_with_timeout import within
 from appliance.keeper.mirror import Mirror
+from appliance.keeper.mirror_process import MirrorProcess
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.release.choice import CHOSEN, Choice, Pair
 from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair_to_dance
 from tests.bundles import FIGURE, write_show
-from tests.show_control.doubles import facts
+from tests.show_control.doubles import facts, until
 
 PATIENCE_S = 60.0
 NEW, BEFORE = "new+", "before+"
@@ -166,6 +167,21 @@ def test_who_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(evening:
     assert evening.choice.first.good
     assert proof.complaint == ""
     proof.last_turn(time.monotonic())
+
+
+def test_a_keeper_that_starts_while_the_show_dances_keeps_the_proof(evening: Evening) -> None:
+    evening.dance(seconds=10.5)
+    process = MirrorProcess(
+        MirroredProof(evening.run, evening.run / CHOSEN), evening.run, end_s=0.0, say=print
+    )
+    try:
+        process.supervise(time.monotonic())
+        until(lambda: evening.kept.first.good)
+    finally:
+        process.request_end()
+        while not process.has_ended:
+            process.supervise(time.monotonic())
+            time.sleep(0.005)
 
 
 def test_a_rehearsal_proves_nothing(evening: Evening) -> None:
