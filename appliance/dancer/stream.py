@@ -14,7 +14,7 @@ _ROWS = 256  # poses before it moves back to the start of its memory
 
 
 class Stream:
-    """Poses (J, 4) and tracks (C,) of so many ticks to come, the first of them being this tick's."""
+    """Poses (J, 4) and tracks (C,) of the next ticks, this one first."""
 
     def __init__(self, joints: int, columns: int, window: int) -> None:
         self._window, self._end = window, 0
@@ -23,7 +23,7 @@ class Stream:
         self._tracks = np.zeros((_ROWS, columns), dtype=np.float32)
 
     def clear(self) -> None:
-        """Begin anew: `window` rows must be appended before anything is read."""
+        """Start over: `window` rows must be appended before anything is read."""
         self._end = 0
 
     def next_row(self) -> tuple[FloatArray, FloatArray]:

@@ -51,7 +51,7 @@ class ControlConfig(Section):
     def _open_to_somebody(self) -> ControlConfig:
         if not self.host.startswith("127.") and not self.senders:
             raise refusal(
-                f"Commands are heard on {self.host}, but from nobody: no senders are listed.",
+                f"Commands are accepted on {self.host}, but no senders are listed.",
                 "List who may command the box, like `senders: [192.168.0.20]` or a whole network "
                 "`[192.168.0.0/24]`; or listen on 127.0.0.1 for this machine alone.",
                 at="host",
