@@ -101,11 +101,12 @@ def fill(copy: Path, files: Sequence[str]) -> None:
 
 
 def environment_of(checkout: Path) -> dict[str, str]:
-    """A shell's environment without a display, and with a runtime folder of the page's own."""
+    """A shell's environment for one copy: its modules, its runtime folder, no display."""
     left_out = ("DISPLAY", "WAYLAND_DISPLAY", "RUNTIME_DIRECTORY")
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
     environment = {name: value for name, value in environment.items() if name not in left_out}
     environment["PATH"] = f"{checkout / '.venv' / 'bin'}:{environment['PATH']}"
+    environment["PYTHONPATH"] = str(checkout)  # the copy's own modules and firmware
     environment["XDG_RUNTIME_DIR"] = str(checkout.parent / f"{checkout.name}-runtime")
     Path(environment["XDG_RUNTIME_DIR"]).mkdir(exist_ok=True)
     return environment

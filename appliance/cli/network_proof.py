@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from appliance.box.runtime_folder import RuntimeFolderError
-from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, limit_memory, within
+from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, limit_memory, run_with_timeout
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.pose.bvh import BvhError
 from appliance.show.config_error import ConfigError
@@ -38,7 +38,7 @@ def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> s
         return json.dumps([words.getvalue(), error]).encode()
 
     try:
-        words, error = json.loads(within(seconds, told))
+        words, error = json.loads(run_with_timeout(seconds, told))
     except TimedOutError as reason:
         raise StageError(
             f"{network}: this network was given up ({reason}): it never ends, or it crashes. "

@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 from appliance.box.durable import alone_in
-from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, within
+from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, run_with_timeout
 from appliance.release.adoption import Outcome, Places, adopt, built_in_box, chosen_before
 from appliance.release.arrivals import look
 from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice
 
 ANEW = "anew"  # touched when units have to restart, for another show or box file dances
 _AT_ONCE_S = 120.0  # after power-on a stick takes effect at once; later no show is interrupted
-_PATIENCE_S = 45.0  # a stick that never finishes reading does not keep the box from dancing
-_TURN_S, _LATE_TURN_S = 20.0, 60.0  # how long another preflight is waited for
+STICK_S = 45.0  # a stick that never finishes reading does not keep the box from dancing
+TURN_S, LATE_TURN_S = 20.0, 60.0  # how long another preflight is waited for
 _NOT_WRITTEN = 1
 
 
@@ -44,7 +44,7 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
     try:
         if not options.late:  # whatever becomes of what is new: this dances, should it end this process
             _publish(places, Outcome(chosen_before(places), False, ()), False, uptime_s, say)
-        patience_s = _LATE_TURN_S if options.late else _TURN_S
+        patience_s = LATE_TURN_S if options.late else TURN_S
         with alone_in(options.data, patience_s), alone_in(options.run, patience_s):
             outcome = _found(options, places)
             for words in outcome.words:
@@ -71,7 +71,7 @@ def _found(options: Options, places: Places) -> Outcome:
 
     try:
         if _is_folder(options.stick):
-            return Outcome.unpacked(within(_PATIENCE_S, lambda: chosen().packed()))
+            return Outcome.unpacked(run_with_timeout(STICK_S, lambda: chosen().packed()))
         return chosen()
     except TimedOutError as error:
         words = f"The stick could not be read ({error}). What danced before goes on. Try another stick."

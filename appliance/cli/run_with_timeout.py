@@ -20,7 +20,7 @@ class TimedOutError(Exception):
     """It gave nothing; the message says why."""
 
 
-def within(seconds: float, do: Callable[[], bytes]) -> bytes:
+def run_with_timeout(seconds: float, do: Callable[[], bytes]) -> bytes:
     """What `do` gives, from a fork of this process; raises TimedOutError when it is late or has crashed.
 
     A process that hangs in the kernel, on a stick that does not answer, cannot be ended and is left behind.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.cli.run_with_timeout import within
+from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.show.bundle import CHECKSUMS, MOST_FILES, write_checksums
 from appliance.show.check import verify_bundle
@@ -27,7 +27,7 @@ def said(directory: Path) -> list[str]:
     def check() -> bytes:
         return json.dumps([f"{found.level} {found}" for found in verify_bundle(directory)]).encode()
 
-    words: list[str] = json.loads(within(PATIENCE_S, check))
+    words: list[str] = json.loads(run_with_timeout(PATIENCE_S, check))
     return words
 
 
