@@ -14,7 +14,7 @@ from appliance.projector.sdl import sdl2
 from appliance.projector.window import Size, Window, last_error
 from appliance.show.projector import ProjectorConfig
 
-_ES_3_0 = 300
+ES_3_0 = 300
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software", "swiftshader")
 _RESET_STATUS = (b"glGetGraphicsResetStatus", b"glGetGraphicsResetStatusKHR", b"glGetGraphicsResetStatusEXT")
 
@@ -26,12 +26,12 @@ class GlContext:
         self._handle = _create(window)
         try:
             loader: Any = _Loader()
-            self.gl = moderngl.create_context(require=_ES_3_0, context=loader)
+            self.gl = moderngl.create_context(require=ES_3_0, context=loader)
         except Exception as error:  # the library raises whatever its driver does
             sdl2.SDL_GL_DeleteContext(self._handle)
             raise _unusable(str(error)) from error
         self.renderer = str(self.gl.info["GL_RENDERER"])
-        self._reset_status = _reset_status()
+        self._reset_status = reset_status()
         self._finish = ctypes.CFUNCTYPE(None)(sdl2.SDL_GL_GetProcAddress(b"glFinish"))
 
     @property
@@ -105,7 +105,7 @@ def _unusable(why: str) -> ProjectorError:
     )
 
 
-def _reset_status() -> Callable[[], int]:
+def reset_status() -> Callable[[], int]:
     """OpenGL's own function, where the driver has it (GL_KHR_robustness)."""
     for name in _RESET_STATUS:
         address = sdl2.SDL_GL_GetProcAddress(name)

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from appliance.projector.projector_error import GPU_LOST
 
 PATIENCE_S = 5.0
-_LOOK_S = 0.5
+LOOK_S = 0.5
 _STOOD_STILL_S = (
     2.0  # between two checks: this process itself was suspended, by Ctrl-Z or by a machine asleep
 )
@@ -58,7 +58,7 @@ def guarded(
     is_done = threading.Event()
 
     def watch() -> None:
-        while not is_done.wait(_LOOK_S):
+        while not is_done.wait(LOOK_S):
             now = monotonic()
             if patience.is_over(now, is_preparing()):
                 give_up()

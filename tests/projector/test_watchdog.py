@@ -23,7 +23,7 @@ from appliance.projector.run import Run, Wish
 from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
 
-watchdog._LOOK_S = 0.1
+watchdog.LOOK_S = 0.1
 shown, show = [], Window.show
 
 def hang(window):
@@ -75,7 +75,7 @@ def test_a_process_that_was_stopped_blames_no_display() -> None:
 
 
 def test_the_guard_gives_up_once_and_ends_with_what_it_guards(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watchdog, "_LOOK_S", 0.01)
+    monkeypatch.setattr(watchdog, "LOOK_S", 0.01)
     seen, gave_up = [0.0], threading.Event()
     now, is_well = 100.0, []
 

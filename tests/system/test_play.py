@@ -20,8 +20,8 @@ from appliance.recorder.reading import read_journal
 from appliance.recorder.record import LATE, NOT_FINITE
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show
-from tests.system.box import JOURNAL, PATIENCE_S, PLAY, is_free, playing
-from tests.system.processes import run, wait_until
+from tests.system.box import JOURNAL, PLAY, is_free, playing
+from tests.system.processes import PATIENCE_S, run, wait_until
 
 pytestmark = pytest.mark.realtime
 

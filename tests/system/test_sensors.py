@@ -17,8 +17,8 @@ from appliance.recorder.reading import read_journal
 from hw_sim.emulator import Sent
 from tests.bundles import FIGURE, MOVING, write_show
 from tests.hw_sim.null_modem import NullModem
-from tests.system.box import JOURNAL, PATIENCE_S, Box, await_end_of_keeper, playing
-from tests.system.processes import wait_until
+from tests.system.box import JOURNAL, Box, await_end_of_keeper, playing
+from tests.system.processes import PATIENCE_S, wait_until
 
 pytestmark = pytest.mark.realtime
 

@@ -26,8 +26,8 @@ from appliance.recorder.reading import read_journal
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show
 from tests.show_control.doubles import Asker
-from tests.system.box import JOURNAL, PATIENCE_S, PLAY, Box, is_free, playing
-from tests.system.processes import BUNRAKU, Process, children_running, run, wait_until
+from tests.system.box import JOURNAL, PLAY, Box, is_free, playing
+from tests.system.processes import BUNRAKU, PATIENCE_S, Process, children_running, run, wait_until
 
 pytestmark = pytest.mark.realtime
 
