@@ -12,7 +12,7 @@ from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.projector.context import offscreen
 from appliance.projector.picture.renderer import Renderer
-from appliance.projector.still import FINER, Image, drawn, moment_of, shrunk
+from appliance.projector.still import FINER, Image, draw_still, moment_of, shrink
 from appliance.show.bundle import default_show_path
 from appliance.show.look import STYLES, CameraConfig, LookConfig
 
@@ -45,7 +45,7 @@ def draw_looks(folder: Path) -> list[Path]:
             ctx, size, recording.skeleton, {name: look for name, (look, _) in PICTURES.items()}
         )
         for name, (_, time_s) in PICTURES.items():
-            image = shrunk(drawn(ctx, renderer, moment_of(recording, time_s), name, size))
+            image = shrink(draw_still(ctx, renderer, moment_of(recording, time_s), name, size))
             paths.append(folder / f"look-{name}.png")
             Files.fromarray(image).save(paths[-1], optimize=True)
         renderer.release()
@@ -62,7 +62,7 @@ def _side_by_side(ctx: moderngl.Context, recording: Recording) -> Image:
     }
     renderer = Renderer(ctx, size, recording.skeleton, looks)
     moment = moment_of(recording, TOGETHER_S)
-    pictures = [shrunk(drawn(ctx, renderer, moment, style, size)) for style in looks]
+    pictures = [shrink(draw_still(ctx, renderer, moment, style, size)) for style in looks]
     renderer.release()
     return np.hstack(pictures)
 

@@ -104,10 +104,10 @@ def play_show(
         for line in _conclusion(stage):
             speaker.say(line)
         if filmstrip is not None and journal is not None:
-            from appliance.cli.pictures import danced, drawn
+            from appliance.cli.pictures import draw_dance, load_dance
             from appliance.cli.rehearsal import PICTURED_S
 
-            picture = drawn(danced(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
+            picture = draw_dance(load_dance(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
             speaker.say(f"What was just danced, held joints highlighted: {picture}")
         if rehearse is not None and journal is not None:
             from appliance.cli.rehearsal import rehearsal_picture

@@ -65,7 +65,7 @@ class Meter:
         self._ages_s: deque[float] = deque(maxlen=_REMEMBERED)
         self._swaps: deque[float] = deque()
 
-    def shown(self, swapped: float, left_stage: float | None) -> None:
+    def note_swap(self, swapped: float, left_stage: float | None) -> None:
         """A picture is on the wall since `swapped`; `left_stage` None: it does not show a dance."""
         self.pictures += 1
         self._swaps.append(swapped)

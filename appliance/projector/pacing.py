@@ -34,7 +34,7 @@ class Pacing:
         self._judged_from = self._grid
         self._pictures = 0
 
-    def next(self) -> float:
+    def wait_for_next(self) -> float:
         """Wait until the next picture is due; the time that it is drawn for, monotonic seconds."""
         self._grid += self.period_s
         now = self._now()

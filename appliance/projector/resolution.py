@@ -47,7 +47,7 @@ class Resolution:
         """Of the display's width and height."""
         return SHARES[self._place]
 
-    def drawn(self, now: float, took_s: float, look: str | None) -> bool:
+    def note_picture(self, now: float, took_s: float, look: str | None) -> bool:
         """Note the drawing time of a picture; returns whether the next one has another size.
 
         took_s: without waiting for the display; look None: two looks cross-fade; now: monotonic seconds.

@@ -136,7 +136,7 @@ class Run:
     def _show_pictures(self, stopped: Callable[[], bool], notifier: Notifier) -> None:
         begun = reported = time.monotonic()
         while not stopped() and not self._controls.is_over:
-            now = self._pacing.next()
+            now = self._pacing.wait_for_next()
             if self._wish.seconds is not None and now - begun >= self._wish.seconds:
                 return
             self._press_keys()
@@ -158,10 +158,10 @@ class Run:
         drawn = time.monotonic()
         self._window.show()
         swapped = time.monotonic()
-        self._patience.swapped(swapped)
-        self._meter.shown(swapped, left_stage)
+        self._patience.note_swap(swapped)
+        self._meter.note_swap(swapped, left_stage)
         look = self.projector.shown if left_stage is not None else None
-        if self._resolution.drawn(drawn, drawn - begun, look):
+        if self._resolution.note_picture(drawn, drawn - begun, look):
             self._report_resolution()
         self._check_context()
 

@@ -31,7 +31,7 @@ class Patience:
         self._since: float | None = None
         self._looked_at = 0.0
 
-    def swapped(self, now: float) -> None:
+    def note_swap(self, now: float) -> None:
         """The display took a picture."""
         self._since = now
 

@@ -27,7 +27,7 @@ class Machine:
         while self.now < end:
             took_s = self.cost(self.resolution.share)
             self.now += max(PERIOD_S, took_s)
-            if self.resolution.drawn(self.now, took_s, look):
+            if self.resolution.note_picture(self.now, took_s, look):
                 self.changes.append((self.now - 100.0, self.resolution.share))
         return self.resolution.share
 

@@ -215,7 +215,7 @@ def test_smaller_pictures_are_reported_once_and_stand_in_the_figures(
     shares: list[float] = []
     run = Run(box, Wish("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
     monkeypatch.setattr(Resolution, "share", property(lambda _: 0.5))
-    monkeypatch.setattr(Resolution, "drawn", lambda *_: True)
+    monkeypatch.setattr(Resolution, "note_picture", lambda *_: True)
     monkeypatch.setattr(Projector, "draw", lambda *arguments: shares.append(arguments[-1]))
     try:
         run.project(lambda: any("64x36 at 50%" in line for line in said))
