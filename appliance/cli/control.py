@@ -32,7 +32,7 @@ def control(
     ] = None,
     chosen: ChosenFile = None,
 ) -> None:
-    """Take commands by OSC (go, stop, panic, cues ...), also while the stage hangs or is not there."""
+    """Take commands by OSC (go, stop, panic, cues ...), even while the stage hangs or is absent."""
     config = load_box(box_of(box, chosen))
     if config.control is None:
         words = "This box file says `control: null`, so nobody commands this box."
@@ -45,13 +45,13 @@ def control(
     _require_udp(socket_fd)
     os.set_inheritable(socket_fd, True)
     command = control_command(config, socket_fd)
-    os.execv(command[0], command)  # a process that has loaded nothing that show control does not need
+    os.execv(command[0], command)  # a fresh process, which loads only what show control needs
 
 
 def open_control_port(control: ControlConfig) -> socket.socket:
     """The port's socket, bound. Raises StageError with what to do when it is taken.
 
-    The show control of a box that was killed may hold it for a moment still.
+    The show control of a killed box may still hold it for a moment.
     """
     until = time.monotonic() + _FREED_WITHIN_S
     while True:

@@ -23,7 +23,7 @@ _FOR_PEOPLE = (BvhError, ConfigError, PuppetError, RuntimeFolderError, StageErro
 
 
 def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> str:
-    """What `do` prints. Raises StageError with what it raised for people, or why it was given up."""
+    """What `do` prints. Raises StageError with its error for the user, or with why it was ended."""
 
     def told() -> bytes:
         limit_memory()
@@ -50,7 +50,7 @@ def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> s
 
 
 def prove_network(show: Show) -> None:
-    """Let it run once, at the show's iterations. Raises StageError where it cannot, or does not end."""
+    """Run it once, at the show's iterations. Raises StageError if that fails or does not end."""
 
     def run() -> None:
         puppet, dancer = Puppet(show.network, show.skeleton), show.config.dancer

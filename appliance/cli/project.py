@@ -1,4 +1,4 @@
-"""`bunraku project`: show what the stage dances until it is stopped; the exit status is for a supervisor."""
+"""`bunraku project`: shows what the stage dances until it is stopped; its exit status is for a supervisor."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def wish(
 def project_show(box_file: Path | None, wish: Wish, waits: bool = False) -> int:
     """0: ended as asked; 69: no display or no OpenGL; 73: no room for --frames; 75: reset or hung.
 
-    waits: without a display it is tried again each 10 s, in this process, until there is one.
+    waits: without a display, try again every 10 s in this process.
     """
     with stop_signals() as stopped, closing(LogWriter()) as speaker, closing(Notifier()) as notifier:
         said = ""
@@ -102,7 +102,7 @@ def _project(
 
 
 def _wait(stopped: Callable[[], bool], notifier: Notifier) -> None:
-    """Until a display is worth looking for again."""
+    """Wait until it is time to look for a display again."""
     again = time.monotonic() + _RETRY_S
     while not stopped() and (now := time.monotonic()) < again:
         notifier.ping(now)

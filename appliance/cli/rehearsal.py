@@ -40,7 +40,7 @@ def rehearsal_picture(journal: Path, out: Path, show: Show) -> list[str]:
 
 
 def _render(journal: Path, out: Path, show: Path, look: str) -> str | None:
-    """What went wrong, or None. In a process of its own, which a broken graphics driver may take with it."""
+    """What went wrong, or None. Runs in its own process, which a broken graphics driver may crash."""
     command = [
         *(sys.executable, "-m", "appliance.cli", "filmstrip", str(journal), "--out", str(out)),
         *("--start", str(-PICTURED_S), "--seconds", str(PICTURED_S), "--look", look, "--show", str(show)),

@@ -1,4 +1,4 @@
-"""The OpenGL ES 3.0 context of a window, and what must be known about it: software only, or lost."""
+"""The OpenGL ES 3.0 context of a window, and whether it is software or lost."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _RESET_STATUS = (b"glGetGraphicsResetStatus", b"glGetGraphicsResetStatusKHR", b"
 
 
 class GlContext:
-    """Current on this thread from now on. Raises ProjectorError where there is no OpenGL ES 3.0."""
+    """A context that is current on this thread. Raises ProjectorError if there is no OpenGL ES 3.0."""
 
     def __init__(self, window: Window) -> None:
         self._handle = _create(window)
@@ -36,7 +36,7 @@ class GlContext:
 
     @property
     def is_software(self) -> bool:
-        """Whether the processor draws, because there is no graphics card or no driver for it."""
+        """Whether the processor draws, for lack of a graphics card or its driver."""
         return any(word in self.renderer.casefold() for word in _SOFTWARE)
 
     @property
@@ -85,7 +85,7 @@ class _Loader:
 
 
 def _create(window: Window) -> object:
-    """A context that tells when the graphics card was reset; without that where the driver cannot."""
+    """A context that reports a reset of the graphics card, if the driver can."""
     for tells_resets in (1, 0):
         sdl2.SDL_GL_SetAttribute(sdl2.SDL_GL_CONTEXT_RESET_NOTIFICATION, tells_resets)
         sdl2.SDL_GL_SetAttribute(

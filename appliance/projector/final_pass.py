@@ -80,8 +80,8 @@ class FinalPass:
     ) -> Wall:
         """What a look draws its picture of that size onto; `draw` does the rest.
 
-        That is the display itself where nothing is left to do, which spares a small computer to write the
-        picture to memory and to read it again; else a texture.
+        That is the display itself if nothing is left to do, which saves a small computer from writing the
+        picture to memory and reading it back; else a texture.
         """
         self._tally.clear()
         scale, gamma = level * controls.alignment.brightness, self._config.gamma
@@ -137,7 +137,7 @@ class FinalPass:
         return self._tally.figures(width * height, 4 * width * height)
 
     def black(self, screen: moderngl.Framebuffer, display: Size) -> None:
-        """Nothing at all, not even figures or marks."""
+        """Clear the display: no picture, no figures, no marks."""
         self._tally.clear()
         screen.use()
         screen.viewport = (0, 0, *display)

@@ -154,7 +154,7 @@ class Run:
         left_stage = self.projector.draw(now, screen, size, lines, self._resolution.share)
         if self._wish.frames is not None:
             self._write_png(self._wish.frames, screen.read(viewport=(0, 0, *size), components=4), size)
-        self.context.finish()  # else the driver queues pictures, each one older
+        self.context.finish()  # else the driver queues pictures, and each is older when shown
         drawn = time.monotonic()
         self._window.show()
         swapped = time.monotonic()
@@ -166,7 +166,7 @@ class Run:
         self._check_context()
 
     def _report_resolution(self) -> None:
-        """Say it once; afterwards the figures show it."""
+        """Report it once; afterwards the figures show it."""
         if not self._is_resolution_said:
             self._is_resolution_said = True
             rate = 1.0 / self._pacing.period_s
@@ -227,7 +227,7 @@ class Run:
             self._say(about_software(figures.rate, 1.0 / self._pacing.period_s, self.context.renderer))
 
     def _publish_health(self, now: float, stage: str, share: float) -> None:
-        """For the box's other processes; a stage that was never seen does not count as away."""
+        """Publish for the box's other processes; a stage that was never seen does not count as away."""
         if self.reader.facts is not None:
             self.fallbacks.set(STAGE_UNSEEN.name, stage != "fresh" and not self.projector.sees_stage)
         self.fallbacks.set(PICTURES_SMALLER.name, share < 1.0)
@@ -244,7 +244,7 @@ class Run:
 
 
 def _open_inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> OrderInbox | None:
-    """Where orders by OSC arrive. Without them keys still work, and the dance is shown all the same."""
+    """The inbox for orders by OSC; without it keys still work, and the dance is shown."""
     try:
         opened.callback(Claim(folder, "projector").close)
         inbox = OrderInbox(folder, "projector")

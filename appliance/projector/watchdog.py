@@ -54,7 +54,7 @@ def guarded(
     monotonic: Callable[[], float] = time.monotonic,
     is_well: Callable[[float], None] = lambda now: None,
 ) -> Iterator[None]:
-    """Meanwhile a thread checks, calls `is_well` while pictures are shown, and `give_up` once they hang."""
+    """Run a thread that calls `is_well` while pictures are shown, and `give_up` once they hang."""
     is_done = threading.Event()
 
     def watch() -> None:
@@ -75,8 +75,8 @@ def guarded(
 
 
 def end_process() -> None:
-    """Say why, and end at once: a thread that waits for the display receives no signal either."""
-    words = threading.Thread(target=_say, daemon=True)  # a terminal that is stopped may not hold this up
+    """Report why, and end at once: a thread that waits for the display receives no signal either."""
+    words = threading.Thread(target=_say, daemon=True)  # a stopped terminal must not block this
     words.start()
     words.join(_LAST_WORDS_S)
     os._exit(GPU_LOST)

@@ -226,7 +226,7 @@ def test_two_preflights_at_once_take_turns(machine: Machine) -> None:
 def test_a_check_that_takes_all_memory_ends_alone(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     """Otherwise systemd would end the preflight with it: both belong to one unit."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    monkeypatch.setattr(candidate, "verified", lambda show, box: bytearray(memory // 2))
+    monkeypatch.setattr(candidate, "verified_parts", lambda show, box: bytearray(memory // 2))
 
     def check() -> bytes:
         return str(candidate.main("show", "box")).encode()

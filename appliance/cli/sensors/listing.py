@@ -34,14 +34,14 @@ def list_sensors(place: Venue, watch: bool, as_json: bool) -> None:
                 while True:
                     time.sleep(1.0)
                     live.update(_picture(place), refresh=True)
-        while True:  # in a pipe, table after table, each at once: its reader may stop at any time
+        while True:  # in a pipe, each table at once: its reader may stop at any time
             console.print(_picture(place), "")
             console.file.flush()
             time.sleep(1.0)
 
 
 def _picture(place: Venue) -> Group:
-    """What should be looked at, and below it the table: a short terminal shows the beginning."""
+    """The notes, and the table below them: a short terminal shows the beginning."""
     try:
         roll = place.running.roll()
     except NoBoxError as error:
@@ -63,7 +63,7 @@ def _picture(place: Venue) -> Group:
 
 
 def _about_file(place: Venue, roll: Roll) -> list[str]:
-    """What would surprise at the next start: another key file, a damaged one, a changed or an open one."""
+    """Surprises at the next start: another key file, a damaged, changed or unprotected one."""
     if roll.age_s < 0 or roll.key_file is None:
         return []
     if place.box.path is not None and roll.key_file.resolve() != place.keys.resolve():
@@ -75,7 +75,7 @@ def _about_file(place: Venue, roll: Roll) -> list[str]:
         return [
             f"{error}. The box goes on with the keys that it has; it lets no sensor in when it starts again."
         ]
-    except OSError:  # another user's file, or another machine's: the box's own matter
+    except OSError:  # another user's or machine's file, which only the box can judge
         return []
     notes = [warning] if warning else []
     if in_file != {(line.name, line.device_id) for line in roll.lines}:

@@ -1,4 +1,4 @@
-"""`bunraku provision`: which port, which file, the password; each step as it is done; the box told."""
+"""`bunraku provision`: port, key file, password; prints each step; tells the running box."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def provision_sensor(
     axes: str | None,
     takes_over: bool = False,
 ) -> int:
-    """Provision the wearable on a serial port; the exit status. Raises StageError, and then it is not."""
+    """Provision the wearable on a serial port; returns the exit status. StageError: it is not provisioned."""
     console = people_console()
 
     def say(what: str, words: str) -> None:
@@ -131,7 +131,7 @@ def _axes(text: str | None) -> tuple[int, int] | None:
 
 
 def _hints(place: Venue, done: Provisioned, settings: Settings, device: str) -> list[str]:
-    """What to do next, and what in the box file would keep the wearable from coming in."""
+    """What to do next, and what in the box file would keep the wearable out."""
     name, sensors = done.sensor.name, place.box.sensors
     hints = [""]
     if settings.network:

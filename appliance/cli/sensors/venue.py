@@ -1,4 +1,4 @@
-"""Which box and which key file a command about sensors means, and the box told of a change to it."""
+"""Which box and which key file a command about sensors means, and how the box learns of a change."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Venue:
 
 
 def venue(box_file: Path | None, keys: Path | None) -> Venue:
-    """By the box file, the key file alone, or what lies in this folder. Raises StageError, ConfigError."""
+    """From the box file, the key file alone, or the files in this folder. Raises StageError, ConfigError."""
     if box_file is not None and keys is not None:
         raise StageError("Give --box or --keys, not both: a box file names its key file.")
     box = load_box(box_file if keys is not None else box_here(box_file))
@@ -61,7 +61,7 @@ def people_console() -> Console:
 
 
 def send_command(place: Venue, address: str, name: str | None) -> None:
-    """Have the running box do this for the sensor of that name, or for all, and print its answer.
+    """Send a command for the sensor of that name, or for all, to the running box and print the answer.
 
     Raises StageError when it is not done.
     """
@@ -75,7 +75,7 @@ def send_command(place: Venue, address: str, name: str | None) -> None:
 
 
 def edit_keys(place: Venue, change_it: Callable[[KeyEditing], None], words: str) -> int:
-    """Change the key file and have the running box take it. The exit status."""
+    """Change the key file and have the running box read it. Returns the exit status."""
     with clear_errors(place.keys):
         if not place.keys.exists():
             raise FileNotFoundError
@@ -87,7 +87,7 @@ def edit_keys(place: Venue, change_it: Callable[[KeyEditing], None], words: str)
 
 
 def reload_and_say(place: Venue) -> int:
-    """Have the running box take the key file, and say whether it did. The exit status."""
+    """Have the running box read the key file, and report whether it did. Returns the exit status."""
     is_well, words = reload_keys(place)
     print(words)
     return 0 if is_well else NOT_TAKEN
@@ -96,7 +96,7 @@ def reload_and_say(place: Venue) -> int:
 def reload_keys(place: Venue) -> tuple[bool, str]:
     """Have the running box read the key file again: whether it is as it should be, and a sentence.
 
-    Where a stage lives, silence is no answer: show control may be on its way back, and is asked again.
+    If a stage runs, silence is no answer: show control may be restarting, and is asked again.
     """
     until = time.monotonic() + _RESTART_S
     while True:
@@ -104,7 +104,7 @@ def reload_keys(place: Venue) -> tuple[bool, str]:
             return _ask_to_reload(place)
         except NoBoxError as error:
             if not place.running.has_port:
-                words = "The box has no control port to be told by: the change counts when it starts again."
+                words = "The box has no control port: the change counts when it starts again."
                 return True, words
             if running_stage(place.box) is None:
                 return True, f"{error} The change counts when it starts."
@@ -126,13 +126,13 @@ def _ask_to_reload(place: Venue) -> tuple[bool, str]:
 
 
 def other_file(key_file: Path) -> str:
-    """Half a sentence."""
+    """The first half of a sentence."""
     return f"The running box reads another key file ({key_file})"
 
 
 @contextmanager
 def clear_errors(path: Path) -> Iterator[None]:
-    """Raise StageError, one clear line, for what goes wrong with a key file."""
+    """Turn errors about a key file into StageError, one clear line."""
     try:
         yield
     except KeyFileError as error:

@@ -62,8 +62,8 @@ class Renderer:
     ) -> None:
         """Draw onto `target`; mix 0: only look_before, 1: only look. Unknown names: the first look.
 
-        While two looks cross-fade, the camera moves from the one's place to the other's, and both see the
-        figure from there: it changes what it is made of, not where it is.
+        While two looks cross-fade, the camera moves from one look's place to the other's, and both draw the
+        figure from there: its material changes, not its place.
         """
         first = next(iter(self._looks.values()))
         now, before = self._looks.get(look, first), self._looks.get(look_before, first)
