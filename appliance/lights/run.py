@@ -140,7 +140,7 @@ def rig_problems(show: Show, box: BoxConfig) -> list[Problem]:
     """Why a show's lights do not fit this venue."""
     problems = misplaced(show, box)
     if not show.config.lights.fixtures:
-        cure = "Add them under lights: (docs/lights.md tells how)."
+        cure = "Add them under lights: (see docs/lights.md)."
         problems.append(Problem(show.file.path, 0, "The show has no fixtures.", cure))
     return problems
 
@@ -153,7 +153,7 @@ def rig_here(show: Show, box: BoxConfig) -> LightsConfig:
 
 
 def require_wires(box: BoxConfig) -> None:
-    """Refuse a box file without any wire to lights, with a NotAskedForError."""
+    """Raise NotAskedForError for a box file without any wire to lights."""
     if not box.outputs.dmx:
         cure = "Add one under outputs: dmx:, for instance {universe: 1, wire: artnet, host: 192.168.0.30}."
         file = box.path or Path("box.yaml")
@@ -174,7 +174,7 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
     box = load_box(box_file)
     require_wires(box)
     with stop_signals() as stopped, ExitStack() as opened:
-        speaker = LogWriter()  # a terminal that blocks must not hold up the lights
+        speaker = LogWriter()  # a terminal that blocks must not block the lights
         opened.callback(speaker.close)
         folder = runtime_folder(box)
         opened.callback(Claim(folder, "lights").close)
@@ -220,7 +220,7 @@ def _light(lights: Lights, stopped: Callable[[], bool], pulse: Callable[[float],
 
 
 def say(words: str) -> None:
-    """Print a line, as far as there is still a terminal: light matters more."""
+    """Print a line; a closed terminal is ignored: light matters more."""
     with contextlib.suppress(OSError, ValueError):
         print(words, flush=True)
 

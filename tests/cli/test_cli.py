@@ -1,4 +1,4 @@
-"""The command: what people can mend is one clear message and status 2; plug-ins cost only themselves."""
+"""The command: errors of the user are one clear message and status 2; a broken plug-in costs only itself."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_a_phrase_shorter_than_a_window_is_refused(
     assert "5 poses" in words
 
 
-def test_check_passes_a_whole_show_and_says_what_it_costs(
+def test_check_passes_a_sound_show_and_reports_its_cost(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     show = write_show(tmp_path / "show")
@@ -175,7 +175,7 @@ def test_without_a_sensors_key_check_refuses_and_play_dances(
         ("null", "it listens to no network"),
     ],
 )
-def test_a_box_that_no_wearable_reaches_is_said(
+def test_a_box_that_no_wearable_reaches_is_reported(
     udp: str, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     show = write_show(tmp_path / "show")

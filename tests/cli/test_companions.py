@@ -48,7 +48,7 @@ def is_gone(pid: int) -> bool:
         return True
 
 
-def test_it_starts_when_it_may_and_ends_with_the_context(diary: Diary) -> None:
+def test_a_companion_starts_when_it_may_and_ends_with_the_context(diary: Diary) -> None:
     dances: list[bool] = []
     said: list[str] = []
     with Companions([diary.child("time.sleep(60)")], said.append, lambda: bool(dances)):
@@ -165,7 +165,7 @@ def test_a_killed_player_leaves_no_orphan(diary: Diary) -> None:
     until(lambda: is_gone(diary.pids[0]))
 
 
-def test_a_child_whose_player_is_gone_already_does_not_begin(diary: Diary) -> None:
+def test_a_companion_does_not_start_without_its_parent(diary: Diary) -> None:
     script = "from appliance.box.parent_death import end_with_parent; end_with_parent(); " + NOTE
     done = subprocess.run(
         [sys.executable, "-c", script, str(diary.path)],

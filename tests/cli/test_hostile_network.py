@@ -35,7 +35,7 @@ def spoilt(show: Path, nodes: list[onnx.NodeProto], constants: list[onnx.TensorP
 
 
 def endless(show: Path, from_iterations: int) -> Path:
-    """A show whose network never ends from so many coding iterations on."""
+    """A show with a network that never ends from this many coding iterations on."""
     body = helper.make_graph(
         [
             helper.make_node("Identity", ["so_far"], ["as_it_was"]),
@@ -61,7 +61,7 @@ def endless(show: Path, from_iterations: int) -> Path:
 
 
 def greedy(show: Path) -> Path:
-    """A show whose network needs a terabyte."""
+    """A show with a network that needs a terabyte."""
     constants = [
         helper.make_tensor("shape", TensorProto.INT64, [2], np.array([1 << 19, 1 << 19])),
         helper.make_tensor("last", TensorProto.INT64, [1], np.array([-1])),

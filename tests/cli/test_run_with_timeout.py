@@ -1,4 +1,4 @@
-"""What may never end is given up: also when it has not come far."""
+"""A function that never ends is killed, also right at its start."""
 
 from __future__ import annotations
 

@@ -203,7 +203,7 @@ def test_matrices_are_read_in_the_order_that_they_ask_for(repeat_for: Any, wante
     assert values["modes"][0]["channels"] == [f"macro {pixel}" for pixel in wanted]
 
 
-def test_modes_larger_than_a_universe_are_left_out_and_said() -> None:
+def test_modes_larger_than_a_universe_are_left_out_and_reported() -> None:
     fixture = {
         **BAR,
         "matrix": {"pixelCount": [300, 1, 1]},

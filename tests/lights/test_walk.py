@@ -98,11 +98,11 @@ def held_up(patch: Patch, attribute: str) -> Any:
     return np.array(shown)
 
 
-def test_a_walk_that_is_held_up_jumps_over_no_peak() -> None:
+def test_a_delayed_walk_skips_no_peak() -> None:
     assert held_up(patch_of(PAR), "red")[:, 1].max() > 230
 
 
-def test_a_head_that_is_held_up_reaches_both_ends_and_goes_no_faster() -> None:
+def test_a_delayed_head_reaches_both_ends_and_moves_no_faster() -> None:
     patch = patch_of(HEAD)
     levels = held_up(patch, "pan")[1:-1]
     pan = (levels[:, 20] * 256 + levels[:, 21]) / 65535 * 540
@@ -228,7 +228,7 @@ def test_the_rig_is_printed_and_drawn(show: Path, tmp_path: Path, capsys: pytest
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_picture_shows_where_heads_point_in_the_mapping_that_is_asked_for(
+def test_the_picture_shows_where_heads_point_in_the_chosen_mapping(
     show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("matplotlib")

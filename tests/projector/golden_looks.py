@@ -52,7 +52,7 @@ def renderer(
 
 
 def difference(a: Picture, b: Picture) -> tuple[float, float]:
-    """How far two pictures are apart in steps of 255: mean and 99th percentile, after a small blur."""
+    """The difference of two pictures in steps of 255: mean and 99th percentile, after a small blur."""
     apart = np.abs(_blurred(a) - _blurred(b))
     return float(apart.mean()), float(np.percentile(apart, 99))
 

@@ -88,7 +88,7 @@ def test_the_pictures_corners_land_on_the_wished_pixels(show: Show, corners: Cor
 
 
 def depth_inside(corners: Corners) -> np.ndarray:
-    """How far within the straight lines between four points each pixel's centre lies, pixels: the oracle."""
+    """Distance of each pixel's centre inside the quadrilateral of four points, pixels: the oracle."""
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
     depth = np.full(x.shape, np.inf)
     for k in range(4):

@@ -32,7 +32,7 @@ def gl() -> Iterator[moderngl.Context]:
 
 
 class Evening:
-    """A projector, and time that passes as the test wishes."""
+    """A projector, and time under the test's control."""
 
     def __init__(self, gl: moderngl.Context, folder: Path, show: Path) -> None:
         TellingPainter.made = TellingPainter.released = 0
@@ -115,7 +115,7 @@ def test_fades_to_black_when_the_stage_hangs_and_comes_back(evening: Evening) ->
     assert TellingPainter.made == 1
 
 
-def test_a_machine_that_was_held_up_whole_shows_no_black(evening: Evening) -> None:
+def test_a_pause_of_the_whole_machine_shows_no_black(evening: Evening) -> None:
     """The projector wakes a few pictures before the stage does."""
     evening.begin()
     assert evening.colour(1.0)[0] == 255
@@ -173,7 +173,7 @@ def test_looks_that_were_changed_are_taken_by_the_next_stage(evening: Evening) -
     assert TellingPainter.made == 2 and not evening.said
 
 
-def test_a_show_that_is_broken_meanwhile_is_said_and_shown_in_built_in_looks(evening: Evening) -> None:
+def test_a_show_broken_since_the_start_is_reported_and_shown_in_built_in_looks(evening: Evening) -> None:
     with (evening.show / "show.yaml").open("a") as file:
         file.write("looks: [{name: cold, style: lnes}]\n")
     evening.begin()
@@ -252,7 +252,7 @@ def test_each_look_is_drawn_unseen_before_the_first_is_seen(
     assert set(seen[: first + 1]) == {(0, 0, 0)}
 
 
-def test_a_show_that_is_prepared_is_told_from_a_display_that_hangs(
+def test_preparing_a_show_is_distinguished_from_a_hung_display(
     evening: Evening, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     draw = TellingPainter.draw
@@ -276,6 +276,6 @@ def test_the_window_may_change_its_size(evening: Evening) -> None:
     assert (evening.picture()[..., 0] == 255).all()
 
 
-def test_no_text_unless_it_is_asked_for(evening: Evening) -> None:
+def test_text_appears_on_demand_alone(evening: Evening) -> None:
     assert not evening.picture().any()
     assert evening.picture(lines=("60 pictures/s",)).any()

@@ -99,7 +99,7 @@ def test_no_blur_where_smaller_pictures_bring_nothing() -> None:
 
 
 def test_full_pictures_that_were_measured_too_short_are_measured_again() -> None:
-    """Another program began meanwhile."""
+    """Another program started."""
     machine = Machine(by_pixels(1.5 * PERIOD_S, fixed_s=1.1 * PERIOD_S))
     machine.dance(1.2)
     assert machine.resolution.share == SHARES[1]

@@ -58,7 +58,7 @@ def test_patience_is_over_after_five_seconds_without_a_picture() -> None:
     assert over_at(patience, 165.0, 190.0) == 164.0 + PATIENCE_S
 
 
-def test_a_show_that_is_prepared_may_take_its_time() -> None:
+def test_preparing_a_show_may_take_long() -> None:
     patience = Patience()
     patience.is_over(99.5, False)
     patience.note_swap(100.0)

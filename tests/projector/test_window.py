@@ -121,7 +121,7 @@ def test_a_desktop_that_does_not_answer(no_display: None, monkeypatch: pytest.Mo
         Window(ProjectorConfig(), "window")
 
 
-def test_a_display_that_is_not_there_and_those_that_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_display_is_refused_with_a_list_of_those_present(monkeypatch: pytest.MonkeyPatch) -> None:
     with virtual_display() as display:
         monkeypatch.setenv("DISPLAY", display)
         monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -256,7 +256,7 @@ def test_a_pause_of_the_whole_machine_is_not_reported_as_a_black_picture(tmp_pat
         assert not is_black_reported()
 
 
-def test_keys_have_the_names_that_are_printed_on_them() -> None:
+def test_keys_are_named_as_printed_on_them() -> None:
     window = Window(ProjectorConfig(), "offscreen", (64, 36))
     event = sdl2.SDL_Event()
     event.type = sdl2.SDL_KEYDOWN

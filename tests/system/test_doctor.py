@@ -54,7 +54,7 @@ def quiet(late_ms: tuple[float, ...] = (0.1,) * 200, **changes: object) -> Sampl
     return Sample(**{**usual, **changes})  # type: ignore[arg-type]
 
 
-def test_every_finding_that_is_not_well_says_what_to_do(tmp_path: Path) -> None:
+def test_every_finding_but_ok_has_a_cure(tmp_path: Path) -> None:
     """Also on a machine that reveals nothing; no check raises."""
     for finding in findings(HostView(tmp_path)):
         assert finding.words.endswith("."), finding
@@ -244,7 +244,7 @@ def test_a_release_put_aside_is_reported(tmp_path: Path) -> None:
     assert "bunraku-install --use 0.2.0" in found.cure
 
 
-def test_how_the_dance_fares() -> None:
+def test_the_health_of_the_dance() -> None:
     health = {"rate_hz": 50.0, "ticks": 5000, "late": 3, "skipped": 0, "complaints": []}
     assert only(box_state.stage(HostView(stage=RunningStage(1, health)))).verdict == "ok"
     found = list(

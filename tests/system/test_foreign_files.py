@@ -109,7 +109,7 @@ def test_foreign_files_block_and_end_nothing(
     assert int(run_with_timeout(PATIENCE_S, done)) < max(PEAK, before + (100 << 20))
 
 
-def test_a_block_whose_slots_are_enormous_or_none_is_refused(tmp_path: Path) -> None:
+def test_a_block_with_enormous_slots_or_none_is_refused(tmp_path: Path) -> None:
     """The checksum covers the header alone."""
     path = tmp_path / "block"
     for slots, capacity in ((0, 100), (2, 0xFFFFFFC0), (2, 1 << 30)):

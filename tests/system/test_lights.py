@@ -156,7 +156,7 @@ def test_a_killed_box_takes_its_lights_with_it_and_they_end_dark(tmp_path: Path)
         lamp.await_levels(is_dark, universe=2)
 
 
-def test_a_widget_that_is_not_there_costs_the_other_wires_nothing(tmp_path: Path) -> None:
+def test_a_missing_widget_does_not_affect_other_wires(tmp_path: Path) -> None:
     show = write_show(tmp_path / "show", lights=DARK)
     with node() as (lamp, port):
         settings = artnet(port, 1)

@@ -202,7 +202,7 @@ def test_a_box_that_holds_the_cable_is_named(show: Path, tmp_path: Path) -> None
             assert box.end() == 0
 
 
-def test_the_password_is_asked_for_on_the_terminal_and_not_shown(tmp_path: Path) -> None:
+def test_the_password_is_read_on_the_terminal_without_echo(tmp_path: Path) -> None:
     keys = tmp_path / "sensors.keys"
     with Bench() as bench:
         command = [*BUNRAKU, "provision", "--port", bench.device, "--name", "head"]
