@@ -8,6 +8,7 @@ import subprocess
 import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -37,11 +38,18 @@ def succeeded(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return capsys.readouterr().out
 
 
-def own_box(folder: Path) -> Path:
-    """A box file without ports: another box may dance on this machine."""
+def write_box(folder: Path, text: str = "control: null\nsensors: {udp: null}") -> Path:
+    """A box file; by default without ports: another box may dance on this machine."""
     box = folder / "box.yaml"
-    box.write_text("control: null\nsensors: {udp: null}\n")
+    box.write_text(text + "\n")
     return box
+
+
+def packed_show(folder: Path, **options: Any) -> Path:
+    """A show with its checksums."""
+    show = write_show(folder / "show", **options)
+    write_checksums(show)
+    return show
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -73,15 +81,14 @@ def test_a_broken_show_is_refused_with_file_and_cause(
 ) -> None:
     show = write_show(tmp_path / "show")
     (show / file).write_text(text)
-    words = refused(capsys, "play", "--show", str(show), "--box", str(own_box(tmp_path)), "--seconds", "1")
+    words = refused(capsys, "play", "--show", str(show), "--box", str(write_box(tmp_path)), "--seconds", "1")
     assert re.search(complaint, words.replace("\n", " "))
 
 
 def test_a_broken_box_file_is_refused_with_its_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    box = tmp_path / "box.yaml"
-    box.write_text("limits:\n  tick_budget: 5\n")
+    box = write_box(tmp_path, "limits:\n  tick_budget: 5")
     words = refused(capsys, "play", "--show", str(write_show(tmp_path / "show")), "--box", str(box))
     assert "box.yaml:2" in words
     assert "tick_budget_ms" in words
@@ -92,27 +99,22 @@ def test_a_phrase_shorter_than_a_window_is_refused(
 ) -> None:
     show = write_show(tmp_path / "show")
     write_bvh(show / "phrase.bvh", swaying_phrase().excerpt(0.0, 0.1))
-    words = refused(capsys, "play", "--show", str(show), "--box", str(own_box(tmp_path)), "--seconds", "1")
+    words = refused(capsys, "play", "--show", str(show), "--box", str(write_box(tmp_path)), "--seconds", "1")
     assert "5 poses" in words
 
 
 def test_check_passes_a_sound_show_and_reports_its_cost(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    show = write_show(tmp_path / "show")
-    write_checksums(show)
+    show = packed_show(tmp_path)
     words = succeeded(capsys, "check", str(show))
     assert "the bundle is whole" in words
     assert "3 coding iterations cost" in words
 
 
 def test_check_reads_a_box_file_against_the_show(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    show = write_show(tmp_path / "show")
-    with (show / "show.yaml").open("a") as file:
-        file.write("lights: {fixtures: [{name: wash, profile: led-par, address: 1}]}\n")
-    write_checksums(show)
-    box = tmp_path / "box.yaml"
-    box.write_text("sensors: {udp: null}\n")
+    show = packed_show(tmp_path, lights={"fixtures": [{"name": "wash", "profile": "led-par", "address": 1}]})
+    box = write_box(tmp_path, "sensors: {udp: null}")
     assert "Universe 1 has no wire, so these stay dark: wash" in succeeded(
         capsys, "check", str(show), "--box", str(box)
     )
@@ -123,8 +125,7 @@ def test_check_reads_a_box_file_against_the_show(tmp_path: Path, capsys: pytest.
 
 
 def test_check_refuses_a_changed_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    show = write_show(tmp_path / "show")
-    write_checksums(show)
+    show = packed_show(tmp_path)
     (show / "phrase.bvh").write_text((show / "phrase.bvh").read_text() + "\n")
     assert "phrase.bvh" in refused(capsys, "check", str(show))
 
@@ -132,10 +133,8 @@ def test_check_refuses_a_changed_file(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_check_refuses_iterations_that_the_budget_cannot_hold(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    show = write_show(tmp_path / "show", network="heavy")
-    write_checksums(show)
-    box = tmp_path / "box.yaml"
-    box.write_text("limits: {tick_budget_ms: 0.5}\n")
+    show = packed_show(tmp_path, network="heavy")
+    box = write_box(tmp_path, "limits: {tick_budget_ms: 0.5}")
     assert "3 coding iterations do not fit" in refused(capsys, "check", str(show), "--box", str(box))
 
 
@@ -154,10 +153,10 @@ def test_check_refuses_iterations_that_the_budget_cannot_hold(
 def test_without_a_sensors_key_check_refuses_and_play_dances(
     keys: str | None, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    show = write_show(tmp_path / "show")
-    write_checksums(show)
-    box = tmp_path / "box.yaml"
-    box.write_text("sensors: {udp: {port: 0}, keys: sensors.keys}\ncontrol: null\noutputs: {osc: []}\n")
+    show = packed_show(tmp_path)
+    box = write_box(
+        tmp_path, "sensors: {udp: {port: 0}, keys: sensors.keys}\ncontrol: null\noutputs: {osc: []}"
+    )
     if keys is not None:
         (tmp_path / "sensors.keys").write_text(keys)
     assert said in refused(capfd, "check", str(show), "--box", str(box))
@@ -178,10 +177,10 @@ def test_without_a_sensors_key_check_refuses_and_play_dances(
 def test_a_box_that_no_wearable_reaches_is_reported(
     udp: str, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    show = write_show(tmp_path / "show")
-    write_checksums(show)
-    box = tmp_path / "box.yaml"
-    box.write_text(f"sensors: {{udp: {udp}, keys: sensors.keys}}\ncontrol: null\noutputs: {{osc: []}}\n")
+    show = packed_show(tmp_path)
+    box = write_box(
+        tmp_path, f"sensors: {{udp: {udp}, keys: sensors.keys}}\ncontrol: null\noutputs: {{osc: []}}"
+    )
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
     for words in (
         succeeded(capfd, "check", str(show), "--box", str(box)),

@@ -40,10 +40,10 @@ class Evening:
         self.said: list[str] = []
         self.controls = Controls(Alignment(), lambda _: None)
         self.show_state = ShowState()
-        self._house = ShowStateWriter(folder)
-        self._reader, self._seen_house = FrameReader(folder), ShowStateReader(folder)
+        self._declared = ShowStateWriter(folder)
+        self._reader, self._show_state = FrameReader(folder), ShowStateReader(folder)
         self.projector = Projector(
-            *(gl, ProjectorConfig(), self._reader, self._seen_house, self.controls, self.said.append),
+            *(gl, ProjectorConfig(), self._reader, self._show_state, self.controls, self.said.append),
             TellingPainter,
         )
         self.now = self._ticked = 1000.0
@@ -52,6 +52,12 @@ class Evening:
 
     def begin(self, joints: int = 3, show: Path | None = None) -> None:
         self.stage = StageDouble(self.folder, show or self.show, joints)
+
+    def lose_stage(self) -> None:
+        """The stage's process ends."""
+        assert self.stage is not None
+        self.stage.close()
+        self.stage = None
 
     def picture(self, size: tuple[int, int] = SIZE, lines: tuple[str, ...] = ()) -> np.ndarray:
         """One display frame later; the stage, if there is one, has ticked meanwhile."""
@@ -71,16 +77,16 @@ class Evening:
         red, green, blue = found.reshape(-1, 3).max(axis=0)
         return int(red), int(green), int(blue)
 
-    def set_house(self, show_state: ShowState) -> None:
+    def declare(self, show_state: ShowState) -> None:
         self.show_state = show_state
-        self._house.write(show_state)
+        self._declared.write(show_state)
 
     def close(self) -> None:
         if self.stage is not None:
             self.stage.close()
         self.projector.release()
-        self._house.close()
-        self._seen_house.close()
+        self._declared.close()
+        self._show_state.close()
         self._reader.close()
 
 
@@ -130,9 +136,7 @@ def test_a_pause_of_the_whole_machine_shows_no_black(evening: Evening) -> None:
 def test_a_stage_that_is_restarted_soon_is_hardly_seen(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    assert evening.stage is not None
-    evening.stage.close()
-    evening.stage = None
+    evening.lose_stage()
     assert evening.colour(0.3)[0] == 255
     evening.begin()
     assert {evening.colour()[0] for _ in range(30)} == {255}
@@ -142,9 +146,7 @@ def test_a_stage_that_is_restarted_soon_is_hardly_seen(evening: Evening) -> None
 def test_a_new_stage_that_has_not_begun_to_dance_takes_no_picture_away(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    assert evening.stage is not None
-    evening.stage.close()
-    evening.stage = None
+    evening.lose_stage()
     evening.colour(0.1)
     coming = StageDouble(evening.folder, evening.show, joints=5)
     assert evening.colour(0.3)[:2] == (255, 76)
@@ -187,10 +189,10 @@ def test_panic_is_black_in_the_very_next_picture(evening: Evening) -> None:
     evening.controls.set_grid(True)
     for _ in range(60):
         assert evening.picture().any() or evening.now < 1000.5
-    evening.set_house(replace(evening.show_state, panic=True))
+    evening.declare(replace(evening.show_state, panic=True))
     assert not evening.picture(lines=("60 pictures/s",)).any()
     assert evening.left_stage is None
-    evening.set_house(replace(evening.show_state, panic=False))
+    evening.declare(replace(evening.show_state, panic=False))
     assert evening.picture().any()
 
 
@@ -203,7 +205,7 @@ def test_panic_that_comes_while_a_picture_is_drawn_is_in_that_picture(
 
     def panics(*arguments: object) -> None:
         draw(*arguments)  # type: ignore[arg-type]
-        evening.set_house(replace(evening.show_state, panic=True))
+        evening.declare(replace(evening.show_state, panic=True))
 
     monkeypatch.setattr(TellingPainter, "draw", panics)
     assert evening.colour() == (0, 0, 0)
@@ -212,20 +214,20 @@ def test_panic_that_comes_while_a_picture_is_drawn_is_in_that_picture(
 def test_blackout_and_master_and_stop(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    evening.set_house(replace(evening.show_state, blackout=True))
+    evening.declare(replace(evening.show_state, blackout=True))
     assert evening.colour() == (0, 0, 0)
-    evening.set_house(ShowState().with_master(0.5, evening.now, 1.0))
+    evening.declare(ShowState().with_master(0.5, evening.now, 1.0))
     assert 180 < evening.colour(0.5)[0] < 200
     assert abs(evening.colour(0.7)[0] - 128) <= 1
-    evening.set_house(ShowState().with_going(False, evening.now, 2.0))
+    evening.declare(ShowState().with_going(False, evening.now, 2.0))
     assert 120 < evening.colour(1.0)[0] < 135
     assert evening.colour(1.1) == (0, 0, 0)
 
 
-def test_looks_fade_as_the_house_says(evening: Evening) -> None:
+def test_looks_fade_as_the_declared_says(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    evening.set_house(ShowState().with_look("lines", evening.now, 1.0))
+    evening.declare(ShowState().with_look("lines", evening.now, 1.0))
     assert 120 < evening.colour(0.5)[2] < 135
     assert evening.colour(0.6)[2] == 255
 

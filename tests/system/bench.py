@@ -9,7 +9,6 @@ import socket
 import threading
 import time
 import tty
-from types import TracebackType
 
 from hw_sim.firmware_library import CompiledWearable, State
 
@@ -43,9 +42,7 @@ class Bench:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._is_over.set()
         self._thread.join()
         self.pull_out()

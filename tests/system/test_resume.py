@@ -6,7 +6,8 @@ import json
 import shutil
 import signal
 import sys
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,15 @@ from tests.system.processes import wait_until
 
 PLAY = (sys.executable, "-m", "appliance.start", "play")
 PHRASE_S, TICK_S = 3.0, 0.02
-NO_REALTIME = {"realtime": {"enabled": False}, "control": None, "state": "state"}
+KEPT = {"journal": {"folder": "journal"}}
+NO_REALTIME: dict[str, Any] = {"realtime": {"enabled": False}, "control": None, "state": "state"}
+
+
+@contextmanager
+def playing_alone(show: Path, folder: Path, **settings: Any) -> Iterator[Box]:
+    """A stage without companions."""
+    with playing(show, folder, "--alone", command=PLAY, settings=NO_REALTIME | settings) as box:
+        yield box
 
 
 def checkpoint_of(box: Box) -> Checkpoint:
@@ -28,6 +37,13 @@ def checkpoint_of(box: Box) -> Checkpoint:
         place = reader.read()
     assert place is not None
     return place
+
+
+def await_kept_checkpoint(box: Box) -> None:
+    """Wait until the keeper has written another checkpoint to the disk."""
+    path = box.box_file.with_name("state") / FILE
+    before = read_checkpoint(path)
+    wait_until(lambda: read_checkpoint(path) not in (None, before), lambda: box.words, box.pause)
 
 
 def danced(frames: list[list[Any]]) -> int:
@@ -49,7 +65,7 @@ def goes_on_at(box: Box, count: int) -> float:
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
 def test_goes_on_at_the_same_place_however_it_died(show: Path, tmp_path: Path, how: int) -> None:
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+    with playing_alone(show, tmp_path) as box:
         frames = box.frames(30)
         box.end(how)
         frames += box.last_frames()
@@ -67,7 +83,7 @@ def test_goes_on_at_the_same_place_however_it_died(show: Path, tmp_path: Path, h
 
 
 def test_twelve_kills_in_a_row(show: Path, tmp_path: Path) -> None:
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+    with playing_alone(show, tmp_path) as box:
         began_at_s = 0.0
         for kill in range(1, 13):
             frames = box.frames(2)  # the first has a checkpoint by now
@@ -83,7 +99,7 @@ def test_twelve_kills_in_a_row(show: Path, tmp_path: Path) -> None:
 
 
 def test_a_show_that_was_ended_begins_at_the_beginning(show: Path, tmp_path: Path) -> None:
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+    with playing_alone(show, tmp_path) as box:
         box.frames(20)
         assert box.end() == 0
         assert checkpoint_of(box).ended
@@ -96,9 +112,8 @@ def test_a_show_that_was_ended_begins_at_the_beginning(show: Path, tmp_path: Pat
 
 
 def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Path) -> None:
-    settings = {**NO_REALTIME, "journal": {"folder": "journal"}}
-    with playing(show, tmp_path, command=PLAY, settings=settings) as box:
-        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
+    with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME | KEPT) as box:
+        await_kept_checkpoint(box)
         assert box.end() == 0
         place = read_checkpoint(tmp_path / "state" / FILE)
         assert place is not None and place.ended
@@ -111,11 +126,10 @@ def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Pa
 
 def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path) -> None:
     """The whole box with its keeper. A power cut takes the memory: the runtime folder and the boot id."""
-    settings = {**NO_REALTIME, "journal": {"folder": "journal"}}
-    with playing(show, tmp_path, command=PLAY, settings=settings) as box:
-        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
+    with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME | KEPT) as box:
+        await_kept_checkpoint(box)
         box.frames(60)
-        await_next_checkpoint(tmp_path)
+        await_kept_checkpoint(box)
         box.end(signal.SIGKILL)
         await_end_of_keeper(box.runtime)
         at_cut = checkpoint_of(box)
@@ -132,16 +146,10 @@ def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path)
 
 def test_a_box_without_a_journal_keeps_its_place_on_the_disk_too(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME) as box:
-        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
+        await_kept_checkpoint(box)
         assert box.end() == 0
         place = read_checkpoint(tmp_path / "state" / FILE)
         assert place is not None and place.ended
-
-
-def await_next_checkpoint(folder: Path) -> None:
-    """Wait until the keeper has written another checkpoint to the disk."""
-    before = read_checkpoint(folder / "state" / FILE)
-    wait_until(lambda: read_checkpoint(folder / "state" / FILE) != before)
 
 
 def mark_as_of_another_boot(path: Path, place: Checkpoint) -> None:
@@ -152,8 +160,7 @@ def mark_as_of_another_boot(path: Path, place: Checkpoint) -> None:
 
 @pytest.mark.parametrize("resume", ["never", "after_crash"])
 def test_the_box_file_decides_whether_it_goes_on(show: Path, tmp_path: Path, resume: str) -> None:
-    settings = {**NO_REALTIME, "resume": resume}
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=settings) as box:
+    with playing_alone(show, tmp_path, resume=resume) as box:
         box.frames(20)
         box.kill_and_restart()
         box.frames(3)
@@ -162,7 +169,7 @@ def test_the_box_file_decides_whether_it_goes_on(show: Path, tmp_path: Path, res
 
 
 def test_a_restart_measures_nothing_and_reads_no_phrase(show: Path, tmp_path: Path) -> None:
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+    with playing_alone(show, tmp_path) as box:
         box.frames(5)
         runtime = box.runtime
         measured = (runtime / "admission").read_bytes()
