@@ -91,12 +91,17 @@ class BoxRoot:
         run("mount", "-t", "overlay", "-o", above, "overlay", str(self.path))
 
     def switch_off(self) -> None:
+        self.flush()
         for mounted in (self.path, self.written):
             unmount(mounted)
         self.release_disk()
 
+    def flush(self) -> None:
+        """Unmounting writes nothing while another mount namespace has the disk too; see release_disk."""
+        subprocess.run(["sync", "--file-system", str(self.written)], capture_output=True)
+
     def release_disk(self) -> None:
-        """Whoever copied this machine's mounts meanwhile (a box in a container does) holds another disk."""
+        """A container that booted meanwhile has copied the mounts: from now on it holds another disk."""
         if subprocess.check_output(["losetup", "--associated", str(self.disk)]):
             copy = self.disk.with_suffix(".copy")
             run("cp", "--sparse=always", str(self.disk), str(copy))

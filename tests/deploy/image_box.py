@@ -50,6 +50,7 @@ class ImageBox(BoxRoot):
             assert done.returncode == 0, done.stderr
 
     def switch_off(self) -> None:
+        self.flush()
         for mounted in (self.written, self.path, self.folder / "memory", self.folder / "below"):
             unmount(mounted)
         self.release_disk()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import signal
 import sys
@@ -178,5 +177,5 @@ def test_a_restart_measures_nothing_and_reads_no_phrase(show: Path, tmp_path: Pa
         box.kill_and_restart()
         box.frames(5)
         assert (runtime / "admission").read_bytes() == measured
-        assert json.loads(measured)["measured"]["asked_coding"] == 3
+        assert b'"asked_coding": 3' in measured
         assert phrase.stat().st_mtime_ns == made
