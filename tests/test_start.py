@@ -93,15 +93,6 @@ def test_playing_loads_no_parser_no_simulation_and_no_other_process_s_parts() ->
     words = "import sys, appliance.start, appliance.cli.play; print(*sorted(sys.modules))"
     ran = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
     loaded = set(ran.stdout.split())
-    needless = {
-        "typer",
-        "rich",
-        "click",
-        "hw_sim",
-        "matplotlib",
-        "onnx",
-        "torch",
-        "appliance.cli.emulation",
-    }
+    needless = {"typer", "rich", "click", "hw_sim", "matplotlib", "onnx", "torch", "appliance.cli.emulation"}
     needless |= {"appliance.cli.app", "appliance.cli.companions", "appliance.projector", "subprocess"}
     assert not loaded & needless

@@ -44,7 +44,7 @@ _JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
 
 
 @dataclass(frozen=True)
-class Wish:
+class Options:
     """The options of the command line. kind None: as the box file says; frames: a folder for PNGs."""
 
     kind: Kind | None = None
@@ -57,20 +57,20 @@ class Wish:
 class Run:
     """Everything open while the projector runs. Raises ProjectorError, ConfigError or RuntimeFolderError."""
 
-    def __init__(self, box: BoxConfig, wish: Wish, say: Callable[[str], None]) -> None:
+    def __init__(self, box: BoxConfig, options: Options, say: Callable[[str], None]) -> None:
         config = box.projector
-        self._wish, self._say = wish, say
+        self._options, self._say = options, say
         with ExitStack() as opened:
             folder = runtime_folder(box)
             self._window = Window(
-                config, wish.kind or ("fullscreen" if config.fullscreen else "window"), wish.size
+                config, options.kind or ("fullscreen" if config.fullscreen else "window"), options.size
             )
             opened.callback(self._window.close)
             self.context = GlContext(self._window)
             opened.callback(self.context.close)
             self._file = AlignmentFile(alignment_folder(box), config, say)
             opened.callback(self._file.close)
-            self._controls = Controls(self._file.alignment, self._file.keep, wish.shows_info)
+            self._controls = Controls(self._file.alignment, self._file.keep, options.shows_info)
             self._inbox = _open_inbox(folder, opened, say)
             self.fallbacks = Fallbacks(OF_THE_PROJECTOR)
             self._health = ProcessHealthWriter(folder, "projector", self.fallbacks)
@@ -137,7 +137,7 @@ class Run:
         begun = reported = time.monotonic()
         while not stopped() and not self._controls.is_over:
             now = self._pacing.wait_for_next()
-            if self._wish.seconds is not None and now - begun >= self._wish.seconds:
+            if self._options.seconds is not None and now - begun >= self._options.seconds:
                 return
             self._press_keys()
             self._carry_out_orders()
@@ -152,8 +152,8 @@ class Run:
         screen, size, begun = self.context.gl.screen, self._window.size, time.monotonic()
         lines = self._lines if self._controls.shows_info else ()
         left_stage = self.projector.draw(now, screen, size, lines, self._resolution.share)
-        if self._wish.frames is not None:
-            self._write_png(self._wish.frames, screen.read(viewport=(0, 0, *size), components=4), size)
+        if self._options.frames is not None:
+            self._write_png(self._options.frames, screen.read(viewport=(0, 0, *size), components=4), size)
         self.context.finish()  # else the driver queues pictures, and each is older when shown
         drawn = time.monotonic()
         self._window.show()
@@ -220,7 +220,7 @@ class Run:
             f"look {self._show_state.read().look or 'of the show'}",
             f"{width}x{height}{drawn_at} {'software' if self.context.is_software else self._window.driver}",
         )
-        if self._wish.shows_info:
+        if self._options.shows_info:
             self._say(f"{figures.sentence()}, {width}x{height}{drawn_at}, stage {state}")
         if not self._warned and figures.dances >= _JUDGED_AFTER:
             self._warned = True

@@ -210,9 +210,7 @@ def test_commands_reach_the_box_and_its_answer_is_printed(
         assert err == f"bunraku: {name} it is.\n"
 
 
-def test_a_late_answer_of_the_stage_replaces_the_refusal(
-    box: RunningBox,
-) -> None:
+def test_a_late_answer_of_the_stage_replaces_the_refusal(box: RunningBox) -> None:
     handler = box.control.process.handler
 
     def late(order: Order) -> tuple[bool, str]:

@@ -61,16 +61,8 @@ MOVER: dict[str, Any] = {
         "Mode": {
             "defaultValue": 0,
             "capabilities": [
-                {
-                    "dmxRange": [0, 99],
-                    "type": "Generic",
-                    "switchChannels": {"Speed / Sound": "Speed"},
-                },
-                {
-                    "dmxRange": [100, 255],
-                    "type": "Generic",
-                    "switchChannels": {"Speed / Sound": "Sound"},
-                },
+                {"dmxRange": [0, 99], "type": "Generic", "switchChannels": {"Speed / Sound": "Speed"}},
+                {"dmxRange": [100, 255], "type": "Generic", "switchChannels": {"Speed / Sound": "Sound"}},
             ],
         },
         "Speed": {"capability": {"type": "Speed", "speedStart": "slow", "speedEnd": "fast"}},
@@ -257,12 +249,7 @@ def test_a_dimmer_that_glows_at_the_start_of_its_range_is_off_at_nothing() -> No
     dimmer = {
         "capabilities": [
             {"dmxRange": [0, 5], "type": "Intensity", "brightness": "off"},
-            {
-                "dmxRange": [6, 255],
-                "type": "Intensity",
-                "brightnessStart": "dark",
-                "brightnessEnd": "bright",
-            },
+            {"dmxRange": [6, 255], "type": "Intensity", "brightnessStart": "dark", "brightnessEnd": "bright"},
         ]
     }
     strobe = {"name": "S", "availableChannels": {"D": dimmer}, "modes": [{"name": "1", "channels": ["D"]}]}

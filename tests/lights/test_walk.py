@@ -50,7 +50,7 @@ def test_every_attribute_of_every_fixture_is_walked_in_the_order_of_the_patch() 
     _, said = walked(patch_of(PAR, HEAD, LAMP))
     assert said[0] == "par (led-par): universe 1, channels 1 to 6"
     assert [line.split(",")[0].strip() for line in said[1:7]] == [
-        *("dimmer", "red", "green", "blue", "white", "strobe"),
+        *("dimmer", "red", "green", "blue", "white", "strobe")
     ]
     assert said[7] == "head (moving-wash): universe 1, channels 21 to 32"
     assert said[8].startswith("  pan, channel 21 and 22:")
@@ -183,10 +183,7 @@ def test_ctrl_c_ends_the_walk_in_the_dark(show: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [
-        (("--fixture", "pra"), "Did you mean 'par'?"),
-        (("--attribute", "dimer"), "Did you mean 'dimmer'?"),
-    ],
+    [(("--fixture", "pra"), "Did you mean 'par'?"), (("--attribute", "dimer"), "Did you mean 'dimmer'?")],
 )
 def test_unknown_names_are_refused_with_the_nearest(
     show: Path, tmp_path: Path, arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]

@@ -78,7 +78,7 @@ def test_mirror_and_upside_down(show: Show) -> None:
 @pytest.mark.parametrize(
     "corners", [((20, 10), (150, 4), (140, 80), (8, 70)), ((40, 30), (120, 20), (130, 60), (30, 85))]
 )
-def test_the_pictures_corners_land_on_the_wished_pixels(show: Show, corners: Corners) -> None:
+def test_the_pictures_corners_land_on_the_wanted_pixels(show: Show, corners: Corners) -> None:
     pinned: Any = tuple((x / SIZE[0], y / SIZE[1]) for x, y in corners)
     lit = show(flat(255), Alignment(pinned))[..., 0] > 127
     depth = depth_inside(corners)

@@ -13,15 +13,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.still import draw_still, moment_of
 from appliance.show.look import STYLES, LookConfig
-from tests.projector.golden_looks import (
-    AT_S,
-    FOLDER,
-    MEAN_LIMIT,
-    P99_LIMIT,
-    SIZE,
-    difference,
-    renderer,
-)
+from tests.projector.golden_looks import AT_S, FOLDER, MEAN_LIMIT, P99_LIMIT, SIZE, difference, renderer
 from tests.projector.skeletons import mixamo, point, toy
 
 MOST_GPU_BYTES = 25e6

@@ -19,7 +19,7 @@ HANGS = """
 import ctypes, sys, time
 from pathlib import Path
 from appliance.projector import watchdog
-from appliance.projector.run import Run, Wish
+from appliance.projector.run import Options, Run
 from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
 
@@ -36,7 +36,7 @@ def hang(window):
 
 Window.show = hang
 place = Path(sys.argv[1])
-run = Run(BoxConfig(runtime=place / "run", state=place / "state"), Wish("offscreen", (64, 36)), print)
+run = Run(BoxConfig(runtime=place / "run", state=place / "state"), Options("offscreen", (64, 36)), print)
 run.project(lambda: False)
 """
 

@@ -23,7 +23,7 @@ from appliance.projector.loop import Projector
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, ProjectorError
 from appliance.projector.resolution import Resolution
-from appliance.projector.run import Run, Wish
+from appliance.projector.run import Options, Run
 from appliance.projector.sdl import sdl2
 from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
@@ -83,10 +83,7 @@ def picture(kind: str, **environment: str) -> np.ndarray:
     without = {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}
     clean = {name: value for name, value in os.environ.items() if name not in without}
     done = subprocess.run(
-        [sys.executable, "-c", PICTURE, kind],
-        capture_output=True,
-        check=True,
-        env={**clean, **environment},
+        [sys.executable, "-c", PICTURE, kind], capture_output=True, check=True, env={**clean, **environment}
     )
     return np.frombuffer(done.stdout, np.uint8).reshape(180, 320, 4)[..., :3].astype(int)
 
@@ -178,7 +175,7 @@ def test_a_lost_context_ends_the_projector_with_a_sentence(
 
     monkeypatch.setattr(context_module, "reset_status", lambda: reset)
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
-    run = Run(box, Wish("offscreen", (64, 36), seconds=20), print)
+    run = Run(box, Options("offscreen", (64, 36), seconds=20), print)
     try:
         with pytest.raises(
             ProjectorError, match=r"was reset.*sees black.*Start the projector again"
@@ -193,7 +190,7 @@ def test_a_lost_context_ends_the_projector_with_a_sentence(
 def test_keys_and_a_closed_window_arrive(tmp_path: Path) -> None:
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
     said: list[str] = []
-    run = Run(box, Wish("offscreen", (64, 36), seconds=20), said.append)
+    run = Run(box, Options("offscreen", (64, 36), seconds=20), said.append)
     try:
         for symbol, modifier in ((sdl2.SDLK_c, 0), (sdl2.SDLK_LEFT, sdl2.KMOD_LSHIFT), (sdl2.SDLK_q, 0)):
             event = sdl2.SDL_Event()
@@ -213,7 +210,7 @@ def test_smaller_pictures_are_reported_once_and_stand_in_the_figures(
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
     said: list[str] = []
     shares: list[float] = []
-    run = Run(box, Wish("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
+    run = Run(box, Options("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
     monkeypatch.setattr(Resolution, "share", property(lambda _: 0.5))
     monkeypatch.setattr(Resolution, "note_picture", lambda *_: True)
     monkeypatch.setattr(Projector, "draw", lambda *arguments: shares.append(arguments[-1]))
@@ -229,7 +226,7 @@ def test_smaller_pictures_are_reported_once_and_stand_in_the_figures(
 
 def test_a_pause_of_the_whole_machine_is_not_reported_as_a_black_picture(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), Wish("offscreen", (64, 36)), print)
+    run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), Options("offscreen", (64, 36)), print)
     now = time.monotonic()
 
     def is_black_reported() -> bool:

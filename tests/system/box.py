@@ -17,14 +17,7 @@ import yaml
 from appliance.sensor.keys import SensorKey, create_keys
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports
-from tests.system.processes import (
-    BUNRAKU,
-    Process,
-    children_running,
-    has_argument,
-    run_bunraku,
-    wait_until,
-)
+from tests.system.processes import BUNRAKU, Process, children_running, has_argument, run_bunraku, wait_until
 from tests.system.wearables import Wearables
 
 PLAY = (*BUNRAKU, "play")

@@ -178,9 +178,7 @@ def relay_evening() -> Iterator[tuple[LockstepSensor, _Relay, int]]:
             yield sensor, relay, len(stage.accepted) - before
 
 
-def test_a_relay_does_not_get_the_stream(
-    relay_evening: tuple[LockstepSensor, _Relay, int],
-) -> None:
+def test_a_relay_does_not_get_the_stream(relay_evening: tuple[LockstepSensor, _Relay, int]) -> None:
     """The box's own assignment, relayed from another address, takes over no live link."""
     sensor, relay, accepted = relay_evening
     assert relay.carried["Hello"] > 10

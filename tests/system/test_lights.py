@@ -67,10 +67,7 @@ def test_lights_move_with_the_dance_obey_show_control_and_end_dark(tmp_path: Pat
 
 
 def test_a_killed_stage_leaves_the_safe_look_and_the_dance_returns_with_the_next(tmp_path: Path) -> None:
-    with (
-        lit_box(tmp_path, RIG, command=ALONE) as (lamp, box),
-        LightsProcess(tmp_path) as lights,
-    ):
+    with lit_box(tmp_path, RIG, command=ALONE) as (lamp, box), LightsProcess(tmp_path) as lights:
         lamp.await_dance()
         killed = time.monotonic()
         box.end(signal.SIGKILL)
@@ -87,10 +84,7 @@ def test_a_killed_stage_leaves_the_safe_look_and_the_dance_returns_with_the_next
 
 
 def test_a_stage_that_hangs_brings_the_safe_look_too(tmp_path: Path) -> None:
-    with (
-        lit_box(tmp_path, RIG, command=ALONE) as (lamp, box),
-        LightsProcess(tmp_path),
-    ):
+    with lit_box(tmp_path, RIG, command=ALONE) as (lamp, box), LightsProcess(tmp_path):
         lamp.await_dance()
         box.process.send_signal(signal.SIGSTOP)
         lamp.await_safe()
@@ -190,10 +184,7 @@ def test_another_show_in_the_same_box_lights_its_own_rig(tmp_path: Path) -> None
         "mappings": [{"name": "on", "rules": [{"reads": "steady", "drives": "dimmer"}]}],
     }
     second = write_show(tmp_path / "second", lights=other)
-    with (
-        lit_box(tmp_path, DARK, 1, command=ALONE) as (lamp, box),
-        LightsProcess(tmp_path) as lights,
-    ):
+    with lit_box(tmp_path, DARK, 1, command=ALONE) as (lamp, box), LightsProcess(tmp_path) as lights:
         lamp.await_dance()
         box.command[box.command.index(str(tmp_path / "show"))] = str(second)
         box.kill_and_restart()

@@ -100,10 +100,7 @@ def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path
 
 
 def test_panic_and_alignment_by_osc(box: Box, tmp_path: Path) -> None:
-    with (
-        Projection(box.box_file, tmp_path) as projection,
-        contextlib.closing(Asker(box.control)) as asker,
-    ):
+    with Projection(box.box_file, tmp_path) as projection, contextlib.closing(Asker(box.control)) as asker:
         projection.await_dance()
         assert asker.ask("/panic", 1)[2] == 1
         projection.await_black()

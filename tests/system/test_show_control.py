@@ -403,7 +403,7 @@ def test_a_descriptor_that_is_no_port_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("box", "complaint", "status"),
     [
-        ("control: null\n", "nobody commands this box", os.EX_CONFIG),
+        ("control: null\n", "this box takes no commands", os.EX_CONFIG),
         ("control: {host: 0.0.0.0}\n", "box.yaml:1: Commands are heard on 0.0.0.0, but no sender", 2),
         ("control:\n  senders: [192.168.4.300]\n", "box.yaml:2: '192.168.4.300' is neither", 2),
         ("control: {heartbeat: [{port: 0}]}\n", "box.yaml:1: 'control.heartbeat[0].port' is 0", 2),
