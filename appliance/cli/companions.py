@@ -149,8 +149,8 @@ class _Running:
         elif status == UNAVAILABLE:
             if self._told is None:
                 self._say(
-                    f"{companion.name} cannot run now. The dance goes on without, and it is tried again "
-                    f"each {RETRY_S:g} s."
+                    f"{companion.name} cannot run now. The dance goes on without it; it is retried "
+                    f"every {RETRY_S:g} s."
                 )
             self._told = status
             self._starts_at = now + RETRY_S
@@ -164,9 +164,9 @@ class _Running:
         self._starts_at = now + self._backoff.pause_s(now - self._started_at)
         deaths = self._backoff.deaths
         if deaths <= _REPORTED:
-            self._say(f"{self._companion.name} {what}. {self._companion.meanwhile} It is started again.")
+            self._say(f"{self._companion.name} {what}. {self._companion.meanwhile} It is restarted.")
         elif deaths == _REPORTED + 1:
             self._say(
                 f"{self._companion.name} {what}, {deaths} times in a row. {self._companion.meanwhile} "
-                f"It is tried again each {LONGEST_PAUSE_S:g} s. Its messages above say why."
+                f"It is retried every {LONGEST_PAUSE_S:g} s. Its messages above say why."
             )

@@ -38,7 +38,7 @@ def project(
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after this time.")] = None,
     info: Annotated[bool, typer.Option("--info", help="Figures on the wall and on the terminal.")] = False,
     wait: Annotated[
-        bool, typer.Option("--wait", help="Without a display wait for one, and look each 10 s.")
+        bool, typer.Option("--wait", help="Without a display, wait for one; look every 10 s.")
     ] = False,
     chosen: ChosenFile = None,
 ) -> int:
@@ -82,8 +82,8 @@ def project_show(box_file: Path | None, options: Options, waits: bool = False) -
                     return error.status
                 if str(error) != said:
                     said = str(error)
-                    speaker.say(f"{said} It is tried again each {_RETRY_S:g} s.")
-            notifier.ready("No display yet; it is tried again.")
+                    speaker.say(f"{said} Trying again every {_RETRY_S:g} s.")
+            notifier.ready("No display yet; trying again.")
             _wait(stopped, notifier)
     return 0
 

@@ -72,9 +72,7 @@ def test_a_killed_companion_is_restarted_and_reported(diary: Diary) -> None:
         until(lambda: len(diary.pids) == 1)
         os.kill(diary.pids[0], signal.SIGKILL)
         until(lambda: len(diary.pids) == 2)
-    assert said == [
-        "The child was killed (signal 9). Something is missing for a moment. It is started again."
-    ]
+    assert said == ["The child was killed (signal 9). Something is missing for a moment. It is restarted."]
 
 
 def test_a_companion_that_dies_at_once_is_retried_ever_more_slowly_and_reported_four_times(
@@ -124,7 +122,7 @@ def test_a_companion_waits_for_its_needs(
         until(lambda: len(diary.pids) >= 3)
         display.touch()
         until(lambda: shows.exists())
-    assert said == ["The child cannot run now. The dance goes on without, and it is tried again each 0.1 s."]
+    assert said == ["The child cannot run now. The dance goes on without it; it is retried every 0.1 s."]
     assert told.read_text() == "0" + "1" * (len(diary.pids) - 1)  # it gives its reasons once
     assert is_gone(diary.pids[-1])
 
