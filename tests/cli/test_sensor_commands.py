@@ -21,7 +21,7 @@ import yaml
 from rich.console import Console
 
 from appliance.cli.app import main
-from appliance.cli.sensors import venue
+from appliance.cli.sensors import box_keys
 from appliance.cli.sensors.control_client import Answer, ControlClient, NoBoxError, Roll
 from appliance.cli.sensors.table import SensorTable
 from appliance.sensor.keys import create_keys, load_keys
@@ -284,7 +284,7 @@ def test_restarting_show_control_is_asked_again(
         return roll(running)
 
     monkeypatch.setattr(ControlClient, "roll", silent_first)
-    monkeypatch.setattr(venue, "time", Clock())
+    monkeypatch.setattr(box_keys, "time", Clock())
     with ended(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
         assert "The running box took it." in out
     assert [order.name for order in box.orders] == ["reload"]
@@ -299,7 +299,7 @@ def test_a_stage_that_dances_without_show_control_has_not_taken_it(
 
     clock = Clock()
     monkeypatch.setattr(ControlClient, "roll", no_box)
-    monkeypatch.setattr(venue, "time", clock)
+    monkeypatch.setattr(box_keys, "time", clock)
     with ended(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
         assert "head is revoked" in out
         assert "A box dances here, but its show control did not answer." in out
@@ -311,7 +311,7 @@ def test_without_a_stage_nothing_waits_for_show_control(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clock = Clock()
-    monkeypatch.setattr(venue, "time", clock)
+    monkeypatch.setattr(box_keys, "time", clock)
     create_keys(tmp_path / "sensors.keys", ["head"])
     box_file = tmp_path / "box.yaml"
     settings = {"runtime": str(tmp_path / "none"), "sensors": {"keys": "sensors.keys"}}
