@@ -13,7 +13,7 @@ from appliance.projector.controls import Controls
 from appliance.projector.corners import homography
 from appliance.projector.page import page
 from appliance.projector.picture.drawing import Drawing
-from appliance.projector.picture.tally import Figures, Tally
+from appliance.projector.picture.tally import Cost, Tally
 from appliance.projector.picture.wall import FLAT, Wall, flat
 from appliance.projector.window import Size
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
@@ -131,10 +131,10 @@ class FinalPass:
             drawing.draw(self._tally, pixels, inputs, moderngl.TRIANGLE_STRIP, 4)
         self._tally.count_bytes(4 * pixels)
 
-    def figures(self) -> Figures:
-        """What the last step of the last picture took; nothing where a look did it itself."""
+    def cost(self) -> Cost:
+        """The cost of the last picture's last step; nothing if a look did that itself."""
         width, height = self.picture.size
-        return self._tally.figures(width * height, 4 * width * height)
+        return self._tally.cost(width * height, 4 * width * height)
 
     def black(self, screen: moderngl.Framebuffer, display: Size) -> None:
         """Clear the display: no picture, no figures, no marks."""

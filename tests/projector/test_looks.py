@@ -156,12 +156,12 @@ def contrast(picture: np.ndarray) -> int:
 
 
 def test_cost_at_1080p(dance: Recording, gl: moderngl.Context) -> None:
-    """GPU memory with the target counted, draw calls; what each takes on a Raspberry Pi 4 is reckoned."""
+    """GPU memory with the target counted, draw calls; time on a Raspberry Pi 4 is estimated."""
     size = 1920, 1080
     with renderer(gl, dance.skeleton, size=size) as made:
         for style in STYLES:
             draw_still(gl, made, moment_of(dance, AT_S), style, size)
-            figures = made.figures()
-            assert figures.draw_calls <= MOST_DRAW_CALLS
-            assert figures.gpu_bytes < MOST_GPU_BYTES
-            assert 1.0 < figures.overdraw < 3.0 and figures.pi4_ms > 0
+            cost = made.cost()
+            assert cost.draw_calls <= MOST_DRAW_CALLS
+            assert cost.gpu_bytes < MOST_GPU_BYTES
+            assert 1.0 < cost.overdraw < 3.0 and cost.pi4_ms > 0

@@ -108,8 +108,8 @@ def test_cost_with_the_last_step_at_1080p(
         looks.draw(moment_of(dance, AT_S), style, style, 1.0, wall)
         if wall.framebuffer is not gl.screen:
             final.draw(gl.screen, FULL_HD, controls, 1.0, ())
-        assert looks.figures().gpu_bytes < MOST_GPU_BYTES
-        costs.append(looks.figures().pi4_ms + final.figures().pi4_ms)
+        assert looks.cost().gpu_bytes < MOST_GPU_BYTES
+        costs.append(looks.cost().pi4_ms + final.cost().pi4_ms)
     assert costs[0] < MOST_PI4_MS and costs[-1] < costs[0]
     final.release()
 

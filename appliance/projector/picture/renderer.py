@@ -17,7 +17,7 @@ from appliance.projector.picture.looks.plaster import Plaster
 from appliance.projector.picture.looks.veil import Veil
 from appliance.projector.picture.poses import poses_of
 from appliance.projector.picture.scene import Easel, Scene
-from appliance.projector.picture.tally import Figures
+from appliance.projector.picture.tally import Cost
 from appliance.projector.picture.wall import Wall, flat
 from appliance.show.look import LookConfig, Style
 
@@ -80,9 +80,9 @@ class Renderer:
         for layer, opacity in layers:
             self._styles[layer.style].draw(scene, layer, opacity, wall)
 
-    def figures(self) -> Figures:
-        """What the last picture took."""
-        return self._easel.tally.figures(self._pixels, self._easel.gpu_bytes + self._target_bytes)
+    def cost(self) -> Cost:
+        """The cost of the last picture."""
+        return self._easel.tally.cost(self._pixels, self._easel.gpu_bytes + self._target_bytes)
 
     def release(self) -> None:
         """Give the GPU's memory back."""

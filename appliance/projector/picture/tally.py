@@ -93,8 +93,8 @@ class Use:
 
 
 @dataclass(frozen=True)
-class Figures:
-    """What one picture takes.
+class Cost:
+    """The cost of one picture.
 
     overdraw: pixels shaded by all passes, for each pixel of the picture; moved_bytes: textures read and
     targets written; gpu_bytes: textures and buffers, a texture that is drawn onto included, a display not;
@@ -122,21 +122,21 @@ class Tally:
         self._moved_bytes = 0.0
 
     def clear(self) -> None:
-        """A new picture begins."""
+        """Start with a new picture."""
         self._uses.clear()
         self._moved_bytes = 0.0
 
     def count_bytes(self, count: float) -> None:
-        """Bytes that are read from memory or written to it."""
+        """Count bytes read from memory or written to it."""
         self._moved_bytes += count
 
     def count_draw_call(self, use: Use) -> None:
-        """Note one."""
+        """Count one draw call."""
         self._uses.append(use)
 
-    def figures(self, picture_pixels: int, gpu_bytes: int) -> Figures:
+    def cost(self, picture_pixels: int, gpu_bytes: int) -> Cost:
         """The sums, for a picture of `picture_pixels` pixels."""
-        return Figures(
+        return Cost(
             draw_calls=len(self._uses),
             triangles=sum(use.triangles for use in self._uses),
             vertices=sum(use.vertices for use in self._uses),
