@@ -238,7 +238,7 @@ def _new_folder(journal: Path) -> Path:
 def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) -> list[str]:
     show = stage.show
     hands = ", ".join(f"{hand.sensor or hand.kind} holds {hand.joint}" for hand in show.config.hands)
-    receivers = ", ".join(receiver.name for receiver in stage.parts.outputs.receivers) or "nobody"
+    receivers = ", ".join(receiver.name for receiver in stage.parts.outputs.receivers) or "no receiver"
     lines = [
         f"{show.config.name}: {hands or 'no hands, the dancer moves freely'}.",
         f"The dance goes to {receivers}.",
@@ -260,7 +260,7 @@ def _inputs(stage: Stage, control: socket.socket | None) -> str:
     if control is not None:
         commands = "on " + ":".join(map(str, control.getsockname()))
     else:
-        commands = "by nobody" if stage.box.control is None else "by a process of their own (bunraku control)"
+        commands = "nowhere" if stage.box.control is None else "by a process of their own (bunraku control)"
     return f"Sensors are heard on {sensors}, commands {commands}."
 
 

@@ -153,7 +153,7 @@ class _Layer:
 
 
 def _safe_level(show_state: ShowState) -> float:
-    """0 or 1, the factor of the safe look: blackout darkens it, panic shows it all the same."""
+    """0 or 1, the factor of the safe look: blackout darkens it, panic overrides that."""
     return 0.0 if show_state.blackout and not show_state.panic else 1.0
 
 

@@ -82,7 +82,7 @@ def test_the_pictures_corners_land_on_the_wanted_pixels(show: Show, corners: Cor
     pinned: Any = tuple((x / SIZE[0], y / SIZE[1]) for x, y in corners)
     lit = show(flat(255), Alignment(pinned))[..., 0] > 127
     depth = depth_inside(corners)
-    clear = np.abs(depth) > 0.01  # pixels: whose centre does not lie on the very edge
+    clear = np.abs(depth) > 0.01  # pixels whose centre is clear of the edge
     assert clear.sum() > 0.99 * clear.size
     assert np.array_equal(lit[clear], depth[clear] > 0)
 

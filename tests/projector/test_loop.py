@@ -70,7 +70,7 @@ class Evening:
         return pixels(self._gl.screen, size)
 
     def colour(self, seconds: float = PERIOD_S) -> tuple[int, int, int]:
-        """What fills the display after so long."""
+        """What fills the display after this time."""
         for _ in range(max(1, round(seconds / PERIOD_S))):
             found = self.picture()
         assert np.ptp(found, axis=(0, 1)).max() <= 1

@@ -76,7 +76,7 @@ class Process:
         time.sleep(POLL_S)
 
     def await_words(self, words: str, count: int = 1) -> None:
-        """Wait until the output has these words so often."""
+        """Wait until the output has these words `count` times."""
 
         def has_words() -> bool:
             return self.words.count(words) >= count
