@@ -12,6 +12,7 @@ from hypothesis import settings
 
 import hw_sim.peers
 from tests.boot import figures_report
+from tests.command import Command
 
 ROOT = Path(__file__).resolve().parents[1]
 # The longest files start first when files run in parallel: started last, one would run alone.
@@ -66,6 +67,12 @@ def chance(request: pytest.FixtureRequest) -> random.Random:
         seed = random.SystemRandom().randrange(1 << 30)
     request.node.add_report_section("setup", "seed", f"Repeat this with --seed {seed}")
     return random.Random(seed)
+
+
+@pytest.fixture
+def bunraku(capfd: pytest.CaptureFixture[str]) -> Command:
+    """Runs commands in this process."""
+    return Command(capfd)
 
 
 @pytest.fixture(autouse=True)

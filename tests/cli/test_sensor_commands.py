@@ -20,7 +20,6 @@ import pytest
 import yaml
 from rich.console import Console
 
-from appliance.cli.app import main
 from appliance.cli.sensors import box_keys
 from appliance.cli.sensors.control_client import Answer, ControlClient, NoBoxError, Roll
 from appliance.cli.sensors.table import SensorTable
@@ -31,6 +30,7 @@ from appliance.show_control.orders import Order
 from appliance.show_control.packet import Message, datagram
 from appliance.show_control.sensor_roster import RosterLine
 from appliance.stage.sensor_lines import roster_lines
+from tests.command import Command
 from tests.show_control.doubles import ControlInThread, StageDouble, until
 
 LEFT = SensorState(
@@ -89,22 +89,9 @@ def box(tmp_path: Path) -> Iterator[RunningBox]:
     box.close()
 
 
-@contextmanager
-def ended(capsys: pytest.CaptureFixture[str], status: int, *words: str) -> Iterator[list[str]]:
-    said: list[str] = []
-    with pytest.raises(SystemExit) as exited:
-        main(["sensors", *words])
-    captured = capsys.readouterr()
-    assert (exited.value.code or 0) == status, captured
-    said += [captured.out, captured.err]
-    yield said
-
-
-def test_the_table_has_everything_that_the_box_knows(
-    box: RunningBox, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with ended(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        *first, heading, left, head, spare = out.splitlines()
+def test_the_table_has_everything_that_the_box_knows(box: RunningBox, bunraku: Command) -> None:
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    *first, heading, left, head, spare = out.splitlines()
     assert re.split(r"  +", heading.strip()) == [
         *("name", "state", "rate", "loss", "round trip", "age", "battery"),
         *("calibration", "neutral", "firmware", "id", "way"),
@@ -132,9 +119,9 @@ def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
     assert all(word in shown for word in words.split())
 
 
-def test_programs_get_values_and_nulls(box: RunningBox, capsys: pytest.CaptureFixture[str]) -> None:
-    with ended(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
-        told = json.loads(out)
+def test_programs_get_values_and_nulls(box: RunningBox, bunraku: Command) -> None:
+    out, _ = bunraku("sensors", "--json", "--box", box.box_file)
+    told = json.loads(out)
     assert told["box"] is True
     left, head, spare = told["sensors"]
     assert left == {
@@ -159,34 +146,32 @@ def test_programs_get_values_and_nulls(box: RunningBox, capsys: pytest.CaptureFi
     assert (spare["calibration"], spare["neutral"]) == (None, None)
 
 
-def test_a_box_that_is_still_starting_or_hangs_is_reported(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_box_that_is_still_starting_or_hangs_is_reported(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
     box = RunningBox(tmp_path)
-    with ended(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "still starting" in out
-    with ended(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
-        assert json.loads(out) == {"box": True, "age_s": None, "sensors": []}
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "still starting" in out
+    out, _ = bunraku("sensors", "--json", "--box", box.box_file)
+    assert json.loads(out) == {"box": True, "age_s": None, "sensors": []}
     box.report_sensors([LEFT], lambda name: "", time.monotonic() - 60.0)
-    with ended(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "This is 60 s old: the box hangs" in out
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "This is 60 s old: the box hangs" in out
     box.close()
 
 
-def test_without_a_box_it_lists_the_key_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_box_it_lists_the_key_file(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist", "head"])
     box_file = tmp_path / "box.yaml"
     box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
-    with ended(capsys, 0, "--box", str(box_file)) as (out, _):
-        assert "has no control port" in out
-        assert re.search(r"^left-wrist  [0-9a-f]{8}", out, re.MULTILINE)
-        assert load_keys(tmp_path / "sensors.keys")["head"].key.hex() not in out
+    out, _ = bunraku("sensors", "--box", box_file)
+    assert "has no control port" in out
+    assert re.search(r"^left-wrist  [0-9a-f]{8}", out, re.MULTILINE)
+    assert load_keys(tmp_path / "sensors.keys")["head"].key.hex() not in out
     (tmp_path / "sensors.keys").chmod(0o644)
-    with ended(capsys, 0, "--box", str(box_file)) as (out, _):
-        assert "chmod 600" in out
-    with ended(capsys, 0, "--json", "--box", str(box_file)) as (out, _):
-        told = json.loads(out)
+    out, _ = bunraku("sensors", "--box", box_file)
+    assert "chmod 600" in out
+    out, _ = bunraku("sensors", "--json", "--box", box_file)
+    told = json.loads(out)
     assert (told["box"], [sensor["state"] for sensor in told["sensors"]]) == (False, [None, None])
 
 
@@ -200,14 +185,14 @@ def test_without_a_box_it_lists_the_key_file(tmp_path: Path, capsys: pytest.Capt
     ],
 )
 def test_commands_reach_the_box_and_its_answer_is_printed(
-    box: RunningBox, capsys: pytest.CaptureFixture[str], words: list[str], name: str, sensor: str
+    box: RunningBox, bunraku: Command, words: list[str], name: str, sensor: str
 ) -> None:
-    with ended(capsys, 0, *words, "--box", str(box.box_file)) as (out, _):
-        assert out == f"{name} it is.\n"
+    out, _ = bunraku("sensors", *words, "--box", box.box_file)
+    assert out == f"{name} it is.\n"
     assert box.orders == [Order(name, text=sensor)]
     box.done = False
-    with ended(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
-        assert err == f"bunraku: {name} it is.\n"
+    _, err = bunraku("sensors", *words, "--box", box.box_file, status=2)
+    assert err == f"bunraku: {name} it is.\n"
 
 
 def test_a_late_answer_of_the_stage_replaces_the_refusal(box: RunningBox) -> None:
@@ -229,17 +214,15 @@ def test_a_stage_that_never_answers_is_reported_after_the_timeout(box: RunningBo
     assert not answer.done and "does not answer" in answer.words
 
 
-def test_changes_of_the_key_file_reach_the_box(
-    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_changes_of_the_key_file_reach_the_box(box: RunningBox, tmp_path: Path, bunraku: Command) -> None:
     before = load_keys(tmp_path / "sensors.keys")
-    with ended(capsys, 0, "replace", "left-wrist", "spare-1", "--box", str(box.box_file)) as (out, _):
-        assert "left-wrist is now the sensor that was spare-1" in out
-        assert "The running box took it." in out
-    with ended(capsys, 0, "rename", "spare-1", "spare-2", "--box", str(box.box_file)) as (out, _):
-        assert "spare-1 is now spare-2" in out
-    with ended(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert "head is revoked" in out
+    out, _ = bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", box.box_file)
+    assert "left-wrist is now the sensor that was spare-1" in out
+    assert "The running box took it." in out
+    out, _ = bunraku("sensors", "rename", "spare-1", "spare-2", "--box", box.box_file)
+    assert "spare-1 is now spare-2" in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file)
+    assert "head is revoked" in out
     after = load_keys(tmp_path / "sensors.keys")
     assert {name: key.key for name, key in after.items()} == {
         "left-wrist": before["spare-1"].key,
@@ -249,13 +232,11 @@ def test_changes_of_the_key_file_reach_the_box(
     assert box.orders[-1].keys == after
 
 
-def test_a_change_that_the_box_refuses_sets_the_exit_status(
-    box: RunningBox, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_change_that_the_box_refuses_sets_the_exit_status(box: RunningBox, bunraku: Command) -> None:
     box.done = False
-    with ended(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert "head is revoked" in out
-        assert "did not take it. reload it is." in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file, status=1)
+    assert "head is revoked" in out
+    assert "did not take it. reload it is." in out
 
 
 class Clock:
@@ -273,7 +254,7 @@ class Clock:
 
 @pytest.mark.parametrize("silent", [1, 20])
 def test_restarting_show_control_is_asked_again(
-    box: RunningBox, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], silent: int
+    box: RunningBox, monkeypatch: pytest.MonkeyPatch, bunraku: Command, silent: int
 ) -> None:
     rolls, roll = [0], ControlClient.roll
 
@@ -285,13 +266,13 @@ def test_restarting_show_control_is_asked_again(
 
     monkeypatch.setattr(ControlClient, "roll", silent_first)
     monkeypatch.setattr(box_keys, "time", Clock())
-    with ended(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert "The running box took it." in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file)
+    assert "The running box took it." in out
     assert [order.name for order in box.orders] == ["reload"]
 
 
 def test_a_stage_that_dances_without_show_control_has_not_taken_it(
-    box: RunningBox, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    box: RunningBox, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
 
     def no_box(client: ControlClient) -> Roll:
@@ -300,15 +281,15 @@ def test_a_stage_that_dances_without_show_control_has_not_taken_it(
     clock = Clock()
     monkeypatch.setattr(ControlClient, "roll", no_box)
     monkeypatch.setattr(box_keys, "time", clock)
-    with ended(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert "head is revoked" in out
-        assert "A box dances here, but its show control did not answer." in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file, status=1)
+    assert "head is revoked" in out
+    assert "A box dances here, but its show control did not answer." in out
     assert clock.now > 102.0
     assert box.orders == []
 
 
 def test_without_a_stage_nothing_waits_for_show_control(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     clock = Clock()
     monkeypatch.setattr(box_keys, "time", clock)
@@ -316,26 +297,26 @@ def test_without_a_stage_nothing_waits_for_show_control(
     box_file = tmp_path / "box.yaml"
     settings = {"runtime": str(tmp_path / "none"), "sensors": {"keys": "sensors.keys"}}
     box_file.write_text(yaml.safe_dump({**settings, "control": {"port": 1}}))
-    with ended(capsys, 0, "revoke", "head", "--box", str(box_file)) as (out, _):
-        assert "No box answers on 127.0.0.1:1. The change counts when it starts." in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box_file)
+    assert "No box answers on 127.0.0.1:1. The change counts when it starts." in out
     assert clock.now == 100.0
 
 
-def test_a_box_with_another_key_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_box_with_another_key_file_is_named(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["head"])
     box = RunningBox(tmp_path, key_file=tmp_path / "others.keys")
-    with ended(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert f"reads another key file ({tmp_path / 'others.keys'})" in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file, status=1)
+    assert f"reads another key file ({tmp_path / 'others.keys'})" in out
     assert box.orders == []
     box.close()
 
 
 def test_faults_of_the_key_file_of_a_running_box_are_reported(
-    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    box: RunningBox, tmp_path: Path, bunraku: Command
 ) -> None:
     keys = tmp_path / "sensors.keys"
-    with ended(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "has other sensors than the running box. Run: bunraku sensors reload" in out
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "has other sensors than the running box. Run: bunraku sensors reload" in out
     keys.write_text(
         "".join(
             f"{one.name}: {{device: {one.device_id}, key: {one.device_id:032x}}}\n" for one in (LEFT, SPARE)
@@ -345,23 +326,21 @@ def test_faults_of_the_key_file_of_a_running_box_are_reported(
     states = [LEFT, SPARE, LOST._replace(device_id=LOST.device_id + 1)]
     box.report_sensors(states, lambda _: "", time.monotonic())
     keys.chmod(0o644)
-    with ended(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "has other sensors" not in out
-        assert "can be read by other users" in out
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "has other sensors" not in out
+    assert "can be read by other users" in out
     keys.write_text("left-wrist: {devise: 7}\n")
-    with ended(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "unknown field 'devise'" in out
-        assert "goes on with the keys that it has" in out
-    with ended(capsys, 2, "reload", "--box", str(box.box_file)) as (_, err):
-        assert "unknown field 'devise'" in err
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "unknown field 'devise'" in out
+    assert "goes on with the keys that it has" in out
+    _, err = bunraku("sensors", "reload", "--box", box.box_file, status=2)
+    assert "unknown field 'devise'" in err
     assert box.orders == []
 
 
-def test_a_key_file_changed_by_hand_reaches_the_box(
-    box: RunningBox, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with ended(capsys, 0, "reload", "--box", str(box.box_file)) as (out, _):
-        assert "The running box took it." in out
+def test_a_key_file_changed_by_hand_reaches_the_box(box: RunningBox, bunraku: Command) -> None:
+    out, _ = bunraku("sensors", "reload", "--box", box.box_file)
+    assert "The running box took it." in out
     assert [order.name for order in box.orders] == ["reload"]
 
 
@@ -405,26 +384,25 @@ def test_watching_goes_on_until_it_is_interrupted(box: RunningBox) -> None:
 
 
 def test_a_missing_folder_and_a_full_disk_are_reported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     keys = tmp_path / "sensors.keys"
     create_keys(keys, ["head"])
     monkeypatch.setattr(os, "fsync", lambda _: (_ for _ in ()).throw(OSError(errno.ENOSPC, "No space left")))
-    with ended(capsys, 2, "revoke", "head", "--keys", str(keys)) as (_, err):
-        assert "No space left. Nothing was changed. Free some space" in err
+    _, err = bunraku("sensors", "revoke", "head", "--keys", keys, status=2)
+    assert "No space left. Nothing was changed. Free some space" in err
     nowhere = str(tmp_path / "nowhere" / "sensors.keys")
-    with pytest.raises(SystemExit) as exited:  # before it asks for a password or opens a port
-        main(["provision", "--name", "head", "--network", "stage", "--keys", nowhere])
-    assert exited.value.code == 2
-    assert "There is no folder" in capsys.readouterr().err
+    # before it asks for a password or opens a port
+    _, err = bunraku("provision", "--name", "head", "--network", "stage", "--keys", nowhere, status=2)
+    assert "There is no folder" in err
 
 
-def test_without_a_box_a_change_counts_later(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_box_a_change_counts_later(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["head"])
     box_file = tmp_path / "box.yaml"
     box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
-    with ended(capsys, 0, "revoke", "head", "--box", str(box_file)) as (out, _):
-        assert "the change counts when it starts again" in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box_file)
+    assert "the change counts when it starts again" in out
     assert load_keys(tmp_path / "sensors.keys") == {}
 
 
@@ -441,37 +419,37 @@ def test_without_a_box_a_change_counts_later(tmp_path: Path, capsys: pytest.Capt
     ],
 )
 def test_a_refusal_is_one_clear_line(
-    box: RunningBox, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], complaint: str
+    box: RunningBox, tmp_path: Path, bunraku: Command, words: list[str], complaint: str
 ) -> None:
     before = (tmp_path / "sensors.keys").read_bytes()
-    with ended(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
-        assert complaint in err
-        assert len(err.splitlines()) == 1
+    _, err = bunraku("sensors", *words, "--box", box.box_file, status=2)
+    assert complaint in err
+    assert len(err.splitlines()) == 1
     assert (tmp_path / "sensors.keys").read_bytes() == before
     assert box.orders == []
 
 
 def test_a_missing_key_file_or_box_is_reported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     monkeypatch.chdir(tmp_path)
     box_file = tmp_path / "box.yaml"
     box_file.write_text("control: {port: 1}\n")
-    with ended(capsys, 2, "--box", str(box_file)) as (_, err):
-        assert "names no key file" in err
-    with ended(capsys, 2, "revoke", "head", "--keys", "sensors.keys") as (_, err):
-        assert "There is no key file sensors.keys" in err
+    _, err = bunraku("sensors", "--box", box_file, status=2)
+    assert "names no key file" in err
+    _, err = bunraku("sensors", "revoke", "head", "--keys", "sensors.keys", status=2)
+    assert "There is no key file sensors.keys" in err
     box_file.write_text("sensors: {keys: nowhere/sensors.keys}\ncontrol: {port: 1}\n")
-    with ended(capsys, 2, "revoke", "head", "--box", str(box_file)) as (_, err):
-        assert "There is no folder" in err
-    with ended(capsys, 2, "strobe", "head", "--box", str(box_file)) as (_, err):
-        assert "No box answers on 127.0.0.1:1." in err
-    with ended(capsys, 2, "--watch", "strobe", "head") as (_, err):
-        assert "behind 'strobe'" in err
+    _, err = bunraku("sensors", "revoke", "head", "--box", box_file, status=2)
+    assert "There is no folder" in err
+    _, err = bunraku("sensors", "strobe", "head", "--box", box_file, status=2)
+    assert "No box answers on 127.0.0.1:1." in err
+    _, err = bunraku("sensors", "--watch", "strobe", "head", status=2)
+    assert "behind 'strobe'" in err
 
 
 def test_provision_refuses_wrong_options_before_it_opens_a_port(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.stdin", open("/dev/null"))  # noqa: SIM115, PTH123
@@ -484,10 +462,7 @@ def test_provision_refuses_wrong_options_before_it_opens_a_port(
         (["--name", "head", "--network", "n"], "No password came"),
         (["--name", "head"], "There is no serial port /dev/nowhere"),
     ):
-        with pytest.raises(SystemExit) as exited:
-            main(["provision", "--port", "/dev/nowhere", *words])
-        assert exited.value.code == 2
-        assert complaint in capsys.readouterr().err
+        assert complaint in bunraku("provision", "--port", "/dev/nowhere", *words, status=2).err
     assert list(tmp_path.iterdir()) == []
 
 
@@ -512,15 +487,15 @@ class Impostor:
 ESCAPES = "\x1b]0;mine\x07\x1b[2J\x9b31m"
 
 
-def test_an_impostor_cannot_control_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_impostor_cannot_control_the_terminal(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
     line = ("name", "1", *(ESCAPES,) * 2, 50.0, 0.0, 0.0, 0.0, 9, 0, 0, *(ESCAPES,) * 4)
     listed: list[Message] = [("/sensors/sensor", *line), ("/sensors/end", 1, 0.1, ESCAPES)]
-    with ended(capsys, 0, "--box", str(Impostor(tmp_path, listed).box_file)) as (out, _):
-        assert "mine" in out
+    out, _ = bunraku("sensors", "--box", str(Impostor(tmp_path, listed).box_file))
+    assert "mine" in out
     told: list[Message] = [("/sensors/reply", "/sensors/strobe", 1, ESCAPES)]
-    with ended(capsys, 0, "strobe", "head", "--box", str(Impostor(tmp_path, told).box_file)) as (words, _):
-        assert "mine" in words
+    words, _ = bunraku("sensors", "strobe", "head", "--box", str(Impostor(tmp_path, told).box_file))
+    assert "mine" in words
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", out + words)
 
 
@@ -538,12 +513,9 @@ def test_an_impostor_cannot_control_the_terminal(tmp_path: Path, capsys: pytest.
     ],
 )
 def test_nonsense_from_an_impostor_does_not_count_as_a_box(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    replies: list[Message],
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, bunraku: Command, replies: list[Message], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ControlClient.__init__, "__defaults__", (0.2,))
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
-    with ended(capsys, 0, "--box", str(Impostor(tmp_path, replies).box_file)) as (out, _):
-        assert "No box answers" in out
+    out, _ = bunraku("sensors", "--box", str(Impostor(tmp_path, replies).box_file))
+    assert "No box answers" in out

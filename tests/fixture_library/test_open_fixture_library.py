@@ -14,6 +14,7 @@ from appliance.fixture_library.open_fixture_library import LibraryError, profile
 from appliance.lights.patch import Patch
 from appliance.show.fixture_profile import load_profile
 from appliance.show.lights import LightsConfig, drivable
+from tests.command import Command
 
 MOVER: dict[str, Any] = {
     "name": "Testbeam 1",
@@ -220,16 +221,12 @@ def test_modes_larger_than_a_universe_are_left_out_and_reported() -> None:
     ],
 )
 def test_other_files_are_refused_in_words_and_nothing_is_written(
-    tmp_path: Path, content: str, words: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, content: str, words: str, bunraku: Command
 ) -> None:
-    from appliance.cli.app import main
 
     source = tmp_path / "x.json"
     source.write_text(content)
-    with pytest.raises(SystemExit) as left:
-        main(["lights", "convert", str(source)])
-    assert left.value.code == 2
-    assert words in capsys.readouterr().err
+    assert words in bunraku("lights", "convert", source, status=2).err
     assert [path.name for path in tmp_path.iterdir()] == ["x.json"]
 
 
