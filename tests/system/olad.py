@@ -26,7 +26,7 @@ PLUGINS = (
     *("openpixelcontrol", "osc", "pathport", "renard", "sandnet", "shownet", "spi", "stageprofi", "uartdmx"),
     *("usbdmx", "usbserial"),
 )
-NOBODY = "nobody"  # olad refuses to run as root
+USER = "nobody"  # olad refuses to run as root
 
 Settings = Mapping[str, str | int | Sequence[str]]
 
@@ -63,7 +63,7 @@ class Olad:
         words += ["--no-register-with-dns-sd", *(("-i", "lo") if self._network else ())]
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                self._network.command(*self._as_nobody(words)) if self._network else self._as_nobody(words),
+                self._network.command(*self._as_user(words)) if self._network else self._as_user(words),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -155,15 +155,15 @@ class Olad:
         ports = "".join(f"{port} = {universe}\n" for port, universe in self._patched.items())
         (self._folder / "ola-port.conf").write_text(ports)
         if os.geteuid() == 0:
-            owner = pwd.getpwnam(NOBODY)
+            owner = pwd.getpwnam(USER)
             for path in (self._folder, *self._folder.iterdir()):
                 os.chown(path, owner.pw_uid, owner.pw_gid)
 
     @staticmethod
-    def _as_nobody(words: list[str]) -> list[str]:
+    def _as_user(words: list[str]) -> list[str]:
         if os.geteuid() != 0:
             return words
-        owner = pwd.getpwnam(NOBODY)
+        owner = pwd.getpwnam(USER)
         return ["setpriv", f"--reuid={owner.pw_uid}", f"--regid={owner.pw_gid}", "--clear-groups", *words]
 
 
