@@ -39,6 +39,7 @@ Axes = Annotated[
     str | None, typer.Option(metavar="MAP,SIGN", help="How the IMU sits: two hexadecimal registers, 24,00.")
 ]
 Name = Annotated[str, typer.Argument(help="The sensor's name, as in the key file.")]
+NameOrAll = Annotated[str | None, typer.Argument(help="Left out: all sensors of the show.")]
 
 sensors = command_group("List the sensors as the running box sees them; find, replace, revoke or rename one.")
 
@@ -81,33 +82,19 @@ def list_them(
 @sensors.command()
 def strobe(name: Name, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Let a sensor's light flash for 10 s, to find it in a drawer."""
-    from appliance.cli.sensors.box_keys import box_keys_of, send_command
-
-    send_command(box_keys_of(box, keys), "/sensors/strobe", name)
+    _send("/sensors/strobe", name, box, keys)
 
 
 @sensors.command()
-def neutral(
-    name: Annotated[str | None, typer.Argument(help="Left out: all sensors of the show.")] = None,
-    box: ThisBoxFile = None,
-    keys: KeyFile = None,
-) -> None:
+def neutral(name: NameOrAll = None, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Take the neutral pose again: how the sensor sits on the dancer, who stands still now."""
-    from appliance.cli.sensors.box_keys import box_keys_of, send_command
-
-    send_command(box_keys_of(box, keys), "/sensors/neutral", name)
+    _send("/sensors/neutral", name, box, keys)
 
 
 @sensors.command()
-def heading(
-    name: Annotated[str | None, typer.Argument(help="Left out: all sensors of the show.")] = None,
-    box: ThisBoxFile = None,
-    keys: KeyFile = None,
-) -> None:
+def heading(name: NameOrAll = None, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Reset the heading alone: the dancer faces the front now."""
-    from appliance.cli.sensors.box_keys import box_keys_of, send_command
-
-    send_command(box_keys_of(box, keys), "/sensors/heading", name)
+    _send("/sensors/heading", name, box, keys)
 
 
 @sensors.command()
@@ -180,3 +167,9 @@ def read_again(box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     with clear_errors(box_keys.keys):
         load_keys(box_keys.keys)
     raise typer.Exit(reload_and_say(box_keys))
+
+
+def _send(address: str, name: str | None, box: Path | None, keys: Path | None) -> None:
+    from appliance.cli.sensors.box_keys import box_keys_of, send_command
+
+    send_command(box_keys_of(box, keys), address, name)
