@@ -165,7 +165,8 @@ def test_a_mirror_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper
         os.kill(process, signal.SIGKILL)
     keeper.follow_place()
     keeper.dance(20, kept=40)
-    assert "has died" in keeper.words and "carried to the disk again" in keeper.words
+    assert "has died" in keeper.words
+    wait_until(lambda: "carried to the disk again" in keeper.words, lambda: keeper.words)
     assert keeper.end() == 0
 
 
