@@ -20,7 +20,7 @@ from appliance.recorder.reading import read_journal
 from appliance.recorder.record import LATE, NOT_FINITE
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show
-from tests.system.box import JOURNAL, PLAY, is_free, playing
+from tests.system.box import JOURNAL, PLAY, Box, is_free, playing
 from tests.system.processes import PATIENCE_S, run, wait_until
 
 pytestmark = pytest.mark.realtime
@@ -218,8 +218,24 @@ def test_emulated_sensors_come_and_go_with_the_run(
         assert box.end() == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert str(picture) in box.words
-    emulators = run(["ps", "-eo", "args"], check=True).stdout
-    assert f"--port {box.sensors}" not in emulators
+    assert not emulators_at(box)
+
+
+def test_a_killed_box_leaves_no_emulator_behind(
+    show: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    with playing(show, tmp_path, "--emulate") as box:
+        box.frame_that(lambda frame: frame[2] > 5)
+        assert emulators_at(box)
+        box.process.kill()
+        wait_until(lambda: not emulators_at(box))
+
+
+def emulators_at(box: Box) -> list[str]:
+    """Command lines of running emulators that send to the box's port."""
+    running = run(["ps", "-ww", "-eo", "args"], check=True).stdout.splitlines()
+    return [line for line in running if f"--port {box.sensors}" in line]
 
 
 def test_a_closed_output_does_not_stop_the_dance(show: Path, tmp_path: Path) -> None:
