@@ -18,7 +18,7 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.studio import improvise_command
-from appliance.studio.autoencoder.training import Settings, Training, save_checkpoint
+from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.improviser.footing import smoothed, stand
 from appliance.studio.improviser.improvisation import Wish, run
@@ -188,7 +188,7 @@ def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     torch.set_num_threads(1)
     training = Training(load_dataset(recordings), Settings(steps=30, latent=8, width=32, batch=32))
     training.run(lambda line: None, lambda: None)
-    save_checkpoint(training, folder / "checkpoint.pt")
+    training.save_checkpoint(folder / "checkpoint.pt")
     return folder / "checkpoint.pt", recordings
 
 

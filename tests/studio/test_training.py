@@ -13,7 +13,7 @@ from appliance.studio.autoencoder import losses
 from appliance.studio.autoencoder.answers import AnswerSettings
 from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.autoencoder.repertoire import Nearness
-from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder, save_checkpoint
+from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder
 from appliance.studio.data.dataset import Dataset, load_dataset
 
 FEW = AnswerSettings(reserve=96, wandering=16, nearness=Nearness(neighbours=4, searched=256))
@@ -28,7 +28,7 @@ def dancer(recordings: Path) -> Dataset:
 def run(training: Training, path: Path, until: int | None = None) -> None:
     training.run(
         lambda report: None,
-        lambda: save_checkpoint(training, path),
+        lambda: training.save_checkpoint(path),
         stop=lambda: until is not None and training.step >= until,
     )
 

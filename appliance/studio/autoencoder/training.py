@@ -21,9 +21,9 @@ from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.lessons import Copies, Lesson, Lessons
 from appliance.studio.autoencoder.networks import Mlp
 from appliance.studio.autoencoder.repertoire import Nearness
-from appliance.studio.course import Course
 from appliance.studio.data.bones import reaches
 from appliance.studio.data.dataset import WINDOW, Dataset, windows
+from appliance.studio.training_loop import TrainingLoop
 
 SHORTEST_REACH = 0.04  # of the longest limb's, for what a joint without any bone below it counts
 
@@ -66,7 +66,7 @@ class Settings:
 
 @dataclass
 class Report:
-    """What the loop tells while it runs: one line of history every report_every steps."""
+    """A line of the training's history."""
 
     step: int
     seconds: float
@@ -75,8 +75,11 @@ class Report:
     held_out_degrees: float | None = None
 
 
-class Training(Course[Report]):
+class Training(TrainingLoop[Report]):
     """State of a training: networks, optimisers, averages, history."""
+
+    report_type = Report
+    saved = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer")
 
     def __init__(self, dataset: Dataset, settings: Settings, device: str = "cpu") -> None:
         super().__init__(settings)
@@ -115,10 +118,8 @@ class Training(Course[Report]):
             else Copies(self.train_windows, settings.input_noise_degrees)
         )
         self._critic_paid = torch.zeros((), device=self.device)
-        self.origin: dict[str, Any] = {}  # where the recordings lie and what is known of them
 
-    def line(self, means: Mapping[str, float]) -> Report:
-        """Mean losses since the last line, and the error on takes kept apart."""
+    def report(self, means: Mapping[str, float]) -> Report:
         return Report(self.step, self.seconds, self.fraction, dict(means), self.held_out_degrees())
 
     def train_step(self) -> dict[str, Tensor]:
@@ -144,7 +145,7 @@ class Training(Course[Report]):
         (total + settings.weights.prior * prior).backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.autoencoder.parameters(), 1.0)
         self.optimizer.step()
-        self._average()
+        self._average_weights(self.averaged, self.autoencoder)
         self.step += 1
         with torch.no_grad():
             spread = {"latent_mean": coded.mean(0).abs().mean(), "latent_std": coded.std(0).mean()}
@@ -205,37 +206,22 @@ class Training(Course[Report]):
         return latents.mean(0), latents.std(0).clamp_min(1e-3)
 
     def state(self) -> dict[str, Any]:
-        """Everything that a resumed training needs, and the moments that load_autoencoder takes out."""
+        """Everything that a resumed training needs, and the latent moments that load_autoencoder removes."""
         return {
+            **self._shared_state(),
             "settings": asdict(self.settings),
             "joints": list(self.dataset.moving_names),
             "shape": asdict(self.autoencoder.shape),
-            "autoencoder": self.autoencoder.state_dict(),
-            "averaged": self.averaged.state_dict(),
-            "critic": self.critic.state_dict(),
-            "optimizer": self.optimizer.state_dict(),
-            "critic_optimizer": self.critic_optimizer.state_dict(),
-            "random": torch.get_rng_state(),
             "random_gpu": torch.cuda.get_rng_state(self.device) if self.device.type == "cuda" else None,
             "latent_moments": self.latent_moments(),
             "lessons": self.lessons.state(),
-            "origin": self.origin,
-            "step": self.step,
-            "seconds": self.seconds,
-            "history": [asdict(line) for line in self.history],
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on where a saved training stood."""
-        for name in ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer"):
-            getattr(self, name).load_state_dict(state[name])
+        super().restore(state)
         self.lessons.restore(state["lessons"])
-        torch.set_rng_state(state["random"].cpu())
         if self.device.type == "cuda" and state.get("random_gpu") is not None:
             torch.cuda.set_rng_state(state["random_gpu"].cpu(), self.device)
-        self.origin = state.get("origin", {})
-        self.step, self.seconds = state["step"], state["seconds"]
-        self.history = [Report(**line) for line in state["history"]]
 
     def _heading_free(self, poses: np.ndarray[Any, np.dtype[np.float32]]) -> Tensor:
         return torch.cat(
@@ -247,25 +233,11 @@ class Training(Course[Report]):
 
     def _pace_learning(self) -> None:
         warm = min(1.0, (self.step + 1) / 200)
-        cosine = 0.5 * (1 + math.cos(math.pi * self.fraction))
+        cosine = self._cosine()
         for group in self.optimizer.param_groups:
             group["lr"] = self.settings.learning_rate * warm * max(cosine, 0.005)
         for group in self.critic_optimizer.param_groups:
             group["lr"] = self.settings.critic_learning_rate * max(cosine, 0.1)
-
-    @torch.no_grad()
-    def _average(self) -> None:
-        keep = min(self.settings.smoothing, (self.step + 1) / (self.step + 10))
-        means: list[Tensor] = list(self.averaged.parameters())
-        values: list[Tensor] = list(self.autoencoder.parameters())
-        torch._foreach_lerp_(means, values, 1 - keep)
-
-
-def save_checkpoint(training: Training, path: Path) -> None:
-    """Write the whole state; the old file stays until the new one is complete."""
-    partial = path.with_suffix(".partial")
-    torch.save(training.state(), partial)
-    partial.replace(path)
 
 
 def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]]:

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn
 from torch import nn
 
-from appliance.studio.autoencoder.training import Report, Training, save_checkpoint
+from appliance.studio.autoencoder.training import Report, Training
 from appliance.studio.data.dataset import window_starts
 from appliance.studio.evaluation.coders import TorchCoder
 from appliance.studio.evaluation.pictures import draw_losses, draw_reconstruction
@@ -92,7 +92,7 @@ class TrainingRun:
         draw_reconstruction(path, coder, take, title)
 
     def _save(self) -> None:
-        save_checkpoint(self.training, self.checkpoint)
+        self.training.save_checkpoint(self.checkpoint)
         self._write_history()
         if self.training.history:
             history = [asdict(line) for line in self.training.history]

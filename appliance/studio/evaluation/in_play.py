@@ -18,9 +18,7 @@ from appliance.studio.data.dataset import FPS, WINDOW
 from appliance.studio.evaluation.coders import Coder, Poses
 
 TICK_S = 1 / FPS
-TAKING_TICKS = round(
-    (TAKE_S + 0.5) * FPS
-)  # before the dance: the hand has then fully taken its joint
+TAKING_TICKS = round((TAKE_S + 0.5) * FPS)  # before the dance: the hand has then fully taken its joint
 
 
 class FollowedOrientation(Puppeteer):

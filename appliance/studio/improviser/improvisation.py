@@ -25,7 +25,6 @@ from appliance.studio.improviser.improviser_training import (
     ImproviserReport,
     ImproviserSettings,
     ImproviserTraining,
-    save_improviser,
 )
 from appliance.studio.improviser.moves import BEFORE, MOVE
 from appliance.studio.improviser.naturalness import Naturalness
@@ -155,7 +154,7 @@ def _train(training: ImproviserTraining, file: Path, console: Console) -> bool:
             if not console.is_terminal:
                 console.print(f"{100 * line.fraction:5.1f} %  {words}", highlight=False, soft_wrap=True)
 
-        training.run(report, lambda: save_improviser(training, file), save_every_s=60.0, stop=stop)
+        training.run(report, lambda: training.save_checkpoint(file), save_every_s=60.0, stop=stop)
     if training.fraction < 1.0:
         console.print("Stopped; nothing is lost. The same command goes on.")
     return training.fraction >= 1.0
