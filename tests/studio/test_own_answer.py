@@ -13,7 +13,7 @@ import pytest
 from appliance.studio.data.dataset import Dataset, Take
 from appliance.studio.evaluation import own_answer, puppetry
 from appliance.studio.evaluation.own_takes import own_takes
-from appliance.studio.evaluation.puppetry_words import sentences, verdict
+from appliance.studio.evaluation.puppetry_report import sentences, verdict
 from appliance.studio.studio_error import StudioError
 from tests.studio.puppets import Freezing, Pasting
 from tests.studio.tiny import moving, skeleton, swaying

@@ -17,7 +17,7 @@ from appliance.studio.evaluation.measurement import Iterations, Measurement, Pai
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.onset import CODED_WINDOWS
 from appliance.studio.evaluation.own_takes import own_takes
-from appliance.studio.evaluation.puppetry_words import verdict
+from appliance.studio.evaluation.puppetry_report import verdict
 from appliance.studio.evaluation.usual_joints import usual_joints
 from appliance.studio.studio_error import StudioError
 

@@ -30,7 +30,7 @@ STEPS_S = FPS / HOP
 
 
 @dataclass(frozen=True)
-class PhraseWish:
+class PhraseOptions:
     """What is wanted of a phrase."""
 
     seconds: float = 90.0
@@ -47,7 +47,7 @@ def make_phrase(
     improviser: Improviser,
     dataset: Dataset,
     heard: Sequence[Steps],
-    wish: PhraseWish,
+    options: PhraseOptions,
     say: Callable[[str], None] = lambda words: None,
 ) -> tuple[Recording, Naturalness]:
     """Improvise several dances, take the stretches that close best, make them endless, keep the best.
@@ -56,17 +56,17 @@ def make_phrase(
     """
     moving, still = dataset.moving, dataset.still_pose()
     dances = [
-        _motion(autoencoder, dance, dataset, still) for dance in improvise(improviser, heard, wish, say)
+        _motion(autoencoder, dance, dataset, still) for dance in improvise(improviser, heard, options, say)
     ]
     yardstick = Yardstick.of(dataset.training, moving)
-    stretches = best_stretches(dances, yardstick, wish.seconds, STAGE_M, SEAM_S, wish.finalists)
+    stretches = best_stretches(dances, yardstick, options.seconds, STAGE_M, SEAM_S, options.finalists)
     if not stretches:
         raise StudioError("No dance is long enough for the phrase: ask for longer ones by --dance-minutes.")
     best: tuple[float, Recording, Naturalness] | None = None
     for number, stretch in enumerate(stretches, 1):
         closed = closed_loop(dances[stretch.dance], stretch.first, stretch.last)
         again = replace(closed, poses=danced_again(autoencoder, closed.poses, moving, cyclic=True))
-        phrase = on_stage(stand(on_stage(again), wish.settling))
+        phrase = on_stage(stand(on_stage(again), options.settling))
         natural = measure(phrase, yardstick)
         say(f"candidate {number} of {len(stretches)}: {verdict(natural)}")
         faults = faultiness(natural) + stretch.cost
@@ -77,18 +77,18 @@ def make_phrase(
 
 
 def improvise(
-    improviser: Improviser, heard: Sequence[Steps], wish: PhraseWish, say: Callable[[str], None]
+    improviser: Improviser, heard: Sequence[Steps], options: PhraseOptions, say: Callable[[str], None]
 ) -> list[Steps]:
     """The dances, each from another recorded start."""
-    chance = np.random.default_rng(wish.seed)
+    chance = np.random.default_rng(options.seed)
     long = [stretch for stretch in heard if len(stretch) >= HEARD]
     starts = []
-    for number in chance.choice(len(long), wish.dances, replace=len(long) < wish.dances):
+    for number in chance.choice(len(long), options.dances, replace=len(long) < options.dances):
         first = int(chance.integers(len(long[number]) - HEARD + 1))
         starts.append(torch.tensor(long[number].features[first : first + HEARD]))
-    moves = int(np.ceil(wish.minutes * 60 * STEPS_S / MOVE))
-    say(f"improvising {wish.dances} dances of {wish.minutes:g} minutes")
-    danced = improviser.improvise(torch.stack(starts), moves, wish.temperature, wish.seed)
+    moves = int(np.ceil(options.minutes * 60 * STEPS_S / MOVE))
+    say(f"improvising {options.dances} dances of {options.minutes:g} minutes")
+    danced = improviser.improvise(torch.stack(starts), moves, options.temperature, options.seed)
     return [Steps.of_features(dance.numpy()) for dance in danced]
 
 
