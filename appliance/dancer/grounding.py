@@ -169,52 +169,6 @@ class Grounding:
         self._offset_z = (self._offset_z + self._step_z) * kept
 
 
-@dataclass(frozen=True)
-class Standing:
-    """How well a motion stands: means over its frames, worst ones beside them."""
-
-    float_cm: float
-    worst_float_cm: float
-    penetration_cm: float
-    worst_penetration_cm: float
-    slide_cm_s: float
-    worst_slide_cm_s: float  # 95th percentile
-
-
-def measure_standing(
-    skeleton: Skeleton,
-    poses: Array,
-    roots: Array,
-    floor: Floor,
-    lifts: Array | None = None,
-    fps: float = 50.0,
-) -> Standing:
-    """Measure poses (N, J, 4) with roots (N, 3) metres against a phrase's floor.
-
-    Float and penetration: the lowest point of the soles above or below where it should be (lifts (N,) metres
-    above the floor, 0 if not given). Slide: horizontal speed of the point that is lowest in two frames
-    running, while nothing jumps.
-    """
-    points = sole_positions(skeleton, poses, roots)
-    clearances = points[..., 1] - floor.rest_heights
-    wanted = np.zeros(len(poses)) if lifts is None else lifts
-    off = clearances.min(axis=-1) - wanted
-    lowest = clearances.argmin(axis=-1)
-    planted = np.flatnonzero((lowest[1:] == lowest[:-1]) & (wanted[1:] == 0) & (wanted[:-1] == 0))
-    carrying = lowest[planted]
-    steps = (points[planted + 1, carrying] - points[planted, carrying])[:, [0, 2]]
-    slides = np.linalg.norm(steps, axis=-1) * fps if len(planted) else np.zeros(1)
-    above, below = np.maximum(off, 0), np.maximum(-off, 0)
-    return Standing(
-        100 * float(above.mean()),
-        100 * float(above.max()),
-        100 * float(below.mean()),
-        100 * float(below.max()),
-        100 * float(slides.mean()),
-        100 * float(np.percentile(slides, 95)),
-    )
-
-
 def sole_positions(skeleton: Skeleton, poses: Array, roots: Array) -> Array:
     """World positions (N, S, 3) in metres of the points of the soles. Raises GroundingError without feet."""
     points = [point for foot in soles_of(skeleton) for point in foot]

@@ -10,8 +10,6 @@ import pytest
 from appliance.dancer.grounding import (
     Grounding,
     GroundingError,
-    Standing,
-    measure_standing,
     sole_positions,
     survey,
 )
@@ -19,6 +17,7 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
+from appliance.studio.standing import Standing, measure_standing
 from tests.dancer.conftest import STANDING_HIP_M
 
 LEGS = ("lThigh", "lShin", "lFoot", "rThigh", "rShin", "rFoot")

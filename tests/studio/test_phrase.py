@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from appliance.dancer.grounding import measure_standing, survey
+from appliance.dancer.grounding import survey
 from appliance.dancer.loop import is_closed, turns_about_y, yaws
 from appliance.dancer.motion_source import Playback
 from appliance.pose import quaternion
@@ -24,6 +24,7 @@ from appliance.studio.improviser.naturalness import Yardstick, distances, measur
 from appliance.studio.improviser.pace import pace
 from appliance.studio.improviser.phrase import STAGE_M, PhraseOptions, closed_loop, on_stage
 from appliance.studio.improviser.stretches import best_stretches
+from appliance.studio.standing import measure_standing
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import moving, swaying, write_recordings
 

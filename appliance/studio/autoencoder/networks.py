@@ -151,7 +151,7 @@ class Mlp(Network):
         first.weight *= deviation
 
 
-class _ConvEncoder(nn.Module):
+class ConvEncoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window, self.pose = shape.window, shape.pose
@@ -167,7 +167,7 @@ class _ConvEncoder(nn.Module):
         return latent
 
 
-class _ConvDecoder(nn.Module):
+class ConvDecoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window, self.width = shape.window, shape.width
@@ -190,10 +190,10 @@ class Conv(Network):
 
     def __init__(self, shape: Shape) -> None:
         super().__init__()
-        self.encoder, self.decoder = _ConvEncoder(shape), _ConvDecoder(shape)
+        self.encoder, self.decoder = ConvEncoder(shape), ConvDecoder(shape)
 
 
-class _LstmEncoder(nn.Module):
+class LstmEncoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window, self.pose = shape.window, shape.pose
@@ -206,7 +206,7 @@ class _LstmEncoder(nn.Module):
         return latent
 
 
-class _LstmDecoder(nn.Module):
+class LstmDecoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window = shape.window
@@ -233,10 +233,10 @@ class Lstm(Network):
 
     def __init__(self, shape: Shape) -> None:
         super().__init__()
-        self.encoder, self.decoder = _LstmEncoder(shape), _LstmDecoder(shape)
+        self.encoder, self.decoder = LstmEncoder(shape), LstmDecoder(shape)
 
 
-class _AutoregressiveDecoder(nn.Module):
+class AutoregressiveDecoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window, self.pose, self.width = shape.window, shape.pose, shape.width
@@ -265,4 +265,4 @@ class LstmAutoregressive(Network):
 
     def __init__(self, shape: Shape) -> None:
         super().__init__()
-        self.encoder, self.decoder = _LstmEncoder(shape), _AutoregressiveDecoder(shape)
+        self.encoder, self.decoder = LstmEncoder(shape), AutoregressiveDecoder(shape)

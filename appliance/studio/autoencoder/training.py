@@ -21,7 +21,6 @@ from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.lessons import Copies, Lesson, Lessons
 from appliance.studio.autoencoder.networks import Mlp
 from appliance.studio.autoencoder.repertoire import Nearness
-from appliance.studio.data.bones import reaches
 from appliance.studio.data.dataset import WINDOW, Dataset, windows
 from appliance.studio.training_loop import TrainingLoop
 
@@ -113,7 +112,7 @@ class Training(TrainingLoop[Report]):
         )
         conditional = isinstance(network, Conditional)
         self.lessons: Lessons = (
-            Answers(self.train_windows, self._chances(), settings.answers)
+            Answers(self.train_windows, self.holding_chances(), settings.answers)
             if conditional
             else Copies(self.train_windows, settings.input_noise_degrees)
         )
@@ -179,12 +178,12 @@ class Training(TrainingLoop[Report]):
         self.critic_optimizer.step()
         return loss.detach()
 
-    def _chances(self) -> Tensor:
+    def holding_chances(self) -> Tensor:
         """(M,): how often a joint is held while learning: more, the more of the body hangs on it.
 
         A head or hand whose bone has no end in the file counts as short: it must be learned as well.
         """
-        reach = reaches(self.dataset.skeleton)[list(self.dataset.moving)]
+        reach = self.dataset.skeleton.reaches[list(self.dataset.moving)]
         share = np.maximum(reach / max(float(reach.max()), 1e-9), SHORTEST_REACH)
         return torch.tensor(np.sqrt(share), dtype=torch.float32, device=self.device)
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.pose.skeleton import Skeleton
 
 SPAN_S = 1 / 30  # motions are compared over this time at any rate: an error of one frame shows as clearly
 # Two motions that follow each other and differ by more than this are a jump: what the dancer's own sharpest
@@ -78,7 +77,7 @@ def visible(recording: Recording, found: Mapping[int, Runs]) -> dict[int, Runs]:
     least_m = SEEN_OF_HEIGHT * float(np.ptp(places[0], axis=0).max())
     shown: dict[int, Runs] = {}
     for joint, jumped in found.items():
-        below = _below(skeleton, joint)
+        below = skeleton.descendants(joint)
         ends = [one for one in below if one not in skeleton.parents]
         reach = places[:, below] - places[:, [joint]]
         moved = _bent(reach[span:] - reach[:-span], len(reach), span).max(axis=1) > least_m
@@ -99,15 +98,6 @@ def _bent(ways: Array, count: int, span: int) -> NDArray[np.float32]:
     if len(ways) > span:
         bent[span:-span] = np.linalg.norm(ways[span:] - ways[:-span], axis=-1)
     return bent
-
-
-def _below(skeleton: Skeleton, joint: int) -> list[int]:
-    """A joint and all that hangs from it."""
-    below = [joint]
-    for other, parent in enumerate(skeleton.parents):
-        if parent in below:
-            below.append(other)
-    return below
 
 
 def _mark(moving: NDArray[np.bool_], steps: Array, first: int, last: int) -> None:

@@ -47,7 +47,7 @@ def asymmetry(skeleton: Skeleton, joints: Sequence[int], usual: Array | None = N
     names = skeleton.names
     if all(pairs[joint] == joint for joint in joints):
         return "no joint's name says which side it is on"
-    carrying = _with_those_above(skeleton, joints)
+    carrying = sorted({above for joint in joints for above in skeleton.ancestors(joint)})
     for joint in carrying:
         above, other = skeleton.parents[joint], skeleton.parents[pairs[joint]]
         if pairs[pairs[joint]] != joint or (above >= 0 and pairs[above] != other):
@@ -94,14 +94,6 @@ def _unequal_m(skeleton: Skeleton, pairs: NDArray[np.intp], axis: int) -> Array:
     """(J,): by how many metres each joint's offset differs from the image of its counterpart's."""
     apart: Array = np.linalg.norm(skeleton.offsets[pairs] * _flip(axis) - skeleton.offsets, axis=-1)
     return apart
-
-
-def _with_those_above(skeleton: Skeleton, joints: Sequence[int]) -> list[int]:
-    found = set(joints)
-    for joint in joints:
-        while (joint := skeleton.parents[joint]) >= 0:
-            found.add(joint)
-    return sorted(found)
 
 
 def _others(name: str) -> Iterator[str]:

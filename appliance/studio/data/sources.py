@@ -8,8 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from appliance.studio.data.catalogue import Catalogue, find_catalogue, read_catalogue
-from appliance.studio.data.catalogue_file import ALWAYS
+from appliance.studio.data.catalogue import ALWAYS, Catalogue, find_catalogue, read_catalogue
 from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.studio_error import StudioError
 

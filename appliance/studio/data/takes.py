@@ -21,6 +21,7 @@ from appliance.studio.data.capture_errors import (
     without,
 )
 from appliance.studio.data.catalogue import Catalogue
+from appliance.studio.data.jumps import Runs, runs
 from appliance.studio.data.stage_frame import in_stage_frame
 
 FPS = 50.0
@@ -52,6 +53,11 @@ class Take:
     def file(self) -> str:
         """The recording that it is, or is a part of."""
         return self.part_of or self.name
+
+    @property
+    def sound_runs(self) -> Runs:
+        """First and last + 1 frame of each stretch without a capture error."""
+        return runs(self.sound)
 
     def part(self, first: int, end: int) -> Take:
         """Frames first to end - 1 as a take of its own."""

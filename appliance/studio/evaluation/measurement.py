@@ -12,8 +12,7 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import WINDOW
-from appliance.studio.evaluation import motion_figures as motion
-from appliance.studio.evaluation.body_figures import BodyFigures
+from appliance.studio.evaluation import dance_figures as figures
 from appliance.studio.evaluation.coders import Coder, Poses
 from appliance.studio.evaluation.in_play import FollowedOrientation, Rehearsal
 from appliance.studio.evaluation.nearest import Floats, Reference, without_heading
@@ -76,7 +75,7 @@ class Measurement:
         ticks = min(len(pair.phrase), len(pair.hand), TICKS + WINDOW - 1)
         self.pair, self.reference, self.joints = pair, reference, coder.joints
         self.rehearsal = Rehearsal(coder, pair.phrase.excerpt(0, ticks / pair.phrase.fps))
-        self.body = BodyFigures(self.rehearsal.recording)
+        self.body = figures.BodyFigures(self.rehearsal.recording)
         self.phrase = without_heading(self.rehearsal.phrase)
         self.phrase_far = reference.nearest(self.phrase[::STEP])
         self._own_fit: dict[str, Floats] = {}
@@ -109,8 +108,8 @@ class Measurement:
             fit_own=_mean(self._fit_of_phrase(joint, others)[: len(far)]),
             fit_bare=self._fit_of_pasted(joint, others, hand_turns[rows]),
             plausibility=_ratio(far.mean(), own_far.mean()),
-            energy=_ratio(motion.energy(danced[:, others]), motion.energy(phrase[:, others])),
-            roughness=_ratio(motion.roughness(danced[:, others]), motion.roughness(phrase[:, others])),
+            energy=_ratio(figures.energy(danced[:, others]), figures.energy(phrase[:, others])),
+            roughness=_ratio(figures.roughness(danced[:, others]), figures.roughness(phrase[:, others])),
             held=float(np.degrees(quaternion.angle_between(danced[:, held], hand_turns)).mean()),
             plausibility_degrees=float(far.mean()),
             found=float(np.isfinite(fit).mean()),
@@ -120,7 +119,7 @@ class Measurement:
     def answer(self, joint: str, danced: Poses, free: Poses) -> float:
         """Degrees that the others are moved by a hand: a dance (T, M, 4) with it against one without."""
         others = self._others(joint)
-        apart = motion.degrees_apart(without_heading(danced)[:, others], without_heading(free)[:, others])
+        apart = figures.degrees_apart(without_heading(danced)[:, others], without_heading(free)[:, others])
         return float(apart.mean())
 
     def free(self, coding_iterations: int) -> dict[str, float]:
@@ -130,9 +129,9 @@ class Measurement:
         far = self.reference.nearest(danced[::STEP])
         return {
             "plausibility": _ratio(far.mean(), self.phrase_far.mean()),
-            "energy": _ratio(motion.energy(danced), motion.energy(self.phrase)),
-            "roughness": _ratio(motion.roughness(danced), motion.roughness(self.phrase)),
-            "deviation": float(motion.degrees_apart(danced, self.phrase).mean()),
+            "energy": _ratio(figures.energy(danced), figures.energy(self.phrase)),
+            "roughness": _ratio(figures.roughness(danced), figures.roughness(self.phrase)),
+            "deviation": float(figures.degrees_apart(danced, self.phrase).mean()),
             "plausibility_degrees": float(far.mean()),
             **self._of_body(shown),
         }
@@ -141,14 +140,14 @@ class Measurement:
         """The phrase's own figures, what the others are compared with."""
         return {
             "plausibility_degrees": float(self.phrase_far.mean()),
-            "energy_degrees_a_tick": motion.energy(self.phrase),
-            "roughness_degrees_a_tick2": motion.roughness(self.phrase),
+            "energy_degrees_a_tick": figures.energy(self.phrase),
+            "roughness_degrees_a_tick2": figures.roughness(self.phrase),
             **self._of_body(self.rehearsal.phrase),
         }
 
     def _of_body(self, danced: Poses) -> dict[str, float]:
         """The largest step, arms in the trunk, feet that slide."""
-        step, whole = motion.largest_step(without_heading(danced)), self.rehearsal.whole(danced)
+        step, whole = figures.largest_step(without_heading(danced)), self.rehearsal.whole(danced)
         return {
             "largest_step": step,
             "snap": _ratio(step, self.reference.largest_step),

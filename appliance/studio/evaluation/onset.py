@@ -9,8 +9,8 @@ import numpy as np
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.data.dataset import WINDOW
+from appliance.studio.evaluation.dance_figures import degrees_apart
 from appliance.studio.evaluation.in_play import FollowedOrientation, Rehearsal
-from appliance.studio.evaluation.motion_figures import degrees_apart
 from appliance.studio.evaluation.nearest import without_heading
 
 STEPS = 8  # evenly over the phrase

@@ -16,7 +16,7 @@ from appliance.studio.evaluation.coders import Coder
 from appliance.studio.evaluation.measurement import Iterations, Measurement, Pair
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.onset import CODED_WINDOWS
-from appliance.studio.evaluation.own_takes import own_takes
+from appliance.studio.evaluation.pairs import own_takes
 from appliance.studio.evaluation.puppetry_report import verdict
 from appliance.studio.evaluation.usual_joints import usual_joints
 from appliance.studio.studio_error import StudioError
@@ -47,7 +47,7 @@ def own_answer(coder: Coder, dataset: Dataset, picture: Path) -> dict[str, Any]:
             )
     except StudioError as error:
         return {"not_measured": str(error)}
-    size = _fitting(coder, len(takes.pairs), len(joints))
+    size = fitting_size(coder, len(takes.pairs), len(joints))
     pairs = [_beginning(pair, size.ticks) for pair in takes.pairs[: size.pairs]]
     measurements = [Measurement(coder, pair, reference) for pair in pairs]
     found = puppetry.measure(measurements, joints[: size.joints], ITERATIONS, FREE, turning=False)
@@ -57,13 +57,13 @@ def own_answer(coder: Coder, dataset: Dataset, picture: Path) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class _Size:
+class Size:
     pairs: int
     joints: int
     ticks: int
 
 
-def _fitting(coder: Coder, pairs: int, joints: int) -> _Size:
+def fitting_size(coder: Coder, pairs: int, joints: int) -> Size:
     """As much as the network codes within the budget."""
     affordable = BUDGET_S / _seconds_a_pass(coder)
     ticks = FEWEST_TICKS
@@ -74,7 +74,7 @@ def _fitting(coder: Coder, pairs: int, joints: int) -> _Size:
         ticks = int((affordable - steps) / dances)
         if ticks >= MOST_TICKS // 2:
             break
-    return _Size(*size, min(max(ticks, FEWEST_TICKS), MOST_TICKS))
+    return Size(*size, min(max(ticks, FEWEST_TICKS), MOST_TICKS))
 
 
 def _seconds_a_pass(coder: Coder) -> float:

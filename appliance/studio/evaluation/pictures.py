@@ -88,10 +88,7 @@ def reconstructed(coder: Coder, recording: Recording, iterations: int) -> NDArra
 
 def longest_sound(take: Take, most_s: float) -> Recording:
     """The longest stretch of a take without a glitch, at most most_s long, cut from its middle."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], take.sound.astype(int), [0]])))
-    starts, ends = edges[::2], edges[1::2]
-    longest = int(np.argmax(ends - starts)) if len(starts) else 0
-    first, last = (int(starts[longest]), int(ends[longest])) if len(starts) else (0, len(take.sound))
+    first, last = max(take.sound_runs, key=lambda run: run[1] - run[0], default=(0, len(take.sound)))
     spare = max(0, last - first - round(min(most_s * FPS, len(take.sound)))) // 2
     return take.recording.excerpt((first + spare) / FPS, (last - spare) / FPS)
 

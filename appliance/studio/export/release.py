@@ -35,16 +35,7 @@ EQUALITY_WINDOWS = 16
 PHRASE_S = 60.0
 SHORT_PHRASE_S = 20.0  # a held-out excerpt shorter than this gives way to a longer one from training
 HANGING_DEGREES = 80.0  # below horizontal: a hanging arm does not touch the hip
-FIRST_HANDS = (
-    "lshldr",
-    "leftshoulder",
-    "leftarm",
-    "leftupperarm",
-    "lforearm",
-    "leftforearm",
-    "lhand",
-    "lefthand",
-)
+FIRST_HANDS = "lshldr leftshoulder leftarm leftupperarm lforearm leftforearm lhand lefthand"
 
 
 @dataclass(frozen=True)
@@ -116,7 +107,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
 def first_hand(joints: tuple[str, ...]) -> str:
     """The joint that a new show assigns to its sensor: the left upper arm, if its name is known."""
     folded = {name.casefold().replace("_", ""): name for name in joints}
-    return next((folded[name] for name in FIRST_HANDS if name in folded), joints[-1])
+    return next((folded[name] for name in FIRST_HANDS.split() if name in folded), joints[-1])
 
 
 def hanging_orientation(skeleton: Skeleton, joint: str) -> list[float] | None:

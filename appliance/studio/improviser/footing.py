@@ -102,7 +102,7 @@ class _Legs(torch.nn.Module):
         moving = (np.abs(poses - still_pose).max(axis=(0, 2)) > STILL).nonzero()[0]
         joints = len(skeleton)
         points = [point for foot in soles_of(skeleton) for point in foot]
-        above = {joint for foot in skeleton.feet for joint in _way_up(skeleton, foot)}
+        above = {joint for foot in skeleton.feet for joint in skeleton.ancestors(foot)}
         self.turned = sorted({0} | (above & set(moving.tolist())))
         ends = [point - joints for point in points if point >= joints]
         longer = Skeleton(
@@ -127,14 +127,6 @@ class _Legs(torch.nn.Module):
         whole[:, self.rows] = pose
         positions: Tensor = self.body(whole)
         return positions[:, self.tips] + root[:, None]
-
-
-def _way_up(skeleton: Skeleton, joint: int) -> list[int]:
-    """A joint and those above it up to the root."""
-    way = [joint]
-    while skeleton.parents[way[-1]] >= 0:
-        way.append(skeleton.parents[way[-1]])
-    return way
 
 
 def _settled(phrase: Recording, iterations: int) -> Recording:

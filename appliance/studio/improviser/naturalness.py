@@ -7,13 +7,14 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from appliance.dancer.grounding import measure_standing, survey
+from appliance.dancer.grounding import survey
 from appliance.dancer.loop import is_closed, turns_about_y, yaws
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, Take
 from appliance.studio.improviser.pace import Pace, mean_pace, mean_speed, pace
+from appliance.studio.standing import measure_standing
 
 EVERY_S = 0.2  # of poses that are compared with each other
 SECOND_S = 1.0  # length of the stretches that are searched for in the recordings
@@ -142,11 +143,8 @@ def measure(phrase: Recording, yardstick: Yardstick) -> Naturalness:
 
 def sound_parts(take: Take, shortest_s: float = 2.0) -> list[Recording]:
     """The stretches of a take without a glitch."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], take.sound, [False]]).astype(int)))
-    fps = take.recording.fps
-    return [
-        take.recording.excerpt(a / fps, b / fps) for a, b in edges.reshape(-1, 2) if b - a >= shortest_s * fps
-    ]
+    recording, fps = take.recording, take.recording.fps
+    return [recording.excerpt(a / fps, b / fps) for a, b in take.sound_runs if b - a >= shortest_s * fps]
 
 
 def figure_shapes(recording: Recording, moving: Sequence[int]) -> Array:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.studio.data.jumps import runs
 
 SLOW_SHARE = 0.25  # of the recordings' mean pace: below it for a while, the dancer has frozen
 TREMBLING_HZ = 8.0  # hardly any of a dancer's motion is faster than this
@@ -45,6 +45,7 @@ def pace(recording: Recording, moving: Sequence[int], usual_speed: float, cyclic
     fast = np.fft.rfftfreq(len(turning), 1 / fps) > TREMBLING_HZ
     width = max(1, min(round(SMOOTHING_S * fps), len(turning)))
     smooth = np.convolve(speeds.mean(axis=1), np.ones(width) / width, mode="valid")
+    still = runs(smooth < SLOW_SHARE * usual_speed)
     return Pace(
         speed=float(speeds.mean()),
         speed_p99=float(np.percentile(speeds, 99)),
@@ -52,7 +53,7 @@ def pace(recording: Recording, moving: Sequence[int], usual_speed: float, cyclic
         jerk_p99=float(np.percentile(jerk, 99)),
         trembling=float(power[fast].sum() / power.sum()),
         root_jerk_p99=float(np.percentile(root_jerk, 99)),
-        longest_still_s=_longest_run(smooth < SLOW_SHARE * usual_speed) / fps,
+        longest_still_s=max((end - first for first, end in still), default=0) / fps,
     )
 
 
@@ -77,8 +78,3 @@ def mean_speed(parts: Sequence[Recording], moving: Sequence[int]) -> float:
     return float(
         np.concatenate([np.linalg.norm(joint_turning(p, moving), axis=-1).mean(1) for p in parts]).mean()
     )
-
-
-def _longest_run(flags: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int))).reshape(-1, 2)
-    return int((edges[:, 1] - edges[:, 0]).max()) if len(edges) else 0

@@ -60,7 +60,7 @@ def steps_of_takes(
     found = []
     two_sided = bool(takes) and not asymmetry(takes[0].recording.skeleton, moving)
     for take in takes:
-        for start, end in _stretches(take.sound):
+        for start, end in take.sound_runs:
             excerpt = take.recording.excerpt(start / FPS, end / FPS)
             for recording in (excerpt, mirrored(excerpt)) if two_sided else (excerpt,):
                 for first in range(HOP):
@@ -176,9 +176,3 @@ def smooth_curve(knots: Array, between: int) -> Array:
     curve = (2 * t3 - 3 * t2 + 1) * a + (t3 - 2 * t2 + t) * da + (3 * t2 - 2 * t3) * b + (t3 - t2) * db
     points: Array = curve.reshape(-1, knots.shape[1])
     return points
-
-
-def _stretches(sound: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last + 1 frame of each run of sound frames."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], sound, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

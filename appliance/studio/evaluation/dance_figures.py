@@ -1,20 +1,50 @@
-"""Whether a body stays a body: upper arms deep in the trunk, and feet that slide while they carry."""
+"""Figures of a dance: energy, roughness and steps of its motion; arms in the trunk, sliding feet."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.dancer.grounding import Floor, Grounding, GroundingError, measure_standing, survey
+from appliance.dancer.grounding import Floor, Grounding, GroundingError, survey
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.evaluation.usual_joints import UPPER_ARMS, usual_joints
+from appliance.studio.standing import measure_standing
 
+ROUGHNESS_PERCENTILE = 99.0
 TRUNK_RADIUS = 0.5  # of the distance between the shoulders: 11 cm for the CMU dancers
 DEEP = 0.3  # of that radius below the surface: 3.5 cm
 ALONG_ARM = (0.5, 0.75, 1.0)  # of the upper arm: its inner half begins in the trunk
+
+
+def degrees_apart(a: Array, b: Array) -> Array:
+    """(T,): mean joint angle between poses (T, M, 4)."""
+    apart: Array = np.degrees(quaternion.angle_between(a, b)).mean(axis=-1)
+    return apart
+
+
+def energy(poses: Array) -> float:
+    """Mean joint speed of poses (T, M, 4), degrees a tick."""
+    return float(_steps(poses).mean())
+
+
+def largest_step(poses: Array) -> float:
+    """The furthest that any joint goes from one tick to the next, degrees."""
+    return float(_steps(poses).max())
+
+
+def roughness(poses: Array) -> float:
+    """99th percentile of the angular acceleration over ticks and joints, degrees a tick squared.
+
+    A joint's angular velocity is the axis of its step times the angle, in the parent's frame.
+    """
+    turns = quaternion.multiply(poses[1:], quaternion.inverse(poses[:-1]))
+    axes, angles = quaternion.to_axis_angle(turns)
+    velocities = axes * np.degrees(angles)[..., None]
+    accelerations = np.linalg.norm(np.diff(velocities, axis=0), axis=-1)
+    return float(np.percentile(accelerations, ROUGHNESS_PERCENTILE))
 
 
 class BodyFigures:
@@ -111,3 +141,9 @@ def _distance(points: Array, starts: Array, ends: Array) -> Array:
     share = np.clip((away * bones).sum(axis=-1) / lengths, 0.0, 1.0)
     distance: Array = np.linalg.norm(away - share[:, None] * bones, axis=-1)
     return distance
+
+
+def _steps(poses: Array) -> Array:
+    """(T - 1, M): degrees that each joint goes from tick to tick."""
+    steps: Array = np.degrees(quaternion.angle_between(poses[1:], poses[:-1]))
+    return steps
