@@ -83,9 +83,9 @@ class Extrapolation:
         np.divide(out, self._lengths, out=out)
 
     def state(self) -> dict[str, Any]:
-        """What the targets to come depend on, for `restore`: plain values and copies of arrays."""
+        """What later targets depend on, for `restore`: plain values and copies of arrays."""
         return {"past": self._past.copy(), "oldest": self._oldest}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state."""
+        """Continue from a state."""
         self._past[:], self._oldest = state["past"], state["oldest"]

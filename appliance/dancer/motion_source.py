@@ -203,7 +203,7 @@ class Playback:
         self._push()
 
     def state(self) -> dict[str, Any]:
-        """What the poses to come depend on, for `restore`: plain values and copies of arrays."""
+        """What later poses depend on, for `restore`: plain values and copies of arrays."""
         repertoire, request = self._repertoire, self._request
         return {
             "rate": self._rate,

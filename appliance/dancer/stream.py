@@ -79,7 +79,7 @@ class Stream:
         return {"played": self._poses[shown].copy(), "played_track": self._tracks[shown].copy()}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state."""
+        """Continue from a state."""
         self._end = self._window
         self._poses[: self._end] = state["played"]
         self._tracks[: self._end] = state["played_track"]

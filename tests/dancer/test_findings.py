@@ -70,7 +70,7 @@ class Dancer:
             moved = blending.take().copy()
             puppet.restore(moved, pose)
             root, lift = motion.roots()[0].copy(), motion.lift
-            grounding.stand(pose, root, lift)
+            grounding.ground_pose(pose, root, lift)
             rows.append((moved, window[0].copy(), pose, root, grounding.root.copy(), lift))
             motion.advance()
         columns = (np.array(column[SETTLING:]) for column in zip(*rows, strict=True))

@@ -29,7 +29,7 @@ def grounded(phrase: Recording, poses: np.ndarray, on_floor: bool = True) -> np.
     grounding = Grounding(phrase.skeleton, floor if on_floor else None)
     roots = []
     for pose, root, lift in zip(poses, phrase.roots, floor.lifts, strict=True):
-        grounding.stand(pose.astype(np.float32), root.astype(np.float32), float(lift))
+        grounding.ground_pose(pose.astype(np.float32), root.astype(np.float32), float(lift))
         roots.append(grounding.root.copy())
     return np.array(roots)
 

@@ -18,7 +18,7 @@ from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.dataset import Take, load_dataset
-from appliance.studio.improviser.footing import smoothed, stand
+from appliance.studio.improviser.footing import plant_feet, smoothed
 from appliance.studio.improviser.improvisation import ImproviseOptions, run
 from appliance.studio.improviser.naturalness import Yardstick, distances, measure
 from appliance.studio.improviser.pace import pace
@@ -126,7 +126,7 @@ def test_feet_that_slid_stand_and_nothing_is_below_the_floor() -> None:
     roots = np.stack([0.04 * np.sin(2 * np.pi * time / 4), np.full(200, 0.79), 0 * time], axis=1)
     phrase = Recording(sway.skeleton, quaternion.continuous(poses), roots, 50.0)
     before, after = (
-        measure_standing(p.skeleton, p.poses, p.roots, survey(p)) for p in (phrase, stand(phrase, 60))
+        measure_standing(p.skeleton, p.poses, p.roots, survey(p)) for p in (phrase, plant_feet(phrase, 60))
     )
     assert before.slide_cm_s > 3
     assert after.slide_cm_s < 0.4 * before.slide_cm_s
@@ -134,7 +134,7 @@ def test_feet_that_slid_stand_and_nothing_is_below_the_floor() -> None:
 
 
 def test_a_phrase_on_its_feet_is_still_a_cycle() -> None:
-    phrase = stand(closed_loop(swaying(10.0), 0, 300), 20)
+    phrase = plant_feet(closed_loop(swaying(10.0), 0, 300), 20)
     assert is_closed(phrase.poses.astype(np.float32), phrase.roots.astype(np.float32))
     np.testing.assert_allclose(np.linalg.norm(phrase.poses, axis=-1), 1.0, atol=1e-6)
 

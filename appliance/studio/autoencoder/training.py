@@ -24,12 +24,12 @@ from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.data.dataset import WINDOW, Dataset, windows
 from appliance.studio.training_loop import TrainingLoop
 
-SHORTEST_REACH = 0.04  # of the longest limb's, for what a joint without any bone below it counts
+SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below it counts as
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to train. minutes bounds the wall time and paces the learning rate; steps does so where given."""
+    """How to train. minutes bounds the wall time and paces the learning rate, unless steps is given."""
 
     network: str = DEFAULT
     latent: int = 0
@@ -41,7 +41,7 @@ class Settings:
     batch: int = 256
     learning_rate: float = 1e-3
     critic_learning_rate: float = 5e-4
-    smoothing: float = 0.999  # of the averaged weights that are kept
+    smoothing: float = 0.999  # of the averaged weights
     latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
     input_noise_degrees: float = 0.0
     mirror: bool = True
@@ -116,7 +116,7 @@ class Training(TrainingLoop[Report]):
             if conditional
             else Copies(self.train_windows, settings.input_noise_degrees)
         )
-        self._critic_paid = torch.zeros((), device=self.device)
+        self._critic_loss = torch.zeros((), device=self.device)
 
     def report(self, means: Mapping[str, float]) -> Report:
         return Report(self.step, self.seconds, self.fraction, dict(means), self.held_out_degrees())
@@ -126,19 +126,19 @@ class Training(TrainingLoop[Report]):
         settings = self.settings
         self._pace_learning()
         total = torch.zeros((), device=self.device)
-        told: dict[str, Tensor] = {}
+        reported: dict[str, Tensor] = {}
         latents = []
         for lesson in self.lessons.draw(settings.batch, self.fraction):
             raw, coded, parts = self._code(lesson)
-            weight, words = (settings.weights.hands, "_with_hands") if lesson.hands else (1.0, "")
+            weight, suffix = (settings.weights.hands, "_with_hands") if lesson.hands else (1.0, "")
             for name, part in parts.items():
                 total = total + weight * getattr(settings.weights, name) * part
-                told[name + words] = part
+                reported[name + suffix] = part
             latents.append(coded)
             self.lessons.follow(lesson, rotation.normalize(raw.detach()))
         coded = torch.cat(latents)
         if self.step % settings.critic_every == 0:
-            self._critic_paid = self._train_critic(coded)
+            self._critic_loss = self._train_critic(coded)
         prior = losses.prior_loss(self.critic, coded)
         self.optimizer.zero_grad(set_to_none=True)
         (total + settings.weights.prior * prior).backward()  # type: ignore[no-untyped-call]
@@ -148,13 +148,13 @@ class Training(TrainingLoop[Report]):
         self.step += 1
         with torch.no_grad():
             spread = {"latent_mean": coded.mean(0).abs().mean(), "latent_std": coded.std(0).mean()}
-        told = {**told, "prior": prior, "critic": self._critic_paid, **spread}
-        return {name: part.detach() for name, part in told.items()}
+        reported |= {"prior": prior, "critic": self._critic_loss, **spread}
+        return {name: part.detach() for name, part in reported.items()}
 
     def _code(self, lesson: Lesson) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
-        """The passes of a lesson: raw windows (B, T, M, 4) and latents (B, Z) of the last, and the losses.
+        """Run a lesson's passes: raw windows (B, T, M, 4) and latents (B, Z) of the last, and the losses.
 
-        The latents are noisy where they are decoded, and come without the noise: so the critic sees them.
+        The decoder sees noisy latents; those that are returned, for the critic, have no noise.
         """
         windows, hands, parts = lesson.windows, lesson.hands, {}
         for taken in range(lesson.passes - 1 if hands is not None else 0):
@@ -179,9 +179,9 @@ class Training(TrainingLoop[Report]):
         return loss.detach()
 
     def holding_chances(self) -> Tensor:
-        """(M,): how often a joint is held while learning: more, the more of the body hangs on it.
+        """(M,): relative frequency with which each joint is held: the more of the body hangs on it, the more.
 
-        A head or hand whose bone has no end in the file counts as short: it must be learned as well.
+        A head or hand whose bone has no end in the file counts as short, so that it is learned too.
         """
         reach = self.dataset.skeleton.reaches[list(self.dataset.moving)]
         share = np.maximum(reach / max(float(reach.max()), 1e-9), SHORTEST_REACH)
@@ -189,7 +189,7 @@ class Training(TrainingLoop[Report]):
 
     @torch.no_grad()
     def held_out_degrees(self, sample: int = 2048) -> float | None:
-        """Mean joint angle error in degrees of the averaged network on windows of takes kept apart."""
+        """Mean joint angle error in degrees of the averaged network on windows of held-out takes."""
         if not len(self.held_windows):
             return None
         rows = torch.linspace(0, len(self.held_windows) - 1, min(sample, len(self.held_windows))).long()
@@ -242,8 +242,8 @@ class Training(TrainingLoop[Report]):
 def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]]:
     """The averaged network of a checkpoint, its joint names, and the whole state.
 
-    The critic shapes the latents, but their mean and scale stay some tenths off the prior's, because other
-    losses pull at them; what is left is taken out here exactly, without a change to any window.
+    The critic shapes the latents, but other losses keep their mean and scale some tenths off the prior's; the
+    rest is removed here exactly, without a change to any window.
     """
     state = torch.load(path, map_location="cpu", weights_only=True)
     shape = state["shape"]

@@ -1,4 +1,4 @@
-"""A training as people see it: progress, checkpoints, pictures, and a stop that loses nothing."""
+"""Runs a training: progress, checkpoints, pictures, and a stop that loses nothing."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class TrainingRun:
         self._line = ""
 
     def run(self) -> bool:
-        """Train until done or asked to stop (Ctrl-C, SIGTERM). True when done; the checkpoint is written."""
+        """Train until done or stopped (Ctrl-C, SIGTERM). True if done; always writes the checkpoint."""
         with stop_signals() as stop_asked, self._progress() as progress:
             self.console.print("Ctrl-C stops without losing anything.")
             bar = progress.add_task("training", total=1.0, words="")
@@ -60,7 +60,7 @@ class TrainingRun:
         return f"{steps_a_second:.1f} steps/s, {_clock(left)} left. {self._line}"
 
     def _report(self, report: Report) -> None:
-        """Every half minute: a line of history; a filmstrip when its time has come."""
+        """Print and store a line of history; draw a filmstrip if one is due."""
         held = (
             ""
             if report.held_out_degrees is None
@@ -99,29 +99,29 @@ class TrainingRun:
             draw_losses(self.folder / "pictures" / "losses.png", history)
 
     def _write_history(self) -> None:
-        told = {
+        record = {
             "settings": asdict(self.training.settings),
             "parameters": parameters(self.training.autoencoder.network),
             "history": [asdict(line) for line in self.training.history],
         }
         partial = self.folder / ".training.json"
-        partial.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+        partial.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
         partial.replace(self.folder / "training.json")
 
 
 def parameters(network: nn.Module) -> int:
-    """How many numbers a network learns."""
+    """The number of learned parameters."""
     return sum(parameter.numel() for parameter in network.parameters())
 
 
 def time_left_s(seconds: float, fraction: float) -> float:
-    """Seconds to go if it goes on as it went."""
+    """Remaining seconds at the pace so far."""
     return seconds * (1 - fraction) / fraction if fraction > 0 else 0.0
 
 
 @contextmanager
 def stop_signals() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C or SIGTERM came; a second one stops at once."""
+    """Yields a function: whether Ctrl-C or SIGTERM arrived. A second signal stops at once."""
     asked = False
 
     def ask(number: int, frame: object) -> None:

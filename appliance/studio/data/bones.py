@@ -1,4 +1,4 @@
-"""Lengths of a skeleton's bones: how far limbs reach, which joints are their ends, how large a body is."""
+"""Lengths of a skeleton's bones: which joints are limb ends or small parts, and the span of a body."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ LIMB_END = 0.15  # of the skeleton's reach: what hangs below a head, hand or foo
 
 
 def small_parts(skeleton: Skeleton) -> set[int]:
-    """Fingers, toes, eyes: joints below which there is little, or nothing where their own bone is short."""
+    """Fingers, toes, eyes: joints with little below them, or with nothing below and a short bone."""
     reach, least = skeleton.reaches, SMALL * span_m(skeleton)
     known = (reach > 0) | (np.linalg.norm(skeleton.offsets, axis=-1) < least)
     return set(np.flatnonzero(known & (reach < least)).tolist()) - {0}
 
 
 def span_m(skeleton: Skeleton) -> float:
-    """The longest way along bones from one end of the body to another: a hand to a foot."""
+    """The longest path along bones between two ends of the body: from a hand to a foot."""
     reach, longest = skeleton.reaches, 0.0
     for joint in range(len(skeleton)):
         arms = [
@@ -31,7 +31,7 @@ def span_m(skeleton: Skeleton) -> float:
 
 
 def limb_ends(skeleton: Skeleton) -> set[int]:
-    """Heads, hands, feet and what is smaller: by their names, or because little hangs below them."""
+    """Heads, hands, feet and smaller parts: by name, or because little is below them."""
     reach = skeleton.reaches
     small = set(np.flatnonzero(reach <= LIMB_END * reach[0]).tolist())
     heads = {joint for joint, name in enumerate(skeleton.names) if "head" in name.casefold()}

@@ -26,14 +26,14 @@ Spans = tuple[tuple[float, float], ...]  # seconds from and to
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What is known of recordings beyond their files: true frame rates, takes, what is held out, and where
-    people know better than we what is a capture error.
+    """What is known of recordings beyond their files: true frame rates, takes, what is held out, and what
+    is or is not a capture error against all appearance.
     """
 
     true_fps: dict[str, float] = field(default_factory=dict)
     take: dict[str, str] = field(default_factory=dict)
     held_out: tuple[str, ...] = ()
-    acknowledgement: str = ""  # whom to thank, in every show made of them
+    acknowledgement: str = ""  # printed in every show made of them
     keep: dict[str, Spans] = field(default_factory=dict)
     mask: dict[str, Spans] = field(default_factory=dict)
     metres_per_unit: dict[str, float] = field(default_factory=dict)
@@ -42,7 +42,7 @@ class Catalogue:
         return _first(self.true_fps, name)
 
     def unit_of(self, name: str) -> float | None:
-        """What a recording's lengths are in, metres."""
+        """Metres in a unit of length of a recording."""
         return _first(self.metres_per_unit, name)
 
     def take_of(self, name: str) -> str:
@@ -52,16 +52,16 @@ class Catalogue:
         return any(fnmatch.fnmatch(name, pattern) for pattern in self.held_out)
 
     def kept(self, name: str) -> Spans:
-        """When a recording is sound whatever it looks like."""
+        """When a recording has no capture error, whatever it looks like."""
         return _spans(self.keep, name)
 
     def masked(self, name: str) -> Spans:
-        """When a recording is not to be learned from."""
+        """When a recording must not be learned from."""
         return _spans(self.mask, name)
 
 
 def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
-    """catalogue.yaml beside the recordings, else the studio's own where they know every name and size."""
+    """catalogue.yaml beside the recordings, else the studio's own if these list every name and size."""
     own = folder / "catalogue.yaml"
     if own.exists():
         return read_catalogue(own)
@@ -77,7 +77,7 @@ def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
 
 
 def read_catalogue(path: Path) -> Catalogue:
-    """Read a catalogue file. Raises ConfigError with the line of everything that is wrong in it."""
+    """Read a catalogue file. Raises ConfigError with the line of each error."""
     file = read_catalogue_file(path)
     return Catalogue(
         file.true_fps,
@@ -91,7 +91,7 @@ def read_catalogue(path: Path) -> Catalogue:
 
 
 def _joined(catalogues: Sequence[Catalogue]) -> Catalogue:
-    """What several know together; each acknowledgement once."""
+    """Several catalogues as one; each acknowledgement once."""
     rates: dict[str, float] = {}
     takes: dict[str, str] = {}
     for one in catalogues:
@@ -113,10 +113,10 @@ def _spans(by_pattern: Mapping[str, Spans], name: str) -> Spans:
 
 
 class CatalogueFile(Section):
-    """What is known of recordings; each part may be left out. Patterns are names of files without '.bvh'."""
+    """catalogue.yaml. Every key is optional. Patterns are file names without '.bvh'."""
 
     true_fps: dict[str, Rate] = Field(
-        default={}, description="Rates by pattern where headers are wrong: {salsa_*: 60}."
+        default={}, description="Rates by pattern if headers are wrong: {salsa_*: 60}."
     )
     takes: dict[str, list[Name]] = Field(
         default={}, description="Files that are one take: {duet-1: [anna_1, bert_1]}."
@@ -128,13 +128,13 @@ class CatalogueFile(Section):
     )
     mask: dict[str, list[SpanOfSeconds]] = Field(
         default={},
-        description="What is not to be learned from, by pattern: {anna_1: [[0, 3.2]]}, in seconds.",
+        description="What must not be learned from, by pattern: {anna_1: [[0, 3.2]]}, in seconds.",
     )
     metres_per_unit: dict[str, Unit] = Field(
-        default={}, description="What lengths are in, by pattern: {solo_*: 0.0254} for inches."
+        default={}, description="Metres in a unit of length, by pattern: {solo_*: 0.0254} for inches."
     )
-    acknowledgement: str = Field(default="", description="Whom to thank in every show made of them.")
-    bytes: dict[str, int] = Field(default={}, description="Sizes by which the studio knows recordings.")
+    acknowledgement: str = Field(default="", description="Acknowledgement in every show made of them.")
+    bytes: dict[str, int] = Field(default={}, description="File sizes that identify recordings.")
 
     @field_validator("keep", "mask", mode="before")
     @classmethod
@@ -163,7 +163,7 @@ def _are_spans(spans: Any) -> bool:
 
 
 def read_catalogue_file(path: Path) -> CatalogueFile:
-    """A key without a value counts as left out. Raises ConfigError: the line of everything that is wrong."""
+    """Read catalogue.yaml; a key without a value counts as absent. Raises ConfigError with the lines."""
     file = read_yaml(path)
     file.values = {key: value for key, value in file.values.items() if value is not None}
     return validated(CatalogueFile, file, {})

@@ -31,7 +31,7 @@ def energy(poses: Array) -> float:
 
 
 def largest_step(poses: Array) -> float:
-    """The furthest that any joint goes from one tick to the next, degrees."""
+    """The largest angle of any joint from one tick to the next, degrees."""
     return float(_steps(poses).max())
 
 
@@ -48,13 +48,12 @@ def roughness(poses: Array) -> float:
 
 
 class BodyFigures:
-    """The figures of dances on one phrase, whose floor it knows; not a number where the skeleton's names do
-    not say what its arms, neck and feet are.
+    """The figures of dances on one phrase and its floor; NaN if joint names do not identify the body parts.
 
     The trunk is a tube along the spine from hip to neck, its radius half the distance between the shoulders.
     An upper arm is deep in it where the axis of its outer half is more than 0.3 radii below the surface.
     Release 0.1.0 on salsa_29 with hands of salsa_24 on lShldr at 10/9: 6 to 11 % of the ticks; the phrase
-    2 %. Foot skate is the horizontal speed of the lowest point of the soles, grounded as in play: 0.14 and
+    2 %. Foot skate is the horizontal speed of the lowest point of the soles, grounded as on stage: 0.14 and
     0.06 m/s there; 0.07 and 0.02 on the default show's own phrase.
     """
 
@@ -82,7 +81,7 @@ class BodyFigures:
         return float(deep.mean())
 
     def foot_skate(self, poses: Array) -> float:
-        """Metres a second that the foot that carries slides in poses (T, J, 4) on the phrase's path."""
+        """Sliding speed of the supporting foot, m/s, in poses (T, J, 4) on the phrase's path."""
         if self._floor is None or len(poses) < 2:
             return float("nan")
         lifts = self._floor.lifts[: len(poses)]
@@ -90,13 +89,13 @@ class BodyFigures:
         return standing.slide_cm_s / 100
 
     def grounded(self, poses: Array) -> Array:
-        """Roots (T, 3) in metres of poses (T, J, 4) on the phrase's path, set on the floor as in play."""
+        """Roots (T, 3) in metres of poses (T, J, 4) on the phrase's path, grounded as on stage."""
         path = self._recording.roots[: len(poses)].astype(np.float32)
         if self._floor is None:
             return path
         grounding, roots = Grounding(self._skeleton, self._floor), np.empty_like(path)
         for tick, pose in enumerate(poses.astype(np.float32)):
-            grounding.stand(pose, path[tick], float(self._floor.lifts[tick]))
+            grounding.ground_pose(pose, path[tick], float(self._floor.lifts[tick]))
             roots[tick] = grounding.root
         return roots
 
@@ -144,6 +143,6 @@ def _distance(points: Array, starts: Array, ends: Array) -> Array:
 
 
 def _steps(poses: Array) -> Array:
-    """(T - 1, M): degrees that each joint goes from tick to tick."""
+    """(T - 1, M): angle of each joint from tick to tick, degrees."""
     steps: Array = np.degrees(quaternion.angle_between(poses[1:], poses[:-1]))
     return steps

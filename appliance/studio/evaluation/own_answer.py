@@ -1,4 +1,4 @@
-"""The answer of a dancer that has just been trained, on its own takes, in about a minute: for its report."""
+"""The answer of a newly trained dancer, measured on its own takes in about a minute, for its report."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from appliance.studio.studio_error import StudioError
 PARTS = ("left upper arm", "left forearm", "head")
 ITERATIONS: tuple[Iterations, ...] = ((2, 1), (10, 9))
 FREE = (1, 10, 30)
-BUDGET_S = 30.0  # for coding; search, grounding and picture take about as long again
+BUDGET_S = 30.0  # for coding; search, grounding and picture take about as long
 MOST_TICKS, FEWEST_TICKS = 600, 150
 SIZES = ((2, 3), (1, 3), (1, 1))  # pairs and joints: fewer for a slow network
 
 
 def own_answer(coder: Coder, dataset: Dataset, picture: Path) -> dict[str, Any]:
-    """Figures as puppetry.measure has them, and verdict, measured_on; a picture.
+    """The figures of puppetry.measure, and verdict, measured_on; draws a picture.
 
-    It never fails: where nothing can be measured, not_measured says why, and there is no picture.
+    Never fails: if nothing can be measured, not_measured gives the reason, and there is no picture.
     """
     picture.unlink(missing_ok=True)
     try:
@@ -64,7 +64,7 @@ class Size:
 
 
 def fitting_size(coder: Coder, pairs: int, joints: int) -> Size:
-    """As much as the network codes within the budget."""
+    """The largest measurement that the network codes within the budget."""
     affordable = BUDGET_S / _seconds_a_pass(coder)
     ticks = FEWEST_TICKS
     for most_pairs, most_joints in SIZES:

@@ -13,15 +13,15 @@ from appliance.studio.evaluation.pictures import longest_sound
 from appliance.studio.studio_error import StudioError
 
 LONGEST_S = (TICKS + WINDOW - 1) / FPS
-HALVES_S = 12.0  # a take kept apart of that length is phrase and hand; a shorter one borrows the hand
+HALVES_S = 12.0  # a held-out take of this length is phrase and hand; a shorter one borrows the hand
 SHORTEST_S = 3.0  # a shorter stretch says nothing: an answer is a mean over many poses
 
 
 def pair_up(phrases: Sequence[Take], hands: Sequence[Take]) -> list[Pair]:
-    """As many pairs as there are phrases or hands, whichever are more; each hand is of another take.
+    """As many pairs as there are phrases or hands, whichever are more; each hand is from another take.
 
-    Of each recording the beginning of the longest stretch without a capture error is taken. Raises
-    StudioError where no hand is of another take, or everything is too short.
+    Each recording contributes the beginning of its longest stretch without a capture error. Raises
+    StudioError if no hand is from another take, or everything is too short.
     """
     pairs: dict[tuple[str, str], Pair] = {}
     for number in range(max(len(phrases), len(hands))):
@@ -47,7 +47,7 @@ def pair_up(phrases: Sequence[Take], hands: Sequence[Take]) -> list[Pair]:
 
 
 def apart_from(dataset: Dataset, takes: Sequence[Take]) -> tuple[Take, ...]:
-    """The training takes without those that are, or were danced together with, one of these takes."""
+    """The training takes except these takes and those that were danced together with them."""
     names = {take.name for take in takes}
     known = (*dataset.training, *dataset.held_out)
     given = {take.take for take in known if take.name in names} | {take.take for take in takes}
@@ -61,7 +61,7 @@ def _beginning(take: Take) -> Recording:
 
 @dataclass(frozen=True)
 class OwnTakes:
-    """Pairs of phrase and hand, the takes that are the reference, and what they are in a sentence."""
+    """Pairs of phrase and hand, the takes of the reference, and a description."""
 
     pairs: list[Pair]
     reference: Sequence[Take]
@@ -69,7 +69,10 @@ class OwnTakes:
 
 
 def own_takes(dataset: Dataset) -> OwnTakes:
-    """The best that there is. Raises StudioError where the recordings are too few or too short."""
+    """What a training measures its own dancer on: held-out takes, else parts of one take.
+
+    Raises StudioError if the recordings are too few or too short.
+    """
     apart = _longest_of_each(dataset.held_out)
     if len(apart) > 1:
         return OwnTakes(pair_up(apart, apart), dataset.training, "on takes that it never saw")
@@ -79,7 +82,7 @@ def own_takes(dataset: Dataset) -> OwnTakes:
 
 
 def _on_one_apart(apart: Take, dataset: Dataset) -> OwnTakes:
-    """A take kept apart as phrase; the hand is its other half, or a take that was learned."""
+    """A held-out take as phrase; the hand is its other half, or a training take."""
     training = _longest_of_each(dataset.training)
     if apart.recording.seconds >= HALVES_S:
         phrase, hand = _part(apart, 0, 2), _part(apart, 1, 2)
@@ -94,7 +97,7 @@ def _on_one_apart(apart: Take, dataset: Dataset) -> OwnTakes:
 
 
 def _on_thirds(take: Take) -> OwnTakes:
-    """A take alone: its beginning as phrase, its end as hand, what is between them as reference."""
+    """A single take: its beginning as phrase, its end as hand, the middle as reference."""
     if take.recording.seconds < 3 * SHORTEST_S:
         raise StudioError(
             f"{take.name} is {take.recording.seconds:.0f} s long, too short to be phrase, hand and "
@@ -106,7 +109,7 @@ def _on_thirds(take: Take) -> OwnTakes:
 
 
 def _longest_of_each(takes: Sequence[Take]) -> list[Take]:
-    """Of partners in a take the one with the most sound poses; the longest take first."""
+    """Of several recordings of a take the one with the most sound poses; the longest take first."""
     best: dict[str, Take] = {}
     for take in sorted(takes, key=lambda take: int(take.sound.sum()), reverse=True):
         best.setdefault(take.take, take)
@@ -114,7 +117,7 @@ def _longest_of_each(takes: Sequence[Take]) -> list[Take]:
 
 
 def _part(take: Take, number: int, parts: int) -> Take:
-    """One of so many equal parts of a take, as a take of its own."""
+    """Part `number` of `parts` equal parts of a take, as a take of its own."""
     first, last = (len(take.recording) * k // parts for k in (number, number + 1))
     return replace(
         take,

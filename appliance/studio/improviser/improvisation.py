@@ -61,17 +61,17 @@ def run(options: ImproviseOptions) -> bool:
             f"{options.checkpoint} moves {', '.join(joints)}; the recordings move "
             f"{', '.join(dataset.moving_names)}. Give the recordings that the checkpoint was trained on."
         )
-    heard = steps_of_takes(autoencoder, dataset.training, dataset.moving, BEFORE + MOVE)
+    steps = steps_of_takes(autoencoder, dataset.training, dataset.moving, BEFORE + MOVE)
     held_out = steps_of_takes(autoencoder, dataset.held_out, dataset.moving, BEFORE + MOVE)
-    training = _training(options, autoencoder, heard, held_out, console)
+    training = _training(options, autoencoder, steps, held_out, console)
     if not _train(training, improviser_file(options.out), console):
         return False
 
-    def say(words: str) -> None:
-        console.print(words, highlight=False, soft_wrap=True)
+    def say(message: str) -> None:
+        console.print(message, highlight=False, soft_wrap=True)
 
-    phrase, natural = make_phrase(autoencoder, training.averaged, dataset, heard, options.phrase, say)
-    write(options, phrase, natural, dataset, training)
+    phrase, natural = make_phrase(autoencoder, training.averaged, dataset, steps, options.phrase, say)
+    write_phrase(options, phrase, natural, dataset, training)
     say(f"{options.out}: {verdict(natural)}")
     return True
 
@@ -81,7 +81,7 @@ def improviser_file(out: Path) -> Path:
     return out.with_suffix(".improviser.pt")
 
 
-def write(
+def write_phrase(
     options: ImproviseOptions,
     phrase: Recording,
     natural: Naturalness,
@@ -91,13 +91,13 @@ def write(
     """The phrase, its report (JSON) and a picture of it."""
     options.out.parent.mkdir(parents=True, exist_ok=True)
     write_bvh(options.out, phrase, digits=PHRASE_DIGITS)
-    told: dict[str, Any] = {
+    report: dict[str, Any] = {
         "phrase": asdict(options.phrase),
         "improviser": {"settings": asdict(training.settings), "steps": training.step},
         "learned_from": [take.name for take in dataset.training if take.sound.any()],
         "naturalness": natural.as_json(),
     }
-    options.out.with_suffix(".json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    options.out.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     title = f"{options.out.stem}: {phrase.seconds:.0f} s, seed {options.phrase.seed}"
     picture = options.out.with_suffix(".png")
     draw_filmstrip(picture, phrase.skeleton, phrase.poses, phrase.roots, phrase.fps, title=title, rows=3)
@@ -106,19 +106,19 @@ def write(
 def _training(
     options: ImproviseOptions,
     autoencoder: Autoencoder,
-    heard: list[Steps],
+    steps: list[Steps],
     held_out: list[Steps],
     console: Console,
 ) -> ImproviserTraining:
     """The training stored beside the phrase, if it is for the same autoencoder; else a new one."""
     settings = ImproviserSettings(seed=options.phrase.seed, minutes=options.minutes, steps=options.steps)
     rows = BEFORE + MOVE * settings.moves
-    if not any(len(stretch) >= rows for stretch in heard):
+    if not any(len(stretch) >= rows for stretch in steps):
         raise StudioError(
             f"No recording has {rows / 12.5:.0f} s without a capture error: too little to improvise from."
         )
     training = ImproviserTraining(
-        [torch.tensor(stretch.features) for stretch in heard],
+        [torch.tensor(stretch.features) for stretch in steps],
         [torch.tensor(stretch.features) for stretch in held_out],
         ROOT,
         settings,
@@ -159,7 +159,7 @@ def _train(training: ImproviserTraining, file: Path, console: Console) -> bool:
             return stop_asked()
 
         def report(line: ImproviserReport) -> None:
-            words = _words(line)
+            words = _history_line(line)
             progress.update(bar, completed=line.fraction, words=words)
             if not console.is_terminal:
                 console.print(f"{100 * line.fraction:5.1f} %  {words}", highlight=False, soft_wrap=True)
@@ -176,7 +176,7 @@ def _progress(console: Console) -> Progress:
     return Progress(*columns, words, console=console, disable=not console.is_terminal)
 
 
-def _words(line: ImproviserReport) -> str:
+def _history_line(line: ImproviserReport) -> str:
     parts = ", ".join(f"{name} {value:.3g}" for name, value in line.parts.items())
     held = ", ".join(f"{name} {value:.3g}" for name, value in line.held_out.items())
     return f"step {line.step}  {parts}" + (f"; held-out takes: {held}" if held else "")

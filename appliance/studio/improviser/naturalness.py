@@ -25,7 +25,7 @@ class Likeness:
     """How a motion's poses lie among the recorded ones; distances are root mean squares over joints."""
 
     breadth: float  # spread of its poses about their mean, over that of the recordings
-    coverage: float  # share of recorded poses that it comes as near to as another take does
+    coverage: float  # share of recorded poses to which it comes as near as another take does
     strangeness: float  # distance of its poses from the nearest recorded ones, over that of another take's
     strangeness_p99: float
     nearest_second_cm: float  # from each of its seconds to the nearest recorded one: 0 would be a copy
@@ -45,7 +45,7 @@ class Seam:
 
 @dataclass(frozen=True)
 class Naturalness:
-    """Measures of a phrase, and beside them, where they mean little alone, those of the recordings."""
+    """Measures of a phrase, with those of the recordings where they mean little alone."""
 
     seconds: float
     pace: Pace
@@ -66,7 +66,7 @@ class Naturalness:
 
 @dataclass(frozen=True)
 class Yardstick:
-    """What the recordings are like, which phrases are held against.
+    """Measures of the recordings, with which phrases are compared.
 
     pace: their own, glitches left out; shapes (K, M * 3): figures of theirs, centimetres; near (K,): how far
     each is from the nearest one of another take; seconds: stretches of a second; shape_speed: of whole
@@ -84,7 +84,7 @@ class Yardstick:
 
     @staticmethod
     def of(takes: Sequence[Take], moving: Sequence[int]) -> Yardstick:
-        """Learn what the takes are like."""
+        """Measure the takes."""
         parts = [part for take in takes for part in sound_parts(take)]
         names = [take.take for take in takes for _ in sound_parts(take)]
         usual_speed = mean_speed(parts, moving)
@@ -173,7 +173,7 @@ def _likeness(phrase: Array, yardstick: Yardstick) -> Likeness:
 
 
 def _to_others(parts: Sequence[Array], names: Sequence[str], every: int = 1) -> Array:
-    """Distance of every so many rows to the nearest row of a part with another name; inf where none is."""
+    """Distance of every `every`-th row to the nearest row of a part with another name, or inf."""
     owners = np.concatenate([[name] * len(part) for name, part in zip(names, parts, strict=True)])
     rows = np.concatenate(parts)
     other = owners[::every, None] != owners[None]
