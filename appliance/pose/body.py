@@ -107,7 +107,7 @@ class Body:
         return trunk
 
     def _webs(self) -> list[tuple[int, int]]:
-        """Pairs (trunk joint, where a limb begins) that fill the sides of the chest and of the pelvis."""
+        """Pairs (trunk joint, start of a limb) that fill the sides of the chest and of the pelvis."""
         pairs = []
         for branching in self._trunk:
             limbs = [c for c in self._long_children(branching) if c not in self._trunk]

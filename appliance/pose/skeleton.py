@@ -15,7 +15,7 @@ from appliance.pose.quaternion import Array
 
 
 class UnknownJointError(KeyError):
-    """A joint name that the skeleton does not have; says which one was probably meant."""
+    """A joint name that the skeleton does not have; suggests the nearest one."""
 
     def __init__(self, name: str, names: Sequence[str]) -> None:
         by_folded = {known.casefold(): known for known in names}

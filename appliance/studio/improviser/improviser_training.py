@@ -12,13 +12,13 @@ import torch
 from torch import Tensor
 
 from appliance.studio.improviser.improviser import Improviser
-from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence, draw, move_loss
+from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence, move_loss, sample_code
 from appliance.studio.training_loop import TrainingLoop
 
 
 @dataclass(frozen=True)
 class ImproviserSettings:
-    """How to train. minutes bounds the wall time and paces the rest; steps does so where given."""
+    """How to train. minutes bounds the wall time and paces the learning rate, unless steps is given."""
 
     seed: int = 1
     minutes: float = 12.0
@@ -30,12 +30,12 @@ class ImproviserSettings:
     lstm_layers: int = 1
     mixtures: int = 6
     batch: int = 128
-    moves: int = 6  # in a row, 3.8 s: what the memory is trained over
+    moves: int = 6  # in a row, 3.8 s: the span over which the memory is trained
     learning_rate: float = 1.5e-3
     dropout: float = 0.2
-    closeness: float = 0.35  # deviation that a move may have from the recorded one, in a step's own
+    closeness: float = 0.35  # tolerated error of a move, in standard deviations of a step
     input_noise: float = 0.1
-    own: float = 0.9  # share of moves that go on from its own steps, at the end of the training
+    own: float = 0.9  # share of moves that continue the network's own steps, at the end of the training
     smoothing: float = 0.995
 
 
@@ -76,7 +76,7 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
         return ImproviserReport(self.step, self.seconds, self.fraction, dict(means), self.held_out())
 
     def train_step(self) -> dict[str, Tensor]:
-        """One step on a batch of rows of moves, each move made out of recorded or of own steps before it."""
+        """One step on a batch of rows of moves, each continuing recorded or the network's own steps."""
         settings = self.settings
         for group in self.optimizer.param_groups:
             warm = min(1.0, (self.step + 1) / 100)
@@ -99,7 +99,7 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
 
     @torch.no_grad()
     def held_out(self, sample: int = 64) -> dict[str, float]:
-        """The losses of the averaged networks on takes kept apart, recorded steps before each move."""
+        """The losses of the averaged networks on held-out takes, with recorded steps before each move."""
         if not len(self.held_starts):
             return {}
         picked = torch.linspace(0, len(self.held_starts) - 1, min(sample, len(self.held_starts))).long()
@@ -126,8 +126,8 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
     ) -> dict[str, Tensor]:
         """Losses over rows (B, 3 + 8 * moves, inside).
 
-        own: share of moves that go on from the steps that the networks made (scheduled sampling). The code of
-        such a move is that which leads from there back to the recording, so that mending is learned too.
+        own: share of moves that continue the networks' own steps (scheduled sampling). The code of such a
+        move leads from there back to the recording, so that correcting is learned too.
         """
         moves, choreographer = improviser.moves, improviser.choreographer
         state = choreographer.start(len(truth))
@@ -141,7 +141,7 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
             before = before + noise * torch.rand(len(truth), 1, 1) * torch.randn_like(before)
             move = truth[:, at : at + MOVE]
             mean, log_variance = moves.encode(before, move)
-            code = draw(mean, log_variance)
+            code = sample_code(mean, log_variance)
             if mixture is not None:
                 sums["nats"] = sums["nats"] + mixture.negative_log_likelihood(code.detach()).mean()
             made = moves.decode(before, code)
@@ -151,7 +151,7 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
         return {name: value / (self.settings.moves - (name == "nats")) for name, value in sums.items()}
 
     def _laid_out(self, stretches: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
-        """All scaled steps after one another, and the rows at which a whole training row begins."""
+        """All scaled steps, concatenated, and the indices at which a whole training row begins."""
         starts, at = [], 0
         for stretch in stretches:
             starts.append(torch.arange(at, at + max(len(stretch) - self._length + 1, 0)))

@@ -1,4 +1,4 @@
-"""Pace: how fast, how smoothly and how restlessly a motion goes."""
+"""Pace: speed, smoothness, trembling and stillness of a motion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.jumps import runs
 
-SLOW_SHARE = 0.25  # of the recordings' mean pace: below it for a while, the dancer has frozen
+SLOW_SHARE = 0.25  # of the recordings' mean pace: a slower dancer is still
 TREMBLING_HZ = 8.0  # hardly any of a dancer's motion is faster than this
 SMOOTHING_S = 0.5
 
@@ -31,7 +31,7 @@ class Pace:
 
 
 def pace(recording: Recording, moving: Sequence[int], usual_speed: float, cyclic: bool = False) -> Pace:
-    """How the recording moves; usual_speed: mean joint speed, degrees a second, that stillness is held by.
+    """How the recording moves; usual_speed: mean joint speed, degrees a second, to which stillness is compared.
 
     cyclic: the last frame leads into the first.
     """
@@ -67,7 +67,7 @@ def joint_turning(recording: Recording, moving: Sequence[int], cyclic: bool = Fa
 
 
 def mean_pace(paces: Sequence[Pace], weights: Sequence[int]) -> Pace:
-    """Weighted means; the longest stillness is the longest of all."""
+    """Weighted means; of the stillness, the maximum."""
     rows = {name: [asdict(one)[name] for one in paces] for name in asdict(paces[0])}
     means = {name: float(np.average(values, weights=weights)) for name, values in rows.items()}
     return Pace(**{**means, "longest_still_s": max(rows["longest_still_s"])})
