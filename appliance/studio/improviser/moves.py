@@ -14,9 +14,7 @@ from torch import Tensor, nn
 
 MOVE = 8  # steps of a move, 0.64 s
 BEFORE = 3  # steps before it that the networks see
-PLACE_WEIGHT = (
-    3.0  # of the root's displacement in the loss, relative to a latent direction of the same variance
-)
+PLACE_WEIGHT = 3.0  # of the root's displacement in the loss, to a latent direction of the same variance
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,7 @@ class MovesShape:
 
 
 class Scale(nn.Module):
-    """Maps steps to and from principal directions of the latents and the root's displacement, standardised."""
+    """Maps steps to and from principal directions of latents and the root's displacement, standardised."""
 
     def __init__(self, shape: MovesShape) -> None:
         super().__init__()

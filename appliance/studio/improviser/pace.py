@@ -31,7 +31,7 @@ class Pace:
 
 
 def pace(recording: Recording, moving: Sequence[int], usual_speed: float, cyclic: bool = False) -> Pace:
-    """How the recording moves; usual_speed: mean joint speed, degrees a second, to which stillness is compared.
+    """How the recording moves; usual_speed: mean joint speed, degrees a second, the measure of stillness.
 
     cyclic: the last frame leads into the first.
     """
