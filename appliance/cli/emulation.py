@@ -19,10 +19,10 @@ _LAST_WORDS_S = 2.0
 
 @contextmanager
 def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
-    """Meanwhile `python -m hw_sim emulate` is the show's sensors; gives the box that finds them.
+    """Run `python -m hw_sim emulate` as the show's sensors; yields the box with their key file.
 
-    Its key file is that of these sensors: the venue's own are not let in meanwhile, and what is learnt of
-    these is forgotten with them. It has no journal: the venue's is not for rehearsals. Raises StageError.
+    The venue's own sensors are not admitted meanwhile, and what the box learns about the emulated ones is
+    discarded with them. That box has no journal: the venue's is not for rehearsals. Raises StageError.
     """
     names = list(dict.fromkeys(hand.sensor for hand in show.config.hands if hand.sensor))
     if not names:
