@@ -6,9 +6,11 @@ import itertools
 import os
 import random
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
+from xdist.scheduler import LoadFileScheduling
 
 import hw_sim.peers
 from tests.boot import figures_report
@@ -16,7 +18,7 @@ from tests.command import Command
 
 ROOT = Path(__file__).resolve().parents[1]
 # The longest files start first when files run in parallel: started last, one would run alone.
-LONGEST_FIRST = ("tests/test_readme.py", "tests/boot/", "tests/system/", "tests/studio/")
+LONGEST_FIRST = ("tests/boot/", "tests/test_readme.py", "tests/system/", "tests/studio/")
 _folders = itertools.count()
 
 
@@ -39,6 +41,18 @@ def pytest_configure(config: pytest.Config) -> None:
     if worker:  # its own share of the ports, so that no other worker takes one between choice and use
         share = slice(int(worker.removeprefix("gw")), None, int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))
         hw_sim.peers.PORTS = hw_sim.peers.PORTS[share]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadFileScheduling:
+    return OneBoxAtATime(config, log)
+
+
+class OneBoxAtATime(LoadFileScheduling):
+    """Files run in parallel, but no two machines boot at once: each takes a whole processor."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return "tests/boot" if nodeid.startswith("tests/boot/") else str(super()._split_scope(nodeid))
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-
-import numpy as np
 
 SHARES = (1.0, 0.5, 0.35)  # of the display's width and height; steps in between save nothing
 _WINDOW_S = 1.5  # of pictures that a judgement is based on
@@ -16,7 +15,7 @@ _UP_AFTER_S, _UP_AFTER_MOST_S = 20.0, 640.0  # of spare time before a larger pic
 _FAILED_S = 60.0  # a larger picture that lasts for less has failed
 _GAIN = 0.85  # smallest pictures that are too slow and save less than this blur for nothing
 _HOPELESS_S = 600.0  # before smaller pictures are tried again
-_TYPICAL = 75  # percentile of the times: a few pictures delayed by other programs do not count
+_TYPICAL = 0.75  # quantile of the times: a few pictures delayed by other programs do not count
 
 
 class Resolution:
@@ -32,9 +31,9 @@ class Resolution:
         self._place = 0
         self._times: deque[tuple[float, float]] = deque()
         self._look: str | None = None
-        self._settled = -np.inf
+        self._settled = -math.inf
         self._eased: float | None = None  # since when a larger picture would do
-        self._grew = -np.inf
+        self._grew = -math.inf
         self._up_after_s = _UP_AFTER_S
         self._took_s: dict[int, float] = {}  # what pictures took at each place when last judged
         self._ratios: dict[int, float] = {}  # how much longer than there they take at the next larger size
@@ -67,7 +66,8 @@ class Resolution:
             self._times.popleft()
         if len(self._times) < _FEWEST:
             return False
-        return self._judge(now, float(np.percentile([took for _, took in self._times], _TYPICAL)))
+        in_order = sorted(took for _, took in self._times)
+        return self._judge(now, in_order[round(_TYPICAL * (len(in_order) - 1))])
 
     def _judge(self, now: float, took_s: float) -> bool:
         self._took_s[self._place] = took_s
@@ -88,8 +88,8 @@ class Resolution:
     def _shrink(self, now: float) -> bool:
         self._eased = None
         look, smallest = self._look or "", len(SHARES) - 1
-        is_gain = self._took_s.get(smallest, np.inf) <= _GAIN * self._took_s.get(0, np.inf)
-        if now < self._hopeless.get(look, -np.inf):
+        is_gain = self._took_s.get(smallest, math.inf) <= _GAIN * self._took_s.get(0, math.inf)
+        if now < self._hopeless.get(look, -math.inf):
             if not is_gain:
                 return False
             del self._hopeless[look]  # full pictures, measured once more, say otherwise

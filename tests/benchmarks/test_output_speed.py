@@ -112,7 +112,7 @@ def test_forward_kinematics_of_many_poses(measured: Callable[..., Any], frame: J
 
 def test_forward_kinematics_in_the_tick(measured: Callable[..., Any], frame: JointFrame) -> None:
     figure = Figure(skeleton())
-    measured("figure, in the tick", FIGURE_GROUP)(figure.stand, frame.pose, frame.positions[0])
+    measured("figure, in the tick", FIGURE_GROUP)(figure.set_pose, frame.pose, frame.positions[0])
     np.testing.assert_allclose(figure.positions, frame.positions, atol=1e-5)
 
 

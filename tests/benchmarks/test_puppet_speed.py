@@ -18,6 +18,7 @@ from appliance.pose.bvh import read_bvh
 from appliance.show.bundle import default_show_path
 from appliance.studio.autoencoder.architectures import NETWORKS, build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.export.export import export
 from tests.studio.tiny import moving, skeleton, swaying
 
@@ -80,7 +81,7 @@ def test_pytorch_eager(measured: Callable[..., Any], one_thread: None, onednn: b
     with torch.backends.mkldnn.flags(enabled=onednn), torch.no_grad():
         made, _ = benchmark.pedantic(
             autoencoder.iterate,
-            (window[None], 10, 9, mask, targets, weights),
+            (window[None], 10, 9, HeldJoints(mask, targets, weights)),
             rounds=15,
             warmup_rounds=2,
         )

@@ -91,6 +91,7 @@ class Hall:
 
     def ask(self, address: str, patience_s: float = 5.0) -> list[tuple[str, list[Any]]]:
         """What show control answers to a question without arguments."""
+        self._forget_late_answers()
         padded = address.encode() + b"\0" * (4 - len(address) % 4)
         self.console.sendto(padded + b",\0\0\0", (BOX, CONTROL))
         return self.answers(
@@ -108,6 +109,12 @@ class Hall:
                 with contextlib.suppress(OSError):
                     found += decode(self.console.recv(65536))
         return found
+
+    def _forget_late_answers(self) -> None:
+        """Those of an earlier question, or of the box before."""
+        while select.select([self.console], [], [], 0.0)[0]:
+            with contextlib.suppress(OSError):
+                self.console.recv(65536)
 
     def dance_with_sensor(self) -> None:
         """A dancer switches the wearable on; it moves until it is switched off or the hall closes."""

@@ -22,7 +22,7 @@ import sys
 from pathlib import Path
 from appliance.cli import project as project_command
 project_command._RETRY_S = 0.2
-window = project_command.wish(True, False, None, None, None, False)
+window = project_command.parse_options(True, False, None, None, None, False)
 sys.exit(project_command.project_show(Path(sys.argv[1]), window, waits=True))
 """
 

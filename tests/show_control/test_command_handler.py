@@ -378,7 +378,7 @@ def test_a_bundle_that_is_too_long_is_refused_as_one(folder: Path, stage: StageD
     asker.socket.send(bundle("/player/start", 150))
     heard = asker.hear()
     assert heard is not None
-    assert "send 64 at most" in heard[3]
+    assert "at most 64 messages" in heard[3]
     assert asker.ask("/ping") == ["/pong"]
     assert show_state(folder).generation == 0
 
