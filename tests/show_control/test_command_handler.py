@@ -97,6 +97,7 @@ def test_stop_fades_then_the_phrase_stands_until_go(folder: Path, stage: StageDo
 
 def test_after_go_the_phrase_plays_at_the_shows_rate(folder: Path, stage: StageDouble, asker: Asker) -> None:
     asker.tell("/player/rate", 2.0)
+    until(lambda: declared(folder, "rate") == ("", 2.0))
     asker.ask("/go")
     assert declared(folder, "rate") == ("", 2.0)  # it goes on already
     asker.ask("/stop", 0)
