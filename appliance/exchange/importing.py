@@ -105,8 +105,9 @@ def _fitted(
     if isinstance(parents, str):
         raise ExchangeError(
             source,
-            f"From {parents}. Write the parent behind each name ('LeftHand, LeftForeArm'; 'Hips, -' for the "
-            "root), or take the skeleton of a recording: --like FILE.bvh.",
+            f"The names do not say what hangs on what ({parents}). Write the parent behind each name "
+            "('LeftHand, LeftForeArm'; 'Hips, -' for the root), or take the skeleton of a recording: --like "
+            "FILE.bvh.",
         )
     order = _parents_first(source, names, parents)
     place = {joint: row for row, joint in enumerate(order)}

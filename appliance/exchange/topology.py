@@ -30,9 +30,10 @@ _CHAINS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("elbow", "forearm", "lowerarm"),
         ("wrist",),
         ("hand",),
-        ("finger", "handtip", "handend", "thumb", "index"),
+        ("handtip", "handend"),
     ),
     "leg": (
+        ("buttock", "hipjoint"),
         ("hip", "upleg", "upperleg", "thigh", "femur"),
         ("knee", "leg", "shin", "calf", "lowerleg", "tibia"),
         ("ankle",),
@@ -40,6 +41,18 @@ _CHAINS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("toe", "toebase", "ball", "toes"),
         ("toeend", "toetip"),
     ),
+    "eye": (("eye",),),
+    **{
+        words[0]: (words, tuple(f"{word}tip" for word in words))
+        for words in (
+            ("thumb", "handthumb"),
+            ("index", "handindex"),
+            ("middle", "mid", "handmiddle"),
+            ("ring", "handring"),
+            ("pinky", "little", "handpinky"),
+            ("finger", "fingerbase"),
+        )
+    },
 }
 _SIDE = re.compile(r"^(left|right)|^[lr](?=[_.\- ])|(left|right)$|[_.\- ][lr]$", re.IGNORECASE)
 _LETTER_SIDE = re.compile(r"^[lrLR](?=[A-Z])")
@@ -49,8 +62,10 @@ _AT_REST: dict[str, tuple[float, float, float]] = {
     "spine": (0.0, 1.0, 0.0),
     "arm": (1.0, 0.0, 0.0),
     "leg": (0.0, -1.0, 0.0),
+    "eye": (0.3, 0.6, 0.7),
 }
-_FOOT_AT_REST, _TOES = (0.0, -0.4, 0.9), 3
+_FOOT_AT_REST, _ANKLE, _TOES = (0.0, -0.4, 0.9), 3, 5
+_HAND, _HEAD = 5, 6
 
 
 class Role(NamedTuple):
@@ -72,7 +87,7 @@ def role_of(name: str) -> Role | None:
         plain = plain[: match.start()] + plain[match.end() :]
     digits = re.findall(r"\d+", plain)
     word = re.sub(r"[^a-z]", "", plain.casefold())
-    for chain in ("arm", "leg") if side else ("spine",):
+    for chain in [name for name in _CHAINS if name != "spine"] if side else ["spine"]:
         for place, words in enumerate(_CHAINS[chain]):
             if word in words:
                 return Role(chain, side, place, int(digits[-1]) if digits else 0)
@@ -84,7 +99,7 @@ def parents_by_name(names: Sequence[str]) -> list[int] | str:
     roles = [role_of(name) for name in names]
     unknown = [name for name, role in zip(names, roles, strict=True) if role is None]
     if unknown:
-        return f"the names do not say which joint hangs on which: {', '.join(unknown[:5])}"
+        return f"unknown: {', '.join(unknown[:5])}"
     known = {joint: role for joint, role in enumerate(roles) if role is not None}
     spine = sorted((j for j in known if known[j].chain == "spine"), key=lambda j: known[j][2:])
     if not spine or known[spine[0]].place:
@@ -93,11 +108,16 @@ def parents_by_name(names: Sequence[str]) -> list[int] | str:
     parents = [-1] * len(names)
     for above, joint in pairwise(spine):
         parents[joint] = above
-    for chain, start in (("arm", chest), ("leg", spine[0])):
-        for side in (1, -1):
+    head = [joint for joint in spine if known[joint].place <= _HEAD][-1]
+    for side in (1, -1):
+        hand = chest
+        for chain in _CHAINS:
             limb = sorted((j for j in known if known[j][:2] == (chain, side)), key=lambda j: known[j][2:])
+            start = {"arm": chest, "leg": spine[0], "eye": head}.get(chain, hand)
             for above, joint in pairwise([start, *limb]):
                 parents[joint] = above
+            if chain == "arm":
+                hand = [chest, *(joint for joint in limb if known[joint].place <= _HAND)][-1]
     return parents
 
 
@@ -106,7 +126,7 @@ def directions_at_rest(names: Sequence[str], parents: Sequence[int]) -> Array | 
 
     None where a name says nothing.
     """
-    found = np.zeros((len(names), 3))
+    found: Array = np.zeros((len(names), 3))
     for joint, name in enumerate(names):
         role = role_of(name)
         if role is None:
@@ -114,8 +134,9 @@ def directions_at_rest(names: Sequence[str], parents: Sequence[int]) -> Array | 
         if parents[joint] < 0:
             continue
         above = role_of(names[parents[joint]])
-        x, y, z = _AT_REST[role.chain]
-        if role.chain == "leg" and role.place >= _TOES:
+        x, y, z = _AT_REST.get(role.chain, _AT_REST["arm"])
+        on_ankle = above is not None and (above.chain, above.place) == ("leg", _ANKLE)
+        if role.chain == "leg" and (role.place >= _TOES or on_ankle):
             x, y, z = _FOOT_AT_REST
         if role.chain == "leg" and above is not None and above.chain != "leg":
             x, y = 1.0, -0.3

@@ -31,6 +31,24 @@ def mean_cm(found: Recording, points: Array) -> float:
     return float(100 * np.linalg.norm(points_of(found) - points, axis=-1).mean())
 
 
+def test_a_shin_points_down_at_rest_and_a_foot_forwards() -> None:
+    figure = body()
+    directions = directions_at_rest(figure.names, figure.parents)
+    assert directions is not None
+    assert directions[figure.index("LeftFoot")][1] == -1.0
+    assert directions[figure.index("LeftToe")][2] > 0.8
+    assert directions[figure.index("RightHand")][0] == -1.0
+
+
+def test_the_names_of_real_recordings_say_what_hangs_on_what(recordings_dir: Path) -> None:
+    for path in (
+        next(recordings_dir.glob("**/salsa_18.bvh")),
+        next(recordings_dir.glob("**/martial_05.bvh")),
+    ):
+        figure = read_bvh(path).skeleton
+        assert parents_by_name(figure.names) == list(figure.parents), path.name
+
+
 def fitted(figure: Skeleton, points: Array) -> Recording:
     directions = directions_at_rest(figure.names, figure.parents)
     skeleton = fit_skeleton(figure.names, figure.parents, points, directions)
@@ -56,6 +74,7 @@ def test_a_synthetic_dance_comes_back(seed: int) -> None:
 
 
 def test_real_dances_come_back(recordings_dir: Path) -> None:
+    """With fingers, eyes, and bones without length, as the CMU recordings have them."""
     paths = sorted(recordings_dir.glob("**/*.bvh"))
     for path in (paths[0], next(recordings_dir.glob("**/salsa_18.bvh")), paths[-1]):
         meant = read_bvh(path, drop_tpose=True).excerpt(0.0, 10.0)
