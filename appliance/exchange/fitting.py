@@ -15,6 +15,9 @@ from appliance.pose.skeleton import Skeleton
 
 _PRIOR = 1e-4  # how much the nearest turn weighs against the children, where these leave a turn open
 _ROUNDS = 6  # of the shape of several bones at one joint; the third already changes less than 0.1 mm
+_TWIST_S = (
+    0.1  # standard deviation of the filter of open twists: a bone that points backwards would flip them
+)
 _TIP = 0.4  # of the last bone: how far the figure reaches beyond a last point
 
 
@@ -146,8 +149,8 @@ def pose_frames(
     in straight lines: there joints turn evenly from the pose before to the pose after.
 
     Each bone is aimed from where the figure's joint is to where the point was seen, so that differences in
-    length do not add up along a limb. One bone at a joint leaves its twist open: it keeps the parent's.
-    Several bones say it.
+    length do not add up along a limb. One bone at a joint leaves its twist open: it keeps the
+    parent's, smoothly. Several bones say it.
     """
     too_long = [gap for gap in gaps_of(points) if gap.last - gap.first + 1 > longest_gap_s * fps]
     unseen: NDArray[np.bool_] = np.zeros(points.shape[:2], dtype=bool)
@@ -170,6 +173,8 @@ def pose_frames(
         if aimed:
             turned = _aim(offsets[aimed], whole[:, aimed] - places[:, [joint]], above)
             local = quaternion.continuous(quaternion.multiply(quaternion.inverse(above), turned))
+            if len(aimed) == 1:
+                local = _with_smooth_twist(local, offsets[aimed[0]], _TWIST_S * fps)
             poses[:, joint] = _across(local, np.any(unseen[:, aimed], axis=1))
         world[:, joint] = quaternion.multiply(above, poses[:, joint])
     return Recording(skeleton, quaternion.continuous(poses), places[:, 0], fps), too_long
@@ -183,6 +188,25 @@ def _aim(bones: Array, observed: Array, above: Array) -> Array:
     if len(bones) == 1:
         return swung
     return quaternion.from_matrix(_nearest_turns(bones, observed, quaternion.to_matrix(swung)))
+
+
+def _with_smooth_twist(local: Array, bone: Array, deviation: float) -> Array:
+    """Rotations (N, 4) that point the bone where `local` does, with a twist that runs smoothly over frames.
+
+    The twist is what is left of each step beside the shortest turn of the bone; it is summed up, filtered by
+    a Gaussian of this many frames, and the difference given back.
+    """
+    axis = bone / np.linalg.norm(bone)
+    points_to = quaternion.rotate(local, np.broadcast_to(axis, (len(local), 3)))
+    carried = quaternion.multiply(_swing(points_to[:-1], points_to[1:]), local[:-1])
+    left = quaternion.multiply(quaternion.inverse(carried), local[1:])
+    steps = 2.0 * np.arctan2(left[:, 1:] @ axis, left[:, 0])
+    steps = (steps + np.pi) % (2.0 * np.pi) - np.pi
+    twist = np.concatenate([[0.0], np.cumsum(steps)])
+    reach = int(np.ceil(3.0 * deviation))
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(deviation, 1e-9)) ** 2)
+    smooth = np.convolve(np.pad(twist, reach, mode="edge"), kernel / kernel.sum(), mode="valid")
+    return quaternion.multiply(local, quaternion.from_axis_angle(axis, smooth - twist))
 
 
 def _across(local: Array, unseen: NDArray[np.bool_]) -> Array:
