@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ _ROUNDS = 6  # of the shape of several bones at one joint; the third already cha
 _TWIST_S = (
     0.1  # standard deviation of the filter of open twists: a bone that points backwards would flip them
 )
+_TOES = np.array([0.0, -0.2, 0.98])
 _TIP = 0.4  # of the last bone: how far the figure reaches beyond a last point
 
 
@@ -65,6 +66,7 @@ def fit_skeleton(
     bones = points[:, 1:] - points[:, list(parents[1:])]
     lengths = np.concatenate([[0.0], np.nanmedian(np.linalg.norm(bones, axis=-1), axis=0)])
     whole = without_gaps(points)
+    stands = directions is not None
     if directions is None:
         first = int(np.argmin(np.isnan(points).any(axis=(1, 2))))
         directions = np.zeros((len(names), 3))
@@ -77,12 +79,15 @@ def fit_skeleton(
         if len(below) > 1:
             observed = whole[:, below] - whole[:, [joint]]
             offsets[below] = _shape(offsets[below], observed, lengths[below])
-    ends = [
-        (joint, tuple(float(part) for part in _TIP * offsets[joint]))
-        for joint in range(1, len(names))
-        if not children[joint]
-    ]
-    return Skeleton(tuple(names), tuple(parents), offsets, tuple((j, (o[0], o[1], o[2])) for j, o in ends))
+    figure = Skeleton(tuple(names), tuple(parents), offsets)
+    ends: list[tuple[int, tuple[float, float, float]]] = []
+    for joint in range(1, len(names)):
+        if not children[joint]:
+            x, y, z = _TIP * offsets[joint]
+            if stands and joint in figure.feet:  # no point says where the toes are: in front
+                x, y, z = _TIP * lengths[joint] * _TOES
+            ends.append((joint, (float(x), float(y), float(z))))
+    return replace(figure, ends=tuple(ends))
 
 
 def like(model: Skeleton, points: Array) -> Skeleton:

@@ -40,6 +40,19 @@ def test_a_shin_points_down_at_rest_and_a_foot_forwards() -> None:
     assert directions[figure.index("RightHand")][0] == -1.0
 
 
+def test_a_foot_without_toes_points_forwards() -> None:
+    figure = body()
+    kept = [joint for joint, name in enumerate(figure.names) if "Toe" not in name]
+    names = [figure.names[joint] for joint in kept]
+    parents = parents_by_name(names)
+    assert not isinstance(parents, str)
+    points = points_of(moved(figure, seconds=1.0))[:, kept]
+    fitted_figure = fit_skeleton(names, parents, points, directions_at_rest(names, parents))
+    tips = dict(fitted_figure.ends)
+    for foot in fitted_figure.feet:
+        assert tips[foot][2] > 0.1
+
+
 def test_the_names_of_real_recordings_say_what_hangs_on_what(recordings_dir: Path) -> None:
     for path in (
         next(recordings_dir.glob("**/salsa_18.bvh")),
