@@ -8,6 +8,7 @@ from functools import wraps
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from importlib.metadata import version as distribution_version
+from keyword import iskeyword
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -35,6 +36,8 @@ _MODULES = {  # in the order of `bunraku --help`; in each a function or a group 
     "journal": "appliance.cli.journal",
     "replay": "appliance.cli.replay",
     "filmstrip": "appliance.cli.pictures",
+    "convert": "appliance.cli.exchange",
+    "import": "appliance.cli.exchange",
     "provision": "appliance.cli.sensors.commands",
     "sensors": "appliance.cli.sensors.commands",
     "lights": "appliance.cli.lights_commands",
@@ -55,7 +58,7 @@ def command_line(name: str | None = None) -> typer.Typer:
     app.callback()(_bunraku)  # a parser of one command expects its name too
     for command, module in _MODULES.items():
         if name in (None, command):
-            found = getattr(import_module(module), command)
+            found = getattr(import_module(module), f"{command}_" if iskeyword(command) else command)
             if isinstance(found, typer.Typer):
                 app.add_typer(found, name=command)
             elif command == "preflight":  # it parses its own options: at power-on it runs without this parser
@@ -161,12 +164,15 @@ def plug_in(onto: typer.Typer, found: Iterable[EntryPoint], say: Callable[[str],
 
 def _is_correctable(error: Exception) -> bool:
     from appliance.box.runtime_folder import RuntimeFolderError
+    from appliance.exchange.exchange_error import ExchangeError
     from appliance.pose.bvh import BvhError
     from appliance.recorder.journal_error import JournalError
     from appliance.show.config_error import ConfigError
     from appliance.stage.stage_error import StageError
 
-    return isinstance(error, BvhError | ConfigError | JournalError | RuntimeFolderError | StageError)
+    return isinstance(
+        error, BvhError | ConfigError | ExchangeError | JournalError | RuntimeFolderError | StageError
+    )
 
 
 if __name__ == "__main__":

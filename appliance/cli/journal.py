@@ -53,16 +53,43 @@ def export_journal(
     box: ThisBoxFile = None,
     chosen: ChosenFile = None,
     recorded: Recorded = None,
+    bvh: Annotated[Path | None, typer.Option(help="Write what was danced into this BVH file.")] = None,
+    glb: Annotated[
+        Path | None, typer.Option(help="And into this one for Blender, three.js, TouchDesigner.")
+    ] = None,
 ) -> None:
-    """Write the journal into one file that replay, filmstrip and list read, on a stick for example."""
+    """Write the journal into one file that replay, filmstrip and list read, on a stick for example.
+
+    With --bvh or --glb it writes the dance alone, as a recording.
+    """
     from appliance.recorder.export import export
 
     source = _recorded(box, chosen, recorded)
+    if bvh is not None or glb is not None:
+        _export_dance(source, to, {".bvh": bvh, ".glb": glb})
+        return
     if to is not None:
         typer.echo(f"Exported: {export(source, to, progress=_progress)}")
         return
     with _writable(STICK):
         typer.echo(f"Exported: {export(source, STICK, progress=_progress)}. The stick can be pulled.")
+
+
+def _export_dance(source: Path, to: Path | None, wanted: dict[str, Path | None]) -> None:
+    """What was danced, as recordings. Raises JournalError or ExchangeError."""
+    from appliance.cli.pictures import load_dance
+    from appliance.exchange.exchange_error import ExchangeError
+    from appliance.exchange.formats import write_recording
+
+    if to is not None:
+        raise typer.BadParameter(f"with --bvh or --glb the dance alone is written: leave out '{to}'")
+    for ending, out in wanted.items():
+        if out is not None and out.suffix.lower() != ending:
+            raise ExchangeError(out, f"A file for --{ending[1:]} ends with {ending}.")
+    danced = load_dance(source).recording
+    for out in filter(None, wanted.values()):
+        write_recording(out, danced)
+        typer.echo(f"Exported: {out}, {danced.seconds:.1f} s of dance.")
 
 
 def _recorded(box: Path | None, chosen: Path | None, recorded: Path | None) -> Path:

@@ -6,9 +6,12 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from appliance.cli import journal
+from appliance.exchange.formats import read_recording
+from appliance.pose import quaternion
 from appliance.recorder.reading import read_journal
 from appliance.release import choice
 from tests.bundles import write_show
@@ -55,6 +58,24 @@ def test_a_stick_that_is_too_small_keeps_what_was_on_it(
     subprocess.run(("mount", "-o", "remount,rw,size=8k", str(stick)), check=True)
     assert "No space left on device" in bunraku("journal", "export", "--journal", recorded, status=2).err
     assert not list(stick.iterdir())
+
+
+def test_the_dance_of_the_night_is_a_recording(recorded: Path, tmp_path: Path, bunraku: Command) -> None:
+    bvh, glb = tmp_path / "night.bvh", tmp_path / "night.glb"
+    said = bunraku("journal", "export", "--journal", recorded, "--bvh", bvh, "--glb", glb).out
+    assert said.count("1.0 s of dance") == 2
+    danced = read_journal(recorded)
+    for found in (read_recording(bvh), read_recording(glb)):
+        assert found.skeleton.same_joints(danced.skeleton)
+        np.testing.assert_allclose(found.roots, danced.ticks["root"], atol=1e-5)
+        assert np.degrees(quaternion.angle_between(found.poses, danced.ticks["pose"])).max() < 0.1
+
+
+def test_a_recording_has_the_ending_of_its_format(recorded: Path, tmp_path: Path, bunraku: Command) -> None:
+    wrong = ("journal", "export", "--journal", recorded, "--bvh", tmp_path / "night.glb")
+    assert "ends with .bvh" in bunraku(*wrong, status=2).err
+    both = ("journal", "export", tmp_path, "--journal", recorded, "--bvh", tmp_path / "night.bvh")
+    assert "leave out" in bunraku(*both, status=2).err
 
 
 def test_without_a_stick_or_a_journal_it_says_what_to_do(

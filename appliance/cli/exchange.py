@@ -1,0 +1,93 @@
+"""`bunraku convert` and `bunraku import`: recordings for other programs, and from them."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class Unit(StrEnum):
+    """Of the points in a file."""
+
+    m = "m"
+    cm = "cm"
+    mm = "mm"
+
+
+class Up(StrEnum):
+    """The vertical axis."""
+
+    y = "y"
+    z = "z"
+
+
+MetresPerUnit = Annotated[float, typer.Option(min=1e-6, help="Unit of BVH files, in metres.")]
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="A recording: .bvh, .glb, .npz or .csv.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="The file; its ending says the format.")],
+    metres_per_unit: MetresPerUnit = 0.01,
+    fps: Annotated[float | None, typer.Option(min=1.0, max=1000.0, help="Another rate.")] = None,
+) -> None:
+    """Turn a recording into another format: .bvh, .glb (Blender, three.js, TouchDesigner), .npz, .csv.
+
+    The dance stays the same: the same joints, the same rotations, metres (BVH: centimetres). A .glb has a
+    body around the skeleton, so that it can be looked at as it is.
+    """
+    from appliance.exchange.formats import read_recording, require_known_ending, write_recording
+
+    require_known_ending(out)
+    recording = read_recording(source, metres_per_unit)
+    if fps is not None:
+        recording = recording.resampled(fps)
+    write_recording(out, recording, metres_per_unit)
+    joints, rate = len(recording.skeleton), recording.fps
+    print(f"{out}: {recording.seconds:.1f} s, {len(recording)} poses at {rate:g} a second, {joints} joints.")
+
+
+def import_(
+    points: Annotated[Path, typer.Argument(help="Points: .npy (frames, points, 3), or .csv.")],
+    out: Annotated[Path, typer.Option(help="The recording: .bvh, .glb, .npz or .csv.")],
+    names: Annotated[
+        Path | None, typer.Option(help="Text file: a name on each line, or a name, a comma, its parent.")
+    ] = None,
+    like: Annotated[
+        Path | None, typer.Option(help="BVH with the skeleton that the points belong to, by their names.")
+    ] = None,
+    fps: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Frames a second of the points.")] = 50.0,
+    unit: Annotated[Unit | None, typer.Option(help="Unit of the points; left out: by the size.")] = None,
+    up: Annotated[Up, typer.Option(help="The axis that points upwards.")] = Up.y,
+    gap: Annotated[
+        float, typer.Option(min=0.0, help="Seconds without a point that are crossed in a straight line.")
+    ] = 0.5,
+    picture: Annotated[
+        Path | None, typer.Option(help="PNG of poses from the dance; left out: beside --out.")
+    ] = None,
+) -> None:
+    """Turn positions of points or joints into a recording: a skeleton is fitted to them and follows them.
+
+    Bones are as long as the points mostly are apart. What hangs on what follows from the names (LeftArm,
+    l_wrist, RightKnee ...), from parents in --names, or from --like. A point that is missing is NaN or an
+    empty field. At the end it says how far the figure is from the points, in centimetres.
+    """
+    from appliance.cli.pictures import RecordedDance, draw_dance
+    from appliance.exchange.formats import require_known_ending, write_recording
+    from appliance.exchange.importing import PointsOptions, import_points
+    from appliance.stage.stage_error import StageError
+
+    require_known_ending(out)
+    options = PointsOptions(names, like, fps, unit.value if unit else None, up.value, gap)
+    imported = import_points(points, options, print)
+    write_recording(out, imported.recording)
+    for line in imported.report():
+        print(line)
+    print(f"{out}: {imported.recording.seconds:.1f} s, {len(imported.recording.skeleton)} joints.")
+    try:
+        print(draw_dance(RecordedDance(imported.recording, (), out.stem), picture or out.with_suffix(".png")))
+    except StageError as error:  # the recording is written: only its picture is missing
+        print(f"There is no picture: {error}", file=sys.stderr)

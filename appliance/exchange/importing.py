@@ -1,0 +1,155 @@
+"""`bunraku import`: tracked points in, a dance of a fitted skeleton out, and its distance from the points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from appliance.exchange.exchange_error import ExchangeError
+from appliance.exchange.fitting import Gap, fit_skeleton, gaps_of, like, pose_frames
+from appliance.exchange.points_file import UNITS, guess_unit, read_names, read_points, with_y_up
+from appliance.exchange.topology import directions_at_rest, parents_by_name
+from appliance.pose.bvh import read_bvh
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+
+_SHOWN_GAPS = 10
+_FEW_FRAMES = 2
+
+
+@dataclass(frozen=True)
+class PointsOptions:
+    """names: file; model: BVH whose skeleton the points belong to; unit: None to guess; up: 'y' or 'z'."""
+
+    names: Path | None = None
+    model: Path | None = None
+    fps: float = 50.0
+    unit: str | None = None
+    up: str = "y"
+    longest_gap_s: float = 0.5
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A dance, and the distances (N, J) in metres from its joints to the points, not a number in gaps."""
+
+    recording: Recording
+    errors: Array
+
+    def report(self) -> list[str]:
+        """The distances in centimetres, in lines: of all joints, then of each, the worst one first."""
+        names = self.recording.skeleton.names
+        width = max(map(len, names))
+        lines = [f"Distance from the points, cm: {_figures(self.errors)}"]
+        worst = np.argsort(-np.nanmean(self.errors, axis=0), kind="stable")
+        return lines + [f"  {names[joint]:{width}}  {_figures(self.errors[:, joint])}" for joint in worst]
+
+
+def _figures(errors: Array) -> str:
+    cm = 100.0 * errors[~np.isnan(errors)]
+    return f"mean {cm.mean():.2f}, 95 % below {np.percentile(cm, 95):.2f}, largest {cm.max():.2f}"
+
+
+def import_points(source: Path, options: PointsOptions, say: Callable[[str], None]) -> Imported:
+    """Read points, fit a skeleton, find its poses. Raises ExchangeError or BvhError."""
+    listed = None if options.names is None else read_names(options.names)
+    names, read = read_points(source, listed)
+    unit = options.unit or guess_unit(read)
+    if options.unit is None:
+        say(f"Unit: {unit}, by the size of the figure. If that is wrong: --unit {' | '.join(UNITS)}.")
+    points = with_y_up(UNITS[unit] * read, options.up)
+    _require_seen(source, names, points)
+    say(f"Points: {len(names)}, frames: {len(points)}, {len(points) / options.fps:.1f} s.")
+    if options.model is not None:
+        skeleton, points = _as_model(source, options.model, names, points)
+    else:
+        given = None if listed is None or listed.parents is None else listed.parents
+        skeleton, points = _fitted(source, names, given, points)
+    recording, too_long = pose_frames(skeleton, points, options.fps, options.longest_gap_s)
+    _say_gaps(gaps_of(points), too_long, skeleton.names, options, say)
+    places, _ = skeleton.forward_kinematics(recording.poses, recording.roots)
+    return Imported(recording, np.linalg.norm(places - points, axis=-1))
+
+
+def _require_seen(source: Path, names: Sequence[str], points: Array) -> None:
+    seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
+    if (seen < min(_FEW_FRAMES, len(points))).any():
+        never = [name for name, count in zip(names, seen, strict=True) if count < _FEW_FRAMES]
+        raise ExchangeError(source, f"{', '.join(never)}: never seen. Leave the point out, of the names too.")
+
+
+def _as_model(source: Path, model: Path, names: Sequence[str], points: Array) -> tuple[Skeleton, Array]:
+    figure = read_bvh(model).skeleton
+    missing = [name for name in figure.names if name not in names]
+    if missing:
+        raise ExchangeError(
+            source,
+            f"{model.name} has joints that are no points: {', '.join(missing[:5])}. Rename the points, or "
+            "take another skeleton.",
+        )
+    points = points[:, [list(names).index(name) for name in figure.names]]
+    return like(figure, points), points
+
+
+def _fitted(
+    source: Path, names: Sequence[str], given: Sequence[str] | None, points: Array
+) -> tuple[Skeleton, Array]:
+    if given is not None:
+        parents: list[int] | str = [list(names).index(name) if name else -1 for name in given]
+    else:
+        parents = parents_by_name(names)
+    if isinstance(parents, str):
+        raise ExchangeError(
+            source,
+            f"The names do not say what hangs on what ({parents}). Write the parent behind each name "
+            "('LeftHand, LeftForeArm'; 'Hips, -' for the root), or take the skeleton of a recording: --like "
+            "FILE.bvh.",
+        )
+    order = _parents_first(source, names, parents)
+    place = {joint: row for row, joint in enumerate(order)}
+    chosen = [names[joint] for joint in order]
+    above = [place.get(parents[joint], -1) for joint in order]
+    points = points[:, order]
+    return fit_skeleton(chosen, above, points, directions_at_rest(chosen, above)), points
+
+
+def _parents_first(source: Path, names: Sequence[str], parents: Sequence[int]) -> list[int]:
+    """The joints depth first, as a BVH file has them. Raises ExchangeError without exactly one root."""
+    roots = [joint for joint, parent in enumerate(parents) if parent < 0]
+    if len(roots) != 1:
+        found = ", ".join(names[joint] for joint in roots) or "none"
+        raise ExchangeError(source, f"A figure has one root, without a parent; here: {found}.")
+
+    def below(joint: int) -> list[int]:
+        return [joint, *(n for child, above in enumerate(parents) if above == joint for n in below(child))]
+
+    order = below(roots[0])
+    if len(order) != len(names):
+        lost = next(name for joint, name in enumerate(names) if joint not in order)
+        raise ExchangeError(source, f"'{lost}' hangs on itself. Correct its parents.")
+    return order
+
+
+def _say_gaps(
+    gaps: Sequence[Gap],
+    too_long: Sequence[Gap],
+    names: Sequence[str],
+    options: PointsOptions,
+    say: Callable[[str], None],
+) -> None:
+    if len(gaps) > len(too_long):
+        short = [gap.last - gap.first + 1 for gap in gaps if gap not in too_long]
+        say(f"Gaps: {len(short)} of up to {max(short) / options.fps:.2f} s, crossed in straight lines.")
+    for gap in too_long[:_SHOWN_GAPS]:
+        seconds = (gap.last - gap.first + 1) / options.fps
+        begin = gap.first / options.fps
+        say(
+            f"{names[gap.joint]} was not seen for {seconds:.2f} s from {begin:.2f} s on: its bone turns "
+            "evenly from the pose before to the pose after. Look whether that can be danced."
+        )
+    if len(too_long) > _SHOWN_GAPS:
+        say(f"And {len(too_long) - _SHOWN_GAPS} more such gaps.")
