@@ -43,6 +43,7 @@ def experiment(
             help="CSV of a worn sensor: seconds, w, x, y, z; left out: how the liveliest excerpt moves it."
         ),
     ] = None,
+    pictures: Annotated[bool, typer.Option(help="Draw the filmstrips, most of the time it takes.")] = True,
 ) -> None:
     """Dance the experiments of 'Puppeteering an AI' and hold what comes out against the paper's claims.
 
@@ -62,5 +63,6 @@ def experiment(
                 networks=tuple(network or ()),
                 joint=joint,
                 trace=trace,
+                pictures=pictures,
             )
         )

@@ -220,9 +220,8 @@ def _sensitivity(trials: Sequence[Trial]) -> Claim:
         speed = _speed(trial, trial.looped.phrase)
         found[trial.excerpt.name] = {"degrees_per_degree": degrees, "recorded_speed": speed}
         by_speed.append((speed, degrees))
-    rank = _correlation(
-        *(np.argsort(np.argsort(np.array(column))).astype(float) for column in zip(*by_speed, strict=True))
-    )
+    speeds, answers = (np.array(column) for column in zip(*by_speed, strict=True))
+    rank = 0.0 if np.ptp(answers) < 1e-6 else _correlation(*(_ranks(each) for each in (speeds, answers)))
     found = {name: row | {"rank_correlation": rank} for name, row in found.items()}
     return Claim(
         "g",
@@ -257,6 +256,10 @@ def _correlation(a: Array, b: Array) -> float:
     one, other = a[:count] - a[:count].mean(), b[:count] - b[:count].mean()
     size = float(np.sqrt((one**2).sum() * (other**2).sum()))
     return float((one * other).sum()) / size if size > 1e-9 else 0.0
+
+
+def _ranks(values: Array) -> Array:
+    return np.argsort(np.argsort(values)).astype(float)
 
 
 def _words(iterations: tuple[int, int]) -> str:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -27,6 +30,7 @@ from appliance.studio.experiments.excerpts import Excerpt, choose, named
 from appliance.studio.experiments.families import (
     AS_IN_THE_PAPER,
     CONDITIONS,
+    FIXED_DEGREES,
     TURNS_S,
     WITH_SENSOR,
     Condition,
@@ -39,26 +43,26 @@ from appliance.studio.studio_error import StudioError
 
 COLUMNS = 8
 FIGURES = (
-    (
-        "coding iterations alone",
-        "once",
-        (("coding", (1, 0), ""), ("coding", (2, 0), ""), ("coding", (5, 0), ""), ("coding", (10, 0), "")),
-    ),
+    ("coding iterations alone", "once", tuple(Condition("coding", (count, 0)) for count in (1, 2, 5, 10))),
     (
         "the joint kept where the recording has it",
         "once",
-        tuple(("kept", each, "") for each in AS_IN_THE_PAPER),
+        tuple(Condition("kept", each) for each in AS_IN_THE_PAPER),
     ),
     *(
         (
             f"the joint turning, {seconds:g} s a turn",
             "looped",
-            tuple(("turning", each, f"{seconds:g}s") for each in AS_IN_THE_PAPER),
+            tuple(Condition("turning", each, f"{seconds:g}s") for each in AS_IN_THE_PAPER),
         )
         for seconds in TURNS_S
     ),
-    ("the joint led by a sensor", "looped", tuple(("sensor", each, "") for each in WITH_SENSOR)),
-    ("the joint held still", "looped", (("fixed", (10, 9), "45deg"), ("fixed", (10, 9), "135deg"))),
+    ("the joint led by a sensor", "looped", tuple(Condition("sensor", each) for each in WITH_SENSOR)),
+    (
+        "the joint held still",
+        "looped",
+        tuple(Condition("fixed", (10, 9), f"{degrees}deg") for degrees in FIXED_DEGREES),
+    ),
 )
 
 
@@ -73,6 +77,7 @@ class Wish:
     networks: tuple[Path, ...] = ()
     joint: str | None = None
     trace: Path | None = None
+    pictures: bool = True
 
 
 def run(wish: Wish) -> None:
@@ -91,8 +96,12 @@ def run(wish: Wish) -> None:
     trace = usual_trace(excerpts, skeleton.index(joint)) if wish.trace is None else read_trace(wish.trace)
     wish.out.mkdir(parents=True, exist_ok=True)
     found, pictures, work = {}, dict[str, list[Path]](), len(coders) * len(excerpts)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("dancing", total=work * (len(CONDITIONS) + len(FIGURES)))
+    drawing: list[Future[Path]] = []
+    with (
+        ProcessPoolExecutor(mp_context=get_context("spawn")) as pool,  # a strip takes seconds
+        Progress(console=console, transient=True, disable=not console.is_terminal) as bar,
+    ):
+        task = bar.add_task("dancing", total=work * (len(CONDITIONS) + len(FIGURES) * wish.pictures))
 
         def advance(words: str) -> None:
             bar.update(task, advance=1, description=words)
@@ -103,9 +112,13 @@ def run(wish: Wish) -> None:
             for trial in trials:
                 trial.run(advance)
                 _write_dances(trial, folder / trial.excerpt.name)
-                drawn = _draw(trial, folder / trial.excerpt.name, name, advance)
-                pictures[f"{name}: {trial.excerpt.name}, {trial.excerpt.why}"] = drawn
+                wanted = _pictures(trial, folder / trial.excerpt.name, name) if wish.pictures else []
+                drawing += [pool.submit(draw_strips, *one) for one in wanted]
+                pictures[f"{name}: {trial.excerpt.name}, {trial.excerpt.why}"] = [one[0] for one in wanted]
             found[name] = claims(trials)
+        for done in as_completed(drawing):
+            done.result()
+            advance("drawing")
     (wish.out / "experiments.json").write_text(
         json.dumps(_report(coders, excerpts, joint, found), indent=1) + "\n"
     )
@@ -187,6 +200,8 @@ def _takes(wish: Wish, coder: Coder) -> list[Take]:
     """Where the excerpts come from: recordings, those kept apart from training, else the show's phrase."""
     if wish.recordings is None:
         return load_takes([load_show(wish.show).phrase], coder)
+    if wish.excerpts is not None:
+        return load_takes(sorted(wish.recordings.glob("*.bvh")), coder)
     dataset = load_dataset(wish.recordings)
     return list(dataset.held_out or dataset.training)
 
@@ -199,28 +214,22 @@ def _write_dances(trial: Trial, folder: Path) -> None:
         write_bvh(folder / f"{condition.name}.bvh", trial.whole(dance))
 
 
-def _draw(trial: Trial, folder: Path, network: str, advance: Callable[[str], None]) -> list[Path]:
-    """A strip for each of the FIGURES: the recording, and the conditions under it."""
-    drawn = []
+def _pictures(trial: Trial, folder: Path, network: str) -> list[tuple[Any, ...]]:
+    """What draw_strips needs for each of the FIGURES: the recording, and the conditions under it."""
     skeleton = trial.excerpt.recording.skeleton
-    held = [skeleton.index(trial.joint)]
+    held, wanted = [skeleton.index(trial.joint)], []
     for number, (words, base, conditions) in enumerate(FIGURES, 1):
-        advance(f"{trial.excerpt.name}: drawing")
         rehearsal = trial.once if base == "once" else trial.looped
         recorded = as_recording(rehearsal, rehearsal.phrase)
         strips = [Strip(recorded.poses, recorded.roots, "recorded")]
-        for family, iterations, variant in conditions:
-            condition = Condition(family, iterations, variant)
+        for condition in conditions:
             danced = trial.whole(trial.dances[condition])
             strips.append(Strip(danced.poses, danced.roots, condition.label))
-        path = folder / f"{number}_{conditions[0][0]}.png"
+        path = folder / f"{number}_{conditions[0].family}.png"
         title = f"{trial.excerpt.name}: {words} ({network})"
-        drawn.append(
-            draw_strips(
-                path, skeleton, strips, FPS, [] if conditions[0][0] == "coding" else held, title, COLUMNS
-            )
-        )
-    return drawn
+        marked = [] if conditions[0].family == "coding" else held
+        wanted.append((path, skeleton, strips, FPS, marked, title, COLUMNS))
+    return wanted
 
 
 def _report(

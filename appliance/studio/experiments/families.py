@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -138,8 +139,13 @@ class Trial:
 def as_recording(rehearsal: Rehearsal, poses: Poses) -> Recording:
     """Poses (T, M, 4) of the moving joints as a whole body on the excerpt's path, feet on the floor."""
     whole = rehearsal.whole(poses)
-    roots = BodyFigures(rehearsal.recording).grounded(whole)
+    roots = _body_figures(rehearsal).grounded(whole)
     return Recording(rehearsal.recording.skeleton, quaternion.continuous(whole), roots, FPS)
+
+
+@cache
+def _body_figures(rehearsal: Rehearsal) -> BodyFigures:
+    return BodyFigures(rehearsal.recording)
 
 
 def usual_trace(excerpts: Sequence[Excerpt], place: int) -> Array:

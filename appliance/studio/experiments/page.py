@@ -37,7 +37,7 @@ def write_page(
     for name, claims in networks.items():
         parts += [f"<h3>{html.escape(name)}</h3>", *(_claim(one) for one in claims)]
     for heading, files in pictures.items():
-        parts += [f"<h2>{html.escape(heading)}</h2>", *map(_picture, files)]
+        parts += [f"<h2>{html.escape(heading)}</h2>", *map(_picture, files)] if files else []
     path.write_text(
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
         f"<style>{_STYLE}</style></head>\n<body>\n" + "\n".join(parts) + "\n</body></html>\n"
