@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from appliance.studio import experiment_command, improvise_command
+from appliance.studio import experiment_command, granular_command, improvise_command
 from appliance.studio.clear_errors import INTERRUPTED, clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -171,3 +171,4 @@ def export(
 
 app.add_typer(improvise_command.app)
 app.add_typer(experiment_command.app)
+app.add_typer(granular_command.app)
