@@ -29,9 +29,9 @@ On a box that has a release already, with the box's own, for the one on a foreig
 A release is taken when it is signed with a key that the release on this box names. A machine without a release knows
 no key: it takes any signed release, says with which key, and keeps to the keys which that one names.
 
-Nothing is switched before the new release lies whole on the disk and has danced for a moment where nobody
-sees it. If it does not start then, the box goes back to the release before. Whenever the power fails, the
-box has the old release or the new one, whole. Two releases before the current one stay.
+Nothing is switched before the new release lies whole on the disk and has danced for a moment out of
+sight. If it does not start then, the box goes back to the release before. Whenever the power fails, the box
+has the old release or the new one, whole. Two releases before the current one stay.
 
 A box made from the image forgets what is written to its root. Its releases lie on the data partition, in
 /data/bunraku-releases, and at each power-on the chosen one is switched to before anything dances. The release
@@ -44,13 +44,13 @@ say() { echo "install: $*"; }
 fail() { echo "install: $*" >&2; exit 1; }
 
 KEPT=2
-# A release has so long, and so many starts of its stage, to dance; more starts than it takes to put two shows aside
+# How long a release has until it dances, and how many starts of its stage: more than it takes to put aside two shows
 # that do not dance.
 STARTS_WITHIN_S=20
 STARTS_TRIED=10
 STAYS_S=3
-# At power-on a release on the data partition has so long to dance for a moment. After so many power-ons in which it
-# never came to that, it is not tried again.
+# At power-on: how long a release on the data partition has until it dances, for how long it must dance, and after how
+# many power-ons without that it is no longer tried.
 DANCES_WITHIN_S=120
 DANCES_FOR_S=5
 POWER_ONS_TRIED=5
@@ -178,9 +178,9 @@ check_source() {
     done
     check_signature
     (cd "$head" && grep '  \./release$' SHA256SUMS | sha256sum --check --strict --status) ||
-        fail "the file 'release' in $source is damaged. Nothing was changed. Copy the release to the stick anew."
+        fail "the file 'release' in $source is damaged. Nothing was changed. Copy the release to the stick again."
     version=$(fact "$head" version)
-    [[ $version =~ ^[0-9A-Za-z.+]+$ ]] || fail "the release in $source has no version. Copy it to the stick anew."
+    [[ $version =~ ^[0-9A-Za-z.+]+$ ]] || fail "the release in $source has no version. Copy it to the stick again."
 }
 
 # One file of a stick, which may hold anything: not through a link, at most $3 bytes, without waiting for a pipe.
@@ -202,7 +202,7 @@ check_signature() {
         fail "ssh-keygen is missing, which checks who made a release. Nothing was changed." \
             "On Debian: apt-get install openssh-client"
     with=$(signature check-novalidate | grep -o 'SHA256:[0-9A-Za-z+/]*$') ||
-        fail "the release in $source is not what its maker signed. Nothing was changed. Copy it to the stick anew."
+        fail "the release in $source is not what its maker signed. Nothing was changed. Copy it to the stick again."
     if [ -n "$key" ]; then
         [ "$with" = "$key" ] ||
             fail "the release in $source is signed with the key $with, not with $key. Nothing was changed."
@@ -276,7 +276,7 @@ copy_and_verify() {
         left=$((left - $(stat -c %s "$part/source/$file")))
     done <"$head/SHA256SUMS"
     (cd "$part/source" && sha256sum --check --strict --quiet "$head/SHA256SUMS" >&2) ||
-        fail "files of the release are damaged (named above). Copy it to the stick anew. The box dances as before."
+        fail "files of the release are damaged (named above). Copy it to the stick again. The box dances as before."
     install -m 644 "$head/SHA256SUMS" "$part/source/"
 }
 
@@ -399,7 +399,7 @@ link() {
     mv -T "$2.new" "$2"
 }
 
-# $1 the file, $2 the release before: what somebody changed on this box stays as it is.
+# $1 the file, $2 the release before: what was changed on this box stays as it is.
 copy() {
     local new=$releases/$name/system/$1 old=$releases/$2/system/$1 here=$root/$1
     if [ -e "$here" ] && ! cmp -s "$here" "$new" && ! cmp -s "$here" "$old"; then
@@ -571,12 +571,12 @@ keep_choice() {
 # $2 says why; from now on the image's own release dances.
 put_aside() {
     say "bunraku $1 is put aside: $2. The release that came with the image dances." \
-        "Install it anew, or try it again: bunraku-install --use $1"
+        "Install it again, or try it once more: bunraku-install --use $1"
     { echo "$2" >"$kept/$1.aside" && keep_choice "$(own)"; } 2>/dev/null ||
         say "The data partition cannot be written: it is tried again at the next power-on."
 }
 
-# Before anything dances, once. The system files are read anew only if they are other ones than the image's.
+# Before anything dances, once. The system files are reread only where they differ from the image's.
 at_power_on() {
     local name why tries=0
     forgets || return 0
@@ -613,7 +613,7 @@ start_watch() {
 
 restarts() { systemctl show --property NRestarts --value bunraku-stage; }
 
-# True as soon as the stage has danced for a moment, or when somebody has stopped it; false when it does not dance.
+# True as soon as the stage has danced for a moment, or when it was stopped on purpose; false when it does not dance.
 danced() {
     local pid='' now since=0 deadline=$((SECONDS + DANCES_WITHIN_S))
     while [ "$SECONDS" -lt "$deadline" ] && [ "$(restarts)" -lt "$STARTS_TRIED" ]; do
@@ -656,7 +656,7 @@ use() {
         fail "no release '$1' on this box. It has: $(installed | cut -d ' ' -f 2 | xargs | grep . || echo none)."
     if [ -L "$releases/$1" ]; then
         why=$(flaw "$1")
-        [ -z "$why" ] || fail "bunraku $1: $why. The box dances as before. Install it anew."
+        [ -z "$why" ] || fail "bunraku $1: $why. The box dances as before. Install it again."
     fi
     switch_or_go_back "$1"
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -33,18 +34,25 @@ WORN = {"sensor": "left-wrist", "joint": "lShldr"}
 WINDOW = 8
 
 
-def write_show(folder: Path, hands: list[dict[str, object]] | None = None, network: str = "plain") -> Path:
-    """A bundle with a phrase of three seconds. Networks: plain (shows the targets), broken
-    (not a number), fragile (not a number at seven coding iterations), heavy (takes milliseconds)."""
+def write_show(
+    folder: Path,
+    hands: list[dict[str, object]] | None = None,
+    network: str = "plain",
+    name: str = "A test",
+    **sections: Any,
+) -> Path:
+    """A bundle with a phrase of three seconds; `sections`: more of show.yaml. Networks: plain (shows the
+    targets), broken (not a number), fragile (not a number at seven coding iterations), heavy (takes ms)."""
     folder.mkdir(parents=True, exist_ok=True)
     phrase = swaying_phrase()
     write_bvh(folder / "phrase.bvh", phrase)
     write_bvh(folder / "skeleton.bvh", phrase.excerpt(0.0, 0.02))
     onnx.save(_network(network), str(folder / "puppet.onnx"))
     show = {
-        "name": "A test",
+        "name": name,
         "dancer": {"coding_iterations": 3, "interaction_iterations": 2},
         "hands": [WORN] if hands is None else hands,
+        **sections,
     }
     (folder / "show.yaml").write_text(yaml.safe_dump(show))
     return folder
@@ -60,7 +68,7 @@ def swaying_phrase(seconds: float = 3.0) -> Recording:
 
 
 def puppet_inputs(joints: int, targets: list[int] | None = None) -> list[onnx.ValueInfoProto]:
-    """The inputs of a puppet's network for so many moving joints; `targets`: another shape of these."""
+    """The inputs of a puppet's network with this many moving joints; `targets`: another shape of these."""
     shapes = {
         "window": (TensorProto.FLOAT, [WINDOW, joints, 4]),
         "mask": (TensorProto.BOOL, [joints]),
@@ -73,7 +81,7 @@ def puppet_inputs(joints: int, targets: list[int] | None = None) -> list[onnx.Va
 
 
 def set_facts(model: onnx.ModelProto, joints: Sequence[str], /, **more: str) -> None:
-    """Write into a network which joints it moves, at rest without a turn, and more facts."""
+    """Write into a network which joints it moves, at rest unrotated, and more facts."""
     rest = np.tile(quaternion.IDENTITY, (len(joints), 1)).tolist()
     facts = {"joints": ",".join(joints), "window": str(WINDOW), "rest": json.dumps(rest), **more}
     helper.set_model_props(model, {f"bunraku.{name}": fact for name, fact in facts.items()})

@@ -1,4 +1,4 @@
-"""What several test folders share, and how a whole run is laid out."""
+"""Fixtures shared by several test folders, and the order of a whole run."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from hypothesis import settings
 
 import hw_sim.peers
 from tests.boot import figures_report
+from tests.command import Command
 
 ROOT = Path(__file__).resolve().parents[1]
-# Files that take longest begin, where files run beside each other: last, one would run alone.
+# The longest files start first when files run in parallel: started last, one would run alone.
 LONGEST_FIRST = ("tests/test_readme.py", "tests/boot/", "tests/system/", "tests/studio/")
 _folders = itertools.count()
 
@@ -26,16 +27,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    # Property tests are not timed: a busy machine must not fail them. What fails prints how to repeat it.
+    # Property tests have no deadline: a busy machine must not fail them. A failure prints how to repeat it.
     untimed = settings(deadline=None, print_blob=True)
     settings.register_profile("long", untimed)
     settings.register_profile("short", untimed, max_examples=50)
     settings.load_profile("long" if config.getoption("--long") else "short")
     report = figures_report.FiguresReport(ROOT / "build" / "boot")
     config.pluginmanager.register(report, figures_report.NAME)
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each process compiles all modules
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process compiles all modules
     worker = os.environ.get("PYTEST_XDIST_WORKER")
-    if worker:  # its own share of the ports: no other takes one between choice and use
+    if worker:  # its own share of the ports, so that no other worker takes one between choice and use
         share = slice(int(worker.removeprefix("gw")), None, int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))
         hw_sim.peers.PORTS = hw_sim.peers.PORTS[share]
 
@@ -54,7 +55,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def long_run(pytestconfig: pytest.Config) -> bool:
-    """Whether every count has its full length."""
+    """Whether counts have their full length (--long)."""
     return bool(pytestconfig.getoption("--long"))
 
 
@@ -68,9 +69,15 @@ def chance(request: pytest.FixtureRequest) -> random.Random:
     return random.Random(seed)
 
 
+@pytest.fixture
+def bunraku(capfd: pytest.CaptureFixture[str]) -> Command:
+    """Runs commands in this process."""
+    return Command(capfd)
+
+
 @pytest.fixture(autouse=True)
 def own_runtime_folder(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the boxes of this test meet: never in the folder of a box that runs beside the tests."""
+    """A runtime folder for the boxes of this test, never that of a box beside the tests."""
     folder = tmp_path_factory.getbasetemp() / f"runtime-{next(_folders)}"
     monkeypatch.setenv("RUNTIME_DIRECTORY", str(folder))
     return folder
@@ -87,7 +94,7 @@ def recordings_dir() -> Path:
 
 @pytest.fixture(scope="session")
 def tiny_show(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small whole show bundle: 17 moving of 20 joints, 3 s of swaying, an untrained mlp really exported."""
+    """A small complete show bundle: 17 moving of 20 joints, 3 s of swaying, an untrained mlp, exported."""
     from tests.studio.tiny import write_tiny_show
 
     return write_tiny_show(tmp_path_factory.mktemp("tiny") / "show")

@@ -1,4 +1,4 @@
-"""A clock that only moves when someone sleeps or works, and that can overshoot like a busy machine."""
+"""A clock that moves by `sleep` and `work` alone, and can overshoot like a busy machine."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 
 class FakeTime:
-    """Monotonic time under the test's control; `overshoot_s` is asked for at every sleep."""
+    """Monotonic time under the test's control; each sleep adds the next `overshoot_s`."""
 
     def __init__(self, overshoot_s: Callable[[], float] = lambda: 0.0) -> None:
         self.now = 1000.0

@@ -1,4 +1,4 @@
-"""The architecture holds: imports run one way, the box never needs torch, names and locks are as agreed."""
+"""The architecture holds: imports run one way, the box needs no torch, names and locks are as agreed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_imports_run_one_way() -> None:
     assert re.search(r"Contracts: [1-9]\d* kept, 0 broken", done.stdout)
 
 
-# Everything that a box does not have: importing any of it fails as it would there.
+# Packages that a box does not have: importing one fails, as it would there.
 BLOCK = """
 import importlib, sys
 from importlib.abc import MetaPathFinder
@@ -90,7 +90,7 @@ def test_top_level_names_are_as_agreed() -> None:
 
 
 @pytest.mark.parametrize("name", [name for package in PACKAGES for name in modules_of(package)])
-def test_every_module_says_in_one_line_what_it_is_for(name: str) -> None:
+def test_every_module_has_a_one_line_summary(name: str) -> None:
     path = ROOT / Path(*name.split("."))
     source = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
     docstring = ast.get_docstring(ast.parse(source))
@@ -115,7 +115,7 @@ def test_locks_pin_exactly_and_name_no_host(lock: str) -> None:
 @pytest.mark.parametrize(
     ("lock", "extras"), [("requirements.txt", ["pictures"]), (LOCKS[1], ["pictures", "studio", "test"])]
 )
-def test_locks_hold_what_the_project_asks_for(lock: str, extras: list[str]) -> None:
+def test_locks_hold_the_project_s_requirements(lock: str, extras: list[str]) -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     wanted = [
         *project["dependencies"],
@@ -135,7 +135,7 @@ def test_both_locks_agree_and_only_one_has_torch() -> None:
     assert "torch" not in box
 
 
-def test_make_explains_itself_and_knows_its_targets() -> None:
+def test_make_help_lists_the_targets() -> None:
     shown = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for target in ("run", "test", "bench", "lock", "clean", "help"):
         assert re.search(rf"^  make {target} +\S", shown, re.MULTILINE), shown

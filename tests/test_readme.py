@@ -1,13 +1,17 @@
-"""Every command that the README and the pages for people show is run as it stands."""
+"""Every command that the README and the pages for people show works as it stands there."""
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +23,8 @@ PAGES = (
     "README.md",
     *(f"docs/{page}.md" for page in ("choreographer", "dancer", "lights", "technician", "touring")),
 )
-RECURSIVE = re.compile(r"^make (test|bench|lock|clean)\b")  # would run these tests in these tests
+WATCHDOG_S = 900.0  # for one block: the slowest one takes a minute on a free machine
+RECURSIVE = re.compile(r"^make (test|bench|lock|clean)\b")  # these would run this test again
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,7 @@ class Block:
 
 
 def blocks_of(page: str) -> list[Block]:
-    """Blocks fenced as sh, in the order in which a reader meets them; other fences are no commands."""
+    """Blocks fenced as sh, in the order of the page; other fences hold no commands."""
     blocks, started, fence = [], 0, None
     lines = (ROOT / page).read_text().splitlines()
     for number, line in enumerate(lines, start=1):
@@ -47,16 +52,17 @@ def blocks_of(page: str) -> list[Block]:
     return blocks
 
 
-def own_network() -> list[str]:
-    """What to put before a command so that all ports are free to it; nothing where that is not allowed."""
+@functools.cache
+def own_network() -> tuple[str, ...]:
+    """The prefix that gives a command a network of its own, with all ports free; empty where not allowed."""
     for wrap in (["unshare", "--net"], ["unshare", "--net", "--map-root-user"]):
         loopback = [*wrap, "ip", "link", "set", "lo", "up"]
         if (
             shutil.which("unshare")
-            and not subprocess.run(loopback, capture_output=True, check=False).returncode
+            and not subprocess.run(loopback, capture_output=True, check=False, timeout=WATCHDOG_S).returncode
         ):
-            return [*wrap, "bash", "-c", 'ip link set lo up && exec "$@"', "own-network"]
-    return []
+            return (*wrap, "bash", "-c", 'ip link set lo up && exec "$@"', "own-network")
+    return ()
 
 
 BLOCKS = {page: blocks_of(page) for page in PAGES}
@@ -64,13 +70,14 @@ BLOCKS = {page: blocks_of(page) for page in PAGES}
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Future[None]]]:
-    """All pages, two at a time: each has a checkout, a network and a runtime folder of its own."""
+    """All pages, two at a time, each with its own checkout, network and runtime folder."""
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
         cwd=ROOT,
         capture_output=True,
         text=True,
         check=False,
+        timeout=WATCHDOG_S,
     )
     if listed.returncode != 0:
         pytest.skip("this is no git checkout")
@@ -83,7 +90,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Future
 
 
 def fill(copy: Path, files: Sequence[str]) -> None:
-    """Make it a copy of the checkout, with this environment as its ready-made .venv."""
+    """Copy the checkout to `copy`, with this environment as its .venv."""
     for name in files:
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, copy / name)
@@ -94,32 +101,61 @@ def fill(copy: Path, files: Sequence[str]) -> None:
 
 
 def environment_of(checkout: Path) -> dict[str, str]:
-    """A shell's environment without a display, and with a runtime folder of the page's own."""
+    """A shell's environment for one copy: its modules, its runtime folder, no display."""
     left_out = ("DISPLAY", "WAYLAND_DISPLAY", "RUNTIME_DIRECTORY")
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
     environment = {name: value for name, value in environment.items() if name not in left_out}
     environment["PATH"] = f"{checkout / '.venv' / 'bin'}:{environment['PATH']}"
+    environment["PYTHONPATH"] = str(checkout)  # the copy's own modules and firmware
     environment["XDG_RUNTIME_DIR"] = str(checkout.parent / f"{checkout.name}-runtime")
     Path(environment["XDG_RUNTIME_DIR"]).mkdir(exist_ok=True)
     return environment
 
 
 def run_page(page: str, files: Sequence[str], checkout: Path) -> None:
-    """Each block in the order of the page; AssertionError for the first that does not work."""
+    """Run the blocks in the order of the page; AssertionError for the first that fails."""
     fill(checkout, files)
     environment = environment_of(checkout)
     for block in BLOCKS[page]:
-        script = "\n".join(RECURSIVE.sub(r"make --dry-run \1", line) for line in block.text.splitlines())
-        done = subprocess.run(
+        run_block(block, checkout, environment)
+
+
+def run_block(block: Block, checkout: Path, environment: Mapping[str, str]) -> None:
+    """Run one block. Its output goes to a file: a process that outlives the shell would hold a pipe open."""
+    script = "\n".join(RECURSIVE.sub(r"make --dry-run \1", line) for line in block.text.splitlines())
+    with tempfile.TemporaryFile() as output:
+        shell = subprocess.Popen(
             [*own_network(), "bash", "-euo", "pipefail", "-c", script],
             cwd=checkout,
             env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
         )
-        assert done.returncode == 0, f"{block}\n{block.text}\n{done.stdout}\n{done.stderr}"
-        assert "Traceback" not in done.stderr, f"{block}\n{block.text}\n{done.stderr}"
+
+        def report(what: str) -> str:
+            output.seek(0)
+            return f"{block} {what}\n{block.text}\n{output.read().decode(errors='replace')}"
+
+        try:
+            status = shell.wait(WATCHDOG_S)
+        except subprocess.TimeoutExpired:
+            running = subprocess.run(
+                ["ps", "-s", str(shell.pid), "-o", "pid,stat,etime,args"],
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=WATCHDOG_S,
+            )
+            pytest.fail(report(f"has not ended after {WATCHDOG_S:g} s. Still running:\n{running.stdout}"))
+        finally:
+            with contextlib.suppress(ProcessLookupError):  # nothing of the block is left
+                os.killpg(shell.pid, signal.SIGKILL)
+            shell.wait(WATCHDOG_S)
+        assert status == 0, report(f"ended with status {status}")
+        said = report("printed an error")
+        assert "Traceback" not in said, said
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -131,7 +167,11 @@ def test_every_command_of_a_page_works(page: str, pages: dict[str, Future[None]]
 def test_the_readme_names_every_command_and_no_other() -> None:
     table = re.findall(r"^\| `bunraku ([a-z]+)` \|", (ROOT / "README.md").read_text(), re.MULTILINE)
     shown = subprocess.run(
-        [Path(sys.executable).parent / "bunraku", "--help"], capture_output=True, text=True, check=True
+        [Path(sys.executable).parent / "bunraku", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=WATCHDOG_S,
     ).stdout
     offered = re.findall(r"^│ ([a-z]+) ", shown[shown.index("Commands") :], re.MULTILINE)
     assert sorted(table) == sorted(offered)

@@ -1,4 +1,4 @@
-"""The command's own start: what plain playing means there is what the whole parser makes of it."""
+"""The quick start of `play` understands its options as the full parser does."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def play_command() -> typer.main.TyperCommand:  # type: ignore[name-defined]
         (["play", "--seconds", "2.5", "--journal", "j"], {"seconds": 2.5, "journal": Path("j")}),
     ],
 )
-def test_plain_playing_is_understood(given: list[str], wishes: dict[str, object]) -> None:
+def test_plain_options_of_play_are_understood(given: list[str], wishes: dict[str, object]) -> None:
     assert wishes_to_play(given) == wishes
 
 
@@ -59,11 +59,11 @@ def test_plain_playing_is_understood(given: list[str], wishes: dict[str, object]
         "play -- --alone",
     ],
 )
-def test_everything_else_is_for_the_whole_parser(line: str) -> None:
+def test_everything_else_is_left_to_the_full_parser(line: str) -> None:
     assert wishes_to_play(line.split()) is None
 
 
-def test_every_plain_wish_is_an_option_of_the_command_and_of_playing() -> None:
+def test_every_plain_option_is_one_of_the_command_and_of_play_show() -> None:
     line = "play --show a --box b --journal c --seconds 1 --alone"
     wishes = wishes_to_play(line.split()) or {}
     options = {parameter.name for parameter in play_command().params}
@@ -72,36 +72,20 @@ def test_every_plain_wish_is_an_option_of_the_command_and_of_playing() -> None:
     assert {"directory", "box_file", "journal", "seconds", "alone"} <= parameters.keys()
 
 
-def test_mistakes_are_one_line_as_everywhere(tmp_path: Path) -> None:
+def test_an_error_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "box.yaml").write_text("sensors: {udp: {prot: 1}}\n")
-    command = [
-        sys.executable,
-        "-m",
-        "appliance.start",
-        "play",
-        "--alone",
-        "--box",
-        str(tmp_path / "box.yaml"),
-    ]
+    play = [sys.executable, "-m", "appliance.start", "play"]
+    command = [*play, "--alone", "--box", str(tmp_path / "box.yaml")]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ran.returncode == cli.REFUSED
     assert ran.stderr.startswith("bunraku: ") and "prot" in ran.stderr and "Traceback" not in ran.stderr
 
 
-def test_playing_loads_no_parser_no_simulation_and_no_other_process_s_parts() -> None:
-    """What a start loads keeps the stage black after a crash."""
+def test_play_loads_neither_parser_nor_simulation_nor_other_processes() -> None:
+    """Loading modules prolongs the black stage after a crash."""
     words = "import sys, appliance.start, appliance.cli.play; print(*sorted(sys.modules))"
     ran = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
     loaded = set(ran.stdout.split())
-    needless = {
-        "typer",
-        "rich",
-        "click",
-        "hw_sim",
-        "matplotlib",
-        "onnx",
-        "torch",
-        "appliance.cli.emulation",
-    }
-    needless |= {"appliance.cli.app", "appliance.cli.companions", "appliance.projector", "subprocess"}
+    needless = {"typer", "rich", "click", "hw_sim", "matplotlib", "onnx", "torch", "subprocess"}
+    needless |= {f"appliance.{name}" for name in ("cli.emulation", "cli.app", "cli.companions", "projector")}
     assert not loaded & needless

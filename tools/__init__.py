@@ -1,1 +1,1 @@
-"""For engineers, in the checkout: they write the wire's generated files and the documentation's pictures."""
+"""Programs for engineers, in the checkout: the wire's generated files and the documentation's pictures."""

@@ -58,7 +58,7 @@ def _wearable(flash: bytes | None, battery_mv: int = FULL_MV) -> Iterator[Compil
 
 
 def _watched(wearable: CompiledWearable, led: int | None = None) -> Trace:
-    """Its lamp once it has settled, from a moment on when it lights up; `led`: what the box asks for."""
+    """Its lamp once it has settled, starting with a flash; `led`: what the box asks for."""
     box = None if led is None else _Box(led)
     changes: list[tuple[int, bool]] = []
     now_us, end_us = 0, round((SETTLE_S + 2 * SHOWN_S) * 1e6)
@@ -72,7 +72,7 @@ def _watched(wearable: CompiledWearable, led: int | None = None) -> Trace:
 
 
 class _Box:
-    """As much of a box as keeps one wearable linked: every hello is answered, each second a heartbeat."""
+    """Enough of a box to keep one wearable linked: answers every hello, sends a heartbeat each second."""
 
     def __init__(self, led: int) -> None:
         self._led = led

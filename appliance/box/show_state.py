@@ -117,7 +117,7 @@ class ShowState:
         return self if show == self.show else replace(self, show=show, cue="", dance={})
 
     def settled(self, now: float) -> ShowState:
-        """With fades that began in the future done: the machine's clock has started anew since."""
+        """With fades that began in the future done: the machine's clock has restarted since."""
         late = max(self.going_since, self.master_since, self.look_since, self.lights_since) > now
         if not late:
             return self

@@ -1,1 +1,1 @@
-"""What a person asks for at the keyboard: play, check, pictures, provisioning, the list of sensors."""
+"""The commands of `bunraku`: play, check, pictures, provisioning, the list of sensors, and more."""

@@ -1,4 +1,4 @@
-"""The command `bunraku`: which module carries out which command; simulation and studio plug theirs in."""
+"""The command `bunraku`: which module has which command; simulation and studio plug in their own."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ def command_line(name: str | None = None) -> typer.Typer:
         add_completion=False,
         pretty_exceptions_enable=False,
     )
-    app.callback()(_bunraku)  # also a parser of one command expects its name
+    app.callback()(_bunraku)  # a parser of one command expects its name too
     for command, module in _MODULES.items():
         if name in (None, command):
             found = getattr(import_module(module), command)
             if isinstance(found, typer.Typer):
                 app.add_typer(found, name=command)
-            elif command == "preflight":  # it parses its options itself, at power-on without this parser
+            elif command == "preflight":  # it parses its own options: at power-on it runs without this parser
                 settings = {"allow_extra_args": True, "ignore_unknown_options": True}
                 app.command(command, add_help_option=False, context_settings=settings)(_ending(found))
             else:
@@ -126,7 +126,7 @@ def version() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run one command; an error that a person can mend ends it with one clear line and exit status 2."""
+    """Run one command; an error that the user can correct ends it with one clear line and exit status 2."""
     end_with_parent()
     given = list(sys.argv[1:] if arguments is None else arguments)
     own = given[0] if given and given[0] in _MODULES else None
@@ -140,13 +140,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def refuse(error: Exception) -> NoReturn:
-    """End with one clear line, if the error is one that a person can mend; others are raised."""
-    if not _is_for_people(error):
+    """Exit with one clear line for an error that the user can correct; raise any other."""
+    if not _is_correctable(error):
         raise error
     print(f"bunraku: {error}", file=sys.stderr)
     status = getattr(error, "exit_status", REFUSED)
     if status != REFUSED:
-        Notifier().ready(str(error))  # for systemd this is no failed start
+        Notifier().ready(str(error))  # systemd must not count this as a failed start
     sys.exit(status)
 
 
@@ -159,7 +159,7 @@ def plug_in(onto: typer.Typer, found: Iterable[EntryPoint], say: Callable[[str],
             say(f"bunraku: the commands of '{point.name}' are not available here ({error}).")
 
 
-def _is_for_people(error: Exception) -> bool:
+def _is_correctable(error: Exception) -> bool:
     from appliance.box.runtime_folder import RuntimeFolderError
     from appliance.pose.bvh import BvhError
     from appliance.recorder.journal_error import JournalError

@@ -11,7 +11,7 @@ from appliance.box.realtime import prepare_environment
 prepare_environment()
 
 from appliance.box.runtime_folder import RuntimeFolderError  # noqa: E402
-from appliance.cli.check import verified  # noqa: E402  (numpy must find the environment prepared)
+from appliance.cli.check import verified_parts  # noqa: E402  (numpy must find the environment prepared)
 from appliance.cli.prepare_show import prepare_show  # noqa: E402
 from appliance.cli.run_with_timeout import limit_memory  # noqa: E402
 from appliance.pose.bvh import BvhError  # noqa: E402
@@ -22,13 +22,13 @@ from appliance.stage.stage_error import StageError  # noqa: E402
 def main(show: str, box: str) -> int:
     """0: it dances; 1: it does not, and stderr says why.
 
-    Sensors without keys are no reason, they can be provisioned later; nor are iterations that the stage has
-    to lower: another program may have come between at the measurement, as many do while a box starts. A
-    network is too slow when half of its runs are, were they of one iteration alone.
+    Sensors without keys are no reason to refuse: they can be provisioned later. Neither are iterations that
+    the stage has to lower: while a box starts, other programs disturb the measurement. A network is too slow
+    if half of its runs are, even with a single iteration.
     """
     limit_memory()
     try:
-        _, verdict = verified(Path(show), Path(box))
+        _, verdict = verified_parts(Path(show), Path(box))
     except (BvhError, ConfigError, RuntimeFolderError, StageError) as error:
         print(error, file=sys.stderr)
         return 1
@@ -38,7 +38,7 @@ def main(show: str, box: str) -> int:
     if verdict.p50_ms > verdict.asked_coding * verdict.budget_ms:
         print(verdict.sentence(), file=sys.stderr)
         return 1
-    with contextlib.suppress(Exception):  # it dances all the same, and starts somewhat later
+    with contextlib.suppress(Exception):  # without it the show only starts somewhat later
         prepare_show(Path(show))
     return 0
 

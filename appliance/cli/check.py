@@ -30,7 +30,7 @@ from appliance.stage.open_sensors import reach
 from appliance.stage.stage_error import StageError
 from appliance.stage.stage_parts import StageParts, admission, assemble
 
-_PATIENCE_S = 60.0  # a person may wait longer than a box that starts
+_PATIENCE_S = 60.0  # a user can wait longer than a box at power-on
 
 
 def check(
@@ -50,7 +50,7 @@ def check_show(directory: Path | None, box_file: Path | None, patience_s: float 
 
 
 def _network(directory: Path) -> Path:
-    """What is to blame for a check that never ends: all other files are read in bounds."""
+    """The file to blame for a check that never ends: all others are read within bounds."""
     try:
         return load_show(directory).network
     except ConfigError:
@@ -58,7 +58,7 @@ def _network(directory: Path) -> Path:
 
 
 def _check(directory: Path, box_file: Path | None) -> None:
-    parts, verdict = verified(directory, box_file)
+    parts, verdict = verified_parts(directory, box_file)
     show, box = load_show(directory), load_box(box_file)
     if box.sensors.keys is not None and parts.complaints:
         raise StageError("\n".join(parts.complaints))
@@ -71,8 +71,8 @@ def _check(directory: Path, box_file: Path | None) -> None:
         print(warning)
 
 
-def verified(directory: Path, box_file: Path | None) -> tuple[StageParts, Admission]:
-    """A show that can dance on this box, all ports closed, and what its iterations cost here.
+def verified_parts(directory: Path, box_file: Path | None) -> tuple[StageParts, Admission]:
+    """The parts of a show that can dance on this box, without ports, and what its iterations cost here.
 
     Raises StageError or ConfigError with all that is wrong.
     """

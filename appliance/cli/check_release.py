@@ -52,7 +52,7 @@ def _missing() -> Iterator[str]:
 
 
 def _undanced(pair: Pair) -> list[str]:
-    """Why this release does not dance a show in time; nothing when it does."""
+    """Why this release does not dance a show in time; empty if it does."""
     try:
         usual_ms, budget_ms = _danced(pair)
     except Exception as error:
@@ -66,7 +66,7 @@ def _undanced(pair: Pair) -> list[str]:
 def _danced(pair: Pair) -> tuple[float, float]:
     """The usual cost of a tick, and its budget, ms: the stage's own tick, without ports and receivers."""
     from appliance.box.clock import TICK_S, Slot
-    from appliance.cli.check import verified, without_ports
+    from appliance.cli.check import verified_parts, without_ports
     from appliance.show.box import load_box
     from appliance.show.show import load_show
     from appliance.stage.iterations import Iterations
@@ -75,7 +75,7 @@ def _danced(pair: Pair) -> tuple[float, float]:
     from appliance.stage.stage_parts import assemble
     from appliance.stage.tick import Tick
 
-    verdict = verified(pair.show, pair.box)[1]
+    verdict = verified_parts(pair.show, pair.box)[1]
     box = load_box(pair.box)
     parts, memory = assemble(load_show(pair.show), without_ports(box)), SensorMemory(None, print)
     iterations = Iterations(verdict.coding, verdict.interaction, verdict.most_coding)

@@ -1,4 +1,4 @@
-"""Companions: show control, lights, projector: children of `bunraku play`, started again when they die."""
+"""Companions: show control, lights, projector: child processes of `bunraku play`, restarted when they die."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _LIVED_S = 10.0  # after a life of this length the shortest pause counts again
 _REPORTED = 3  # deaths in a row that are reported one by one
 _MOST_DOUBLINGS = 10  # of the pause: beyond it is the longest one anyway
 _LOOK_S = 0.1
-_LAST_WORDS_S, _KILLED_WITHIN_S = 3.0, 1.0
+LAST_WORDS_S, _KILLED_WITHIN_S = 3.0, 1.0
 
 
 @dataclass(frozen=True)
 class Companion:
     """One process beside the stage.
 
-    meanwhile: a sentence, what is missing while it is away. may_close: a person may end it, and then it stays
-    ended. descriptors: the open files that it inherits.
+    meanwhile: a sentence, what is missing while it is away. may_close: the user may end it for good.
+    descriptors: the open files that it inherits.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Companion:
 
 
 class Companions:
-    """A context: starts them when `may_start` says so, from a thread of its own, and ends them with itself.
+    """A context: starts them in its own thread once `may_start` holds, and ends them with itself.
 
     The stage's first frame does not wait for them. They end by themselves when this process is killed.
     """
@@ -62,7 +62,7 @@ class Companions:
             self._thread.join()
 
     def _supervise(self) -> None:
-        """All children are this thread's: Linux ends them when the thread that started them ends."""
+        """Start all children from this thread: Linux ends them when the thread that started them ends."""
         while not self._may_start():
             if self._closing.wait(_LOOK_S / 4):
                 return
@@ -72,10 +72,22 @@ class Companions:
             if self._closing.wait(_LOOK_S):
                 break
         for running in self._running:
-            running.ask_to_end()
-        until = time.monotonic() + _LAST_WORDS_S
+            running.request_end()
+        until = time.monotonic() + LAST_WORDS_S
         for running in self._running:
-            running.end(max(0.0, until - time.monotonic()))
+            running.await_end(max(0.0, until - time.monotonic()))
+
+
+class Backoff:
+    """How long a companion that died waits for its next start."""
+
+    def __init__(self) -> None:
+        self.deaths = 0  # in a row
+
+    def pause_s(self, lived_s: float) -> float:
+        """The pause after a life of this length: doubled with each death in a row."""
+        self.deaths = 1 if lived_s > _LIVED_S else self.deaths + 1
+        return min(SHORTEST_PAUSE_S * 2.0 ** min(self.deaths - 1, _MOST_DOUBLINGS), LONGEST_PAUSE_S)
 
 
 class _Running:
@@ -86,23 +98,23 @@ class _Running:
         self._process: subprocess.Popen[bytes] | None = None
         self._started_at = 0.0
         self._starts_at = 0.0
-        self._deaths = 0
+        self._backoff = Backoff()
         self._told: int | None = None
         self._is_over = False
 
     def check(self, now: float) -> None:
-        """Start it when it is time to; notice when it has died."""
+        """Start it when it is due; notice when it has died."""
         if self._process is not None and (status := self._process.poll()) is not None:
             self._process = None
             self._note_exit(status, now)
         if self._process is None and not self._is_over and now >= self._starts_at:
             self._start(now)
 
-    def ask_to_end(self) -> None:
+    def request_end(self) -> None:
         if self._process is not None:
             self._process.terminate()
 
-    def end(self, within_s: float) -> None:
+    def await_end(self, within_s: float) -> None:
         """Wait for its end; kill what does not end, and leave behind what hangs in the kernel."""
         if self._process is None:
             return
@@ -137,8 +149,8 @@ class _Running:
         elif status == UNAVAILABLE:
             if self._told is None:
                 self._say(
-                    f"{companion.name} cannot run now. The dance goes on without, and it is tried again "
-                    f"each {RETRY_S:g} s."
+                    f"{companion.name} cannot run now. The dance goes on without it; it is retried "
+                    f"every {RETRY_S:g} s."
                 )
             self._told = status
             self._starts_at = now + RETRY_S
@@ -149,13 +161,12 @@ class _Running:
 
     def _start_later(self, what: str, now: float) -> None:
         self._told = None
-        self._deaths = 1 if now - self._started_at > _LIVED_S else self._deaths + 1
-        doublings = min(self._deaths - 1, _MOST_DOUBLINGS)
-        self._starts_at = now + min(SHORTEST_PAUSE_S * 2**doublings, LONGEST_PAUSE_S)
-        if self._deaths <= _REPORTED:
-            self._say(f"{self._companion.name} {what}. {self._companion.meanwhile} It is started again.")
-        elif self._deaths == _REPORTED + 1:
+        self._starts_at = now + self._backoff.pause_s(now - self._started_at)
+        deaths = self._backoff.deaths
+        if deaths <= _REPORTED:
+            self._say(f"{self._companion.name} {what}. {self._companion.meanwhile} It is restarted.")
+        elif deaths == _REPORTED + 1:
             self._say(
-                f"{self._companion.name} {what}, {self._deaths} times in a row. {self._companion.meanwhile} "
-                f"It is tried again each {LONGEST_PAUSE_S:g} s. Its messages above say why."
+                f"{self._companion.name} {what}, {deaths} times in a row. {self._companion.meanwhile} "
+                f"It is retried every {LONGEST_PAUSE_S:g} s. Its messages above say why."
             )

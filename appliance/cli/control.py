@@ -32,10 +32,10 @@ def control(
     ] = None,
     chosen: ChosenFile = None,
 ) -> None:
-    """Take commands by OSC (go, stop, panic, cues ...), also while the stage hangs or is not there."""
+    """Take commands by OSC (go, stop, panic, cues ...), even while the stage hangs or is absent."""
     config = load_box(box_of(box, chosen))
     if config.control is None:
-        words = "This box file says `control: null`, so nobody commands this box."
+        words = "This box file says `control: null`, so this box takes no commands."
         cure = "Write `control: {port: 9002}`."
         raise NotAskedForError([Problem(config.file.path, 0, words, cure)])
     if socket_fd is None:
@@ -45,13 +45,13 @@ def control(
     _require_udp(socket_fd)
     os.set_inheritable(socket_fd, True)
     command = control_command(config, socket_fd)
-    os.execv(command[0], command)  # a process that has loaded nothing that show control does not need
+    os.execv(command[0], command)  # a fresh process, which loads only what show control needs
 
 
 def open_control_port(control: ControlConfig) -> socket.socket:
     """The port's socket, bound. Raises StageError with what to do when it is taken.
 
-    The show control of a box that was killed may hold it for a moment still.
+    The show control of a killed box may still hold it for a moment.
     """
     until = time.monotonic() + _FREED_WITHIN_S
     while True:
@@ -66,7 +66,7 @@ def open_control_port(control: ControlConfig) -> socket.socket:
 def _taken(control: ControlConfig, error: OSError) -> StageError:
     return StageError(
         f"UDP port {control.port} on {control.host} cannot be opened for commands ({error.strerror}). "
-        "Nobody would hear commands, so nothing is started. Is a second bunraku running? Stop it, or "
+        "Commands could not arrive, so nothing is started. Is a second bunraku running? Stop it, or "
         "give another port under control: in the box file, or `control: null` for none."
     )
 
@@ -99,12 +99,12 @@ def _require_udp(descriptor: int) -> None:
         one = socket.socket(fileno=os.dup(descriptor))
     except OSError as error:
         raise StageError(
-            f"Descriptor {descriptor} is no open socket ({error.strerror}). Nobody hears commands. "
+            f"Descriptor {descriptor} is no open socket ({error.strerror}). Commands cannot arrive. "
             "Leave --socket-fd out, and the port is opened here."
         ) from error
     with one:
         if (one.family, one.type) != (socket.AF_INET, socket.SOCK_DGRAM):
             raise StageError(
-                f"The socket with descriptor {descriptor} is not UDP over IPv4. Nobody hears commands. "
+                f"The socket with descriptor {descriptor} is not UDP over IPv4. Commands cannot arrive. "
                 "In a socket unit, write ListenDatagram= with an IPv4 address."
             )

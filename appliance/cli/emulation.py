@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from appliance.box.parent_death import PARENT
 from appliance.sensor.keys import create_keys
 from appliance.show.box import BoxConfig, UdpConfig
 from appliance.show.show import Show
@@ -19,10 +21,10 @@ _LAST_WORDS_S = 2.0
 
 @contextmanager
 def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
-    """Meanwhile `python -m hw_sim emulate` is the show's sensors; gives the box that finds them.
+    """Run `bunraku emulate` as the show's sensors; yields the box with their key file.
 
-    Its key file is that of these sensors: the venue's own are not let in meanwhile, and what is learnt of
-    these is forgotten with them. It has no journal: the venue's is not for rehearsals. Raises StageError.
+    The venue's own sensors are not admitted meanwhile, and what the box learns about the emulated ones is
+    discarded with them. That box has no journal: the venue's is not for rehearsals. Raises StageError.
     """
     names = list(dict.fromkeys(hand.sensor for hand in show.config.hands if hand.sensor))
     if not names:
@@ -31,7 +33,7 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     create_keys(keys, names)
     udp = box.sensors.udp or UdpConfig()
     command = [
-        *(sys.executable, "-m", "hw_sim", "emulate", "--keys", str(keys), "--motion", "dance"),
+        *(sys.executable, "-m", "appliance.cli", "emulate", "--keys", str(keys), "--motion", "dance"),
         *("--host", udp.host, "--port", str(udp.port)),
     ]
     sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
@@ -42,6 +44,7 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=subprocess.STDOUT,
+            env={**os.environ, PARENT: str(os.getpid())},
             start_new_session=True,  # Ctrl-C is for the box, which then ends the emulator
         )
     try:

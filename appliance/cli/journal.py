@@ -66,7 +66,7 @@ def export_journal(
 
 
 def _recorded(box: Path | None, chosen: Path | None, recorded: Path | None) -> Path:
-    """Where the journal is; without any option that of the show that was chosen on this box."""
+    """Where the journal is; without any option, that of the show chosen on this box."""
     from appliance.recorder.journal_error import JournalError
     from appliance.show.box import load_box
 
@@ -106,7 +106,7 @@ def _event_line(event: dict[str, Any], begun: float) -> str:
 
 @contextmanager
 def _writable(stick: Path) -> Iterator[None]:
-    """The stick is there to be read; while inside it may be written to. Raises JournalError."""
+    """A context in which the stick, mounted read-only, is writable. Raises JournalError."""
     from appliance.recorder.journal_error import JournalError
 
     if not stick.is_mount():

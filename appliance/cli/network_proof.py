@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from appliance.box.runtime_folder import RuntimeFolderError
-from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, limit_memory, within
+from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, limit_memory, run_with_timeout
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.pose.bvh import BvhError
 from appliance.show.config_error import ConfigError
@@ -23,7 +23,7 @@ _FOR_PEOPLE = (BvhError, ConfigError, PuppetError, RuntimeFolderError, StageErro
 
 
 def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> str:
-    """What `do` prints. Raises StageError with what it raised for people, or why it was given up."""
+    """What `do` prints. Raises StageError with its error for the user, or with why it was ended."""
 
     def told() -> bytes:
         limit_memory()
@@ -38,7 +38,7 @@ def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> s
         return json.dumps([words.getvalue(), error]).encode()
 
     try:
-        words, error = json.loads(within(seconds, told))
+        words, error = json.loads(run_with_timeout(seconds, told))
     except TimedOutError as reason:
         raise StageError(
             f"{network}: this network was given up ({reason}): it never ends, or it crashes. "
@@ -50,7 +50,7 @@ def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> s
 
 
 def prove_network(show: Show) -> None:
-    """Let it run once, at the show's iterations. Raises StageError where it cannot, or does not end."""
+    """Run it once, at the show's iterations. Raises StageError if that fails or does not end."""
 
     def run() -> None:
         puppet, dancer = Puppet(show.network, show.skeleton), show.config.dancer

@@ -33,7 +33,7 @@ def command_group(help_text: str, needs_command: bool = False) -> typer.Typer:
 
 
 def is_for_subcommand(context: typer.Context, *given: object) -> bool:
-    """Whether a command of the group was named; options in front of it, which have no effect, are refused."""
+    """Whether a command of the group was named; options before it would have no effect and are refused."""
     if context.invoked_subcommand is not None and any(given):
         raise typer.BadParameter(f"write options behind '{context.invoked_subcommand}'")
     return context.invoked_subcommand is not None

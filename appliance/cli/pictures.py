@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -11,8 +11,7 @@ import typer
 from appliance.box.clock import TICK_S
 from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
 from appliance.pose.bvh import read_bvh
-from appliance.pose.quaternion import Array
-from appliance.pose.skeleton import Skeleton
+from appliance.pose.recording import Recording
 from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal
 from appliance.show.look import looks_by_name
@@ -21,26 +20,23 @@ from appliance.stage.stage_error import StageError
 
 
 @dataclass(frozen=True)
-class Danced:
-    """Poses (N, J, 4) and roots (N, 3) at `fps`; the joints that hands held; what it is called."""
+class RecordedDance:
+    """A recording, the joints that hands held in it, its title."""
 
-    skeleton: Skeleton
-    poses: Array
-    roots: Array
-    fps: float
+    recording: Recording
     held: tuple[int, ...]
     title: str
 
-    def part(self, start_s: float, seconds: float) -> Danced:
-        """So many seconds from a start on; a negative start counts from the end. Raises StageError."""
-        count = len(self.poses)
-        first = round(start_s * self.fps) if start_s >= 0.0 else max(0, count + round(start_s * self.fps))
-        if first >= count:
+    def part(self, start_s: float, seconds: float) -> RecordedDance:
+        """`seconds` of it from a start on; a negative start counts from the end. Raises StageError."""
+        whole = self.recording
+        start_s = start_s if start_s >= 0.0 else max(0.0, whole.seconds + start_s)
+        part = whole.excerpt(start_s, start_s + max(seconds, 1.0 / whole.fps))
+        if not len(part):
             raise StageError(
                 f"{self.title}: nothing was danced after second {start_s:g}. Choose an earlier start."
             )
-        kept = slice(first, first + max(1, round(seconds * self.fps)))
-        return Danced(self.skeleton, self.poses[kept], self.roots[kept], self.fps, self.held, self.title)
+        return replace(self, recording=part)
 
 
 def filmstrip(
@@ -57,27 +53,29 @@ def filmstrip(
     show: Annotated[Path | None, typer.Option(help="Show bundle that the look belongs to.")] = None,
 ) -> None:
     """Draw a recording or a journal as a row of poses; held joints are highlighted."""
-    dance, out = danced(recording, metres_per_unit).part(start, seconds), out or recording.with_suffix(".png")
-    print(drawn(dance, out) if look is None else rendered(dance, out, look, show))
+    out = out or recording.with_suffix(".png")
+    dance = load_dance(recording, metres_per_unit).part(start, seconds)
+    print(draw_dance(dance, out) if look is None else render_dance(dance, out, look, show))
 
 
-def danced(source: Path, metres_per_unit: float = 0.01) -> Danced:
+def load_dance(source: Path, metres_per_unit: float = 0.01) -> RecordedDance:
     """All of a BVH recording or of a journal. Raises BvhError or JournalError."""
     if source.suffix.lower() == ".bvh":
-        recording = read_bvh(source, metres_per_unit=metres_per_unit)
-        return Danced(recording.skeleton, recording.poses, recording.roots, recording.fps, (), source.stem)
+        return RecordedDance(read_bvh(source, metres_per_unit=metres_per_unit), (), source.stem)
     journal = read_journal(source)
     held = tuple(journal.skeleton.index(hand["joint"]) for hand in journal.header["hands"])
-    return Danced(
-        journal.skeleton, journal.ticks["pose"], journal.ticks["root"], 1.0 / TICK_S, held, source.stem
+    ticks = journal.ticks
+    return RecordedDance(
+        Recording(journal.skeleton, ticks["pose"], ticks["root"], 1.0 / TICK_S), held, source.stem
     )
 
 
-def drawn(dance: Danced, out: Path) -> Path:
-    """A filmstrip of lit figures in rows, held joints highlighted. Raises StageError."""
+def draw_dance(dance: RecordedDance, out: Path) -> Path:
+    """Draw a filmstrip of lit figures in rows, held joints highlighted. Raises StageError."""
+    danced = dance.recording
     try:
         return draw_filmstrip(
-            out, dance.skeleton, dance.poses, dance.roots, dance.fps, held=dance.held, title=dance.title
+            out, danced.skeleton, danced.poses, danced.roots, danced.fps, held=dance.held, title=dance.title
         )
     except MissingPicturesError as error:
         raise StageError(str(error)) from error
@@ -85,16 +83,18 @@ def drawn(dance: Danced, out: Path) -> Path:
         raise _unwritable(out, error) from error
 
 
-def rendered(dance: Danced, out: Path, look: str, show: Path | None) -> Path:
-    """A strip of pictures as the projector shows them, in a look of a show or, without a show, a built-in
-    one. Raises ConfigError, or StageError where the look is unknown or nothing can be rendered here."""
+def render_dance(dance: RecordedDance, out: Path, look: str, show: Path | None) -> Path:
+    """Render a strip of pictures as the projector shows them, in a look of a show, or else a built-in one.
+
+    Raises ConfigError, or StageError where the look is unknown or nothing can be rendered here.
+    """
     looks = looks_by_name(() if show is None else load_show(show).config.looks)
     if look not in looks:
         raise StageError(f"There is no look '{look}'. There are: {', '.join(looks)}.")
     try:
-        from appliance.projector.strip import strip
+        from appliance.projector.strip import render_strip
 
-        return strip(out, dance.skeleton, looks, look, dance.poses, dance.roots, dance.fps, dance.held)
+        return render_strip(out, dance.recording, looks, look, dance.held)
     except ProjectorError as error:
         raise StageError(str(error)) from error
     except OSError as error:

@@ -1,4 +1,4 @@
-"""`bunraku play`: load, say what will dance, dance, say what was danced."""
+"""`bunraku play`: load, announce, dance, and report what was danced."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from appliance.stage.stage_error import StageError
 if TYPE_CHECKING:
     from appliance.cli.companions import Companion
 
-PICTURED_MINUTES = 0.5  # a journal that only serves the picture at the end keeps little more than is drawn
+PICTURED_MINUTES = 0.5  # a journal for the picture at the end keeps little more than is drawn
 _REHEARSAL = (
     "A rehearsal with emulated sensors: the box's own place, journal and sensor memory stay as they are."
 )
 _NO_REFUSAL = ("accepted", "hello", "profile", "lost", "reboot", "drain_limit")
-# In a technician's words; what is not here goes by its name in docs/wire.md.
+# In a technician's words; a reason that is missing here keeps its name from docs/wire.md.
 _REFUSALS = {
     "no packets of ours": ("length", "magic", "version", "kind"),
     "from sensors without a key": ("device",),
@@ -55,17 +55,17 @@ def play_show(
     rehearse: Path | None = None,
     chosen: Path | None = None,
 ) -> int:
-    """Dance until the seconds are over or a signal comes; the exit status.
+    """Dance until the seconds are over or a signal comes; returns the exit status.
 
-    alone: start no companions. window: show the projection in a window. rehearse: the same where there is
-    a display, and a picture of the projection at the end. chosen: dance what the preflight chose and proved.
+    alone: start no companions. window: show the projection in a window. rehearse: the same if there is a
+    display, and a picture of the projection at the end. chosen: dance what the preflight chose and proved.
 
     Raises ConfigError, StageError.
     """
     if chosen is not None:
         directory, box_file = _pair_to_dance(chosen, directory, box_file)
     show, box = load_show(directory or default_show_path()), load_box(box_file)
-    if directory is not None and chosen is None:  # no signal reaches a run that never ends
+    if directory is not None and chosen is None:  # a network that never ends would block every signal
         from appliance.cli.network_proof import prove_network
 
         prove_network(show)
@@ -104,10 +104,10 @@ def play_show(
         for line in _conclusion(stage):
             speaker.say(line)
         if filmstrip is not None and journal is not None:
-            from appliance.cli.pictures import danced, drawn
+            from appliance.cli.pictures import draw_dance, load_dance
             from appliance.cli.rehearsal import PICTURED_S
 
-            picture = drawn(danced(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
+            picture = draw_dance(load_dance(journal).part(-PICTURED_S, PICTURED_S), filmstrip)
             speaker.say(f"What was just danced, held joints highlighted: {picture}")
         if rehearse is not None and journal is not None:
             from appliance.cli.rehearsal import rehearsal_picture
@@ -133,7 +133,7 @@ def _pair_to_dance(chosen: Path, directory: Path | None, box_file: Path | None) 
 
 
 def _scratch(opened: ExitStack) -> Path:
-    """A folder that goes with this process."""
+    """A folder that is removed with this process."""
     import shutil
     import tempfile
 
@@ -143,7 +143,7 @@ def _scratch(opened: ExitStack) -> Path:
 
 
 def _rehearsal_box(stage: Stage, scratch: Path) -> Path:
-    """The box file of a rehearsal's keeper, which finds there what the rehearsal notes, and no venue."""
+    """The box file of a rehearsal's keeper: the rehearsal's runtime folder alone, nothing of the venue."""
     path = scratch / "keeper.yaml"
     path.write_text(f"runtime: {json.dumps(str(stage.sharing.noted))}\n")
     return path
@@ -166,7 +166,7 @@ def _opened(control: ControlConfig, opened: ExitStack) -> socket.socket:
 def _running(
     companions: tuple[Companion, ...], speaker: LogWriter, stage: Stage
 ) -> AbstractContextManager[object]:
-    """While inside, they run; without any, nothing is loaded for them, so that a stage restarts soon."""
+    """A context in which they run; without any, their module is not loaded, so that a stage restarts fast."""
     if not companions:
         return nullcontext()
     from appliance.cli.companions import Companions
@@ -206,14 +206,14 @@ def _companions(
 
 
 def _forget_run(stage: Stage) -> None:
-    """All have ended as they should: the next show begins at its beginning."""
+    """After a clean end the next show starts from its beginning."""
     forget_show_state(stage.sharing.folder)
     if stage.box.state_folder is not None:
         forget_memory(stage.sharing.noted, stage.box.state_folder)
 
 
 def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Companion:
-    """The process that carries the journal, the place and the sensors' memory to the disk."""
+    """The process that writes the journal, the checkpoint and the sensors' memory to the disk."""
     from appliance.cli.companions import Companion
 
     named = () if box_file is None else ("--box", str(box_file))
@@ -226,7 +226,7 @@ def _keeper(box_file: Path | None, journal: Path | None, minutes: float) -> Comp
 
 
 def _new_folder(journal: Path) -> Path:
-    """Refuse a file in its place: a journal is a folder."""
+    """Refuse a file: a journal is a folder."""
     if journal.is_file():
         raise StageError(
             f"{journal} is a file, and a journal is a folder. Nothing is danced. Name another place, or "
@@ -238,7 +238,7 @@ def _new_folder(journal: Path) -> Path:
 def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) -> list[str]:
     show = stage.show
     hands = ", ".join(f"{hand.sensor or hand.kind} holds {hand.joint}" for hand in show.config.hands)
-    receivers = ", ".join(receiver.name for receiver in stage.parts.outputs.receivers) or "nobody"
+    receivers = ", ".join(receiver.name for receiver in stage.parts.outputs.receivers) or "no receiver"
     lines = [
         f"{show.config.name}: {hands or 'no hands, the dancer moves freely'}.",
         f"The dance goes to {receivers}.",
@@ -260,7 +260,7 @@ def _inputs(stage: Stage, control: socket.socket | None) -> str:
     if control is not None:
         commands = "on " + ":".join(map(str, control.getsockname()))
     else:
-        commands = "by nobody" if stage.box.control is None else "by a process of their own (bunraku control)"
+        commands = "nowhere" if stage.box.control is None else "by a process of their own (bunraku control)"
     return f"Sensors are heard on {sensors}, commands {commands}."
 
 
@@ -276,7 +276,7 @@ def _conclusion(stage: Stage) -> list[str]:
 
 
 def _readings(counts: dict[str, int]) -> str:
-    """What became of the sensors' packets, refusals by reason."""
+    """Counts of the sensors' packets: accepted, lost, refused by reason."""
     words = {reason: words for words, reasons in _REFUSALS.items() for reason in reasons}
     refused: dict[str, int] = {}
     for reason, count in counts.items():

@@ -1,4 +1,4 @@
-"""`bunraku preflight`: decides at power-on which show dances; it imports little: the box waits for it."""
+"""`bunraku preflight`: decides at power-on which show dances. Imports little: the box waits for it."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 from appliance.box.durable import alone_in
-from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, within
+from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, run_with_timeout
 from appliance.release.adoption import Outcome, Places, adopt, built_in_box, chosen_before
 from appliance.release.arrivals import look
 from appliance.release.choice import BOOTS, CHOSEN, DATA, RUN, STICK, Choice
 
-ANEW = "anew"  # touched when units have to restart, for another show or box file dances
-_AT_ONCE_S = 120.0  # after power-on a stick takes effect at once; later no show is interrupted
-_PATIENCE_S = 45.0  # a stick that never finishes reading does not keep the box from dancing
-_TURN_S, _LATE_TURN_S = 20.0, 60.0  # how long another preflight is waited for
+ANEW = "anew"  # touched to restart the units with another show or box file
+_AT_ONCE_S = 120.0  # this soon after power-on a stick takes effect at once; later no show is interrupted
+STICK_S = 45.0  # a stick that cannot be read does not keep the box from dancing
+TURN_S, LATE_TURN_S = 20.0, 60.0  # how long to wait for another preflight
 _NOT_WRITTEN = 1
 
 
 class Options(NamedTuple):
-    """Where to look and where to write. late: a stick was plugged into a box that is on; check_release: only
-    whether this release dances."""
+    """Where to read and where to write. late: a stick was plugged into a running box; check_release: only
+    check whether this release dances."""
 
     boot: Path | None = None
     stick: Path = STICK
@@ -36,15 +36,15 @@ class Options(NamedTuple):
 
 
 def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> int:
-    """Write chosen.json into the run folder: 0 when it stands there, 1 when the folder does not take it."""
+    """Write chosen.json into the run folder; 0 once it is there, 1 if it cannot be written."""
     places = Places(options.data, options.run)
     if options.late:
-        with contextlib.suppress(OSError):  # its unit has said so already, and allows no more
+        with contextlib.suppress(OSError):  # the unit has set it already and allows no change
             os.nice(19)
     try:
-        if not options.late:  # whatever becomes of what is new: this dances, should it end this process
+        if not options.late:  # this dances even if the new show ends this process
             _publish(places, Outcome(chosen_before(places), False, ()), False, uptime_s, say)
-        patience_s = _LATE_TURN_S if options.late else _TURN_S
+        patience_s = LATE_TURN_S if options.late else TURN_S
         with alone_in(options.data, patience_s), alone_in(options.run, patience_s):
             outcome = _found(options, places)
             for words in outcome.words:
@@ -62,7 +62,7 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
 
 
 def _found(options: Options, places: Places) -> Outcome:
-    """What is chosen; a stick is read in a process that can be given up."""
+    """What is chosen; a stick is read in a process that can be killed."""
     boot = options.boot or next((one for one in BOOTS if _is_folder(one)), BOOTS[-1])
 
     def chosen() -> Outcome:
@@ -71,7 +71,7 @@ def _found(options: Options, places: Places) -> Outcome:
 
     try:
         if _is_folder(options.stick):
-            return Outcome.unpacked(within(_PATIENCE_S, lambda: chosen().packed()))
+            return Outcome.unpacked(run_with_timeout(STICK_S, lambda: chosen().packed()))
         return chosen()
     except TimedOutError as error:
         words = f"The stick could not be read ({error}). What danced before goes on. Try another stick."
@@ -82,7 +82,7 @@ def _found(options: Options, places: Places) -> Outcome:
 
 
 def _is_folder(path: Path) -> bool:
-    """Not one on a stick that is pulled at this moment, or gives errors."""
+    """False also for a stick that is just being pulled or gives errors."""
     try:
         return path.is_dir()
     except OSError:
@@ -92,7 +92,7 @@ def _is_folder(path: Path) -> bool:
 def _publish(
     places: Places, outcome: Outcome, late: bool, uptime_s: float, say: Callable[[str], None]
 ) -> None:
-    """Where all processes of the box look; once a show has gone on for long, it is let be."""
+    """Write the choice where all processes look for it; a show that has run for long is not interrupted."""
     path = places.run / CHOSEN
     before = Choice.read(path) if late else None
     if before is not None and (not outcome.taken or uptime_s >= _AT_ONCE_S):

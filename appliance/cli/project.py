@@ -1,4 +1,4 @@
-"""`bunraku project`: show what the stage dances until it is stopped; the exit status is for a supervisor."""
+"""`bunraku project`: shows what the stage dances until it is stopped; its exit status is for a supervisor."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from appliance.box.parent_death import was_told
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
-from appliance.projector.run import Run, Wish
+from appliance.projector.run import Options, Run
 from appliance.projector.window import Kind, Size
 from appliance.release.choice import box_of
 from appliance.show.box import load_box
@@ -38,42 +38,42 @@ def project(
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after this time.")] = None,
     info: Annotated[bool, typer.Option("--info", help="Figures on the wall and on the terminal.")] = False,
     wait: Annotated[
-        bool, typer.Option("--wait", help="Without a display wait for one, and look each 10 s.")
+        bool, typer.Option("--wait", help="Without a display, wait for one; look every 10 s.")
     ] = False,
     chosen: ChosenFile = None,
 ) -> int:
     """Show what the stage dances, on a projector: before it starts, while it dances and when it is back."""
-    wished = wish(window, fullscreen, offscreen, frames, seconds, info)
-    return project_show(box_of(box, chosen), wished, wait)
+    options = parse_options(window, fullscreen, offscreen, frames, seconds, info)
+    return project_show(box_of(box, chosen), options, wait)
 
 
-def wish(
+def parse_options(
     window: bool,
     fullscreen: bool,
     offscreen: str | None,
     frames: Path | None,
     seconds: float | None,
     info: bool,
-) -> Wish:
-    """The command line's options as one wish; raises typer.BadParameter where they contradict each other."""
+) -> Options:
+    """The command line's options as one value; raises typer.BadParameter where they contradict each other."""
     if window + fullscreen + (offscreen is not None) > 1:
         raise typer.BadParameter("Give one of --window, --fullscreen and --offscreen.")
     kind: Kind | None = "window" if window else "fullscreen" if fullscreen else None
     if offscreen is None:
-        return Wish(kind, None, frames, seconds, info)
-    return Wish("offscreen", _size(offscreen), frames, seconds, info)
+        return Options(kind, None, frames, seconds, info)
+    return Options("offscreen", _size(offscreen), frames, seconds, info)
 
 
-def project_show(box_file: Path | None, wish: Wish, waits: bool = False) -> int:
+def project_show(box_file: Path | None, options: Options, waits: bool = False) -> int:
     """0: ended as asked; 69: no display or no OpenGL; 73: no room for --frames; 75: reset or hung.
 
-    waits: without a display it is tried again each 10 s, in this process, until there is one.
+    waits: without a display, try again every 10 s in this process.
     """
     with stop_signals() as stopped, closing(LogWriter()) as speaker, closing(Notifier()) as notifier:
         said = ""
         while not stopped():
             try:
-                _project(box_file, wish, stopped, notifier, speaker.say)
+                _project(box_file, options, stopped, notifier, speaker.say)
                 break
             except ProjectorError as error:
                 if not (waits and error.status == NO_DISPLAY):
@@ -82,27 +82,27 @@ def project_show(box_file: Path | None, wish: Wish, waits: bool = False) -> int:
                     return error.status
                 if str(error) != said:
                     said = str(error)
-                    speaker.say(f"{said} It is tried again each {_RETRY_S:g} s.")
-            notifier.ready("No display yet; it is tried again.")
+                    speaker.say(f"{said} Trying again every {_RETRY_S:g} s.")
+            notifier.ready("No display yet; trying again.")
             _wait(stopped, notifier)
     return 0
 
 
 def _project(
     box_file: Path | None,
-    wish: Wish,
+    options: Options,
     stopped: Callable[[], bool],
     notifier: Notifier,
     say: Callable[[str], None],
 ) -> None:
-    with closing(Run(load_box(box_file), wish, say)) as run:
+    with closing(Run(load_box(box_file), options, say)) as run:
         for line in run.introduction():
             say(line)
         say(f"Shown: {run.project(stopped, notifier).sentence()}.")
 
 
 def _wait(stopped: Callable[[], bool], notifier: Notifier) -> None:
-    """Until a display is worth looking for again."""
+    """Wait until it is time to look for a display again."""
     again = time.monotonic() + _RETRY_S
     while not stopped() and (now := time.monotonic()) < again:
         notifier.ping(now)

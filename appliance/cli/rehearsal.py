@@ -21,26 +21,26 @@ def has_display(environment: Mapping[str, str] = os.environ) -> bool:
 
 
 def rehearsal_picture(journal: Path, out: Path, show: Show) -> list[str]:
-    """Draw the last ten seconds of a journal into `out`, in the show's first look; what to say about it.
+    """Render the last ten seconds of a journal into `out`, in the show's first look; what to say about it.
 
-    Where nothing can be rendered the figures are drawn instead, and why is said. Raises JournalError,
+    Where nothing can be rendered, a filmstrip is drawn instead, and the reason is given. Raises JournalError,
     StageError.
     """
     look = next(iter(looks_by_name(show.config.looks)))
-    from appliance.cli.pictures import danced, drawn
+    from appliance.cli.pictures import draw_dance, load_dance
 
     trouble = _render(journal, out, show.directory, look)
     if trouble is None:
         return [f"What was just danced, as the projector shows it: {out}"]
-    dance = danced(journal).part(-PICTURED_S, PICTURED_S)
+    dance = load_dance(journal).part(-PICTURED_S, PICTURED_S)
     return [
         f"The projection cannot be rendered here: {trouble}",
-        f"What was just danced, held joints highlighted: {drawn(dance, out)}",
+        f"What was just danced, held joints highlighted: {draw_dance(dance, out)}",
     ]
 
 
 def _render(journal: Path, out: Path, show: Path, look: str) -> str | None:
-    """What went wrong, or None. In a process of its own, which a broken graphics driver may take with it."""
+    """What went wrong, or None. Runs in its own process, which a broken graphics driver may crash."""
     command = [
         *(sys.executable, "-m", "appliance.cli", "filmstrip", str(journal), "--out", str(out)),
         *("--start", str(-PICTURED_S), "--seconds", str(PICTURED_S), "--look", look, "--show", str(show)),

@@ -17,7 +17,7 @@ from appliance.show_control.packet import readable
 from appliance.stage.comparison import METRES_PER_DEGREE, Comparison
 from appliance.stage.replay import Replay
 
-# Other processors round otherwise, and iterating makes more of it: an emulated Nehalem was 0.46 degrees and
+# Other processors round differently, and iterations amplify that: an emulated Nehalem was 0.46 degrees and
 # 1.9 mm off at worst in 25 s of the default show that a Xeon with AVX-512 had recorded (docs/journal.md).
 TOLERANCE_DEGREES = 2.0
 _PROGRESS_TICKS = 500
@@ -47,7 +47,7 @@ def replay(
 def _replay(
     run: Run, given: Path | None, from_s: float, tolerance: float | None, name: str
 ) -> tuple[int, bool]:
-    """How many ticks were danced again, and whether all of them came out the same."""
+    """How many ticks were danced again, and whether all came out the same."""
     if not run.keyframes:
         print(f"{name}: {len(run.ticks)} ticks, and no keyframe was kept: it can be drawn, not danced again.")
         return 0, True

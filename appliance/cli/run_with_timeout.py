@@ -1,4 +1,4 @@
-"""Run something that may never end, in a process that is given up after a timeout."""
+"""Run a function that may never end, in a process that is killed after a timeout."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _OF_ALL_MEMORY, _LEAST_MEMORY_BYTES = 0.2, 400 << 20
 
 
 class TimedOutError(Exception):
-    """It gave nothing; the message says why."""
+    """It gave no result; the message says why."""
 
 
-def within(seconds: float, do: Callable[[], bytes]) -> bytes:
-    """What `do` gives, from a fork of this process; raises TimedOutError when it is late or has crashed.
+def run_with_timeout(seconds: float, do: Callable[[], bytes]) -> bytes:
+    """The result of `do`, run in a fork of this process; raises TimedOutError if it is late or crashes.
 
-    A process that hangs in the kernel, on a stick that does not answer, cannot be ended and is left behind.
+    A process that hangs in the kernel, on a dead stick for example, cannot be killed and is left behind.
     """
     reading, writing = os.pipe()
     parent = os.getpid()
@@ -31,7 +31,7 @@ def within(seconds: float, do: Callable[[], bytes]) -> bytes:
     if child == 0:
         _answer(writing, do, parent)
     with contextlib.suppress(OSError):
-        os.setpgid(child, child)  # as it does itself, but perhaps not before its time is up
+        os.setpgid(child, child)  # the child does the same, perhaps too late
     os.close(writing)
     how = os.WNOHANG
     try:
@@ -47,7 +47,7 @@ def within(seconds: float, do: Callable[[], bytes]) -> bytes:
 
 
 def limit_memory() -> None:
-    """Running out of memory ends this process alone, not the one that waits for it, nor the dance."""
+    """Limit memory so that running out ends this process alone, not the waiting one, nor the dance."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     most = max(_LEAST_MEMORY_BYTES, int(_OF_ALL_MEMORY * memory))
     with contextlib.suppress(OSError, ValueError):  # a lower limit holds already
@@ -58,7 +58,7 @@ def _answer(writing: int, do: Callable[[], bytes], parent: int) -> None:
     """In the fork; does not return."""
     status = 1
     try:
-        os.setpgid(0, 0)  # what it starts is given up with it
+        os.setpgid(0, 0)  # its own children are killed with it
         end_with(parent, signal.SIGKILL)
         with os.fdopen(writing, "wb") as stream:
             stream.write(b"!" + do())

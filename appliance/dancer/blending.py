@@ -22,11 +22,11 @@ import numpy as np
 
 from appliance.dancer.slerp import FloatArray, Slerp
 
-_ROWS = 256  # poses of running motion before it moves back to the start of its memory
+_ROWS = 256  # poses of running motion in memory; at its end they move back to the start
 
 
 class Blending:
-    """A running buffer of the next `window` poses of `joints` joints; a window comes in every `hop` ticks."""
+    """A running buffer of the next `window` poses of `joints` joints; a window arrives every `hop` ticks."""
 
     def __init__(self, joints: int, window: int = 8, hop: int = 1) -> None:
         self._window = window
@@ -55,7 +55,7 @@ class Blending:
 
     @property
     def is_due(self) -> bool:
-        """Whether this tick should generate a window."""
+        """Whether a window should be generated in this tick."""
         return self._fresh or self._ticks_since_window >= self._hop
 
     def add(self, poses: FloatArray) -> None:
@@ -88,7 +88,7 @@ class Blending:
         return pose
 
     def state(self) -> dict[str, Any]:
-        """What the poses to come depend on, for `restore`: plain values and copies of arrays."""
+        """What later poses depend on, for `restore`: plain values and copies of arrays."""
         rows = slice(self._first, self._first + self._window)
         return {
             "poses": self._poses[rows].copy(),
@@ -99,7 +99,7 @@ class Blending:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state."""
+        """Continue from a state."""
         self._first = 0
         self._poses[: self._window] = state["poses"]
         self._gathered[: self._window] = state["gathered"]

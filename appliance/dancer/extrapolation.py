@@ -1,4 +1,4 @@
-"""Extrapolation: the orientation that a hand has now becomes one for each pose of the window."""
+"""Extrapolation: from a hand's present orientation to one for each pose of the window."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SUM = np.ones((4, 1), dtype=np.float32)
 
 
 class Extrapolation:
-    """Carries joints on with the velocity of their last SPAN ticks, which fades over the window.
+    """Extrapolates joints with the velocity of their last SPAN ticks, which fades over the window.
 
     The velocity of the SPAN ticks before limits it, as neighbouring slopes limit each other in flow solvers
     (after van Albada et al. 1982): where one of the two is nothing, or they point apart, the joint is not
@@ -49,7 +49,7 @@ class Extrapolation:
         self._lengths = np.empty((window, joints, 1), dtype=np.float32)
 
     def __call__(self, present: FloatArray, is_new: NDArray[np.bool_], out: FloatArray) -> None:
-        """Write out (window, joints, 4): row 0 the present (joints, 4), row i what is expected i ticks later.
+        """Write out (window, joints, 4): row 0 the present (joints, 4), row i predicted for i ticks later.
 
         present: unit quaternions, their signs continuous from call to call, one call a tick; is_new (joints,
         1): joints of which nothing counts that was before.
@@ -83,9 +83,9 @@ class Extrapolation:
         np.divide(out, self._lengths, out=out)
 
     def state(self) -> dict[str, Any]:
-        """What the targets to come depend on, for `restore`: plain values and copies of arrays."""
+        """What later targets depend on, for `restore`: plain values and copies of arrays."""
         return {"past": self._past.copy(), "oldest": self._oldest}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state."""
+        """Continue from a state."""
         self._past[:], self._oldest = state["past"], state["oldest"]

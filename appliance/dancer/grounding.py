@@ -1,4 +1,4 @@
-"""Grounding: a figure whose legs the puppet has changed stands on the floor again, without sliding."""
+"""Grounding: sets a figure whose legs the puppet has changed on the floor again, without sliding."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
-# Capture leaves planted feet some centimetres off the floor: up to FLOOR_NOISE_M they are set down on it;
-# from JUMP_M on the phrase really jumps, and keeps its height; in between one turns into the other.
+# Capture leaves planted feet some centimetres off the floor: up to FLOOR_NOISE_M they are set down on it.
+# From JUMP_M on the phrase really jumps, and keeps its height; in between, one blends into the other.
 FLOOR_NOISE_M = 0.03
 JUMP_M = 0.08
-PLANTED_PERCENTILE = 5.0  # of a point's heights over the phrase: its height above the floor while planted
-MOST_ABOVE_OTHER_FOOT_M = 0.03  # a foot that never stands in a phrase is not taken for a planted one
-SUPPORT_M = 0.02  # points of the feet so close to the lowest one share its support
-SWINGING_M_S = 0.5  # a point of that speed counts half: it lands or lifts, it does not carry
-# How much of a correction is made at once, the rest in the ticks after it. Measured on three takes at ten
-# coding iterations with a held joint (untreated: 92 cm/s of slide): all at once leaves 11 cm/s, but the hip
-# shakes with 28 mm per tick^2 (99th percentile); 0.85 leaves 13 cm/s and 26 mm; 0.7 leaves 18 and 22.
+PLANTED_PERCENTILE = 5.0  # of a point's heights over the phrase: its height while planted
+MOST_ABOVE_OTHER_FOOT_M = 0.03  # so that a foot that never stands in a phrase does not count as planted
+SUPPORT_M = 0.02  # points of the feet this close to the lowest one share its support
+SWINGING_M_S = 0.5  # a point at this speed counts half: it lands or lifts and does not carry
+# The share of a correction that is made at once; the rest follows in later ticks. Measured on three takes at
+# ten coding iterations with a held joint (untreated: 92 cm/s of slide): all at once leaves 11 cm/s, but the
+# hip shakes with 28 mm per tick^2 (99th percentile); 0.85 leaves 13 cm/s and 26 mm; 0.7 leaves 18 and 22.
 FOLLOW = 0.85
-LEAK_S = 6.0  # the root goes back to its path in about this time
-FAR_M = 0.6  # so far from its path it goes back twice as fast
+LEAK_S = 6.0  # time constant of the root's return to its path
+FAR_M = 0.6  # this far from its path the root returns twice as fast
 
 
 class GroundingError(ValueError):
-    """A skeleton that names no feet."""
+    """A skeleton without named feet."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Floor:
 
 
 def survey(phrase: Recording) -> Floor:
-    """Learn the floor from a phrase. Raises GroundingError when the skeleton names no feet."""
+    """Estimate the floor from a phrase. Raises GroundingError for a skeleton without named feet."""
     heights = sole_positions(phrase.skeleton, phrase.poses, phrase.roots)[..., 1]
     rest = np.percentile(heights, PLANTED_PERCENTILE, axis=0)
     feet = soles_of(phrase.skeleton)
@@ -59,7 +59,7 @@ def survey(phrase: Recording) -> Floor:
 
 
 def lift(clearance: Array) -> Array:
-    """How much of a height above the floor (metres) is a jump: none up to FLOOR_NOISE_M, all from JUMP_M."""
+    """The part of a height above the floor (metres) that is a jump: 0 to FLOOR_NOISE_M, all from JUMP_M."""
     share = np.clip((clearance - FLOOR_NOISE_M) / (JUMP_M - FLOOR_NOISE_M), 0.0, 1.0)
     jumped: Array = clearance * share * share * (3 - 2 * share)
     return jumped
@@ -69,9 +69,9 @@ class Grounding:
     """Stands a pose on the floor and pins the foot that carries it; once per tick.
 
     Vertically the lowest point of the soles comes to the phrase's lift above the floor. Horizontally the root
-    leaves its path by as much as the supporting points would slide; the support passes from foot to foot with
-    their heights and speeds, so nothing pops; the offset leaks back in about LEAK_S. Where a puppet's legs
-    stand still while the phrase's root travels, the feet slide after it at last: the stage has an edge.
+    leaves its path by as much as the supporting points would slide; support passes from foot to foot with
+    their heights and speeds, so nothing pops; the offset decays in about LEAK_S. If a puppet's legs stand
+    still while the phrase's root travels, the feet finally slide after it: the stage has an edge.
     """
 
     def __init__(self, skeleton: Skeleton, floor: Floor | None, tick_s: float = 0.02) -> None:
@@ -89,22 +89,22 @@ class Grounding:
 
     @property
     def strayed(self) -> tuple[float, float]:
-        """How far the root is from its path, metres along x and z; set it before the first pose."""
+        """Offset of the root from its path, metres along x and z; set it before the first pose."""
         return self._offset_x, self._offset_z
 
     @strayed.setter
     def strayed(self, metres: tuple[float, float]) -> None:
         self._offset_x, self._offset_z = metres
 
-    def stand(
+    def ground_pose(
         self, pose: FloatArray, root: FloatArray, lift_m: float, rest_heights: FloatArray | None = None
     ) -> Figure:
-        """Stand the figure in a pose (J, 4), the phrase's root at (3,) metres and its feet lifted so far.
+        """Ground a pose (J, 4) with the phrase's root at (3,) metres and its feet lifted by lift_m.
 
-        rest_heights (S,): the floor of the phrase that plays now, where it changes; None: still the same.
+        rest_heights (S,): the floor of the phrase that plays now; None: unchanged.
         Its positions and world rotations, and `root`, hold until the next call.
         """
-        self.figure.stand(pose, root)
+        self.figure.set_pose(pose, root)
         self.root[:] = root
         if self._rest is None:
             return self.figure
@@ -124,7 +124,7 @@ class Grounding:
         return self.figure
 
     def state(self) -> dict[str, Any]:
-        """What the places to come depend on, for `restore`: plain values and copies of arrays."""
+        """What later positions depend on, for `restore`: plain values and copies of arrays."""
         return {
             "figure": self.figure.state(),
             "root": self.root.copy(),
@@ -136,7 +136,7 @@ class Grounding:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state."""
+        """Continue from a state."""
         self.figure.restore(state["figure"])
         self.root[:] = state["root"]
         self._rest, self._height, self._before = state["rest"], state["height"], state["before"]
@@ -167,52 +167,6 @@ class Grounding:
         kept = 1.0 - self._leak * (1.0 + far)
         self._offset_x = (self._offset_x + self._step_x) * kept
         self._offset_z = (self._offset_z + self._step_z) * kept
-
-
-@dataclass(frozen=True)
-class Standing:
-    """How well a motion stands: means over its frames, worst ones beside them."""
-
-    float_cm: float
-    worst_float_cm: float
-    penetration_cm: float
-    worst_penetration_cm: float
-    slide_cm_s: float
-    worst_slide_cm_s: float  # 95th percentile
-
-
-def measure_standing(
-    skeleton: Skeleton,
-    poses: Array,
-    roots: Array,
-    floor: Floor,
-    lifts: Array | None = None,
-    fps: float = 50.0,
-) -> Standing:
-    """Measure poses (N, J, 4) with roots (N, 3) metres against a phrase's floor.
-
-    Float and penetration: the lowest point of the soles above or below where it should be (lifts (N,) metres
-    above the floor, 0 if not given). Slide: horizontal speed of the point that is lowest in two frames
-    running, while nothing jumps.
-    """
-    points = sole_positions(skeleton, poses, roots)
-    clearances = points[..., 1] - floor.rest_heights
-    wanted = np.zeros(len(poses)) if lifts is None else lifts
-    off = clearances.min(axis=-1) - wanted
-    lowest = clearances.argmin(axis=-1)
-    planted = np.flatnonzero((lowest[1:] == lowest[:-1]) & (wanted[1:] == 0) & (wanted[:-1] == 0))
-    carrying = lowest[planted]
-    steps = (points[planted + 1, carrying] - points[planted, carrying])[:, [0, 2]]
-    slides = np.linalg.norm(steps, axis=-1) * fps if len(planted) else np.zeros(1)
-    above, below = np.maximum(off, 0), np.maximum(-off, 0)
-    return Standing(
-        100 * float(above.mean()),
-        100 * float(above.max()),
-        100 * float(below.mean()),
-        100 * float(below.max()),
-        100 * float(slides.mean()),
-        100 * float(np.percentile(slides, 95)),
-    )
 
 
 def sole_positions(skeleton: Skeleton, poses: Array, roots: Array) -> Array:

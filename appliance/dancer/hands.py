@@ -1,4 +1,4 @@
-"""Hands: all puppeteers of a show, gathered for the puppet."""
+"""Hands: all puppeteers of a show, combined for the puppet."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from appliance.pose.skeleton import UnknownJointError
 
 
 class HandError(ValueError):
-    """A hand that cannot hold its joint: which one, why, which joints there are."""
+    """A hand that cannot hold its joint: which one, why, and which joints exist."""
 
 
 class Hands:
-    """Who holds which of the M moving joints: mask (M,), targets (T, M, 4) and weights (M,).
+    """Which of the M moving joints are held: mask (M,), targets (T, M, 4) and weights (M,).
 
     targets: one orientation for each pose of the window, the present one first. The motion of a hand is
-    carried on over the window; a joint that is kept has the orientations of the phrase's own window.
+    extrapolated over the window; a kept joint has the orientations of the phrase's own window.
     """
 
     def __init__(self, puppeteers: Sequence[Puppeteer], joints: Sequence[str], window: int = 8) -> None:
@@ -51,8 +51,8 @@ class Hands:
         """Write all targets of this moment; call it once a tick.
 
         window (T, M, 4): the phrase's own poses of the moving joints, without sign jumps. The signs of the
-        targets jump neither from tick to tick nor from pose to pose. What moved a joint while nothing held it
-        is not carried on.
+        targets jump neither from tick to tick nor from pose to pose. Motion of a joint while
+        nothing held it is not extrapolated.
         """
         if not self.puppeteers:
             return
@@ -60,7 +60,7 @@ class Hands:
         for hand, (place, puppeteer) in enumerate(zip(self._places, self.puppeteers, strict=True)):
             self._is_new[hand] = not puppeteer.is_holding
             if isinstance(puppeteer, Kept):
-                puppeteer.see(window[0, place])
+                puppeteer.follow_phrase(window[0, place])
             target = puppeteer.pull(now)
             self._present[hand] = target.orientation
             self.weights[place] = target.weight
@@ -76,7 +76,7 @@ class Hands:
         np.greater(self.weights, 0.0, out=self.mask)
 
     def state(self) -> dict[str, Any]:
-        """What the targets to come depend on, for `restore`: plain values and copies of arrays."""
+        """What later targets depend on, for `restore`: plain values and copies of arrays."""
         return {
             "puppeteers": [puppeteer.state() for puppeteer in self.puppeteers],
             "mask": self.mask.copy(),
@@ -87,7 +87,7 @@ class Hands:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the hands of the same show did that gave this state."""
+        """Continue from a state of the same show's hands."""
         for puppeteer, kept in zip(self.puppeteers, state["puppeteers"], strict=True):
             puppeteer.restore(kept)
         self.mask[:], self._present[:], self.weights[:] = state["mask"], state["present"], state["weights"]

@@ -1,4 +1,4 @@
-"""Loop: an excerpt of a phrase made endless, its last moments crossfaded into its first ones."""
+"""Loop: an excerpt of a phrase made endless by crossfading its end into its start."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _TURN_M = 0.3  # a radian of turning counts as much as this way when a miss is s
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a phrase stands on the stage: turned by yaw about +Y, then moved by x, z (metres)."""
+    """A phrase's place on the stage: turned by yaw about +Y, then moved by x, z (metres)."""
 
     yaw: float = 0.0
     x: float = 0.0
@@ -38,7 +38,7 @@ class Placement:
         return cosine * x + sine * z + self.x, cosine * z - sine * x + self.z
 
     def after(self, first: Placement) -> Placement:
-        """One placement for two, first and then this one."""
+        """The composition: `first`, then this one."""
         return Placement(self.yaw + first.yaw, *self.point(first.x, first.z))
 
     @property
@@ -48,14 +48,14 @@ class Placement:
 
     @staticmethod
     def bringing(old: tuple[float, float, float], new: tuple[float, float, float]) -> Placement:
-        """The placement that brings old (x, z, yaw) to new."""
+        """The placement that maps old (x, z, yaw) to new."""
         yaw = new[2] - old[2]
         x, z = Placement(yaw).point(old[0], old[1])
         return Placement(yaw, new[0] - x, new[1] - z)
 
 
 class Loop:
-    """Frames 0..length-1 are the excerpt; its last `fade` ones turn gradually into its first ones.
+    """Frames 0..length-1 are the excerpt; the last `fade` frames are crossfaded into the first ones.
 
     An excerpt that is a closed loop already, its end leading into its start, is left as it is (`fade` 0).
     After frame length - 1 the motion goes on at frame `fade`, placed by `step` (where the excerpt's end
@@ -77,7 +77,7 @@ class Loop:
         self._fade_over()
 
     def _close_or_carry(self) -> Placement:
-        """Close the root's path where little is missing; returns what is left to carry from end to start."""
+        """Close the root's path if little is missing; returns the step that remains from end to start."""
         first = self.fade // 2
         last = min(self.period + first, self.length - 1)
         ground = self.track[first : last + 1, [0, 2]].astype(np.float64)
@@ -99,7 +99,7 @@ class Loop:
         return Placement()
 
     def _close(self, first: int, last: int, share: Array, miss_yaw: float) -> None:
-        """Take the miss between two frames out of the path, each frame its share (length,)."""
+        """Remove the gap between two frames from the path, from each frame its share (length,)."""
         back = -miss_yaw * share
         own = slice(0, self.length)
         self.poses[own, 0] = quaternion.multiply(turns_about_y(back), self.poses[own, 0])
@@ -112,7 +112,7 @@ class Loop:
         self.track[own, [0, 2]] = path
 
     def _fade_over(self) -> None:
-        """Write the frames period..length: the excerpt's end turning into its start, placed by the step."""
+        """Write frames period..length: the excerpt's end crossfaded into its start, placed by the step."""
         end, begin = slice(self.period, self.length + 1), slice(0, self.fade + 1)
         weight = np.ones(self.fade + 1, dtype=np.float32)
         weight[:-1] = smooth(np.arange(self.fade) / max(self.fade, 1))
@@ -146,7 +146,7 @@ def is_closed(poses: FloatArray, roots: FloatArray) -> bool:
 
 
 def smooth(share: Array) -> Array:
-    """0..1 to 0..1, level at both ends."""
+    """Smoothstep: 0..1 to 0..1 with slope 0 at both ends."""
     eased: Array = share * share * (3 - 2 * share)
     return eased
 

@@ -24,7 +24,7 @@ _FRAME_DIGITS = 2  # of a place to start at: its seconds are exact to some thous
 
 
 class Playback:
-    """Plays one of its phrases for ever. Each tick: read window() and roots(), then advance().
+    """Plays one of its phrases endlessly. Each tick: read window() and roots(), then advance().
 
     The motion is one continuous stream; the window is its next 8 poses, the first of them the pose of this
     tick. Every change (phrase, jump, excerpt, rate) enters at the far end of the window, 7 ticks before the
@@ -64,12 +64,12 @@ class Playback:
         self._begin()
 
     def add(self, name: str, phrase: Recording, floor: Floor | None = None) -> None:
-        """Make another phrase of the same skeleton ready before the first tick. Raises PhraseError."""
+        """Add a phrase of the same skeleton before the first tick. Raises PhraseError."""
         self._repertoire.add(name, phrase, floor)
 
     @property
     def phrases(self) -> tuple[str, ...]:
-        """Names of all phrases, the one that the show starts with first."""
+        """Names of all phrases, the show's first phrase first."""
         return self._repertoire.names
 
     def window(self) -> FloatArray:
@@ -93,12 +93,12 @@ class Playback:
 
     @property
     def phrase(self) -> str:
-        """Name of the phrase that the window's first pose comes from; in a crossfade the one that enters."""
+        """Name of the phrase of the window's first pose; in a crossfade the entering one."""
         return self.phrases[self._stream.number]
 
     @property
     def position_s(self) -> float:
-        """Where in the phrase (seconds) the window's first pose comes from."""
+        """Position of the window's first pose in the phrase, seconds."""
         return self._stream.position_s
 
     @property
@@ -112,7 +112,7 @@ class Playback:
 
     @property
     def excerpt_s(self) -> tuple[float, float]:
-        """First and last second of the part of the phrase that plays, or that it is about to go over to."""
+        """First and last second of the part of the phrase that plays or is about to."""
         loop = self._excerpt
         return loop.start_s, loop.start_s + loop.length / FPS
 
@@ -129,11 +129,11 @@ class Playback:
 
     @property
     def standing(self) -> tuple[float, float, float]:
-        """Where the root stands at the window's first pose: x, z in metres, heading in radians."""
+        """The root on the stage at the window's first pose: x, z in metres, heading in radians."""
         return self._stream.standing
 
     def jump(self, to_s: float) -> None:
-        """Go on at another second of the phrase, crossfaded; the nearest one inside the excerpt is taken.
+        """Continue at another second of the phrase, clamped to the excerpt, with a crossfade.
 
         During a crossfade it waits until that one is over, and hurries a long one; of several that wait the
         last counts.
@@ -142,12 +142,12 @@ class Playback:
         self._request = loop, min(max((to_s - loop.start_s) * FPS, 0.0), loop.length - 1.0), self._fade
 
     def excerpt(self, start_s: float, end_s: float | None = None) -> None:
-        """Play another part of the phrase from its start on, crossfaded. Raises as the constructor does."""
+        """Play another part of the phrase from its start, with a crossfade. Raises PhraseError."""
         self._excerpt = self._asked.cut(start_s, end_s)
         self._request = self._excerpt, 0.0, self._fade
 
     def play(self, name: str, fade_s: float | None = None) -> bool:
-        """Go over to another phrase within fade_s (None: the show's crossfade). Raises ValueError.
+        """Switch to another phrase within fade_s (None: the show's crossfade). Raises ValueError.
 
         It begins at its start (backwards: at its end); one that plays already goes on where it is, told by
         False. An excerpt that was chosen meanwhile is forgotten: the phrase is what it was at the beginning.
@@ -161,7 +161,7 @@ class Playback:
         return True
 
     def start_with(self, name: str) -> None:
-        """Before the first tick: begin with this phrase instead, without a crossfade. Raises ValueError."""
+        """Before the first tick: start with this phrase instead, without a crossfade. Raises ValueError."""
         self.play(name)
         self._begin()
 
@@ -173,7 +173,7 @@ class Playback:
         rate: float,
         standing: tuple[float, float, float],
     ) -> None:
-        """Before the first tick: go on where another playback was, from its going_on, excerpt_s and standing.
+        """Before the first tick: continue another playback from its going_on, excerpt_s and standing.
 
         Without a crossfade, at once at this rate. Raises ValueError for what this show does not have.
         """
@@ -187,7 +187,7 @@ class Playback:
         self._begin(min(max(position, 0.0), loop.length - 1.0), standing)
 
     def advance(self) -> None:
-        """Go one tick on. `jumped` tells whether a jump was taken up in it."""
+        """Advance by one tick. `jumped`: whether a jump began in it."""
         self.jumped = False
         if self._request is not None and self._leaving is None:
             (loop, position, fade), self._request = self._request, None
@@ -203,7 +203,7 @@ class Playback:
         self._push()
 
     def state(self) -> dict[str, Any]:
-        """What the poses to come depend on, for `restore`: plain values and copies of arrays."""
+        """What later poses depend on, for `restore`: plain values and copies of arrays."""
         repertoire, request = self._repertoire, self._request
         return {
             "rate": self._rate,
@@ -220,7 +220,7 @@ class Playback:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Continue from this state, with the same phrases. Raises KeyError, ValueError."""
+        """Continue from a state, with the same phrases. Raises KeyError, ValueError."""
         self._rate, self._wanted_rate = state["rate"], state["wanted_rate"]
         repertoire = self._repertoire
         self._asked, _ = repertoire.find(state["asked"])
@@ -275,7 +275,7 @@ class Playback:
         self._stream.append()
 
     def _cross_over(self, loop: Loop, position: float, fade: int) -> None:
-        """Begin to fade, over `fade` ticks, to another place of a loop, put where the figure stands."""
+        """Start a crossfade of `fade` ticks to another position of a loop, placed where the figure stands."""
         leaving = self._head
         entering = ReadingHead(loop, position, leaving.pose.copy())
         entering.placement = Placement.bringing(entering.standing, leaving.standing)
@@ -285,7 +285,7 @@ class Playback:
         self._on_the_way, self._entered_at = self._window, position
 
     def _hurry(self) -> None:
-        """End a long crossfade sooner, from where it has come to: the next change waits for it."""
+        """End a long crossfade sooner, from its present state: the next change waits for it."""
         soon = max(_HURRY, self._fade + 1.0)
         if self._fade_length - self._fade_tick > soon:
             self._fade_length *= soon / (self._fade_length - self._fade_tick)

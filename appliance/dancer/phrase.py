@@ -1,4 +1,4 @@
-"""Phrase: a recording made ready at the start, so that switching to it costs a tick nothing."""
+"""Phrase: a recording prepared at the start, so that switching to it costs the tick nothing."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ NUMBER, AT = -2, -1
 
 
 class PhraseError(ValueError):
-    """The phrase, or the excerpt of it, has fewer poses than a window, or other joints."""
+    """A phrase, or the excerpt of it, that has fewer poses than a window, or other joints."""
 
 
 class Phrase:
-    """A recording at the tick's rate: poses (N, J, 4) and track (N, C), float32, and the loop that is played.
+    """A recording at the tick's rate: poses (N, J, 4) and track (N, C), float32, from which loops are cut.
 
-    What the floor knows of it travels in the track: through loops and crossfades like the root's position.
+    The track carries the phrase's floor through loops and crossfades, like the root's position.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Phrase:
             self._track[:, STANDING:NUMBER] = floor.rest_heights
 
     def cut(self, start_s: float, end_s: float | None) -> Loop:
-        """A part of it made endless, in seconds of the phrase. Raises PhraseError."""
+        """A part of the phrase, in seconds, as an endless loop. Raises PhraseError."""
         count = len(self._poses)
         first = round(start_s * FPS)
         last = count if end_s is None else min(round(end_s * FPS), count)

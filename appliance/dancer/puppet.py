@@ -36,14 +36,14 @@ class PuppetError(ValueError):
 
 
 class Puppet:
-    """One onnxruntime session on one network file; joints that the network does not move pass by it.
+    """One onnxruntime session on one network file; joints that the network does not move bypass it.
 
     joints: names of the M moving joints; moving (M,): their places in the skeleton; window: poses a window.
-    is_broken: whether the last dance() gave no sound poses (its result is then the last sound one).
+    is_broken: whether the last dance() gave invalid poses (it then returned the last valid ones).
     """
 
     def __init__(self, path: Path, skeleton: Skeleton) -> None:
-        """Raises PuppetError when the file is no network of ours or does not fit the skeleton."""
+        """Raises PuppetError if bunraku did not export the file or it does not fit the skeleton."""
         self._session, facts = _session(path)
         self.joints, self.window, self.rest = _read_facts(path, facts)
         self.architecture = facts.get("bunraku.architecture", "unknown")

@@ -1,4 +1,4 @@
-"""Puppeteers: each holds one joint (worn sensor, turning axis, fixed orientation, the phrase, OSC)."""
+"""Puppeteers: each holds one joint (worn sensor, turning axis, fixed orientation, phrase, OSC)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from appliance.pose import quaternion
 HOLD_S = 0.1  # of silence, after which a sensor's joint is released
 GIVE_BACK_S = 1.0
 TAKE_S = 0.5
-LONGEST_STEP_S = 0.12  # six ticks; after a longer stall the targets continue from where they were
+LONGEST_STEP_S = 0.12  # six ticks; after a longer stall the targets continue from their last state
 
 
 @dataclass(slots=True)
@@ -29,9 +29,9 @@ class Target:
 
 
 class Puppeteer:
-    """Holds one joint. The weight grows over TAKE_S when it takes the joint and fades over GIVE_BACK_S when
-    it lets go, level at both ends; a new `weight` is reached at the pace of taking. A disabled puppeteer lets
-    go, whatever its source, and takes the joint again when it is enabled.
+    """Holds one joint. Its weight eases in over TAKE_S when it takes the joint and eases out over GIVE_BACK_S
+    when it releases it; a new `weight` is approached at the pace of taking. A disabled puppeteer releases the
+    joint, whatever its source, and takes it again when enabled.
     """
 
     def __init__(self, joint: str, weight: float = 1.0) -> None:
@@ -49,9 +49,9 @@ class Puppeteer:
         return self._target.weight > 0.0
 
     def pull(self, now: float) -> Target:
-        """The target at this moment; it stands still where the time does not go on.
+        """The target at the time `now`; it stands still while the time does.
 
-        One pull moves it by LONGEST_STEP_S at most: it stood still in a longer gap between two pulls.
+        One pull advances it by LONGEST_STEP_S at most: in a longer gap between two pulls it stood still.
         """
         elapsed = 0.0 if self._pulled_at is None else min(max(0.0, now - self._pulled_at), LONGEST_STEP_S)
         self._pulled_at = now
@@ -66,7 +66,7 @@ class Puppeteer:
         return self._target
 
     def state(self) -> dict[str, Any]:
-        """What the targets to come depend on, for `restore`: plain values and copies of arrays."""
+        """What later targets depend on, for `restore`: plain values and copies of arrays."""
         return {
             "weight": self.weight,
             "enabled": self.enabled,
@@ -78,24 +78,24 @@ class Puppeteer:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Continue from this state."""
+        """Continue from a state."""
         self.weight, self.enabled = state["weight"], state["enabled"]
         self._target.orientation[:], self._target.weight = state["orientation"], state["held"]
         self._presence, self._level = state["presence"], state["level"]
         self._pulled_at = state["pulled_at"]
 
     def _holds(self, now: float) -> bool:
-        """Whether the joint should be held at this moment."""
+        """Whether the joint should be held at the time `now`."""
         return True
 
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
-        """Write the orientation (4,) of the moment `now`, `elapsed` seconds after the last pull."""
+        """Write the orientation (4,) at the time `now`, `elapsed` seconds after the last pull."""
 
 
 class WornSensor(Puppeteer):
     """A sensor that a dancer wears. After 100 ms of silence its joint is released over 1 s. When readings
     return, the joint is taken over 0.5 s, and the target is led to them over the length of the silence (0.5 s
-    at most): the difference at its end is taken out evenly while the readings move on.
+    at most): the difference at its end is removed evenly while the readings continue.
 
     joint_from_reading: the matrix (4, 4) from a reading (w, x, y, z; sensor axes) to the joint's local
     orientation; it preserves length. None: the readings are local orientations already.
@@ -110,7 +110,7 @@ class WornSensor(Puppeteer):
         )
         self._reading, self._local = quaternion.IDENTITY.copy(), quaternion.IDENTITY.copy()
         self._heard_at: float | None = None
-        self._leading_s = self._led_s = 0.0  # what is left of the leading, and how long it takes in all
+        self._leading_s = self._led_s = 0.0  # rest and total of the time in which the target is led
         self._apart = 0.0, 0.0, 0.0, 0.0  # half the angle from reading to target, and its axis
 
     def wear(self, joint_from_reading: NDArray[np.float32]) -> None:
@@ -120,7 +120,7 @@ class WornSensor(Puppeteer):
             np.matmul(joint_from_reading, self._reading, out=self._local)
             self._lead(TAKE_S)
 
-    def hear(self, orientation: Sequence[float] | FloatArray, arrival: float) -> None:
+    def take_reading(self, orientation: Sequence[float] | FloatArray, arrival: float) -> None:
         """Take a reading (unit quaternion w, x, y, z) that arrived at this time."""
         self._reading[:] = orientation
         np.matmul(self._joint_from_reading, self._reading, out=self._local)
@@ -165,9 +165,9 @@ class WornSensor(Puppeteer):
             orientation[:] = quaternion.multiply(left, self._local)
 
     def _lead(self, seconds: float) -> None:
-        """Lead the target from where it is to the readings, by half a turn in TAKE_S at most.
+        """Lead the target from its present orientation to the readings, by half a turn in TAKE_S at most.
 
-        The difference is fixed here and taken out evenly. Recomputed each tick it made steps of 25 degrees
+        The difference is fixed here and removed evenly. Recomputed each tick it made steps of 25 degrees
         for a hand that moved by 7, and reversed where the hand passed the opposite orientation.
         """
         axis, angle = quaternion.to_axis_angle(
@@ -179,7 +179,7 @@ class WornSensor(Puppeteer):
 
 
 class TurningAxis(Puppeteer):
-    """Turns its joint about an axis at a constant rate, from the rest pose at its first pull on."""
+    """Turns its joint about an axis at a constant rate, from the rest pose at the first pull."""
 
     def __init__(
         self, joint: str, axis: Sequence[float], seconds_per_turn: float, weight: float = 1.0
@@ -222,13 +222,13 @@ class Kept(Puppeteer):
     Its target is that of the window's first pose; Hands gives the other poses theirs.
     """
 
-    def see(self, orientation: FloatArray) -> None:
+    def follow_phrase(self, orientation: FloatArray) -> None:
         """Take the phrase's orientation (4,) of this tick."""
         self._target.orientation[:] = orientation
 
 
 class Remote(Puppeteer):
-    """A joint held from elsewhere (OSC, a slider), set by another thread; free until the first message."""
+    """A joint held by remote control (OSC, a slider), set by another thread; free until the first message."""
 
     def __init__(self, joint: str, weight: float = 1.0) -> None:
         super().__init__(joint, weight)
@@ -248,7 +248,7 @@ class Remote(Puppeteer):
         self._held = _unit((math.cos(angle / 2), *(sine * value for value in axis)))
 
     def hold_here(self, orientation: Sequence[float]) -> None:
-        """Hold the joint where it is (w, x, y, z), unless it was told another orientation before."""
+        """Hold the joint where it is (w, x, y, z), unless an orientation was set before."""
         if self._held is None:
             self.hold(orientation)
 

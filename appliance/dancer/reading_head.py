@@ -1,4 +1,4 @@
-"""Reading head: a place in a loop, where that stands on the stage, and how its pose is read from there."""
+"""Reading head: a position in a loop, its place on the stage, and how poses are read there."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from appliance.dancer.slerp import FloatArray, Slerp
 
 @dataclass
 class ReadingHead:
-    """Its position in a loop (frames and fractions), where that stands on the stage, and the pose (J, 4) that
-    it read last; the next one takes its signs.
+    """A position in a loop (frames and fractions), its place on the stage, and the pose (J, 4) read last,
+    whose signs the next one follows.
     """
 
     loop: Loop
@@ -25,14 +25,14 @@ class ReadingHead:
 
     @property
     def standing(self) -> tuple[float, float, float]:
-        """Where the root stands on the stage: x, z in metres, heading in radians."""
+        """The root on the stage: x, z in metres, heading in radians."""
         index = int(self.position)
         x, z = self.loop.track[index, [X, Z]].tolist()
         w, _, y, _ = self.loop.poses[index, 0].tolist()
         return *self.placement.point(x, z), 2 * math.atan2(y, w) + self.placement.yaw
 
     def move(self, rate: float) -> None:
-        """Go on by `rate` frames, through the loop's seam where it comes to it."""
+        """Advance by `rate` frames, across the loop's seam if it is reached."""
         loop, before = self.loop, self.position
         self.position += rate
         if self.position >= loop.length:
@@ -46,7 +46,7 @@ class ReadingHead:
 
 
 class Reader:
-    """Reads poses and tracks at the positions of heads, into arrays that are there already."""
+    """Reads poses and tracks at the positions of heads into preallocated arrays."""
 
     def __init__(self, joints: int) -> None:
         self._between_frames = Slerp(joints)

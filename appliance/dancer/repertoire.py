@@ -1,4 +1,4 @@
-"""Repertoire: the phrases of a show by their names, and loops and reading heads told by those names."""
+"""Repertoire: the phrases of a show by name, and loops and reading heads as plain values with those names."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from appliance.show.dance import MAIN
 
 
 class Repertoire:
-    """Phrases of one skeleton, and for each the loop that it plays by itself. names: in their order."""
+    """Phrases of one skeleton and the whole loop of each. names: in their order."""
 
     def __init__(self, main: Phrase, excerpt: Loop, fade: int, window: int) -> None:
-        """main: the phrase that the show starts with; excerpt: what of it plays. fade: frames."""
+        """main: the phrase with which the show starts; excerpt: the loop of it that plays. fade: frames."""
         self._skeleton = main.skeleton
         self._fade, self._window = fade, window
         self._phrases = {MAIN: (main, excerpt)}
         self.names: tuple[str, ...] = (MAIN,)
 
     def add(self, name: str, recording: Recording, floor: Floor | None) -> None:
-        """One more. Raises PhraseError."""
+        """Add a phrase. Raises PhraseError."""
         if not recording.skeleton.same_joints(self._skeleton):
             raise PhraseError(f"The phrase '{name}' has other joints than '{MAIN}'. Nothing can be danced.")
         ready = Phrase(len(self._phrases), name, recording, floor, self._fade, self._window)
@@ -34,18 +34,18 @@ class Repertoire:
         self.names = tuple(self._phrases)
 
     def find(self, name: str) -> tuple[Phrase, Loop]:
-        """A phrase, and the loop that it plays by itself. Raises ValueError naming the nearest one."""
+        """A phrase and its whole loop. Raises ValueError with the nearest name."""
         if name not in self._phrases:
             raise ValueError(f"This show has no phrase '{name}'. {did_you_mean(name, self.names)}")
         return self._phrases[name]
 
     def named(self, loop: Loop) -> list[Any]:
-        """A loop as plain values: its phrase, first second, frames, whether the phrase plays it by itself."""
+        """A loop as plain values: phrase, first second, frames, and whether it is the phrase's whole loop."""
         name = self.names[round(float(loop.track[0, NUMBER]))]
         return [name, loop.start_s, loop.length, loop is self._phrases[name][1]]
 
     def loop(self, named: list[Any]) -> Loop:
-        """The loop that `named` told. Raises KeyError, PhraseError."""
+        """The loop of the values from `named`. Raises KeyError, PhraseError."""
         name, start_s, length, is_own = named
         phrase, own = self._phrases[name]
         return own if is_own else phrase.cut(start_s, start_s + length / FPS)

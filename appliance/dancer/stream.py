@@ -1,4 +1,4 @@
-"""Stream: the motion that is played, one pose and root behind the other; the newest rows are the window."""
+"""Stream: the played motion, one row of pose and root for each tick; the newest rows are the window."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ROWS = 256  # poses before it moves back to the start of its memory
 
 
 class Stream:
-    """Poses (J, 4) and tracks (C,) of so many ticks to come, the first of them being this tick's."""
+    """Poses (J, 4) and tracks (C,) of the next `window` ticks, this tick first."""
 
     def __init__(self, joints: int, columns: int, window: int) -> None:
         self._window, self._end = window, 0
@@ -23,17 +23,17 @@ class Stream:
         self._tracks = np.zeros((_ROWS, columns), dtype=np.float32)
 
     def clear(self) -> None:
-        """Begin anew: `window` rows must be appended before anything is read."""
+        """Empty the stream: append `window` rows before reading."""
         self._end = 0
 
     def next_row(self) -> tuple[FloatArray, FloatArray]:
-        """Where the next pose and its track are to be written; `append` then makes them the newest."""
+        """The arrays for the next pose and its track; `append` then makes them the newest row."""
         if self._end == len(self._poses):
             self._move_to_start()
         return self._poses[self._end], self._tracks[self._end]
 
     def append(self) -> None:
-        """The next row is written."""
+        """Append what was written into next_row."""
         self._end += 1
 
     def poses(self) -> FloatArray:
@@ -79,7 +79,7 @@ class Stream:
         return {"played": self._poses[shown].copy(), "played_track": self._tracks[shown].copy()}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the one did that gave this state."""
+        """Continue from a state."""
         self._end = self._window
         self._poses[: self._end] = state["played"]
         self._tracks[: self._end] = state["played_track"]

@@ -45,7 +45,7 @@ class Meaning:
 
 
 def meaning_of(key: str, channel: Json, fixture: Json) -> Meaning:
-    """What the channel of this key does in the first place."""
+    """What the channel of this key mainly does."""
     largest = _largest(channel)
     capabilities = [_in_bytes(capability, largest) for capability in capabilities_of(channel)]
     kind = _leading_kind(capabilities)
@@ -160,7 +160,7 @@ def _brightness(leading: Json) -> tuple[float, float]:
 
 
 def _default(name: str, channel: Json, capabilities: Sequence[Json], largest: int) -> float:
-    """Where it rests, share of its range; 0 where that goes without saying."""
+    """Its default, share of its range; 0 if it needs no mention."""
     if name in (DIMMER, PAN, TILT, *COLOURS, *LAMPS):
         return 0.0
     if name == SHUTTER:

@@ -1,6 +1,6 @@
 """Fixtures of the Open Fixture Library (JSON) as profiles: modes, matrices, fine and switching channels.
 
-The format: docs/fixture-format.md of that library. What a profile has no word for is left out and said.
+The format: docs/fixture-format.md of that library. What a profile cannot express is left out and reported.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class _Conversion:
         return {"name": str(self._fixture["name"]), "modes": listed, "attributes": special}, self._notes
 
     def _keys(self, mode: Json) -> list[str]:
-        """A mode's channels as keys of `_channels` or of their finer bytes; '-' where nothing is."""
+        """A mode's channels as keys of `_channels` or of their finer bytes; '-' for none."""
         blocks = (
             _inserted(entry, self._fixture) if isinstance(entry, Mapping) else [entry]
             for entry in mode["channels"]

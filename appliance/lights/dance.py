@@ -34,7 +34,7 @@ class Dance:
         self._tick: tuple[int, int] | None = None
 
     def take_frame(self, frame: SeenFrame, generation: int, now: float) -> None:
-        """Take the newest frame, perhaps the same one again; `generation`: the stage's."""
+        """Take the newest frame, which may be the same again; `generation`: the stage's."""
         tick = (generation, frame.tick)
         if tick == self._tick:
             if now - self._time > PAUSE_S:

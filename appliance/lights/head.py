@@ -27,7 +27,7 @@ TURNS = np.arange(-2.0, 3.0) * 360.0  # enough for ranges of two whole turns to 
 FLIP_GAIN = 5.0  # degrees of pan that the other solution must save before a head takes it
 # A dancer who passes close below a head demands more pan speed than it has, or the other tilt. The solution
 # is chosen by where pan will be in LOOK_AHEAD_S: at 1.5 m/s, 3 m below, the beam is at most 4.9 degrees off
-# instead of 8.2. Closer to the head's own axis than QUIET_CONE pan hardly moves the beam, so it moves slower.
+# instead of 8.2. Closer to the head's own axis than QUIET_CONE pan barely moves the beam, so it moves slower.
 LOOK_AHEAD_S, MOST_AHEAD, JUMP = 0.1, 90.0, 45.0  # degrees; a heading that jumps in one pass is no motion
 QUIET_CONE = np.sin(np.radians(3.0))
 LONGEST_STEP_S = 0.1  # after a pause heads continue from where they were, at their usual speed

@@ -59,10 +59,7 @@ class Mapping:
     def evaluate(self, dance: Dance, seconds: float) -> MappingOutput:
         """The rules' output now, `seconds` after the pass before."""
         output = MappingOutput(
-            self._patch.defaults.copy(),
-            np.zeros((len(self._aimed), 3)),
-            self._aimed,
-            self._steered,
+            self._patch.defaults.copy(), np.zeros((len(self._aimed), 3)), self._aimed, self._steered
         )
         for rule in self._rules:
             rule.apply(dance, seconds, output)

@@ -11,15 +11,7 @@ from numpy.typing import NDArray
 from appliance.lights.colour import SUBTRACTIVE, components_of, mixed
 from appliance.lights.head import Heads, heads_of
 from appliance.lights.slot import Slot
-from appliance.show.fixture_profile import (
-    DIMMER,
-    FINE,
-    PAN,
-    TILT,
-    AttributeConfig,
-    ModeConfig,
-    load_profile,
-)
+from appliance.show.fixture_profile import DIMMER, FINE, PAN, TILT, AttributeConfig, ModeConfig, load_profile
 from appliance.show.light_rules import COLOUR
 from appliance.show.lights import UNIVERSE_CHANNELS, FixtureConfig
 

@@ -26,8 +26,8 @@ MOST_LAYERS = 4  # mappings that fade into each other when cues come faster than
 class Rig:
     """Fixtures, mappings and the safe look. Starts in the safe look and fades in with the first frame.
 
-    rate_hz: the nominal rate of passes. A pass that comes much later was held up, most often with the whole
-    machine: it advances by LONGEST_STEP_S alone, and no more counts against a stage that was held up too.
+    rate_hz: the nominal rate of passes. A pass that comes much later was delayed, usually with the whole
+    machine: it advances by LONGEST_STEP_S alone, and no more than that counts against the stage.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Rig:
         self._mappings = mappings_of(config.mappings, patch)
         self._layers: list[_Layer] = []
         self._called: tuple[str, float] | None = None
-        self._unseen_s = np.inf  # how old the newest frame is, without what held up this process
+        self._unseen_s = np.inf  # age of the newest frame, without delays of this process
         self._pace = Pace(LONGEST_STEP_S, rate_hz)
         self._leaving = False
 
@@ -153,7 +153,7 @@ class _Layer:
 
 
 def _safe_level(show_state: ShowState) -> float:
-    """0 or 1, the factor of the safe look: blackout darkens it, panic shows it all the same."""
+    """0 or 1, the factor of the safe look: blackout darkens it, panic overrides that."""
     return 0.0 if show_state.blackout and not show_state.panic else 1.0
 
 

@@ -33,7 +33,7 @@ def print_rig(
 ) -> None:
     """Print the table and draw the picture. Raises ConfigError for a rig that cannot hang like this."""
     show, box = load_show(directory or default_show_path()), load_box(box_file)
-    problems = rig_problems(show, box, box_file)
+    problems = rig_problems(show, box)
     names = [one.name for one in show.config.lights.mappings]
     if mapping is not None and mapping not in names:
         line = show.file.line(("lights", "mappings"))

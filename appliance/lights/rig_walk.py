@@ -24,8 +24,8 @@ def walk_rig(
 ) -> None:
     """Take every step, then send zeros. Raises ConfigError, or AlreadyHereError while the lights run."""
     show, box = load_show(directory or default_show_path()), load_box(box_file)
-    require_wires(box, box_file)
-    config = rig_here(show, box, box_file)
+    require_wires(box)
+    config = rig_here(show, box)
     _require_known(show, fixtures, attribute)
     patch = Patch(config.fixtures, show.directory)
     to_see = list(steps(patch, fixtures, attribute))

@@ -41,13 +41,12 @@ class Lights:
         self,
         show: Show,
         box: BoxConfig,
-        box_file: Path | None,
         stage: FrameReader,
         show_state: ShowStateReader,
         say: Callable[[str], None],
         fallbacks: Fallbacks,
     ) -> None:
-        config = rig_here(show, box, box_file)
+        config = rig_here(show, box)
         patch = Patch(config.fixtures, show.directory)
         self.show, self.box = show, box
         self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz)
@@ -137,27 +136,27 @@ class Lights:
         self._fallbacks.set(DMX_AWAY.name, troubles)
 
 
-def rig_problems(show: Show, box: BoxConfig, box_file: Path | None) -> list[Problem]:
+def rig_problems(show: Show, box: BoxConfig) -> list[Problem]:
     """Why a show's lights do not fit this venue."""
     problems = misplaced(show, box)
     if not show.config.lights.fixtures:
-        cure = "Add them under lights: (docs/lights.md tells how)."
+        cure = "Add them under lights: (see docs/lights.md)."
         problems.append(Problem(show.file.path, 0, "The show has no fixtures.", cure))
     return problems
 
 
-def rig_here(show: Show, box: BoxConfig, box_file: Path | None) -> LightsConfig:
+def rig_here(show: Show, box: BoxConfig) -> LightsConfig:
     """A show's lights as they hang in this venue. Raises ConfigError when there is nothing to light."""
-    if problems := rig_problems(show, box, box_file):
+    if problems := rig_problems(show, box):
         raise ConfigError(problems)
     return at_venue(show.config.lights, box.lights)
 
 
-def require_wires(box: BoxConfig, box_file: Path | None) -> None:
-    """Refuse a box file without any wire to lights, with a NotAskedForError."""
+def require_wires(box: BoxConfig) -> None:
+    """Raise NotAskedForError for a box file without any wire to lights."""
     if not box.outputs.dmx:
         cure = "Add one under outputs: dmx:, for instance {universe: 1, wire: artnet, host: 192.168.0.30}."
-        file = box_file or Path("box.yaml")
+        file = box.path or Path("box.yaml")
         raise NotAskedForError([Problem(file, 0, "No wire leads to the lights.", cure)])
 
 
@@ -173,9 +172,9 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
     Raises ConfigError for a show or box file that cannot be lit, RuntimeFolderError without a place to meet.
     """
     box = load_box(box_file)
-    require_wires(box, box_file)
+    require_wires(box)
     with stop_signals() as stopped, ExitStack() as opened:
-        speaker = LogWriter()  # a terminal that blocks must not hold up the lights
+        speaker = LogWriter()  # a terminal that blocks must not block the lights
         opened.callback(speaker.close)
         folder = runtime_folder(box)
         opened.callback(Claim(folder, "lights").close)
@@ -192,7 +191,7 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
             process_health.publish_health(now)
 
         if directory is not None:
-            lights = Lights(load_show(directory), box, box_file, stage, show_state, speaker.say, fallbacks)
+            lights = Lights(load_show(directory), box, stage, show_state, speaker.say, fallbacks)
             notifier.ready("The lights dance.")
             _light(lights, stopped, pulse)
             process_health.end(time.monotonic())
@@ -202,7 +201,7 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
         while not stopped():
             if active.is_new(time.monotonic()):
                 try:
-                    lights = Lights(active.load(), box, box_file, stage, show_state, speaker.say, fallbacks)
+                    lights = Lights(active.load(), box, stage, show_state, speaker.say, fallbacks)
                 except ConfigError as error:
                     speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
                 else:
@@ -221,7 +220,7 @@ def _light(lights: Lights, stopped: Callable[[], bool], pulse: Callable[[float],
 
 
 def say(words: str) -> None:
-    """Print a line, as far as there is still a terminal: light matters more."""
+    """Print a line; a closed terminal is ignored: light matters more."""
     with contextlib.suppress(OSError, ValueError):
         print(words, flush=True)
 

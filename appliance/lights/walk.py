@@ -15,8 +15,8 @@ from appliance.show.light_rules import AIM
 from appliance.show.lights import UNIVERSE_CHANNELS
 
 LONGEST_STEP_S = 0.04  # of a pass; a late one continues where it was, so that no peak is skipped
-_ROOM = 2.2  # sweeps from end to end that a head has time for; it makes two
-CHEST_M = 1.2  # heads point here at the end: above the stage's origin, at chest height
+_ROOM = 2.2  # sweeps from end to end that a head gets time for; it makes two
+CHEST_M = 1.2  # heads point here at the end, at chest height above the origin
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ LONGEST_PAUSE_S = 1.0
 WELL_AFTER_S = 2.0  # longer than the pause between two keep-alives: a refusal comes back with the next one
 PASSING = (errno.EAGAIN, errno.ENOBUFS)  # a full buffer: the next datagram may go through
 _IN_WORDS = {
-    errno.ECONNREFUSED: "nobody listens on that port",
+    errno.ECONNREFUSED: "no program listens on that port",
     errno.ENETUNREACH: "no network leads there",
     errno.EHOSTUNREACH: "that machine does not answer",
     errno.EADDRNOTAVAIL: "this machine does not have the interface's address",

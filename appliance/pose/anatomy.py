@@ -182,7 +182,7 @@ class Anatomy:
 
 
 def _sidedness(name: str) -> int:
-    """1 for names of the left, -1 of the right, 0 for what is in the middle or does not say."""
+    """1 for names of the left, -1 of the right, 0 for the middle and for names that do not say."""
     folded = name.rpartition(":")[2]
     for number, (word, letter) in ((1, ("left", "l")), (-1, ("right", "r"))):
         if word in folded.casefold() or (folded[:1].casefold() == letter and folded[1:2].isupper()):

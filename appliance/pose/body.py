@@ -35,9 +35,10 @@ class Body:
             np.tile(quaternion.IDENTITY.astype(float), (joints, 1)), np.zeros(3)
         )
         self.height = float(np.ptp(np.vstack([rest, self._ends(rest, None)]), axis=0).max()) or 1.0
-        self._reach = self._reaches()
         self._trunk = self._trunk_joints()
-        self._radius = self.height * np.clip(0.042 * (self._reach / self.height) ** 0.62 * 1.36, 0.011, None)
+        self._radius = self.height * np.clip(
+            0.042 * (skeleton.reaches / self.height) ** 0.62 * 1.36, 0.011, None
+        )
         self._radius[list(self._trunk)] = 0.055 * self.height
         self._radius[0] *= 0.7  # where the legs part
         self._head = next(
@@ -46,7 +47,8 @@ class Body:
 
     def cones(self, positions: Array, world: Array) -> Cones:
         """The figure's volume for world positions (J, 3) and world rotations (J, 4)."""
-        radius, face = self._radius, self._below(self._head)
+        radius = self._radius
+        face = [] if self._head is None else self.skeleton.descendants(self._head)[1:]
         parts = [(positions[0], positions[0], radius[0], radius[0], 0)]
         parts += [
             (positions[parent], positions[joint], radius[parent], radius[joint], parent)
@@ -87,22 +89,11 @@ class Body:
         offsets = np.array([offset for _, offset in self.skeleton.ends], float)
         return positions[joints] + (offsets if world is None else quaternion.rotate(world[joints], offsets))
 
-    def _reaches(self) -> Array:
-        """Length of the longest chain of bones below each joint."""
-        reach = np.zeros(len(self.skeleton))
-        for joint, offset in self.skeleton.ends:
-            reach[joint] = max(reach[joint], float(np.linalg.norm(offset)))
-        for joint in reversed(range(1, len(self.skeleton))):
-            parent = self.skeleton.parents[joint]
-            length = float(np.linalg.norm(self.skeleton.offsets[joint]))
-            reach[parent] = max(reach[parent], reach[joint] + length)
-        return reach
-
     def _long_children(self, joint: int) -> list[int]:
         return [
             child
             for child, parent in enumerate(self.skeleton.parents)
-            if parent == joint and self._reach[child] > LONG_BRANCH * self.height
+            if parent == joint and self.skeleton.reaches[child] > LONG_BRANCH * self.height
         ]
 
     def _trunk_joints(self) -> set[int]:
@@ -116,7 +107,7 @@ class Body:
         return trunk
 
     def _webs(self) -> list[tuple[int, int]]:
-        """Pairs (trunk joint, where a limb begins) that fill the sides of the chest and of the pelvis."""
+        """Pairs (trunk joint, start of a limb) that fill the sides of the chest and of the pelvis."""
         pairs = []
         for branching in self._trunk:
             limbs = [c for c in self._long_children(branching) if c not in self._trunk]
@@ -127,10 +118,3 @@ class Body:
                 beyond = self._long_children(limb)[:1]
                 pairs += [(middle, start) for middle in neighbours for start in (limb, *beyond)]
         return pairs
-
-    def _below(self, joint: int | None) -> set[int]:
-        below: set[int] = set()
-        for child, parent in enumerate(self.skeleton.parents):
-            if joint is not None and (parent == joint or parent in below):
-                below.add(child)
-        return below

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from appliance.pose.foreign_file import opened
 
 MAX_LINE = 1 << 17  # characters; the longest honest line is one frame of some hundred channels
-MAX_BLANK_LINES = 1000  # in a row; a file of nothing but line ends must not keep anybody waiting
+MAX_BLANK_LINES = 1000  # in a row; a file of line ends alone must not block
 MAX_JOINTS = 1000
 MAX_VALUES = 50_000_000  # 400 MB: 50 minutes of 132 channels at 120 poses a second
-_STAGE_FPS = 50  # a recording is danced at this rate: slow frames become many
+_STAGE_FPS = 50  # recordings are resampled to this rate: slow frames become many
 _CHANNELS = {f"{axis}{kind}" for axis in "XYZ" for kind in ("position", "rotation")}
 
 

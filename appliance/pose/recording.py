@@ -74,7 +74,7 @@ class Recording:
 
 
 def leading_tpose_frames(recording: Recording) -> int:
-    """How many frames at the start are a rest pose or still swing away from one."""
+    """The number of frames at the start that are a rest pose or the swing away from it."""
     head = recording.poses[: TPOSE_SEARCH_FRAMES + 1]
     steps = np.degrees(quaternion.angle_between(head[1:], head[:-1])).max(axis=-1)
     if not (steps > TPOSE_JUMP_DEGREES).any():

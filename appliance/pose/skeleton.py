@@ -15,7 +15,7 @@ from appliance.pose.quaternion import Array
 
 
 class UnknownJointError(KeyError):
-    """A joint name that the skeleton does not have; says which one was probably meant."""
+    """A joint name that the skeleton does not have; suggests the nearest one."""
 
     def __init__(self, name: str, names: Sequence[str]) -> None:
         by_folded = {known.casefold(): known for known in names}
@@ -60,6 +60,32 @@ class Skeleton:
     def feet(self) -> tuple[int, ...]:
         """Joints that stand on the floor: those named foot or ankle."""
         return tuple(i for i, n in enumerate(self.names) if any(w in n.casefold() for w in ("foot", "ankle")))
+
+    @cached_property
+    def reaches(self) -> NDArray[np.float64]:
+        """(J,): length in metres of the longest chain of bones below each joint."""
+        reach = np.zeros(len(self))
+        for joint, offset in self.ends:
+            reach[joint] = max(reach[joint], float(np.linalg.norm(offset)))
+        for joint in reversed(range(1, len(self))):
+            parent = self.parents[joint]
+            reach[parent] = max(reach[parent], reach[joint] + float(np.linalg.norm(self.offsets[joint])))
+        return reach
+
+    def ancestors(self, joint: int) -> list[int]:
+        """A joint and those above it, up to the root."""
+        chain = [joint]
+        while (joint := self.parents[joint]) >= 0:
+            chain.append(joint)
+        return chain
+
+    def descendants(self, joint: int) -> list[int]:
+        """A joint and all below it."""
+        found = [joint]
+        for child, parent in enumerate(self.parents):
+            if parent in found:
+                found.append(child)
+        return found
 
     @cached_property
     def _levels(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], ...]:

@@ -1,4 +1,4 @@
-"""How the picture lies on the wall, and the file in which the box keeps it from night to night."""
+"""How the picture lies on the wall, and the file that keeps it from night to night."""
 
 from __future__ import annotations
 
@@ -46,16 +46,16 @@ def alignment_folder(box: BoxConfig, environment: Mapping[str, str] = os.environ
 
 
 def file_name(config: ProjectorConfig) -> str:
-    """Two projectors side by side on one box lie each in its own way."""
+    """Two projectors side by side on one box have a file each."""
     side = "" if config.edge_blend is None else f"-{config.edge_blend.part}"
     return f"projector{side}.alignment"
 
 
 class AlignmentFile:
-    """Keeps an alignment in a file, which is replaced as a whole by a thread of its own: pictures never wait.
+    """Keeps an alignment in a file. Its own thread replaces the file as a whole: pictures never wait.
 
-    What was chosen by hand overrides the box file until that value changes in the box file. Nothing here
-    raises: an error is reported in one sentence, and the alignment then holds for this run alone.
+    A value chosen by hand overrides the box file until that value changes there. Nothing here raises: an
+    error is reported in one sentence, and the alignment then holds for this run alone.
     """
 
     def __init__(self, folder: Path, config: ProjectorConfig, say: Callable[[str], None]) -> None:
@@ -73,7 +73,7 @@ class AlignmentFile:
         return self._wanted
 
     def overrides(self) -> list[str]:
-        """A sentence for each thing that was chosen by hand and overrides the box file."""
+        """A sentence for each value chosen by hand that overrides the box file."""
         chosen, box_file = self._wanted, self._from_box
         sentences = []
         if chosen.corners != WHOLE:
@@ -89,12 +89,12 @@ class AlignmentFile:
         return sentences
 
     def keep(self, alignment: Alignment) -> None:
-        """Remember this one."""
+        """Have the thread write this one."""
         self._wanted = alignment
         self._is_wanted.set()
 
     def close(self) -> None:
-        """Write what is not written yet, for as long as LAST_WRITE_S: a dead disk holds up no end."""
+        """Write what is still pending, within LAST_WRITE_S: a dead disk must not delay the end."""
         self._closing = True
         self._is_wanted.set()
         self._thread.join(LAST_WRITE_S)
@@ -157,7 +157,7 @@ class AlignmentFile:
 
 
 def _text(alignment: Alignment, from_box: Alignment) -> str:
-    """By each thing that the box file sets as well stands what it said then."""
+    """Beside each value that the box file sets as well stands the box file's value of that time."""
     corners = ", ".join(f"[{x!r}, {y!r}]" for x, y in alignment.corners)
     mirror, box_mirror = str(alignment.mirror).lower(), str(from_box.mirror).lower()
     return (

@@ -1,4 +1,4 @@
-"""The OpenGL ES 3.0 context of a window, and what must be known about it: software only, or lost."""
+"""The OpenGL ES 3.0 context of a window, and whether it is software or lost."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from appliance.projector.sdl import sdl2
 from appliance.projector.window import Size, Window, last_error
 from appliance.show.projector import ProjectorConfig
 
-_ES_3_0 = 300
+ES_3_0 = 300
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software", "swiftshader")
 _RESET_STATUS = (b"glGetGraphicsResetStatus", b"glGetGraphicsResetStatusKHR", b"glGetGraphicsResetStatusEXT")
 
 
 class GlContext:
-    """Current on this thread from now on. Raises ProjectorError where there is no OpenGL ES 3.0."""
+    """A context that is current on this thread. Raises ProjectorError if there is no OpenGL ES 3.0."""
 
     def __init__(self, window: Window) -> None:
         self._handle = _create(window)
         try:
             loader: Any = _Loader()
-            self.gl = moderngl.create_context(require=_ES_3_0, context=loader)
+            self.gl = moderngl.create_context(require=ES_3_0, context=loader)
         except Exception as error:  # the library raises whatever its driver does
             sdl2.SDL_GL_DeleteContext(self._handle)
             raise _unusable(str(error)) from error
         self.renderer = str(self.gl.info["GL_RENDERER"])
-        self._reset_status = _reset_status()
+        self._reset_status = reset_status()
         self._finish = ctypes.CFUNCTYPE(None)(sdl2.SDL_GL_GetProcAddress(b"glFinish"))
 
     @property
     def is_software(self) -> bool:
-        """Whether the processor draws, because there is no graphics card or no driver for it."""
+        """Whether the processor draws, for lack of a graphics card or its driver."""
         return any(word in self.renderer.casefold() for word in _SOFTWARE)
 
     @property
@@ -85,7 +85,7 @@ class _Loader:
 
 
 def _create(window: Window) -> object:
-    """A context that tells when the graphics card was reset; without that where the driver cannot."""
+    """A context that reports a reset of the graphics card, if the driver can."""
     for tells_resets in (1, 0):
         sdl2.SDL_GL_SetAttribute(sdl2.SDL_GL_CONTEXT_RESET_NOTIFICATION, tells_resets)
         sdl2.SDL_GL_SetAttribute(
@@ -105,7 +105,7 @@ def _unusable(why: str) -> ProjectorError:
     )
 
 
-def _reset_status() -> Callable[[], int]:
+def reset_status() -> Callable[[], int]:
     """OpenGL's own function, where the driver has it (GL_KHR_robustness)."""
     for name in _RESET_STATUS:
         address = sdl2.SDL_GL_GetProcAddress(name)

@@ -1,4 +1,4 @@
-"""What a technician has in hand at the projector: corners, mirror, brightness, grid, information."""
+"""What a technician controls at the projector: corners, mirror, brightness, grid, information."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _CORNER_NAMES = ("top left", "top right", "bottom right", "bottom left")
 class Controls:
     """The state behind keys and orders. Each change returns a sentence about it.
 
-    `keep` gets each new alignment. corner: which one keys move in corner mode, 0 to 3; None outside of it.
+    `keep` receives each new alignment. corner: the one that keys move in corner mode, 0 to 3, else None.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Corner-pin: the homography that lays the picture onto four points of the wall, and which four it can."""
+"""Corner-pin: the homography that lays the picture onto four points of the wall; which points are valid."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from appliance.box.fallback import Fallback
 STAGE_UNSEEN = Fallback(
     "picture-black",
     "No frame came from the stage for half a second: the picture fades to black, and is back as soon as the "
-    "stage is. Look what the stage says.",
+    "stage is. See what the stage says.",
 )
 PICTURES_SMALLER = Fallback(
     "pictures-smaller",

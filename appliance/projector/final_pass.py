@@ -13,7 +13,7 @@ from appliance.projector.controls import Controls
 from appliance.projector.corners import homography
 from appliance.projector.page import page
 from appliance.projector.picture.drawing import Drawing
-from appliance.projector.picture.tally import Figures, Tally
+from appliance.projector.picture.tally import Cost, Tally
 from appliance.projector.picture.wall import FLAT, Wall, flat
 from appliance.projector.window import Size
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
@@ -80,8 +80,8 @@ class FinalPass:
     ) -> Wall:
         """What a look draws its picture of that size onto; `draw` does the rest.
 
-        That is the display itself where nothing is left to do, which spares a small computer to write the
-        picture to memory and to read it again; else a texture.
+        That is the display itself if nothing is left to do, which saves a small computer from writing the
+        picture to memory and reading it back; else a texture.
         """
         self._tally.clear()
         scale, gamma = level * controls.alignment.brightness, self._config.gamma
@@ -131,13 +131,13 @@ class FinalPass:
             drawing.draw(self._tally, pixels, inputs, moderngl.TRIANGLE_STRIP, 4)
         self._tally.count_bytes(4 * pixels)
 
-    def figures(self) -> Figures:
-        """What the last step of the last picture took; nothing where a look did it itself."""
+    def cost(self) -> Cost:
+        """The cost of the last picture's last step; nothing if a look did that itself."""
         width, height = self.picture.size
-        return self._tally.figures(width * height, 4 * width * height)
+        return self._tally.cost(width * height, 4 * width * height)
 
     def black(self, screen: moderngl.Framebuffer, display: Size) -> None:
-        """Nothing at all, not even figures or marks."""
+        """Clear the display: no picture, no figures, no marks."""
         self._tally.clear()
         screen.use()
         screen.viewport = (0, 0, *display)

@@ -1,4 +1,4 @@
-"""What the projector says of itself when asked to: figures of its pictures, in small letters of its own."""
+"""The projector's figures about its pictures, and the small letters to show them on the wall."""
 
 from __future__ import annotations
 
@@ -58,15 +58,15 @@ class Figures:
 
 
 class Meter:
-    """Measures what is shown. Frame age: how long ago what is now on the wall left the stage."""
+    """Measures the pictures shown. Frame age: how long ago the frame now on the wall left the stage."""
 
     def __init__(self) -> None:
         self.pictures = 0
         self._ages_s: deque[float] = deque(maxlen=_REMEMBERED)
         self._swaps: deque[float] = deque()
 
-    def shown(self, swapped: float, left_stage: float | None) -> None:
-        """A picture is on the wall since `swapped`; `left_stage` None: it does not show a dance."""
+    def note_swap(self, swapped: float, left_stage: float | None) -> None:
+        """Note that a picture is on the wall since `swapped`; `left_stage` None: it shows no dance."""
         self.pictures += 1
         self._swaps.append(swapped)
         while self._swaps[-1] - self._swaps[0] > _COUNTED_S and len(self._swaps) > 2:

@@ -26,10 +26,10 @@ class _Seen(NamedTuple):
 
 
 class Interpolation:
-    """Follows one stage's frames. Between two of them positions go straight, world rotations turn (slerp).
+    """Follows one stage's frames. Between two of them, positions are linear and world rotations slerped.
 
-    The dance is shown one tick later than its newest frame can be here, so that the frame after the wanted
-    time has come; when it has not, the newest one is held: nothing is ever extrapolated.
+    The dance is shown one tick behind its newest possible frame, so that the frame after the wanted time is
+    usually there; if not, the newest one is held. Nothing is ever extrapolated.
     """
 
     def __init__(self, reader: FrameReader, held: tuple[int, ...]) -> None:

@@ -1,6 +1,6 @@
-"""Keyboards of a box without a desktop, read from the kernel (evdev), also those plugged in later.
+"""Keyboards of a box without a desktop, read from the kernel (evdev), including those plugged in later.
 
-SDL's library as Python packages bring it is built without udev, so that on KMS/DRM it finds no keyboard.
+The SDL library in Python packages is built without udev, so it finds no keyboard on KMS/DRM.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _NAMES = (
     | {2: "1", 3: "2", 4: "3", 5: "4", 12: "-", 13: "=", 74: "Keypad -", 78: "Keypad +"}
     | {16: "Q", 19: "R", 23: "I", 33: "F", 34: "G", 35: "H", 46: "C", 50: "M"}
 )
-_REFUSED_S = 0.5  # udev opens a new device to its users some time after the kernel has made it
-_SETTLED_S = 1.0  # after a change once more: a folder's time stamp is as coarse as the kernel's tick
+_REFUSED_S = 0.5  # udev grants access to a new device some time after the kernel has made it
+_SETTLED_S = 1.0  # after a change, look once more: a folder's time stamp is as coarse as the kernel's tick
 _MOST_EVENTS = 64  # at once, from one keyboard
 
 
@@ -43,9 +43,9 @@ class Key:
 
 
 class Keyboards:
-    """All keyboards in a folder of devices. Nothing here raises or waits.
+    """All keyboards in a folder of devices. Nothing here raises or blocks.
 
-    is_refused: whether there are devices, none of which this user may read.
+    is_refused: whether there are devices and this user may read none of them.
     """
 
     def __init__(self, devices: Path = DEVICES, *, monotonic: Callable[[], float] = time.monotonic) -> None:
@@ -56,11 +56,11 @@ class Keyboards:
         self._settled_at = self._again_at = math.inf  # when to look although nothing changed
         self._shifts: set[tuple[int, int]] = set()
         self.is_refused = False
-        self._look()
+        self._open_new()
 
     def pressed(self) -> Iterator[Key]:
         """Keys that were pressed, or repeat, since the last time."""
-        self._look()
+        self._open_new()
         for path, descriptor in list(self._open.items()):
             try:
                 received = os.read(descriptor, _MOST_EVENTS * _EVENT.size)
@@ -77,7 +77,7 @@ class Keyboards:
                     yield from self._key(descriptor, code, value)
 
     def close(self) -> None:
-        """Let go of all of them."""
+        """Close all of them."""
         for path in list(self._open):
             self._forget(path)
 
@@ -88,8 +88,8 @@ class Keyboards:
         elif value != _RELEASED and code in _NAMES:
             yield Key(_NAMES[code], bool(self._shifts))
 
-    def _look(self) -> None:
-        """Open what was plugged in since the folder last changed, and what was refused so far."""
+    def _open_new(self) -> None:
+        """Open devices plugged in since the folder last changed, and those refused so far."""
         now = self._now()
         try:
             changed = self._devices.stat().st_mtime_ns
@@ -128,7 +128,7 @@ class Keyboards:
 
 
 def is_keyboard(descriptor: int) -> bool:
-    """Whether a device has the keys that are asked for here; mice and power buttons have not."""
+    """Whether a device has the projector's keys; mice and power buttons do not."""
     try:
         bits = fcntl.ioctl(descriptor, _EVIOCGBIT_KEY, bytes(96))
     except OSError:

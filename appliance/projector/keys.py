@@ -26,7 +26,7 @@ _STEP = 0.05
 
 
 def press(key: Key, controls: Controls, size: Size) -> str:
-    """Do what a key asks for; `size`: the display's, pixels. A sentence for the terminal, maybe empty."""
+    """Carry out a key; `size`: the display's, pixels. Returns a sentence for the terminal, maybe empty."""
     if key.name in _ARROWS:
         pixels = 10 if key.shift else 1
         dx, dy = _ARROWS[key.name]

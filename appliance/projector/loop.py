@@ -44,7 +44,7 @@ MakePainter = Callable[[moderngl.Context, Size, Skeleton, Looks], Painter]
 
 
 class Projector:
-    """Shows whatever stage there is, black while there is none; a restarted one is shown as it comes."""
+    """Shows any stage, black while there is none; a restarted stage is shown with its first frame."""
 
     def __init__(
         self,
@@ -84,8 +84,8 @@ class Projector:
     ) -> float | None:
         """Draw the picture for `now` (monotonic seconds) onto a display of that size in pixels.
 
-        lines: figures to show; share: of the display's size that the scene is drawn in, where the box file
-        does not say its size. Gives when what is shown left the stage; None while no fresh dance is seen.
+        lines: figures to show; share: of the display's size, for the scene, unless the box file sets that
+        size. Returns when the shown frame left the stage; None while no fresh dance is seen.
         """
         self.shown = None
         self._follow_stage(now)
@@ -103,7 +103,7 @@ class Projector:
             mix = show_state.look_mix(now)
             self._painter.draw(moment, show_state.look, show_state.look_before, mix, wall)
             self.shown = show_state.look if mix in (0.0, 1.0) else None
-        show_state = self._show_state.read()  # again: a panic that came meanwhile is in this picture already
+        show_state = self._show_state.read()  # again: this picture already shows a panic that came meanwhile
         if show_state.panic or show_state.blackout:
             self._final.black(screen, display)
             self.shown = None
@@ -144,15 +144,14 @@ class Projector:
         display: Size,
         share: float,
     ) -> None:
-        """Draw each look once, unseen: what a driver puts off until then would halt the dance.
+        """Draw each look once, unseen: drivers defer work to the first use, which would halt the dance.
 
-        Once over itself, as in a cross-fade, onto a texture and onto the display: drivers compile shaders
-        again for each of these.
+        Cross-faded with itself, onto a texture and onto the display: drivers compile shaders again for each.
         """
         if not self._is_black:
             self._is_black = True
             return
-        if self._painter is not None:  # one picture later, so that the fade does not count that time
+        if self._painter is not None:  # one picture later, so that the fade excludes that time
             self._drawn, self._to_draw = show, None
             return
         self.is_preparing = True

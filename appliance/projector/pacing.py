@@ -15,8 +15,8 @@ _FOLLOW = 0.1  # how far one measured swap moves the display's grid
 class Pacing:
     """Gives each picture the time that it is drawn for, on an even grid: uneven times would show as judder.
 
-    `holds_vsync`: whether showing a picture waits for the display. That turns out only by measuring: drivers
-    promise it and do not keep it (a virtual display, a hidden window).
+    `holds_vsync`: whether showing a picture waits for the display. That must be measured: drivers promise it
+    and do not keep it (a virtual display, a hidden window).
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class Pacing:
         self._judged_from = self._grid
         self._pictures = 0
 
-    def next(self) -> float:
+    def wait_for_next(self) -> float:
         """Wait until the next picture is due; the time that it is drawn for, monotonic seconds."""
         self._grid += self.period_s
         now = self._now()
@@ -47,7 +47,7 @@ class Pacing:
         if now < self._grid:
             self._sleep(self._grid - now)
         elif now - self._grid > _ON_TIME * self.period_s:
-            self._grid = now  # pictures that were missed are never made up for
+            self._grid = now  # missed pictures are never made up for
         return self._grid
 
     def _judge(self, now: float) -> None:

@@ -32,7 +32,7 @@ def page(size: tuple[int, int], lines: tuple[str, ...], corners: Corners | None,
 
 
 def _write(image: Image, lines: tuple[str, ...], middle: NDArray[np.float64]) -> None:
-    """Around this place, moved so far that it is on the page."""
+    """Write around this place, moved onto the page."""
     written = letters(lines)[: image.shape[0], : image.shape[1]]
     room = np.array(image.shape) - written.shape
     top, left = np.clip(np.round(middle[::-1] - np.array(written.shape) / 2), 0, room).astype(int)

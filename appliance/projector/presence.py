@@ -15,8 +15,8 @@ _LONGEST_S = 0.25  # between two pictures: after a longer pause the fade still t
 class Presence:
     """A level from 0 to 1 that follows whether fresh frames come; it starts in the dark.
 
-    rate: the intended pictures a second. A pause of this process, most often of the whole machine, counts
-    neither for the fade nor against a stage that paused with it; slow drawing counts.
+    rate: the intended pictures a second. A pause of this process, usually of the whole machine, counts
+    neither for the fade nor against the stage; slow drawing does.
     """
 
     def __init__(self, rate: float = USUAL_RATE) -> None:

@@ -1,12 +1,12 @@
-"""The one error with which the projector ends by itself: a sentence for people, an exit status."""
+"""The error that ends the projector: a sentence for the user, an exit status."""
 
 from __future__ import annotations
 
 import os
 
-NO_DISPLAY = os.EX_UNAVAILABLE  # 69: no display or no OpenGL; starting again helps once that is mended
-NO_PLACE = os.EX_CANTCREAT  # 73: for the pictures that were asked for as files
-GPU_LOST = os.EX_TEMPFAIL  # 75, also for a display that hangs: starting again at once is the cure
+NO_DISPLAY = os.EX_UNAVAILABLE  # 69: no display or no OpenGL; restarting helps once that is fixed
+NO_PLACE = os.EX_CANTCREAT  # 73: for the pictures of --frames
+GPU_LOST = os.EX_TEMPFAIL  # 75, also for a display that hangs: restart at once
 
 
 class ProjectorError(Exception):

@@ -6,25 +6,25 @@ from collections import deque
 
 import numpy as np
 
-SHARES = (1.0, 0.5, 0.35)  # of the display's width and height; between them laying takes what drawing saves
-_WINDOW_S = 1.5  # that a judgement looks back
-_FEWEST = 15  # pictures of which one is made
-_SETTLES_S = 0.5  # after a change, or a new look: what a driver does then is no measure
+SHARES = (1.0, 0.5, 0.35)  # of the display's width and height; steps in between save nothing
+_WINDOW_S = 1.5  # of pictures that a judgement is based on
+_FEWEST = 15  # pictures for a judgement
+_SETTLES_S = 0.5  # after a change or a new look, whose first pictures are slow
 _MOST = 0.95  # of the display's period that drawing may take
 _EASY = 0.7  # of it that a larger picture must be expected to take at most
-_UP_AFTER_S, _UP_AFTER_MOST_S = 20.0, 640.0  # of ease before a larger picture is tried
-_FAILED_S = 60.0  # a larger picture that lasts for less was a mistake
-_GAIN = 0.85  # smallest pictures that are too slow and take more of the full ones' time blur for nothing
-_HOPELESS_S = 600.0  # before that is tried again
-_TYPICAL = 75  # percentile of the times: a few pictures that another program holds up do not count
+_UP_AFTER_S, _UP_AFTER_MOST_S = 20.0, 640.0  # of spare time before a larger picture is tried
+_FAILED_S = 60.0  # a larger picture that lasts for less has failed
+_GAIN = 0.85  # smallest pictures that are too slow and save less than this blur for nothing
+_HOPELESS_S = 600.0  # before smaller pictures are tried again
+_TYPICAL = 75  # percentile of the times: a few pictures delayed by other programs do not count
 
 
 class Resolution:
     """Judges how long pictures take; `share` says how large the next one is.
 
-    It goes down at once and up slowly, each time that a larger picture was a mistake twice as slowly, and
-    stays where it is while looks cross-fade. Where even the smallest pictures bring nothing, because
-    something else takes the time, it goes back to full ones for ten minutes.
+    It shrinks at once and grows slowly, twice as slowly after each failed attempt, and stays as it is while
+    looks cross-fade. If even the smallest pictures do not help, because something else takes the time, it
+    returns to full ones for ten minutes.
     """
 
     def __init__(self, period_s: float, adapts: bool = True) -> None:
@@ -47,7 +47,7 @@ class Resolution:
         """Of the display's width and height."""
         return SHARES[self._place]
 
-    def drawn(self, now: float, took_s: float, look: str | None) -> bool:
+    def note_picture(self, now: float, took_s: float, look: str | None) -> bool:
         """Note the drawing time of a picture; returns whether the next one has another size.
 
         took_s: without waiting for the display; look None: two looks cross-fade; now: monotonic seconds.

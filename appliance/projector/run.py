@@ -44,7 +44,7 @@ _JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
 
 
 @dataclass(frozen=True)
-class Wish:
+class Options:
     """The options of the command line. kind None: as the box file says; frames: a folder for PNGs."""
 
     kind: Kind | None = None
@@ -57,32 +57,32 @@ class Wish:
 class Run:
     """Everything open while the projector runs. Raises ProjectorError, ConfigError or RuntimeFolderError."""
 
-    def __init__(self, box: BoxConfig, wish: Wish, say: Callable[[str], None]) -> None:
+    def __init__(self, box: BoxConfig, options: Options, say: Callable[[str], None]) -> None:
         config = box.projector
-        self._wish, self._say = wish, say
+        self._options, self._say = options, say
         with ExitStack() as opened:
             folder = runtime_folder(box)
             self._window = Window(
-                config, wish.kind or ("fullscreen" if config.fullscreen else "window"), wish.size
+                config, options.kind or ("fullscreen" if config.fullscreen else "window"), options.size
             )
             opened.callback(self._window.close)
-            self._context = GlContext(self._window)
-            opened.callback(self._context.close)
+            self.context = GlContext(self._window)
+            opened.callback(self.context.close)
             self._file = AlignmentFile(alignment_folder(box), config, say)
             opened.callback(self._file.close)
-            self._controls = Controls(self._file.alignment, self._file.keep, wish.shows_info)
+            self._controls = Controls(self._file.alignment, self._file.keep, options.shows_info)
             self._inbox = _open_inbox(folder, opened, say)
-            self._fallbacks = Fallbacks(OF_THE_PROJECTOR)
-            self._health = ProcessHealthWriter(folder, "projector", self._fallbacks)
+            self.fallbacks = Fallbacks(OF_THE_PROJECTOR)
+            self._health = ProcessHealthWriter(folder, "projector", self.fallbacks)
             opened.callback(self._health.close)
-            self._reader = FrameReader(folder)
-            opened.callback(self._reader.close)
+            self.reader = FrameReader(folder)
+            opened.callback(self.reader.close)
             self._show_state = ShowStateReader(folder)
             opened.callback(self._show_state.close)
-            self._projector = Projector(
-                self._context.gl, config, self._reader, self._show_state, self._controls, say
+            self.projector = Projector(
+                self.context.gl, config, self.reader, self._show_state, self._controls, say
             )
-            opened.callback(self._projector.release)
+            opened.callback(self.projector.release)
             self._closing = opened.pop_all()
         rate = config.rate or self._window.display_rate or USUAL_RATE
         self._pacing = Pacing(rate, self._window.set_pace(config.vsync))
@@ -91,13 +91,13 @@ class Run:
         self._meter = Meter()
         self._patience = Patience()
         self._lines: tuple[str, ...] = ()
-        self._warned = not self._context.is_software
+        self._warned = not self.context.is_software
 
     def introduction(self) -> list[str]:
         """What a technician should know at the start."""
         width, height = self._window.size
         lines = [
-            f"The picture is {width}x{height} ({self._window.driver}, {self._context.renderer}). "
+            f"The picture is {width}x{height} ({self._window.driver}, {self.context.renderer}). "
             f"Its alignment is kept in {self._file.path}.",
             *self._file.overrides(),
         ]
@@ -116,7 +116,7 @@ class Run:
         notifier = notifier or Notifier({})
         try:
             with guarded(
-                self._patience, lambda: self._projector.is_preparing, end_process, is_well=notifier.ping
+                self._patience, lambda: self.projector.is_preparing, end_process, is_well=notifier.ping
             ):
                 self._show_pictures(stopped, notifier)
             self._health.end(time.monotonic())
@@ -136,8 +136,8 @@ class Run:
     def _show_pictures(self, stopped: Callable[[], bool], notifier: Notifier) -> None:
         begun = reported = time.monotonic()
         while not stopped() and not self._controls.is_over:
-            now = self._pacing.next()
-            if self._wish.seconds is not None and now - begun >= self._wish.seconds:
+            now = self._pacing.wait_for_next()
+            if self._options.seconds is not None and now - begun >= self._options.seconds:
                 return
             self._press_keys()
             self._carry_out_orders()
@@ -146,27 +146,27 @@ class Run:
                 notifier.ready("The display shows pictures.")
             if now - reported >= _REPORT_S:
                 reported = now
-                self._report(now)
+                self.report(now)
 
     def _show(self, now: float) -> None:
-        screen, size, begun = self._context.gl.screen, self._window.size, time.monotonic()
+        screen, size, begun = self.context.gl.screen, self._window.size, time.monotonic()
         lines = self._lines if self._controls.shows_info else ()
-        left_stage = self._projector.draw(now, screen, size, lines, self._resolution.share)
-        if self._wish.frames is not None:
-            self._write_png(self._wish.frames, screen.read(viewport=(0, 0, *size), components=4), size)
-        self._context.finish()  # else the driver queues pictures, each one older
+        left_stage = self.projector.draw(now, screen, size, lines, self._resolution.share)
+        if self._options.frames is not None:
+            self._write_png(self._options.frames, screen.read(viewport=(0, 0, *size), components=4), size)
+        self.context.finish()  # else the driver queues pictures, and each is older when shown
         drawn = time.monotonic()
         self._window.show()
         swapped = time.monotonic()
-        self._patience.swapped(swapped)
-        self._meter.shown(swapped, left_stage)
-        look = self._projector.shown if left_stage is not None else None
-        if self._resolution.drawn(drawn, drawn - begun, look):
+        self._patience.note_swap(swapped)
+        self._meter.note_swap(swapped, left_stage)
+        look = self.projector.shown if left_stage is not None else None
+        if self._resolution.note_picture(drawn, drawn - begun, look):
             self._report_resolution()
         self._check_context()
 
     def _report_resolution(self) -> None:
-        """Say it once; afterwards the figures show it."""
+        """Report it once; afterwards the figures show it."""
         if not self._is_resolution_said:
             self._is_resolution_said = True
             rate = 1.0 / self._pacing.period_s
@@ -204,10 +204,10 @@ class Run:
                 return
             self._inbox.answer(order, *self._controls.carry_out(order))
 
-    def _report(self, now: float) -> None:
+    def report(self, now: float) -> None:
         """Once a second."""
         figures = self._meter.figures()
-        state = self._reader.state(now)
+        state = self.reader.state(now)
         width, height = self._window.size
         share = self._resolution.share
         self._publish_health(now, state, share)
@@ -218,23 +218,23 @@ class Run:
             f"frame age {age}",
             f"stage {state}",
             f"look {self._show_state.read().look or 'of the show'}",
-            f"{width}x{height}{drawn_at} {'software' if self._context.is_software else self._window.driver}",
+            f"{width}x{height}{drawn_at} {'software' if self.context.is_software else self._window.driver}",
         )
-        if self._wish.shows_info:
+        if self._options.shows_info:
             self._say(f"{figures.sentence()}, {width}x{height}{drawn_at}, stage {state}")
         if not self._warned and figures.dances >= _JUDGED_AFTER:
             self._warned = True
-            self._say(about_software(figures.rate, 1.0 / self._pacing.period_s, self._context.renderer))
+            self._say(about_software(figures.rate, 1.0 / self._pacing.period_s, self.context.renderer))
 
     def _publish_health(self, now: float, stage: str, share: float) -> None:
-        """For the box's other processes; a stage that was never seen does not count as away."""
-        if self._reader.facts is not None:
-            self._fallbacks.set(STAGE_UNSEEN.name, stage != "fresh" and not self._projector.sees_stage)
-        self._fallbacks.set(PICTURES_SMALLER.name, share < 1.0)
+        """Publish for the box's other processes; a stage that was never seen does not count as away."""
+        if self.reader.facts is not None:
+            self.fallbacks.set(STAGE_UNSEEN.name, stage != "fresh" and not self.projector.sees_stage)
+        self.fallbacks.set(PICTURES_SMALLER.name, share < 1.0)
         self._health.publish_health(now)
 
     def _check_context(self) -> None:
-        if self._context.is_lost:
+        if self.context.is_lost:
             raise ProjectorError(
                 "The graphics card was reset, and all that was on it is gone. The audience sees black; the "
                 "dance goes on. Start the projector again (a supervisor does it by itself); if it happens "
@@ -244,7 +244,7 @@ class Run:
 
 
 def _open_inbox(folder: Path, opened: ExitStack, say: Callable[[str], None]) -> OrderInbox | None:
-    """Where orders by OSC arrive. Without them keys still work, and the dance is shown all the same."""
+    """The inbox for orders by OSC; without it keys still work, and the dance is shown."""
     try:
         opened.callback(Claim(folder, "projector").close)
         inbox = OrderInbox(folder, "projector")

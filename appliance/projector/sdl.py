@@ -1,4 +1,4 @@
-"""SDL2 without what its Python package says on the terminal about where the library comes from."""
+"""SDL2, without its Python package's message about the library's origin on the terminal."""
 
 from __future__ import annotations
 

@@ -35,10 +35,10 @@ def moment_of(recording: Recording, time_s: float, held: Sequence[int] = ()) -> 
     )
 
 
-def drawn(
+def draw_still(
     ctx: moderngl.Context, renderer: Renderer, moment: Moment, look: str, size: tuple[int, int]
 ) -> Image:
-    """One look of a moment as an image (height, width, 3), the upper row first."""
+    """Draw one look of a moment: an image (height, width, 3), top row first."""
     target = ctx.framebuffer([ctx.texture(size, 4)])
     try:
         target.clear()
@@ -50,8 +50,8 @@ def drawn(
     return pixels[::-1, :, :3].copy()
 
 
-def shrunk(image: Image) -> Image:
-    """An image drawn FINER times as large as it is wanted: each pixel the mean of those in its place."""
+def shrink(image: Image) -> Image:
+    """Shrink an image drawn FINER times too large: each pixel is the mean of those in its place."""
     height, width = image.shape[0] // FINER, image.shape[1] // FINER
     fine = image.reshape(height, FINER, width, FINER, 3)
     return np.asarray(fine.mean(axis=(1, 3)).round(), np.uint8)

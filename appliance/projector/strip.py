@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.context import offscreen
 from appliance.projector.moment import Moment
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
-from appliance.projector.still import FINER, Image, drawn, moment_of, shrunk
+from appliance.projector.still import FINER, Image, draw_still, moment_of, shrink
 from appliance.show.look import LookConfig
 
 COLUMNS, ROWS = 5, 2
@@ -23,25 +22,18 @@ VIGNETTE = 0.0  # pictures side by side need no black around them
 COLOURS = 256  # in the file: 160 kB instead of 800, and no more than 2 of 255 off
 
 
-def strip(
-    out: Path,
-    skeleton: Skeleton,
-    looks: Mapping[str, LookConfig],
-    look: str,
-    poses: Array,
-    roots: Array,
-    fps: float,
-    held: Sequence[int] = (),
+def render_strip(
+    out: Path, recording: Recording, looks: Mapping[str, LookConfig], look: str, held: Sequence[int] = ()
 ) -> Path:
-    """Draw ten instants at equal distances, the last one at the end, into `out`; returns it.
+    """Render ten instants at equal distances, the last one at the end, into `out`; returns it.
 
-    poses: (N, J, 4) local rotations; roots: (N, 3) metres; held: joints that hands hold.
-    Raises ProjectorError where nothing can be drawn here, OSError where `out` cannot be written.
+    held: joints that hands hold. Raises ProjectorError where nothing can be rendered here, OSError where
+    `out` cannot be written.
     """
-    recording = Recording(skeleton, poses, roots, fps)
     chosen = np.unique(np.linspace(0, len(recording) - 1, COLUMNS * ROWS + 1)[1:].round().astype(int))
-    moments = [moment_of(recording, last / fps, held) for last in chosen.tolist()]
-    pictures = list(_drawn(skeleton, {name: _framed(one) for name, one in looks.items()}, look, moments))
+    moments = [moment_of(recording, last / recording.fps, held) for last in chosen.tolist()]
+    framed = {name: _framed(one) for name, one in looks.items()}
+    pictures = list(_render(recording.skeleton, framed, look, moments))
     pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % COLUMNS)
     rows = [np.hstack(pictures[at : at + COLUMNS]) for at in range(0, len(pictures), COLUMNS)]
     _save(out, np.vstack(rows))
@@ -55,7 +47,7 @@ def _framed(look: LookConfig) -> LookConfig:
     return look.model_copy(update={"camera": camera, "vignette": VIGNETTE})
 
 
-def _drawn(
+def _render(
     skeleton: Skeleton, looks: Mapping[str, LookConfig], look: str, moments: Sequence[Moment]
 ) -> Iterator[Image]:
     """Pictures (height, width, 3), top row first."""
@@ -63,7 +55,7 @@ def _drawn(
     with offscreen(size) as gl:
         renderer = Renderer(gl, size, skeleton, looks)
         for moment in moments:
-            yield shrunk(drawn(gl, renderer, moment, look, size))
+            yield shrink(draw_still(gl, renderer, moment, look, size))
         renderer.release()
 
 

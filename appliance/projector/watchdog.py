@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from appliance.projector.projector_error import GPU_LOST
 
 PATIENCE_S = 5.0
-_LOOK_S = 0.5
+LOOK_S = 0.5
 _STOOD_STILL_S = (
     2.0  # between two checks: this process itself was suspended, by Ctrl-Z or by a machine asleep
 )
@@ -31,7 +31,7 @@ class Patience:
         self._since: float | None = None
         self._looked_at = 0.0
 
-    def swapped(self, now: float) -> None:
+    def note_swap(self, now: float) -> None:
         """The display took a picture."""
         self._since = now
 
@@ -54,11 +54,11 @@ def guarded(
     monotonic: Callable[[], float] = time.monotonic,
     is_well: Callable[[float], None] = lambda now: None,
 ) -> Iterator[None]:
-    """Meanwhile a thread checks, calls `is_well` while pictures are shown, and `give_up` once they hang."""
+    """Run a thread that calls `is_well` while pictures are shown, and `give_up` once they hang."""
     is_done = threading.Event()
 
     def watch() -> None:
-        while not is_done.wait(_LOOK_S):
+        while not is_done.wait(LOOK_S):
             now = monotonic()
             if patience.is_over(now, is_preparing()):
                 give_up()
@@ -75,8 +75,8 @@ def guarded(
 
 
 def end_process() -> None:
-    """Say why, and end at once: a thread that waits for the display receives no signal either."""
-    words = threading.Thread(target=_say, daemon=True)  # a terminal that is stopped may not hold this up
+    """Report why, and end at once: a thread that waits for the display receives no signal either."""
+    words = threading.Thread(target=_say, daemon=True)  # a stopped terminal must not block this
     words.start()
     words.join(_LAST_WORDS_S)
     os._exit(GPU_LOST)

@@ -39,13 +39,13 @@ class Window:
 
     @property
     def size(self) -> Size:
-        """What is drawn onto, pixels; on a dense display more than the window's nominal size."""
+        """The size to draw, pixels; on a dense display more than the window's nominal size."""
         width, height = sdl2.c_int(), sdl2.c_int()
         sdl2.SDL_GL_GetDrawableSize(self.handle, width, height)
         return max(1, width.value), max(1, height.value)
 
     def show(self) -> None:
-        """What was drawn becomes visible; waits for the display where it sets the pace."""
+        """Make the picture visible; waits for the display if that sets the pace."""
         sdl2.SDL_GL_SwapWindow(self.handle)
 
     def set_pace(self, vsync: bool) -> bool:
@@ -81,7 +81,7 @@ class Window:
 
 
 def last_error() -> str:
-    """What SDL complained about last."""
+    """SDL's last error."""
     return sdl2.SDL_GetError().decode(errors="replace") or "no reason given"
 
 
@@ -106,7 +106,7 @@ def _start(kind: Kind) -> str:
 
 
 def _drivers(kind: Kind) -> list[str]:
-    """The display systems to try: SDL by itself would also take one that shows nothing."""
+    """The display systems to try: SDL itself would also accept one that shows nothing."""
     if kind == "offscreen":
         return ["offscreen"]
     chosen = os.environ.get("SDL_VIDEODRIVER")
@@ -162,7 +162,7 @@ def _create(kind: Kind, display: int, size: Size) -> Any:
 
 
 def _rate(display: int) -> float | None:
-    """Pictures a second that the display shows; None when it does not tell."""
+    """The display's pictures a second; None if it does not report them."""
     mode = sdl2.SDL_DisplayMode()
     if sdl2.SDL_GetCurrentDisplayMode(display, mode) != 0 or mode.refresh_rate <= 0:
         return None

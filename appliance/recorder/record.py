@@ -62,7 +62,7 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
     `sensors`: whose readings are noted, in this order. A show that comes with the box has no directory: it
     lies somewhere else on each of them.
     """
-    import onnxruntime  # the stage has it already, and nobody else needs it for a journal
+    import onnxruntime  # loaded in the stage already; no other process needs it for a journal
 
     skeleton, bundled = show.skeleton, show.directory.resolve() == default_show_path().resolve()
     hands = [{"joint": hand.joint, "kind": hand.kind, "sensor": hand.sensor} for hand in show.config.hands]

@@ -157,7 +157,7 @@ def turned(before: Quaternion, after: Quaternion) -> float | None:
 
 
 def with_heading_reset(pose: NeutralPose, reading: Quaternion) -> NeutralPose | None:
-    """The pose for a dancer who faces the front again: without drift, same tilt. None: undefined."""
+    """The pose for a dancer facing the front again: without drift, same tilt. None: undefined."""
     drift = turned(pose.orientation, reading)
     return None if drift is None else replace(pose, heading=drift)
 

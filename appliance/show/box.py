@@ -61,7 +61,7 @@ def out_of_reach(sensors: SensorsConfig) -> str | None:
     udp = sensors.udp
     if udp is not None and udp.host == "0.0.0.0":
         return None
-    where = "to no network" if udp is None else f"on {udp.host} alone, and they call everybody on the network"
+    where = "to no network" if udp is None else f"on {udp.host} alone, and their hello is a broadcast"
     if udp is not None and udp.host.startswith("127."):
         where = "to this machine alone"
     port = udp.port if udp is not None and udp.port else UdpConfig().port
@@ -178,7 +178,7 @@ class BoxConfig(Section):
         return None if self._file is None else self._file.path
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, BoxConfig) and dict(self) == dict(other)  # from whichever file
+        return isinstance(other, BoxConfig) and dict(self) == dict(other)  # wherever it was read from
 
     @property
     def state_folder(self) -> Path | None:

@@ -13,7 +13,7 @@ from appliance.pose.foreign_file import content, opened, require_inside
 from appliance.show.config_error import Problem
 
 CHECKSUMS = "SHA256SUMS"
-WORKSHOP = ("checkpoint.pt", "training.json", "pictures")  # a training leaves them there: no part of the show
+WORKSHOP = ("checkpoint.pt", "training.json", "pictures")  # left there by a training: no part of the show
 LARGEST_FILE = 400_000_000  # bytes; a network has some 3 MB, a phrase some 5
 MOST_FILES = 4000
 LARGEST_CHECKSUMS = 1 << 20

@@ -1,4 +1,4 @@
-"""Is a show bundle whole and consistent? Everything that can be said without dancing it."""
+"""Is a show bundle complete and consistent? All checks that need no dancing."""
 
 from __future__ import annotations
 

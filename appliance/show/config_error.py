@@ -37,9 +37,9 @@ class ConfigError(ValueError):
 
 
 class NotAskedForError(ConfigError):
-    """Something is started that this box file or show has no use for; to try again does not help."""
+    """Something was started that this box file or show has no use for; trying again does not help."""
 
-    exit_status = os.EX_CONFIG  # 78: its unit ends with it, and systemd leaves it so
+    exit_status = os.EX_CONFIG  # 78: systemd does not restart a unit that ends with it
 
 
 def nearest(word: object, known: Sequence[str]) -> str | None:

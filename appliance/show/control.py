@@ -48,11 +48,11 @@ class ControlConfig(Section):
     )
 
     @model_validator(mode="after")
-    def _open_to_somebody(self) -> ControlConfig:
+    def _open_to_a_sender(self) -> ControlConfig:
         if not self.host.startswith("127.") and not self.senders:
             raise refusal(
-                f"Commands are heard on {self.host}, but from nobody: no senders are listed.",
-                "List who may command the box, like `senders: [192.168.0.20]` or a whole network "
+                f"Commands are heard on {self.host}, but no sender may command the box.",
+                "List the senders, like `senders: [192.168.0.20]` or a whole network "
                 "`[192.168.0.0/24]`; or listen on 127.0.0.1 for this machine alone.",
                 at="host",
             )

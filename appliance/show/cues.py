@@ -59,7 +59,7 @@ class CueConfig(Section):
 def cue_problems(
     cues: Sequence[CueConfig], known: Mapping[str, Sequence[str]], file: YamlFile
 ) -> Iterator[Problem]:
-    """What cues name that the show has not, and names that stand twice, each with its line.
+    """Names in cues that the show does not have, and cues with the same name, each with its line.
 
     `known`: which names there are for the keys phrase, hands, look and lights of a cue.
     """

@@ -127,7 +127,7 @@ class DmxConfig(Section):
 
     @property
     def destination(self) -> tuple[object, ...]:
-        """What no second entry may have: a light that receives both cannot tell them apart."""
+        """What two entries must not share: a light that receives both cannot tell them apart."""
         if self.wire in NUMBERS:
             host = self.host or ("127.0.0.1" if self.wire == "artnet" else "multicast")
             return (self.wire, host, self.udp_port, self.number_on_wire, self.interface)

@@ -124,7 +124,7 @@ class ProfileConfig(Section):
 
 
 def base(attribute: str) -> str:
-    """'red' for 'red 2': what the attribute is, of whichever cell."""
+    """'red' for 'red 2': the attribute without the number of its cell."""
     name, _, number = attribute.rpartition(" ")
     return name if name and number.isdigit() else attribute
 

@@ -35,7 +35,7 @@ def inspect_network(path: Path, skeleton_joints: Sequence[str]) -> tuple[list[st
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4
     try:
-        # As bytes: a network cannot name other files then, whose contents would be read as weights.
+        # As bytes: so a network cannot have other files read as its weights.
         network = content(path, LARGEST_FILE)
         session = onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
         facts: dict[str, str] = session.get_modelmeta().custom_metadata_map  # its words need be no text

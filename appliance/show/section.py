@@ -62,7 +62,7 @@ def refusal(
 
 
 def refuse_repeats(values: Sequence[object], message: str, cure: str) -> None:
-    """Raise for the first value that stands twice; the message may name {value}, {first} and {place}."""
+    """Raise for the first repeated value; the message may name {value}, {first} and {place}."""
     for place, value in enumerate(values):
         if value in values[:place]:
             words = message.format(value=value, first=values.index(value), place=place)

@@ -198,9 +198,9 @@ class Show:
             raise ConfigError(problems)
 
     def idle_hands(self) -> list[Problem]:
-        """Where hands hold joints and no iteration is interactive, so that they move nothing.
+        """Places where hands hold joints although no iteration is interactive: they move nothing.
 
-        A show may begin like this on purpose, so it is a warning. A cue that lets hands go says `hands: []`.
+        A show may begin like this on purpose, so this is a warning. A cue without hands says `hands: []`.
         """
         if not self.config.hands:
             return []

@@ -15,7 +15,7 @@ from appliance.show.config_error import ConfigError, Problem
 
 MAX_BYTES = 256 * 1024  # a long show file has some 2 kB
 _DEEPEST = 32
-_LARGEST_NUMBER = 1 << 63  # 60:60:... and 0xff... may have so many digits that Python does not print them
+_LARGEST_NUMBER = 1 << 63  # 60:60:... and 0xff... can have more digits than Python prints
 _BARE_COLOUR = re.compile(r"[:\[,]\s+#[0-9a-fA-F]{3}")
 _TIMESTAMP = "tag:yaml.org,2002:timestamp"
 _TAGS = {
@@ -46,7 +46,7 @@ class YamlFile:
 
 
 def read_yaml(path: Path, inside: Path | None = None) -> YamlFile:
-    """Read one document whose top level has keys. inside: the folder out of which no link may lead.
+    """Read one document whose top level has keys. inside: the folder that links must not leave.
 
     Raises ConfigError: file missing or unreadable, not YAML, a key written twice, anchors, too large.
     """
@@ -86,7 +86,7 @@ def _read_text(path: Path, inside: Path | None) -> str:
 
 
 def _not_yaml(path: Path, text: str, error: yaml.MarkedYAMLError) -> ConfigError:
-    """The three slips that are made most, in plain words; all others in those of the YAML library."""
+    """The three most common mistakes in plain words; all others in those of the YAML library."""
     mark, start = error.problem_mark or error.context_mark, error.context_mark
     line = mark.line + 1 if mark else 1
     why = error.problem or "it breaks off"
@@ -112,7 +112,7 @@ def _refused(path: Path, line: int, why: str, cure: str = "") -> ConfigError:
 
 
 class _ShallowLoader(yaml.SafeLoader):
-    """Gives up on a depth that no show has, for which the library takes seconds."""
+    """Refuses a depth that no show has and for which the library takes seconds."""
 
     _depth = 0
 

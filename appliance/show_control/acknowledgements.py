@@ -9,7 +9,7 @@ from typing import NamedTuple
 from appliance.show_control import order_dispatch
 from appliance.show_control.stage_observer import StageObserver
 
-EVERY_S = 0.005  # how often the report is read while somebody waits for it
+EVERY_S = 0.005  # how often the report is read while a client waits for it
 
 _SILENT = (
     "The stage does not answer. The dance follows as soon as it is back; a stage that hangs is restarted by "

@@ -37,7 +37,7 @@ class Number(NamedTuple):
 class Form(NamedTuple):
     """What an address takes: `text` says what its first argument names (empty: nothing), then numbers.
 
-    may_be_nameless: the text may be left out. optional: so many of the last numbers may be.
+    may_be_nameless: the text may be left out. optional: how many of the last numbers may be left out.
     """
 
     text: str = ""

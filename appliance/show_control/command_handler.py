@@ -36,7 +36,7 @@ REPLY, SENSORS_REPLY, PONG = "/reply", "/sensors/reply", "/pong"
 _ANSWERS = frozenset((REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END))
 _LISTED = ("/cues/", "/phrases/", "/looks/", "/hands/", "/fallbacks/")
 _ONCE_A_BUNDLE = frozenset((*QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
-_STREAMS = ("/player/", "/mocap/")  # answered only when refused, or when nobody carried them out
+_STREAMS = ("/player/", "/mocap/")  # answered only when refused or not carried out
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
 
 ORDERS: Mapping[str, tuple[Place, str]] = {

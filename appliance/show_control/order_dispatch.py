@@ -19,7 +19,7 @@ AT_ONCE, EVERY_S = 4, 0.02  # four orders a tick at most: a flood cannot touch t
 Then = Callable[[bool, str], None]  # gets whether an order was done, and a sentence
 
 _SILENT = {
-    "stage": "The stage does not answer, and nothing is changed. If it hangs, it is started anew by itself "
+    "stage": "The stage does not answer, and nothing is changed. If it hangs, it restarts by itself "
     "or with: bunraku play.",
     "projector": "The projector does not answer, and nothing is changed.",
     "lights": "The lights do not answer, and nothing is changed.",

@@ -31,7 +31,7 @@ def messages_in(received: bytes) -> list[tuple[str, list[object]]]:
     messages: list[tuple[str, list[object]]] = []
     for element in _elements(received, 0):
         if len(messages) == MOST_MESSAGES:
-            raise ValueError(f"A bundle of so many messages is too long: send {MOST_MESSAGES} at most.")
+            raise ValueError(f"A bundle may hold at most {MOST_MESSAGES} messages. Split it.")
         messages.append(_message(element))
     return messages
 
@@ -48,7 +48,7 @@ def datagram(message: Message) -> bytes:
 
 
 def readable(text: str) -> str:
-    """What may be shown on a terminal, whoever sent it: no control characters."""
+    """The text without control characters, safe to show on a terminal."""
     return "".join(sign if sign.isprintable() else "?" for sign in text)
 
 

@@ -59,7 +59,7 @@ class Port:
             received, sender = self._socket.recvfrom(LARGEST_DATAGRAM + 1)
         except BlockingIOError:
             return None
-        except OSError:  # the kernel reports that an earlier reply reached nobody
+        except OSError:  # the kernel reports that an earlier reply found no listener
             return b"", ("", 0)
         if not self._may_command(sender[0]):
             self.strangers += 1

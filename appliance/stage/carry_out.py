@@ -56,7 +56,7 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
 
 
 def obey_for_sensors(order: Order, parts: StageParts, wearing: SensorFit, now: float) -> Outcome:
-    """Carry out one of SENSOR_ORDERS: whether it was done, and a sentence for who asked."""
+    """Carry out one of SENSOR_ORDERS: whether it was done, and a sentence for the client."""
     sensor = str(order.text)
     try:
         if order.name == "reload":

@@ -55,7 +55,7 @@ class PhaseLock:
         self.arrivals += 1
 
     def forget(self) -> None:
-        """The sensor fell silent: run free from where the grid stands, and learn anew when it returns."""
+        """The sensor fell silent: run free on the present grid, and relearn the phase on its return."""
         self.arrivals = 0
         self.error_s = 0.0
 

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 FILE, KIND, FORMAT = "journal", "journal", 1  # in the runtime folder
 RINGS = 3
 FACTS, LOG, KEYFRAMES = range(RINGS)  # of the file
-LOG_SLOTS = 4096  # 80 s: so long the disk may hang before a tick is missing in the journal
+LOG_SLOTS = 4096  # 80 s: how long the disk may hang before the journal loses a tick
 KEYFRAME_TICKS = 500  # from one keyframe to the next
 KEYFRAME_SLOTS = 1 + LOG_SLOTS // KEYFRAME_TICKS
-KEYFRAME_BYTES, KEYFRAME_JOINT_BYTES = 1 << 14, 1 << 9  # and so many more for each joint
+KEYFRAME_BYTES, KEYFRAME_JOINT_BYTES = 1 << 14, 1 << 9  # and for each joint
 EVENT_BYTES = 1024
 ENTRY = struct.Struct("<Q")  # kind of an entry of the log; then the tick's record, or the event as JSON
 
@@ -55,7 +55,7 @@ class Recorder:
 
     @property
     def wants_keyframe(self) -> bool:
-        """Whether the last keyframe is so long ago that the next one is due."""
+        """Whether the next keyframe is due."""
         return self._ticks >= KEYFRAME_TICKS
 
     def note_tick(self, slot: Slot, tick: Tick, flags: int) -> None:

@@ -39,7 +39,7 @@ _FIRST_FRAME_IN_S = 0.001
 _LONGEST_WARM_UP_MS = 3.0  # a network this heavy comes from memory each time: warming it up gains nothing
 _HUNG_SLOTS = 3  # skipped before a tick: what sensors sent meanwhile may not all be heard in it
 _LONGEST_TICK_S = 0.1  # held up for longer, a tick knows too little of the sensors to take an order
-_FORGET_PHASE_S = 5.0  # a sensor silent for longer may come back anywhere: the phase is learnt anew
+_FORGET_PHASE_S = 5.0  # a sensor silent for longer may return at any phase: it is learned again
 
 
 class Stage:

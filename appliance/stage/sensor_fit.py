@@ -67,7 +67,7 @@ class SensorFit:
         wearer.stillness.add_reading(reading.orientation, reading.arrival)
 
     def look(self, now: float) -> None:
-        """After the frame: take the neutral poses of those who stand still, and say what happened."""
+        """After the frame: take the neutral pose of each sensor that is at rest, and report it."""
         for wearer in self._wearers.values():
             if wearer.needs_still_s and wearer.stillness.still_s >= wearer.needs_still_s:
                 self._take(wearer)
@@ -159,7 +159,7 @@ class SensorFit:
             for hand in wearer.hands
         )
         self._wear(wearer, poses)
-        what = "'s IMU started anew" if reading.boot_nonce == before.boot_nonce else " is on again"
+        what = "'s IMU restarted" if reading.boot_nonce == before.boot_nonce else " is on again"
         self._news.append(
             f"Sensor {wearer.name}{what}: its joint goes on where it was. "
             "If it stands askew: a double tap on the sensor, then stand still."
@@ -211,7 +211,7 @@ class SensorFit:
             self._memory.keep_neutral(wearer.name, taken)
 
     def _asked(self, sensor: str | None, now: float) -> list[tuple[SensorBinding, SensorReading]]:
-        """The sensors that a person means, with a fresh reading: who is silent shows nothing to go by."""
+        """The sensors that a command means and that have a fresh reading; silent ones have no pose."""
         wearers = (self._wearers[name] for name in self.named(sensor))
         return [
             (wearer, wearer.reading)

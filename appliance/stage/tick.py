@@ -148,7 +148,7 @@ class Tick:
     def _stand(self) -> None:
         """Put the pose on the floor and into the world."""
         parts, frame, motion = self.parts, self.frame, self.parts.motion
-        figure = parts.grounding.stand(frame.pose, motion.roots()[0], motion.lift, motion.rest_heights)
+        figure = parts.grounding.ground_pose(frame.pose, motion.roots()[0], motion.lift, motion.rest_heights)
         frame.world[:] = figure.world
         frame.positions[:] = figure.positions
         frame.root[:] = parts.grounding.root

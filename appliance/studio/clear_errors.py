@@ -1,4 +1,4 @@
-"""What people can mend is one clear message and exit status 2, for every command of the studio."""
+"""An error that the artist can fix is one message and exit status 2, for every command of the studio."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from contextlib import contextmanager
 
 import typer
 
-REFUSED, INTERRUPTED = 2, 130
+REFUSED, INTERRUPTED = 2, 130  # exit statuses
 
 
 @contextmanager
 def clear_errors(command: str) -> Iterator[None]:
-    """What people can mend is one message and status 2."""
+    """Turn an error that the artist can fix into one message and exit status 2."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -41,6 +41,6 @@ def _is_for_people(error: Exception) -> bool:
     )
 
 
-def _refuse(words: str) -> None:
-    print(f"bunraku: {words}", file=sys.stderr)
+def _refuse(message: str) -> None:
+    print(f"bunraku: {message}", file=sys.stderr)
     raise typer.Exit(REFUSED)

@@ -1,4 +1,7 @@
-"""`bunraku train`, `evaluate`, `export` and `improvise`: from a dancer's recordings to a show."""
+"""The studio's commands, from a dancer's recordings to a show; those with a module of their own join last.
+
+Only this module loads with the command line; what needs torch is imported by the command that runs.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,14 @@ from typing import Annotated
 
 import typer
 
-from appliance.studio import experiment_command, granular_command, improvise_command
+from appliance.studio import experiment_command, granular_command
 from appliance.studio.clear_errors import INTERRUPTED, clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
 
 class NetworkName(StrEnum):
-    """Architectures, as networks.NETWORKS has them."""
+    """Architectures, by their names in architectures.NETWORKS."""
 
     conditional = "conditional"
     mlp = "mlp"
@@ -36,50 +39,46 @@ class Device(StrEnum):
 Recordings = Annotated[Path | None, typer.Option(help="Folder with the dancer's BVH recordings.")]
 Phrase = Annotated[
     Path | None,
-    typer.Option(help="BVH that the show plays; left out: the folder's own, else an excerpt of a recording."),
+    typer.Option(help="BVH that the show plays. Default: the one in --out, else an excerpt of a recording."),
 ]
 
 
 @app.command()
 def train(
-    out: Annotated[Path, typer.Option(help="Folder of the show that comes out of it.")],
+    out: Annotated[Path, typer.Option(help="Folder for the show.")],
     recordings: Recordings = None,
     network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.conditional,
-    minutes: Annotated[
-        float | None, typer.Option(min=0.01, help="How long to train.", show_default="45")
-    ] = None,
-    steps: Annotated[int | None, typer.Option(min=1, help="How many steps, instead of minutes.")] = None,
-    seed: Annotated[int, typer.Option(help="The same seed and steps give the same network.")] = 1,
-    latent: Annotated[int, typer.Option(min=0, help="Size of the latent; 0: the architecture's.")] = 0,
-    width: Annotated[int, typer.Option(min=0, help="Width of the layers; 0: the architecture's.")] = 0,
-    depth: Annotated[int, typer.Option(min=0, help="Blocks of an mlp; 0: its own.")] = 0,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the training in --out.")] = False,
-    threads: Annotated[int, typer.Option(min=0, help="Processor cores to use; 0: all.")] = 0,
-    device: Annotated[Device, typer.Option(help="auto: the GPU if there is one.")] = Device.auto,
+    minutes: Annotated[float | None, typer.Option(min=0.01, help="Training time.", show_default="45")] = None,
+    steps: Annotated[int | None, typer.Option(min=1, help="Training steps, instead of --minutes.")] = None,
+    seed: Annotated[int, typer.Option(help="The same seed and number of steps give the same network.")] = 1,
+    latent: Annotated[int, typer.Option(min=0, help="Size of the latent. 0: as the network has it.")] = 0,
+    width: Annotated[int, typer.Option(min=0, help="Width of the layers. 0: as the network has it.")] = 0,
+    depth: Annotated[int, typer.Option(min=0, help="Blocks of conditional and mlp. 0: the default.")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the training in --out.")] = False,
+    threads: Annotated[int, typer.Option(min=0, help="CPU cores to use. 0: all.")] = 0,
+    device: Annotated[Device, typer.Option(help="auto: the GPU, if there is one.")] = Device.auto,
     catalogue: Annotated[
-        Path | None, typer.Option(help="YAML: true rates, takes, what is held out; see docs/training.md.")
+        Path | None, typer.Option(help="YAML: true rates, takes, held-out files; see docs/training.md.")
     ] = None,
     held_out: Annotated[
-        list[str] | None, typer.Option(help="Files to measure on, not to learn from ('solo_*'); repeatable.")
+        list[str] | None, typer.Option(help="Files to measure on, not to train on ('solo_*'); repeatable.")
     ] = None,
     true_fps: Annotated[
-        list[str] | None, typer.Option(help="PATTERN=FPS where a header is wrong ('salsa_*=60'); repeatable.")
+        list[str] | None, typer.Option(help="PATTERN=FPS if the header is wrong ('salsa_*=60'); repeatable.")
     ] = None,
     keep: Annotated[
         list[str] | None,
-        typer.Option(help="Files in which nothing is a capture error ('solo_*'); repeatable."),
+        typer.Option(help="Files without capture errors, whatever they look like ('solo_*'); repeatable."),
     ] = None,
     phrase: Phrase = None,
-    name: Annotated[
-        str | None, typer.Option(help="What the show is called; left out: as its folder.")
-    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the show. Default: the folder's name.")] = None,
 ) -> None:
-    """Train a dancer on recordings; at the end --out is a show that can be played."""
+    """Train a dancer on recordings and write a show that can be played to --out."""
     with clear_errors("train"):
         from appliance.studio import train_command
 
         done = train_command.run(
-            train_command.Wish(
+            train_command.TrainOptions(
                 out=out,
                 recordings=recordings,
                 network=network.value,
@@ -109,35 +108,35 @@ def evaluate(
     network: Annotated[Path, typer.Argument(help="Show folder, puppet.onnx or checkpoint.pt.")],
     recordings: Annotated[list[Path], typer.Argument(help="BVH recordings with the same joint names.")],
     true_fps: Annotated[
-        float | None, typer.Option(min=1, help="Rate of the recordings where their headers are wrong.")
+        float | None, typer.Option(min=1, help="Rate of the recordings if their headers are wrong.")
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Figures as JSON on standard output.")] = False,
-    all_frames: Annotated[bool, typer.Option("--all-frames", help="Measure on glitches too.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
+    all_frames: Annotated[bool, typer.Option("--all-frames", help="Measure on capture errors too.")] = False,
     hands: Annotated[
         list[Path] | None,
-        typer.Option(help="BVH of another take: its joints hold the puppet's, one by one; repeatable."),
+        typer.Option(help="BVH of another take, whose joints hold the puppet's one by one; repeatable."),
     ] = None,
     reference: Annotated[
-        Path | None, typer.Option(help="Folder of the training takes: what the dancer ever did.")
+        Path | None, typer.Option(help="Folder of the training takes: all that the dancer did.")
     ] = None,
     joint: Annotated[
         list[str] | None,
-        typer.Option(help="Joint to hold; repeatable; left out: arms, head, chest and a thigh."),
+        typer.Option(help="Joint to hold; repeatable. Default: arms, head, chest and a thigh."),
     ] = None,
     iterations: Annotated[
         list[str] | None,
-        typer.Option(help="K/J, coding and interaction iterations; repeatable; left out: 1/1 to 30/29."),
+        typer.Option(help="K/J, coding and interaction iterations; repeatable. Default: 1/1 to 30/29."),
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option(help="PNG: the phrase, the arm pasted on, the dancer's answer.")
+        Path | None, typer.Option(help="PNG to draw: the phrase, the arm pasted on, the dancer's answer.")
     ] = None,
 ) -> None:
-    """Measure how well a network knows a dance, and with --hands whether its body answers a held joint."""
+    """Measure how well a network reproduces a dance and, with --hands, whether its body answers a hand."""
     with clear_errors("evaluate"):
         from appliance.studio import evaluate_command
 
         evaluate_command.run(
-            evaluate_command.Wish(
+            evaluate_command.EvaluateOptions(
                 network=network,
                 recordings=recordings,
                 true_fps=true_fps,
@@ -155,20 +154,59 @@ def evaluate(
 @app.command()
 def export(
     checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a training.")],
-    out: Annotated[Path, typer.Option(help="Folder of the show; what the artist wrote there stays.")],
+    out: Annotated[Path, typer.Option(help="Folder of the show; show.yaml and phrase.bvh in it are kept.")],
     recordings: Recordings = None,
     phrase: Phrase = None,
-    name: Annotated[
-        str | None, typer.Option(help="What the show is called; left out: as its folder.")
-    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the show. Default: the folder's name.")] = None,
 ) -> None:
-    """Make a show of a checkpoint: network file, quantization gate, report, skeleton, phrase, checksums."""
+    """Turn a checkpoint into a show: network file, quantization gate, report, skeleton, phrase, checksums."""
     with clear_errors("export"):
         from appliance.studio import export_command
 
         export_command.run(checkpoint, out, recordings, phrase, name)
 
 
-app.add_typer(improvise_command.app)
+@app.command()
+def improvise(
+    checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a training: the pose autoencoder.")],
+    out: Annotated[Path, typer.Option(help="The phrase, a BVH file; report and picture go beside it.")],
+    recordings: Annotated[
+        Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=2.0, max=600.0, help="Approximate length.")] = 90.0,
+    seed: Annotated[int, typer.Option(help="Another seed gives another dance.")] = 1,
+    minutes: Annotated[float, typer.Option(min=0.01, help="Training time of the improviser.")] = 12.0,
+    steps: Annotated[int, typer.Option(min=0, help="Training steps, instead of --minutes.")] = 0,
+    temperature: Annotated[
+        float, typer.Option(min=0.05, max=2.0, help="1: as free as the training; less: closer to habits.")
+    ] = 1.2,
+    dances: Annotated[int, typer.Option(min=1, help="How many dances to choose the phrase from.")] = 16,
+    dance_minutes: Annotated[float, typer.Option(min=0.05, help="Length of each dance.")] = 4.0,
+    threads: Annotated[int, typer.Option(min=0, help="CPU cores to use. 0: all.")] = 0,
+) -> None:
+    """Train an improviser on a dancer's recordings and let it make an endless phrase.
+
+    The improviser is stored beside the phrase. The same command again continues its training; once trained,
+    it only dances, and another --seed gives another phrase.
+    """
+    with clear_errors("improvise"):
+        from appliance.studio.improviser import improvisation
+        from appliance.studio.improviser.phrase import PhraseOptions
+
+        done = improvisation.run(
+            improvisation.ImproviseOptions(
+                checkpoint=checkpoint,
+                out=out,
+                recordings=recordings,
+                minutes=minutes,
+                steps=steps,
+                threads=threads,
+                phrase=PhraseOptions(seconds, seed, temperature, dances, dance_minutes),
+            )
+        )
+    if not done:
+        raise typer.Exit(INTERRUPTED)
+
+
 app.add_typer(experiment_command.app)
 app.add_typer(granular_command.app)

@@ -13,7 +13,7 @@ from rich.progress import Progress, track
 from rich.table import Table
 
 from appliance.studio.data.dataset import Take, load_dataset
-from appliance.studio.evaluation import puppetry, puppetry_words
+from appliance.studio.evaluation import puppetry, puppetry_report
 from appliance.studio.evaluation.answer_picture import draw_answer
 from appliance.studio.evaluation.coders import Coder, open_coder
 from appliance.studio.evaluation.evaluation import Evaluation, evaluate, fitting_hop, load_takes
@@ -25,7 +25,7 @@ from appliance.studio.studio_error import StudioError
 
 
 @dataclass(frozen=True)
-class Wish:
+class EvaluateOptions:
     """The command line of bunraku evaluate."""
 
     network: Path
@@ -40,14 +40,14 @@ class Wish:
     picture: Path | None = None
 
 
-def run(wish: Wish) -> None:
+def run(options: EvaluateOptions) -> None:
     """Measure and print. Figures go to standard output, everything else to standard error."""
     console = Console(stderr=True)
-    iterations = _checked(wish)
-    coder = open_coder(wish.network)
-    joints = _held_joints(coder, wish.joints) if wish.hands else []
-    takes = load_takes(wish.recordings, coder, wish.true_fps, wish.all_frames)
-    hands = load_takes(wish.hands, coder, wish.true_fps, wish.all_frames)
+    iterations = _checked(options)
+    coder = open_coder(options.network)
+    joints = _held_joints(coder, options.joints) if options.hands else []
+    takes = load_takes(options.recordings, coder, options.true_fps, options.all_frames)
+    hands = load_takes(options.hands, coder, options.true_fps, options.all_frames)
     for take in (*takes, *hands):
         console.print(_about(take), highlight=False)
 
@@ -55,35 +55,35 @@ def run(wish: Wish) -> None:
         return track(parts, "coding", count, console=console, transient=True, disable=not console.is_terminal)
 
     answer = {}
-    if wish.reference is not None:
-        measurements = _measurements(console, coder, takes, hands, wish.reference)
+    if options.reference is not None:
+        measurements = _measurements(console, coder, takes, hands, options.reference)
         answer = _answer(console, measurements, joints, iterations)
-        if wish.picture is not None:
+        if options.picture is not None:
             usual = puppetry.usual_iterations(iterations)
-            draw_answer(wish.picture, measurements[0], joints[0], usual)
-            console.print(f"{wish.picture} shows a hand on {joints[0]}.", highlight=False)
+            draw_answer(options.picture, measurements[0], joints[0], usual)
+            console.print(f"{options.picture} shows a hand on {joints[0]}.", highlight=False)
     found = evaluate(coder, takes, fitting_hop(coder, takes), progress)
-    if wish.as_json:
+    if options.as_json:
         figures = {"network": coder.facts, **found.as_json()}
         print(json.dumps({**figures, "puppetry": answer} if answer else figures, indent=1))
         return
     _print_table(Console(), coder, found)
     if answer:
-        puppetry_words.print_answer(Console(), answer)
+        puppetry_report.print_answer(Console(), answer)
 
 
-def _checked(wish: Wish) -> list[Iterations]:
+def _checked(options: EvaluateOptions) -> list[Iterations]:
     """The iterations asked for. Raises StudioError where options are missing or no numbers."""
-    if bool(wish.hands) != (wish.reference is not None):
+    if bool(options.hands) != (options.reference is not None):
         raise StudioError(
             "--hands and --reference belong together: the answer to a hand is measured against what the "
             "dancer did in the recordings that the network learned from. Give both, or neither."
         )
-    if not wish.hands and (wish.joints or wish.iterations or wish.picture):
+    if not options.hands and (options.joints or options.iterations or options.picture):
         raise StudioError(
             "--joint, --iterations and --picture say how a hand is tried: give --hands as well."
         )
-    return [_iterations(words) for words in wish.iterations] or list(puppetry.ITERATIONS)
+    return [_iterations(words) for words in options.iterations] or list(puppetry.ITERATIONS)
 
 
 def _measurements(

@@ -52,10 +52,10 @@ def experiment(
     """
     with clear_errors("experiment"):
         from appliance.show.bundle import default_show_path
-        from appliance.studio.experiments.experiment import Wish, run
+        from appliance.studio.experiments.experiment import ExperimentOptions, run
 
         run(
-            Wish(
+            ExperimentOptions(
                 show=show or default_show_path(),
                 out=out,
                 recordings=recordings,

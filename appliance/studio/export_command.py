@@ -9,28 +9,24 @@ from rich.console import Console
 
 from appliance.studio.data import sources
 from appliance.studio.evaluation.coders import load_checkpoint
-from appliance.studio.evaluation.puppetry_words import print_answer
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
-from appliance.studio.train_command import reading
+from appliance.studio.train_command import reading_progress
 
 
 def run(checkpoint: Path, out: Path, recordings: Path | None, phrase: Path | None, name: str | None) -> None:
-    """Write the bundle and say what ships and why."""
+    """Write the bundle and print what ships and why. Raises StudioError."""
     console = Console(stderr=True)
     if checkpoint.is_dir():
         checkpoint = checkpoint / "checkpoint.pt"
     if not checkpoint.exists():
         raise StudioError(f"{checkpoint} does not exist. Give the checkpoint.pt of a training.")
     source = sources.remembered(load_checkpoint(checkpoint)[1], recordings, checkpoint)
-    dataset = source.load(reading(console))
-    request = Request(checkpoint, source.recordings, out, name or out.resolve().name, phrase)
-    report = release(request, dataset, source.catalogue, lambda words: console.print(words, highlight=False))
-    print_answer(console, report["puppetry"])
-    once = report["degrees"]["1"]["mean"]
+    dataset = source.load(reading_progress(console))
+    report = release(Request(checkpoint, source, out, name or "", phrase), dataset, console)
     console.print(
-        f"{out}: {once:.2f} degrees a joint after one iteration. Look at {out / 'report.png'}; "
-        f"dance it: bunraku play --show {shlex.quote(str(out))} --emulate",
+        f"{out}: {report['degrees']['1']['mean']:.2f} degrees a joint after one iteration. "
+        f"See {out / 'report.png'}; dance it: bunraku play --show {shlex.quote(str(out))} --emulate",
         highlight=False,
         soft_wrap=True,
     )

@@ -54,10 +54,10 @@ def granular(
     what it danced before. The phrase plays in a show as any other.
     """
     with clear_errors("granular"):
-        from appliance.studio.granular.walk import Wish, run
+        from appliance.studio.granular.walk import GranularOptions, run
 
         run(
-            Wish(
+            GranularOptions(
                 checkpoint=checkpoint,
                 out=out,
                 recordings=recordings,

@@ -91,7 +91,7 @@ struct ImuRig {
     clock.advance(loop_us);
   }
 
-  // A believed reading must be what fusion said, and a fusion started anew must show in `recoveries`.
+  // A believed reading must be what fusion said, and a fusion restart must show in `recoveries`.
   void judge() {
     const Quaternion newest = model.newest(), previous = model.previous();
     const uint64_t begun_us = clock.now_us();

@@ -87,21 +87,21 @@ TEST_CASE("the board restarts, the chip does not: it goes on, heading kept, what
       const uint8_t page = 1;
       rig.model.write(0x28, bno055::kPageId, &page, 1);
     }
-    Bno055 anew(rig.model);
+    Bno055 restarted(rig.model);
     const Offsets profile;
-    anew.start(ImuRig::kPlain, rig.clock.micros());
+    restarted.start(ImuRig::kPlain, rig.clock.micros());
     const uint64_t begun_us = rig.clock.now_us();
-    while (!anew.is_running() && rig.clock.now_us() < begun_us + 1000000) {
-      anew.step(rig.clock.micros());
-      if (anew.has_id()) anew.use_profile(profile.bytes, rig.clock.micros());  // it is kept by this id
+    while (!restarted.is_running() && rig.clock.now_us() < begun_us + 1000000) {
+      restarted.step(rig.clock.micros());
+      if (restarted.has_id()) restarted.use_profile(profile.bytes, rig.clock.micros());  // it is kept by this id
       rig.clock.advance(700);
     }
-    CHECK(anew.is_running());
+    CHECK(restarted.is_running());
     CHECK(rig.clock.now_us() - begun_us < 60000);
-    for (int i = 0; i < 100; ++i) anew.step(rig.clock.micros());
-    CHECK(anew.has_id());
-    CHECK(anew.has_profile());
-    CHECK(anew.recoveries() == 0);
+    for (int i = 0; i < 100; ++i) restarted.step(rig.clock.micros());
+    CHECK(restarted.has_id());
+    CHECK(restarted.has_profile());
+    CHECK(restarted.recoveries() == 0);
     CHECK(rig.model.counts().fusion_starts == 1);
   }
 }

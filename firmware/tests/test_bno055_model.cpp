@@ -62,7 +62,7 @@ TEST_CASE("nothing answers for 400 ms after power-on and 650 ms after a reset") 
   CHECK(bus.get16(0x69) == 480);
 }
 
-TEST_CASE("modes take 7 ms and 19 ms; who is early is counted, and what he writes is lost") {
+TEST_CASE("mode changes take 7 ms and 19 ms; an early write is counted and lost") {
   Bus bus;
   bus.started();
   bus.put(kMode, 0x08);

@@ -133,16 +133,16 @@ TEST_CASE("a saved profile can be restored into the same chip after a power cycl
     CHECK(sound_profile_bytes(saved) == (settings.fusion == Fusion::kNdof ? 22 : 20));
 
     rig.model.power_on();
-    Bno055 anew(rig.model);
-    anew.start(settings, rig.clock.micros());
-    anew.use_profile(saved, rig.clock.micros());
+    Bno055 restarted(rig.model);
+    restarted.start(settings, rig.clock.micros());
+    restarted.use_profile(saved, rig.clock.micros());
     for (int i = 0; i < 4000; ++i) {
-      anew.step(rig.clock.micros());
+      restarted.step(rig.clock.micros());
       rig.clock.advance(700);
     }
-    CHECK(anew.is_running());
-    CHECK(anew.is_calibrated());
-    CHECK(anew.counts().fusion_errors == 0);
+    CHECK(restarted.is_running());
+    CHECK(restarted.is_calibrated());
+    CHECK(restarted.counts().fusion_errors == 0);
     rig.check_manners();
   }
 }

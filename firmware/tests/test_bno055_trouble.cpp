@@ -188,7 +188,7 @@ TEST_CASE("trouble long ago does not slow the next repair down") {
   rig.check_manners();
 }
 
-TEST_CASE("a chip that says all is well and gives zeros is started anew") {
+TEST_CASE("a chip that reports success but reads zeros is restarted") {
   ImuRig rig;
   rig.model.set_motion(dance);
   rig.power_on();

@@ -1,4 +1,4 @@
-// The gate: refuses what cannot be a hand, believes every hand, and locks nobody out.
+// The gate: refuses what no hand can do, accepts every hand, and locks none out.
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -145,7 +145,7 @@ TEST_CASE("what has truly moved is believed after five readings, or half a secon
   }
 }
 
-TEST_CASE("nobody is locked out: after any nonsense, two sound readings and half a second are enough") {
+TEST_CASE("no hand is locked out: after any nonsense, two sound readings and half a second are enough") {
   for (uint64_t seed = 1; seed <= 300; ++seed) {
     Random random(seed);
     Gate gate;

@@ -1,4 +1,4 @@
-// Pairing on invented times: greeting, assignment, loss, roaming, and everyone who must not be believed.
+// Pairing on invented times: greeting, assignment, loss, roaming, and every sender that must not be trusted.
 #include <doctest/doctest.h>
 
 #include <cstring>
@@ -137,7 +137,7 @@ TEST_CASE("a hello at once, then every 500 ms, broadcast, counted, signed") {
   }
 }
 
-TEST_CASE("greets on both lanes while nobody has answered") {
+TEST_CASE("greets on both lanes until it is answered") {
   Wearer wearer;
   wearer.pairing.set_lane(Lane::kWifi, true);
   wearer.pairing.set_lane(Lane::kCable, true);
@@ -200,7 +200,7 @@ TEST_CASE("an assignment answers the newest hello or one of three before it, eac
   CHECK(wearer.pairing.counts().replayed == 5);
 }
 
-TEST_CASE("whoever only carries the box's answer to a live link does not get the stream") {
+TEST_CASE("relaying the box's answer to a live link does not divert the stream") {
   Wearer wearer;
   wearer.link();
   wearer.hear(wearer.box.call());
@@ -218,7 +218,7 @@ TEST_CASE("a session of 0 is none") {
   CHECK_FALSE(wearer.pairing.is_linked());
 }
 
-TEST_CASE("an assignment that was recorded does not move the link to who replays it") {
+TEST_CASE("a replayed assignment does not move the link") {
   Wearer wearer;
   wearer.pairing.set_lane(Lane::kWifi, true);
   wearer.wait(1000);
@@ -321,7 +321,7 @@ TEST_CASE("heartbeats count only in the session, only rising, and only while lin
   CHECK_FALSE(wearer.pairing.is_linked());
 }
 
-TEST_CASE("a box that was started anew calls; the wearable says hello there and follows into its session") {
+TEST_CASE("a restarted box calls; the wearable greets it and joins its session") {
   Wearer wearer;
   wearer.link();
   wearer.dance(2);
@@ -337,7 +337,7 @@ TEST_CASE("a box that was started anew calls; the wearable says hello there and 
   CHECK(wearer.hear(restarted.assignment(wearer.newest_hello())) == Received::kAssignment);
   CHECK(wearer.pairing.session() == 0x22222222);
   CHECK(wearer.hear(wearer.box.heartbeat()) == Received::kNothing);  // of the old session
-  CHECK(wearer.hear(restarted.heartbeat()) == Received::kHeartbeat);  // its sequence began anew
+  CHECK(wearer.hear(restarted.heartbeat()) == Received::kHeartbeat);  // its sequence restarted
 }
 
 TEST_CASE("calls are answered at most once in 200 ms") {
@@ -530,7 +530,7 @@ TEST_CASE("new settings: other key and device, sequences that go on, answers to 
   CHECK(wearer.hear(signed_packet(box.assignment(2), fakes::kOtherKey)) == Received::kAssignment);
 }
 
-TEST_CASE("without a device id nobody is greeted and nobody believed, not even with a key of zeros") {
+TEST_CASE("without a device id it greets no box and trusts none, even with a key of zeros") {
   const uint8_t zeros[wire::kKeyBytes] = {};
   Wearer wearer;
   wearer.pairing.begin(0, zeros, kBoot);
@@ -545,7 +545,7 @@ TEST_CASE("without a device id nobody is greeted and nobody believed, not even w
   CHECK(wearer.sent.empty());
 }
 
-TEST_CASE("what a hello tells can be told anew where the link is") {
+TEST_CASE("the contents of a hello can be updated on a live link") {
   Wearer wearer;
   wearer.pairing.introduce();
   wearer.wait(kSecond);

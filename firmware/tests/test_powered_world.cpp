@@ -52,7 +52,7 @@ TEST_CASE("a world begins switched off, and time passes all the same") {
   CHECK_FALSE(world.led.is_on());
 }
 
-TEST_CASE("settings survive power-off, all else begins anew") {
+TEST_CASE("settings survive power-off, all else starts over") {
   Provisioned wearable;
   wearable.world.power(true);
   const uint32_t first = wearable.world.status().boot_nonce;
@@ -105,7 +105,7 @@ TEST_CASE("a dead radio hangs each join, and the console is reached all the same
   REQUIRE(set_trouble(world, "dead radio", 1));
   world.power(true);
   world.step_until(wearable.now() + 3 * kSecond);
-  REQUIRE(world.counts.watchdog_bites == 1);  // USB is enumerated by now, and nobody had opened the port
+  REQUIRE(world.counts.watchdog_bites == 1);  // USB is enumerated by now, and the port was not open
   world.step_until(world.booted_at_us() + 5 * kSecond);
   world.serial.connect(true);
   CHECK(ask(world, "id").find("ok bunraku-wearable") == 0);

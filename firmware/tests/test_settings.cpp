@@ -52,7 +52,7 @@ TEST_CASE("settings come back as they were saved, at their longest") {
   CHECK(settings.is_provisioned());
 }
 
-TEST_CASE("a fresh board has the defaults and belongs to nobody") {
+TEST_CASE("a fresh board has the defaults and no owner") {
   fakes::FakeFlash flash;
   Settings settings = full();
   CHECK_FALSE(load_settings(flash, settings));

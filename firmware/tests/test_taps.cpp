@@ -114,7 +114,7 @@ TEST_CASE("a long shove is no tap, and neither is a soft knock") {
   CHECK(soft.found == 0);
 }
 
-TEST_CASE("samples that stop begin it anew") {
+TEST_CASE("a gap in the samples starts it over") {
   Hand hand;
   hand.rest(600);
   hand.tap();

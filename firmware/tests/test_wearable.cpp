@@ -152,7 +152,7 @@ struct Stage {
 
 }  // namespace
 
-TEST_CASE("power-on to readings, with nobody's help") {
+TEST_CASE("power-on to readings, unattended") {
   Stage stage;
   stage.provision_and_switch_on();
   stage.run(3 * kSecond);
@@ -224,7 +224,7 @@ TEST_CASE("the assignment's rate is kept") {
   CHECK(stage.readings.size() == 100);
 }
 
-TEST_CASE("a fresh board joins nothing, greets nobody, and is provisioned by cable") {
+TEST_CASE("a fresh board joins no network, greets no box, and is provisioned by cable") {
   Stage stage;
   stage.serial.is_open = true;
   stage.switch_on();
@@ -382,7 +382,7 @@ TEST_CASE("an overlong line is refused; garbage harms nothing") {
   CHECK(stage.ask("id").substr(0, 3) == "ok ");
 }
 
-TEST_CASE("the box goes silent: greeting after 3 s, the network joined anew 10 s later, then less often") {
+TEST_CASE("the box goes silent: greeting after 3 s, the network rejoined 10 s later, then less often") {
   Stage stage;
   stage.link();
   stage.is_box_on = false;

@@ -143,7 +143,7 @@ TEST_CASE("leaving closes the socket and forgets what waits") {
   CHECK_FALSE(air.receives());
 }
 
-TEST_CASE("the radio keeps so many datagrams and no more") {
+TEST_CASE("the radio queue is bounded") {
   Air air;
   air.link_up();
   int taken = 0;
@@ -255,6 +255,6 @@ TEST_CASE("a path turns evenly, the short way, and stays at its end") {
   CHECK(path.at(500)[0] == doctest::Approx(1));
   CHECK(2 * std::acos(path.at(1500)[0]) == doctest::Approx(0.25 * std::acos(-1.0)));
   CHECK(std::abs(path.at(9000)[3]) == doctest::Approx(half));
-  path.go_to({1, 0, 0, 0}, 1500);  // told anew: what was to come after is gone
+  path.go_to({1, 0, 0, 0}, 1500);  // a new order: what was to follow is dropped
   CHECK(path.at(9000)[0] == doctest::Approx(1));
 }

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from appliance.cli.check import check_show
-from appliance.cli.run_with_timeout import within
+from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.show.bundle import CHECKSUMS, write_checksums
 from appliance.stage.stage_error import StageError
 from tests.bundles import write_show
@@ -110,7 +110,7 @@ def test_check_ends_with_words_whatever_a_file_holds(
         (show / name).write_bytes(content)
         if name != CHECKSUMS:
             write_checksums(show)
-        told = within(DEADLINE_S, lambda: said(show, box)).decode()
+        told = run_with_timeout(DEADLINE_S, lambda: said(show, box)).decode()
         assert told and "Traceback" not in told + capfd.readouterr().err, content
         if name != "puppet.onnx":  # what native code does with a damaged one is given up, and said
             assert "given up" not in told, content

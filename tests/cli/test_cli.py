@@ -1,4 +1,4 @@
-"""The command: what people can mend is one clear message and status 2; plug-ins cost only themselves."""
+"""The command: errors of the user are one clear message and status 2; a broken plug-in costs only itself."""
 
 from __future__ import annotations
 
@@ -8,48 +8,41 @@ import subprocess
 import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
 
-from appliance.cli.app import main, plug_in
+from appliance.cli.app import plug_in
 from appliance.pose.bvh import write_bvh
 from appliance.recorder.export import export
 from appliance.sensor.keys import create_keys
 from appliance.show.bundle import write_checksums
 from tests.bundles import swaying_phrase, write_show
+from tests.command import Command
 from tests.recorder.night import Night
 
 
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    with pytest.raises(SystemExit) as ended:
-        main(list(arguments))
-    assert ended.value.code == 2
-    words = capsys.readouterr().err
-    assert "Traceback" not in words
-    return words
-
-
-def succeeded(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    with pytest.raises(SystemExit) as ended:
-        main(list(arguments))
-    assert not ended.value.code
-    return capsys.readouterr().out
-
-
-def own_box(folder: Path) -> Path:
-    """A box file without ports: another box may dance on this machine."""
+def write_box(folder: Path, text: str = "control: null\nsensors: {udp: null}") -> Path:
+    """A box file; by default without ports: another box may dance on this machine."""
     box = folder / "box.yaml"
-    box.write_text("control: null\nsensors: {udp: null}\n")
+    box.write_text(text + "\n")
     return box
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert succeeded(capsys, "version").startswith("bunraku ")
+def packed_show(folder: Path, **options: Any) -> Path:
+    """A show with its checksums."""
+    show = write_show(folder / "show", **options)
+    write_checksums(show)
+    return show
 
 
-def test_help_names_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
-    words = succeeded(capsys, "--help")
+def test_version(bunraku: Command) -> None:
+    assert bunraku("version").out.startswith("bunraku ")
+
+
+def test_help_names_the_commands(bunraku: Command) -> None:
+    words = bunraku("--help").out
     assert all(command in words for command in ("play", "check", "filmstrip", "version"))
 
 
@@ -69,74 +62,55 @@ def test_help_names_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_a_broken_show_is_refused_with_file_and_cause(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, text: str, complaint: str
+    tmp_path: Path, bunraku: Command, file: str, text: str, complaint: str
 ) -> None:
     show = write_show(tmp_path / "show")
     (show / file).write_text(text)
-    words = refused(capsys, "play", "--show", str(show), "--box", str(own_box(tmp_path)), "--seconds", "1")
+    words = bunraku("play", "--show", show, "--box", str(write_box(tmp_path)), "--seconds", "1", status=2).err
     assert re.search(complaint, words.replace("\n", " "))
 
 
-def test_a_broken_box_file_is_refused_with_its_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    box = tmp_path / "box.yaml"
-    box.write_text("limits:\n  tick_budget: 5\n")
-    words = refused(capsys, "play", "--show", str(write_show(tmp_path / "show")), "--box", str(box))
+def test_a_broken_box_file_is_refused_with_its_line(tmp_path: Path, bunraku: Command) -> None:
+    box = write_box(tmp_path, "limits:\n  tick_budget: 5")
+    words = bunraku("play", "--show", str(write_show(tmp_path / "show")), "--box", box, status=2).err
     assert "box.yaml:2" in words
     assert "tick_budget_ms" in words
 
 
-def test_a_phrase_shorter_than_a_window_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_phrase_shorter_than_a_window_is_refused(tmp_path: Path, bunraku: Command) -> None:
     show = write_show(tmp_path / "show")
     write_bvh(show / "phrase.bvh", swaying_phrase().excerpt(0.0, 0.1))
-    words = refused(capsys, "play", "--show", str(show), "--box", str(own_box(tmp_path)), "--seconds", "1")
+    words = bunraku("play", "--show", show, "--box", str(write_box(tmp_path)), "--seconds", "1", status=2).err
     assert "5 poses" in words
 
 
-def test_check_passes_a_whole_show_and_says_what_it_costs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    show = write_show(tmp_path / "show")
-    write_checksums(show)
-    words = succeeded(capsys, "check", str(show))
+def test_check_passes_a_sound_show_and_reports_its_cost(tmp_path: Path, bunraku: Command) -> None:
+    show = packed_show(tmp_path)
+    words = bunraku("check", show).out
     assert "the bundle is whole" in words
     assert "3 coding iterations cost" in words
 
 
-def test_check_reads_a_box_file_against_the_show(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    show = write_show(tmp_path / "show")
-    with (show / "show.yaml").open("a") as file:
-        file.write("lights: {fixtures: [{name: wash, profile: led-par, address: 1}]}\n")
-    write_checksums(show)
-    box = tmp_path / "box.yaml"
-    box.write_text("sensors: {udp: null}\n")
-    assert "Universe 1 has no wire, so these stay dark: wash" in succeeded(
-        capsys, "check", str(show), "--box", str(box)
-    )
+def test_check_reads_a_box_file_against_the_show(tmp_path: Path, bunraku: Command) -> None:
+    show = packed_show(tmp_path, lights={"fixtures": [{"name": "wash", "profile": "led-par", "address": 1}]})
+    box = write_box(tmp_path, "sensors: {udp: null}")
+    assert "Universe 1 has no wire, so these stay dark: wash" in bunraku("check", show, "--box", box).out
     box.write_text("outputs:\n  posistagenet: [{joints: [Chset]}]\nlights:\n  places: [{fixture: wahs}]\n")
-    words = refused(capsys, "check", str(show), "--box", str(box))
+    words = bunraku("check", show, "--box", box, status=2).err
     assert "box.yaml:2: The show's skeleton has no joint 'Chset'. Did you mean 'Chest'?" in words
     assert "box.yaml:4: The show has no fixture 'wahs'. Did you mean 'wash'?" in words
 
 
-def test_check_refuses_a_changed_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    show = write_show(tmp_path / "show")
-    write_checksums(show)
+def test_check_refuses_a_changed_file(tmp_path: Path, bunraku: Command) -> None:
+    show = packed_show(tmp_path)
     (show / "phrase.bvh").write_text((show / "phrase.bvh").read_text() + "\n")
-    assert "phrase.bvh" in refused(capsys, "check", str(show))
+    assert "phrase.bvh" in bunraku("check", show, status=2).err
 
 
-def test_check_refuses_iterations_that_the_budget_cannot_hold(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    show = write_show(tmp_path / "show", network="heavy")
-    write_checksums(show)
-    box = tmp_path / "box.yaml"
-    box.write_text("limits: {tick_budget_ms: 0.5}\n")
-    assert "3 coding iterations do not fit" in refused(capsys, "check", str(show), "--box", str(box))
+def test_check_refuses_iterations_that_the_budget_cannot_hold(tmp_path: Path, bunraku: Command) -> None:
+    show = packed_show(tmp_path, network="heavy")
+    box = write_box(tmp_path, "limits: {tick_budget_ms: 0.5}")
+    assert "3 coding iterations do not fit" in bunraku("check", show, "--box", box, status=2).err
 
 
 @pytest.mark.parametrize(
@@ -152,16 +126,16 @@ def test_check_refuses_iterations_that_the_budget_cannot_hold(
     ids=["revoked", "damaged", "absent"],
 )
 def test_without_a_sensors_key_check_refuses_and_play_dances(
-    keys: str | None, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    keys: str | None, said: str, tmp_path: Path, bunraku: Command
 ) -> None:
-    show = write_show(tmp_path / "show")
-    write_checksums(show)
-    box = tmp_path / "box.yaml"
-    box.write_text("sensors: {udp: {port: 0}, keys: sensors.keys}\ncontrol: null\noutputs: {osc: []}\n")
+    show = packed_show(tmp_path)
+    box = write_box(
+        tmp_path, "sensors: {udp: {port: 0}, keys: sensors.keys}\ncontrol: null\noutputs: {osc: []}"
+    )
     if keys is not None:
         (tmp_path / "sensors.keys").write_text(keys)
-    assert said in refused(capfd, "check", str(show), "--box", str(box))
-    words = succeeded(capfd, "play", "--show", str(show), "--box", str(box), "--seconds", "0.2")
+    assert said in bunraku("check", show, "--box", box, status=2).err
+    words = bunraku("play", "--show", show, "--box", box, "--seconds", "0.2").out
     assert said in words
     assert "the dancer moves freely" in words
     assert re.search(r"Danced [1-9]\d* ticks", words)
@@ -175,25 +149,23 @@ def test_without_a_sensors_key_check_refuses_and_play_dances(
         ("null", "it listens to no network"),
     ],
 )
-def test_a_box_that_no_wearable_reaches_is_said(
-    udp: str, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+def test_a_box_that_no_wearable_reaches_is_reported(
+    udp: str, said: str, tmp_path: Path, bunraku: Command
 ) -> None:
-    show = write_show(tmp_path / "show")
-    write_checksums(show)
-    box = tmp_path / "box.yaml"
-    box.write_text(f"sensors: {{udp: {udp}, keys: sensors.keys}}\ncontrol: null\noutputs: {{osc: []}}\n")
+    show = packed_show(tmp_path)
+    box = write_box(
+        tmp_path, f"sensors: {{udp: {udp}, keys: sensors.keys}}\ncontrol: null\noutputs: {{osc: []}}"
+    )
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
     for words in (
-        succeeded(capfd, "check", str(show), "--box", str(box)),
-        succeeded(capfd, "play", "--show", str(show), "--box", str(box), "--seconds", "0.2"),
+        bunraku("check", show, "--box", box).out,
+        bunraku("play", "--show", show, "--box", box, "--seconds", "0.2").out,
     ):
         assert ("No wearable on Wi-Fi reaches the box" in words) == bool(said)
         assert said in words
 
 
-def test_a_filmstrip_of_a_recording_and_of_a_journal(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_filmstrip_of_a_recording_and_of_a_journal(tmp_path: Path, bunraku: Command) -> None:
     show = write_show(tmp_path / "show")
     night = Night(show, tmp_path / "runtime")
     night.dance(100)
@@ -201,17 +173,15 @@ def test_a_filmstrip_of_a_recording_and_of_a_journal(
     exported = export(folder, tmp_path / "night.bunraku")
     for source in (show / "phrase.bvh", exported):
         picture = tmp_path / "picture.png"
-        assert str(picture) in succeeded(
-            capsys, "filmstrip", str(source), "--out", str(picture), "--seconds", "1"
-        )
+        assert str(picture) in bunraku("filmstrip", source, "--out", picture, "--seconds", "1").out
         assert picture.read_bytes().startswith(b"\x89PNG")
         picture.unlink()
 
 
-def test_a_filmstrip_of_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "cannot be read" in refused(capsys, "filmstrip", str(tmp_path / "absent.journal"))
+def test_a_filmstrip_of_nothing_is_refused(tmp_path: Path, bunraku: Command) -> None:
+    assert "cannot be read" in bunraku("filmstrip", tmp_path / "absent.journal", status=2).err
     show = write_show(tmp_path / "show")
-    assert "nothing was danced" in refused(capsys, "filmstrip", str(show / "phrase.bvh"), "--start", "99")
+    assert "nothing was danced" in bunraku("filmstrip", show / "phrase.bvh", "--start", "99", status=2).err
 
 
 def test_a_broken_plug_in_costs_only_its_own_commands() -> None:
@@ -254,23 +224,19 @@ def test_the_box_starts_without_torch_and_without_the_plug_ins() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_pack_vouches_for_a_changed_show(
-    tiny_show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_pack_vouches_for_a_changed_show(tiny_show: Path, tmp_path: Path, bunraku: Command) -> None:
     show = tmp_path / "mine"
     shutil.copytree(tiny_show, show)
     (show / "show.yaml").write_text((show / "show.yaml").read_text().replace("name: tiny", "name: mine"))
-    assert "show.yaml" in refused(capsys, "check", str(show))
-    assert "packed" in succeeded(capsys, "pack", str(show))
-    assert "mine: the bundle is whole" in succeeded(capsys, "check", str(show))
+    assert "show.yaml" in bunraku("check", show, status=2).err
+    assert "packed" in bunraku("pack", show).out
+    assert "mine: the bundle is whole" in bunraku("check", show).out
 
 
-def test_pack_refuses_a_show_that_cannot_be_danced(
-    tiny_show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_pack_refuses_a_show_that_cannot_be_danced(tiny_show: Path, tmp_path: Path, bunraku: Command) -> None:
     show = tmp_path / "mine"
     shutil.copytree(tiny_show, show)
     before = (show / "SHA256SUMS").read_text()
     (show / "puppet.onnx").write_bytes(b"nonsense")
-    assert "puppet.onnx" in refused(capsys, "pack", str(show))
+    assert "puppet.onnx" in bunraku("pack", show, status=2).err
     assert (show / "SHA256SUMS").read_text() == before

@@ -48,7 +48,7 @@ def is_gone(pid: int) -> bool:
         return True
 
 
-def test_it_starts_when_it_may_and_ends_with_the_context(diary: Diary) -> None:
+def test_a_companion_starts_when_it_may_and_ends_with_the_context(diary: Diary) -> None:
     dances: list[bool] = []
     said: list[str] = []
     with Companions([diary.child("time.sleep(60)")], said.append, lambda: bool(dances)):
@@ -66,18 +66,16 @@ def test_without_a_first_tick_nothing_is_started(diary: Diary) -> None:
     assert diary.pids == []
 
 
-def test_one_that_is_killed_is_started_again_and_that_is_said(diary: Diary) -> None:
+def test_a_killed_companion_is_restarted_and_reported(diary: Diary) -> None:
     said: list[str] = []
     with Companions([diary.child("time.sleep(60)")], said.append, lambda: True):
         until(lambda: len(diary.pids) == 1)
         os.kill(diary.pids[0], signal.SIGKILL)
         until(lambda: len(diary.pids) == 2)
-    assert said == [
-        "The child was killed (signal 9). Something is missing for a moment. It is started again."
-    ]
+    assert said == ["The child was killed (signal 9). Something is missing for a moment. It is restarted."]
 
 
-def test_one_that_dies_at_once_is_tried_ever_more_slowly_and_not_said_for_ever(
+def test_a_companion_that_dies_at_once_is_retried_ever_more_slowly_and_reported_four_times(
     diary: Diary, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(companions, "SHORTEST_PAUSE_S", 0.01)
@@ -90,26 +88,18 @@ def test_one_that_dies_at_once_is_tried_ever_more_slowly_and_not_said_for_ever(
     assert "4 times in a row" in said[3]
 
 
-def test_pauses_grow_and_one_that_lived_starts_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    child = companions._Running(Companion("The child", ("x",), ""), lambda words: None)
-    pauses = []
-    now = 1000.0
-    for lived_s in (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 11.0, 0.1):
-        child._started_at = now
-        now += lived_s
-        child._note_exit(1, now)
-        pauses.append(round(child._starts_at - now, 3))
-    assert pauses == [0.2, 0.4, 0.8, 1.6, 2.0, 2.0, 0.2, 0.4]
+def test_pauses_grow_and_start_over_after_a_long_life() -> None:
+    backoff = companions.Backoff()
+    lives_s = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 11.0, 0.1)
+    assert [backoff.pause_s(lived_s) for lived_s in lives_s] == [0.2, 0.4, 0.8, 1.6, 2.0, 2.0, 0.2, 0.4]
 
 
-def test_one_that_dies_all_evening_takes_nothing_with_it() -> None:
-    child = companions._Running(Companion("The child", ("/nowhere/at/all",), ""), lambda words: None)
-    for second in range(0, 3 * 1100, 3):
-        child.check(float(second))
-    assert child._starts_at - second == companions.LONGEST_PAUSE_S
+def test_a_companion_that_dies_all_evening_overflows_nothing() -> None:
+    backoff = companions.Backoff()
+    assert [backoff.pause_s(0.0) for _ in range(1100)][-1] == companions.LONGEST_PAUSE_S
 
 
-def test_one_that_a_person_has_closed_stays_closed(diary: Diary) -> None:
+def test_a_companion_that_the_user_closed_stays_closed(diary: Diary) -> None:
     said: list[str] = []
     with Companions([diary.child("sys.exit(0)", may_close=True)], said.append, lambda: True):
         until(lambda: bool(said))
@@ -118,7 +108,9 @@ def test_one_that_a_person_has_closed_stays_closed(diary: Diary) -> None:
     assert said == ["The child was closed. The dance goes on."]
 
 
-def test_what_it_needs_may_come_late(diary: Diary, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_companion_waits_for_its_needs(
+    diary: Diary, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(companions, "RETRY_S", 0.1)
     said: list[str] = []
     display, told, shows = tmp_path / "display", tmp_path / "told", tmp_path / "shows"
@@ -130,12 +122,12 @@ def test_what_it_needs_may_come_late(diary: Diary, monkeypatch: pytest.MonkeyPat
         until(lambda: len(diary.pids) >= 3)
         display.touch()
         until(lambda: shows.exists())
-    assert said == ["The child cannot run now. The dance goes on without, and it is tried again each 0.1 s."]
+    assert said == ["The child cannot run now. The dance goes on without it; it is retried every 0.1 s."]
     assert told.read_text() == "0" + "1" * (len(diary.pids) - 1)  # it gives its reasons once
     assert is_gone(diary.pids[-1])
 
 
-def test_what_cannot_be_started_is_said_and_tried_again() -> None:
+def test_a_companion_that_cannot_start_is_reported_and_retried() -> None:
     said: list[str] = []
     missing = Companion("The child", ("/nowhere/at/all",), "Something is missing.")
     with Companions([missing], said.append, lambda: True):
@@ -143,8 +135,8 @@ def test_what_cannot_be_started_is_said_and_tried_again() -> None:
     assert said[0].startswith("The child cannot be started (No such file or directory).")
 
 
-def test_one_that_does_not_end_is_killed(diary: Diary, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(companions, "_LAST_WORDS_S", 0.2)
+def test_a_companion_that_does_not_end_is_killed(diary: Diary, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(companions, "LAST_WORDS_S", 0.2)
     stubborn = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True); "
     stubborn += "open(sys.argv[1], 'a').write('0\\n'); time.sleep(60)"
     with Companions([diary.child(stubborn)], print, lambda: True):
@@ -171,7 +163,7 @@ def test_a_killed_player_leaves_no_orphan(diary: Diary) -> None:
     until(lambda: is_gone(diary.pids[0]))
 
 
-def test_a_child_whose_player_is_gone_already_does_not_begin(diary: Diary) -> None:
+def test_a_companion_does_not_start_without_its_parent(diary: Diary) -> None:
     script = "from appliance.box.parent_death import end_with_parent; end_with_parent(); " + NOTE
     done = subprocess.run(
         [sys.executable, "-c", script, str(diary.path)],

@@ -39,7 +39,7 @@ def test_a_port_that_a_killed_box_lets_go_of_is_waited_for(
     assert len(looks) == 3
 
 
-def test_a_port_that_stays_taken_is_told(taken: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_that_stays_taken_is_reported(taken: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
     looks: list[float] = []
     began = time.monotonic()
     monkeypatch.setattr(control.time, "sleep", looks.append)

@@ -13,11 +13,11 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
-from appliance.cli.app import main
 from appliance.cli.check import check_show, pack
 from appliance.show.bundle import write_checksums
 from appliance.stage.stage_error import StageError
 from tests.bundles import write_show
+from tests.command import Command
 
 PATIENCE_S = 120.0
 
@@ -35,7 +35,7 @@ def spoilt(show: Path, nodes: list[onnx.NodeProto], constants: list[onnx.TensorP
 
 
 def endless(show: Path, from_iterations: int) -> Path:
-    """A show whose network never ends from so many coding iterations on."""
+    """A show with a network that never ends from this many coding iterations on."""
     body = helper.make_graph(
         [
             helper.make_node("Identity", ["so_far"], ["as_it_was"]),
@@ -61,7 +61,7 @@ def endless(show: Path, from_iterations: int) -> Path:
 
 
 def greedy(show: Path) -> Path:
-    """A show whose network needs a terabyte."""
+    """A show with a network that needs a terabyte."""
     constants = [
         helper.make_tensor("shape", TensorProto.INT64, [2], np.array([1 << 19, 1 << 19])),
         helper.make_tensor("last", TensorProto.INT64, [1], np.array([-1])),
@@ -88,19 +88,14 @@ def test_check_gives_an_endless_network_up_and_names_it(tmp_path: Path, from_ite
         check_show(show, box(tmp_path), patience_s=5.0)
 
 
-def test_a_network_that_needs_all_memory_is_refused(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_network_that_needs_all_memory_is_refused(tmp_path: Path, bunraku: Command) -> None:
     show = greedy(write_show(tmp_path / "show"))
     with pytest.raises(StageError, match=r"puppet\.onnx"):
         check_show(show, box(tmp_path))
     with pytest.raises(StageError, match=r"puppet\.onnx"):
         pack(show)
-    with pytest.raises(SystemExit) as ended:
-        main(["play", "--show", str(show), "--box", str(box(tmp_path)), "--seconds", "1"])
-    assert ended.value.code == 2
-    said = capfd.readouterr().err
-    assert "puppet.onnx" in said and "Traceback" not in said
+    refusal = bunraku("play", "--show", show, "--box", box(tmp_path), "--seconds", "1", status=2)
+    assert "puppet.onnx" in refusal.err
 
 
 def test_play_refuses_an_endless_network(tmp_path: Path) -> None:

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from appliance.cli import journal
-from appliance.cli.app import main
 from appliance.recorder.reading import read_journal
 from appliance.release import choice
 from tests.bundles import write_show
+from tests.command import Command
 from tests.recorder.night import Night
 
 
@@ -39,17 +39,10 @@ def stick(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     subprocess.run(("umount", "-l", str(folder)), check=True)
 
 
-def bunraku(*arguments: str) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    return int(ended.value.code or 0)
-
-
 def test_the_stick_takes_the_journal_and_is_read_only_again(
-    recorded: Path, stick: Path, capsys: pytest.CaptureFixture[str]
+    recorded: Path, stick: Path, bunraku: Command
 ) -> None:
-    assert bunraku("journal", "export", "--journal", str(recorded)) == 0
-    assert "The stick can be pulled." in capsys.readouterr().out
+    assert "The stick can be pulled." in bunraku("journal", "export", "--journal", recorded).out
     (exported,) = stick.iterdir()
     assert len(read_journal(exported).ticks) == 50
     with pytest.raises(OSError, match="Read-only"):
@@ -57,43 +50,41 @@ def test_the_stick_takes_the_journal_and_is_read_only_again(
 
 
 def test_a_stick_that_is_too_small_keeps_what_was_on_it(
-    recorded: Path, stick: Path, capsys: pytest.CaptureFixture[str]
+    recorded: Path, stick: Path, bunraku: Command
 ) -> None:
     subprocess.run(("mount", "-o", "remount,rw,size=8k", str(stick)), check=True)
-    assert bunraku("journal", "export", "--journal", str(recorded)) == 2
-    assert "No space left on device" in capsys.readouterr().err
+    assert "No space left on device" in bunraku("journal", "export", "--journal", recorded, status=2).err
     assert not list(stick.iterdir())
 
 
 def test_without_a_stick_or_a_journal_it_says_what_to_do(
-    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     monkeypatch.setattr(journal, "STICK", tmp_path / "absent")
-    assert bunraku("journal", "export", "--journal", str(recorded)) == 2
-    assert "No stick is at" in capsys.readouterr().err
+    assert "No stick is at" in bunraku("journal", "export", "--journal", recorded, status=2).err
     (tmp_path / "box.yaml").write_text("{}\n")
-    assert bunraku("journal", "list", "--box", str(tmp_path / "box.yaml")) == 2
-    assert "No box file names a journal" in capsys.readouterr().err
+    assert (
+        "No box file names a journal"
+        in bunraku("journal", "list", "--box", tmp_path / "box.yaml", status=2).err
+    )
 
 
 def test_on_a_box_it_is_the_journal_of_what_was_chosen(
-    recorded: Path, stick: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    recorded: Path, stick: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     """Without any option, as a technician types it."""
     monkeypatch.setattr(choice, "RUN", recorded.parent)
     box = recorded.with_name("box.yaml")
     box.write_text("journal: {folder: journal}\n")
     choice.Choice((choice.Pair(box=box),), (), ()).write(choice.RUN / choice.CHOSEN)
-    assert bunraku("journal", "list") == 0
-    assert "A test: 1 s, 20 late" in capsys.readouterr().out
-    assert bunraku("journal", "export") == 0
+    assert "A test: 1 s, 20 late" in bunraku("journal", "list").out
+    bunraku("journal", "export")
     (exported,) = stick.iterdir()
     assert len(read_journal(exported).ticks) == 50
 
 
-def test_a_list_tells_what_happened(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert bunraku("journal", "list", "--journal", str(recorded), "--events") == 0
-    run, order, said = capsys.readouterr().out.splitlines()
+def test_a_list_tells_what_happened(recorded: Path, bunraku: Command) -> None:
+    run, order, said = bunraku("journal", "list", "--journal", recorded, "--events").out.splitlines()
     assert "A test: 1 s, 20 late" in run
     assert order.endswith("0.58 s  order: rate 0.5")
     assert said.endswith("said: The network gives poses again.")

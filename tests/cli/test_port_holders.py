@@ -1,4 +1,4 @@
-"""Which process has a port, and whether it is the box's: told also while it opens and closes files."""
+"""Which process has a port, and whether it is the box's, also while it opens and closes files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from appliance.show.box import BoxConfig
 ROW = "0: 0100007F:{port:04X} 00000000:0000 07 00000000:00000000 00:00000000 00000000 0 0 77 2"
 
 
-def test_a_file_that_is_closed_meanwhile_hides_no_process(tmp_path: Path) -> None:
+def test_a_file_closed_during_the_search_hides_no_process(tmp_path: Path) -> None:
     box = BoxConfig.model_validate({"sensors": {"udp": None}, "control": {"port": 9002}})
     process = tmp_path / "proc/4711"
     for folder in (tmp_path / "proc/net", process / "fd"):

@@ -1,4 +1,4 @@
-"""What may never end is given up: also when it has not come far."""
+"""A function that never ends is killed, also right at its start."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import signal
 
 import pytest
 
-from appliance.cli.run_with_timeout import TimedOutError, within
+from appliance.cli.run_with_timeout import TimedOutError, run_with_timeout
 
 PATIENCE_S = 20.0
 
@@ -36,7 +36,7 @@ def test_a_child_that_has_not_left_its_parent_s_group_is_ended_too(monkeypatch: 
     reading, writing = os.pipe()
     try:
         with pytest.raises(TimedOutError):
-            within(0.05, lambda: b"never")
+            run_with_timeout(0.05, lambda: b"never")
         os.close(writing)
         assert select.select([reading], [], [], PATIENCE_S)[0], "it lives on"
         assert os.read(reading, 1) == b""

@@ -20,19 +20,17 @@ import pytest
 import yaml
 from rich.console import Console
 
-from appliance.cli.app import main
-from appliance.cli.sensors import venue
-from appliance.cli.sensors.control_client import Answer, NoBoxError, Roll
-from appliance.cli.sensors.control_client import ControlClient as AskedBox
+from appliance.cli.sensors import box_keys
+from appliance.cli.sensors.control_client import Answer, ControlClient, NoBoxError, Roll
 from appliance.cli.sensors.table import SensorTable
 from appliance.sensor.keys import create_keys, load_keys
 from appliance.sensor.link import SensorState
 from appliance.sensor.wire import HAS_PROFILE, IS_NDOF
 from appliance.show_control.orders import Order
 from appliance.show_control.packet import Message, datagram
-from appliance.show_control.port import Address
 from appliance.show_control.sensor_roster import RosterLine
 from appliance.stage.sensor_lines import roster_lines
+from tests.command import Command
 from tests.show_control.doubles import ControlInThread, StageDouble, until
 
 LEFT = SensorState(
@@ -45,8 +43,8 @@ SPARE = SensorState(
 )
 
 
-class ControlClient:
-    """Show control, and a stage that answers without dancing."""
+class RunningBox:
+    """Show control, and a stage double that answers."""
 
     def __init__(self, folder: Path, key_file: Path | None = None) -> None:
         runtime = folder / "runtime"
@@ -66,11 +64,11 @@ class ControlClient:
         until(lambda: self.control.process.handler.status(0, time.monotonic()).state == "dancing")
 
     @property
-    def obeyed(self) -> list[Order]:
+    def orders(self) -> list[Order]:
         return self.stage.orders
 
-    def look(self, states: list[SensorState], neutral_of: Callable[[str], str], now: float) -> None:
-        """The stage looks at its sensors."""
+    def report_sensors(self, states: list[SensorState], neutral_of: Callable[[str], str], now: float) -> None:
+        """The stage reports its sensors."""
         self.stage.tell(sensors=roster_lines(states, neutral_of), looked_at=now)
 
     def close(self) -> None:
@@ -79,10 +77,10 @@ class ControlClient:
 
 
 @pytest.fixture
-def box(tmp_path: Path) -> Iterator[ControlClient]:
+def box(tmp_path: Path) -> Iterator[RunningBox]:
     create_keys(tmp_path / "sensors.keys", ["left-wrist", "head", "spare-1"])
-    box = ControlClient(tmp_path)
-    box.look(
+    box = RunningBox(tmp_path)
+    box.report_sensors(
         [LEFT, LOST, SPARE],
         lambda name: {"left-wrist": "wanted", "head": "kept"}.get(name, ""),
         time.monotonic(),
@@ -91,22 +89,9 @@ def box(tmp_path: Path) -> Iterator[ControlClient]:
     box.close()
 
 
-@contextmanager
-def ends(capsys: pytest.CaptureFixture[str], status: int, *words: str) -> Iterator[list[str]]:
-    said: list[str] = []
-    with pytest.raises(SystemExit) as ended:
-        main(["sensors", *words])
-    captured = capsys.readouterr()
-    assert (ended.value.code or 0) == status, captured
-    said += [captured.out, captured.err]
-    yield said
-
-
-def test_the_table_has_everything_that_the_box_knows(
-    box: ControlClient, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        *first, heading, left, head, spare = out.splitlines()
+def test_the_table_has_everything_that_the_box_knows(box: RunningBox, bunraku: Command) -> None:
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    *first, heading, left, head, spare = out.splitlines()
     assert re.split(r"  +", heading.strip()) == [
         *("name", "state", "rate", "loss", "round trip", "age", "battery"),
         *("calibration", "neutral", "firmware", "id", "way"),
@@ -134,9 +119,9 @@ def test_a_narrow_terminal_gets_two_tables_and_loses_nothing() -> None:
     assert all(word in shown for word in words.split())
 
 
-def test_programs_get_values_and_nulls(box: ControlClient, capsys: pytest.CaptureFixture[str]) -> None:
-    with ends(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
-        told = json.loads(out)
+def test_programs_get_values_and_nulls(box: RunningBox, bunraku: Command) -> None:
+    out, _ = bunraku("sensors", "--json", "--box", box.box_file)
+    told = json.loads(out)
     assert told["box"] is True
     left, head, spare = told["sensors"]
     assert left == {
@@ -161,34 +146,32 @@ def test_programs_get_values_and_nulls(box: ControlClient, capsys: pytest.Captur
     assert (spare["calibration"], spare["neutral"]) == (None, None)
 
 
-def test_a_box_that_is_still_starting_or_hangs_is_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_box_that_is_still_starting_or_hangs_is_reported(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
-    box = ControlClient(tmp_path)
-    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "still starting" in out
-    with ends(capsys, 0, "--json", "--box", str(box.box_file)) as (out, _):
-        assert json.loads(out) == {"box": True, "age_s": None, "sensors": []}
-    box.look([LEFT], lambda name: "", time.monotonic() - 60.0)
-    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "This is 60 s old: the box hangs" in out
+    box = RunningBox(tmp_path)
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "still starting" in out
+    out, _ = bunraku("sensors", "--json", "--box", box.box_file)
+    assert json.loads(out) == {"box": True, "age_s": None, "sensors": []}
+    box.report_sensors([LEFT], lambda name: "", time.monotonic() - 60.0)
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "This is 60 s old: the box hangs" in out
     box.close()
 
 
-def test_without_a_box_it_lists_the_key_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_box_it_lists_the_key_file(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist", "head"])
     box_file = tmp_path / "box.yaml"
     box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
-    with ends(capsys, 0, "--box", str(box_file)) as (out, _):
-        assert "has no control port" in out
-        assert re.search(r"^left-wrist  [0-9a-f]{8}", out, re.MULTILINE)
-        assert load_keys(tmp_path / "sensors.keys")["head"].key.hex() not in out
+    out, _ = bunraku("sensors", "--box", box_file)
+    assert "has no control port" in out
+    assert re.search(r"^left-wrist  [0-9a-f]{8}", out, re.MULTILINE)
+    assert load_keys(tmp_path / "sensors.keys")["head"].key.hex() not in out
     (tmp_path / "sensors.keys").chmod(0o644)
-    with ends(capsys, 0, "--box", str(box_file)) as (out, _):
-        assert "chmod 600" in out
-    with ends(capsys, 0, "--json", "--box", str(box_file)) as (out, _):
-        told = json.loads(out)
+    out, _ = bunraku("sensors", "--box", box_file)
+    assert "chmod 600" in out
+    out, _ = bunraku("sensors", "--json", "--box", box_file)
+    told = json.loads(out)
     assert (told["box"], [sensor["state"] for sensor in told["sensors"]]) == (False, [None, None])
 
 
@@ -202,64 +185,58 @@ def test_without_a_box_it_lists_the_key_file(tmp_path: Path, capsys: pytest.Capt
     ],
 )
 def test_commands_reach_the_box_and_its_answer_is_printed(
-    box: ControlClient, capsys: pytest.CaptureFixture[str], words: list[str], name: str, sensor: str
+    box: RunningBox, bunraku: Command, words: list[str], name: str, sensor: str
 ) -> None:
-    with ends(capsys, 0, *words, "--box", str(box.box_file)) as (out, _):
-        assert out == f"{name} it is.\n"
-    assert box.obeyed == [Order(name, text=sensor)]
+    out, _ = bunraku("sensors", *words, "--box", box.box_file)
+    assert out == f"{name} it is.\n"
+    assert box.orders == [Order(name, text=sensor)]
     box.done = False
-    with ends(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
-        assert err == f"bunraku: {name} it is.\n"
+    _, err = bunraku("sensors", *words, "--box", box.box_file, status=2)
+    assert err == f"bunraku: {name} it is.\n"
 
 
-def test_a_stage_that_was_held_up_in_the_middle_of_a_command_is_believed_in_the_end(
-    box: ControlClient,
-) -> None:
+def test_a_late_answer_of_the_stage_replaces_the_refusal(box: RunningBox) -> None:
     handler = box.control.process.handler
 
     def late(order: Order) -> tuple[bool, str]:
-        until(lambda: handler.refused == 1)  # by then it was said that the stage does not answer
+        until(lambda: handler.refused == 1)  # by then the client has been told that the stage does not answer
         return True, "It is."
 
     box.stage.answer = late
-    asked = AskedBox(("127.0.0.1", box.control.port), patience_s=20.0)
-    assert asked.ask("/sensors/strobe", "left-wrist") == Answer(True, "It is.")
+    client = ControlClient(("127.0.0.1", box.control.port), patience_s=20.0)
+    assert client.ask("/sensors/strobe", "left-wrist") == Answer(True, "It is.")
 
 
-def test_a_stage_that_never_answers_is_told_once_patience_is_over(box: ControlClient) -> None:
+def test_a_stage_that_never_answers_is_reported_after_the_timeout(box: RunningBox) -> None:
     box.stage.obeys = False
-    asked = AskedBox(("127.0.0.1", box.control.port), patience_s=3.0)
-    answer = asked.ask("/sensors/strobe", "left-wrist")
+    client = ControlClient(("127.0.0.1", box.control.port), patience_s=3.0)
+    answer = client.ask("/sensors/strobe", "left-wrist")
     assert not answer.done and "does not answer" in answer.words
 
 
-def test_changes_of_the_key_file_reach_the_box(
-    box: ControlClient, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_changes_of_the_key_file_reach_the_box(box: RunningBox, tmp_path: Path, bunraku: Command) -> None:
     before = load_keys(tmp_path / "sensors.keys")
-    with ends(capsys, 0, "replace", "left-wrist", "spare-1", "--box", str(box.box_file)) as (out, _):
-        assert "left-wrist is now the sensor that was spare-1" in out
-        assert "The running box took it." in out
-    with ends(capsys, 0, "rename", "spare-1", "spare-2", "--box", str(box.box_file)) as (out, _):
-        assert "spare-1 is now spare-2" in out
-    with ends(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert "head is revoked" in out
+    out, _ = bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", box.box_file)
+    assert "left-wrist is now the sensor that was spare-1" in out
+    assert "The running box took it." in out
+    out, _ = bunraku("sensors", "rename", "spare-1", "spare-2", "--box", box.box_file)
+    assert "spare-1 is now spare-2" in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file)
+    assert "head is revoked" in out
     after = load_keys(tmp_path / "sensors.keys")
     assert {name: key.key for name, key in after.items()} == {
         "left-wrist": before["spare-1"].key,
         "spare-2": before["left-wrist"].key,
     }
-    assert [order.name for order in box.obeyed] == ["reload"] * 3
-    assert box.obeyed[-1].keys == after
+    assert [order.name for order in box.orders] == ["reload"] * 3
+    assert box.orders[-1].keys == after
 
 
-def test_a_box_that_does_not_take_it_costs_the_exit_status(
-    box: ControlClient, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_change_that_the_box_refuses_sets_the_exit_status(box: RunningBox, bunraku: Command) -> None:
     box.done = False
-    with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert "head is revoked" in out
-        assert "did not take it. reload it is." in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file, status=1)
+    assert "head is revoked" in out
+    assert "did not take it. reload it is." in out
 
 
 class Clock:
@@ -276,66 +253,70 @@ class Clock:
 
 
 @pytest.mark.parametrize("silent", [1, 20])
-def test_show_control_that_is_on_its_way_back_is_asked_again(
-    box: ControlClient, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], silent: int
+def test_restarting_show_control_is_asked_again(
+    box: RunningBox, monkeypatch: pytest.MonkeyPatch, bunraku: Command, silent: int
 ) -> None:
-    asked, roll = [0], AskedBox.roll
+    rolls, roll = [0], ControlClient.roll
 
-    def silent_first(running: AskedBox) -> Roll:
-        asked[0] += 1
-        if asked[0] <= silent:
+    def silent_first(running: ControlClient) -> Roll:
+        rolls[0] += 1
+        if rolls[0] <= silent:
             raise NoBoxError("No box answers.")
         return roll(running)
 
-    monkeypatch.setattr(AskedBox, "roll", silent_first)
-    monkeypatch.setattr(venue, "time", Clock())
-    with ends(capsys, 0, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert "The running box took it." in out
-    assert [order.name for order in box.obeyed] == ["reload"]
+    monkeypatch.setattr(ControlClient, "roll", silent_first)
+    monkeypatch.setattr(box_keys, "time", Clock())
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file)
+    assert "The running box took it." in out
+    assert [order.name for order in box.orders] == ["reload"]
 
 
 def test_a_stage_that_dances_without_show_control_has_not_taken_it(
-    box: ControlClient, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    box: RunningBox, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
+
+    def no_box(client: ControlClient) -> Roll:
+        raise NoBoxError("No box answers.")
+
     clock = Clock()
-    monkeypatch.setattr(AskedBox, "_replies", lambda *_: (one for one in ()))
-    monkeypatch.setattr(venue, "time", clock)
-    with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert "head is revoked" in out
-        assert "A box dances here, but its show control did not answer." in out
+    monkeypatch.setattr(ControlClient, "roll", no_box)
+    monkeypatch.setattr(box_keys, "time", clock)
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file, status=1)
+    assert "head is revoked" in out
+    assert "A box dances here, but its show control did not answer." in out
     assert clock.now > 102.0
-    assert box.obeyed == []
+    assert box.orders == []
 
 
-def test_where_no_stage_lives_show_control_is_not_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_without_a_stage_nothing_waits_for_show_control(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     clock = Clock()
-    monkeypatch.setattr(venue, "time", clock)
+    monkeypatch.setattr(box_keys, "time", clock)
     create_keys(tmp_path / "sensors.keys", ["head"])
     box_file = tmp_path / "box.yaml"
     settings = {"runtime": str(tmp_path / "none"), "sensors": {"keys": "sensors.keys"}}
     box_file.write_text(yaml.safe_dump({**settings, "control": {"port": 1}}))
-    with ends(capsys, 0, "revoke", "head", "--box", str(box_file)) as (out, _):
-        assert "No box answers on 127.0.0.1:1. The change counts when it starts." in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box_file)
+    assert "No box answers on 127.0.0.1:1. The change counts when it starts." in out
     assert clock.now == 100.0
 
 
-def test_a_box_with_another_key_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_box_with_another_key_file_is_named(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["head"])
-    box = ControlClient(tmp_path, key_file=tmp_path / "others.keys")
-    with ends(capsys, 1, "revoke", "head", "--box", str(box.box_file)) as (out, _):
-        assert f"reads another key file ({tmp_path / 'others.keys'})" in out
-    assert box.obeyed == []
+    box = RunningBox(tmp_path, key_file=tmp_path / "others.keys")
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box.box_file, status=1)
+    assert f"reads another key file ({tmp_path / 'others.keys'})" in out
+    assert box.orders == []
     box.close()
 
 
-def test_what_is_wrong_with_the_key_file_of_a_running_box_is_said(
-    box: ControlClient, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_faults_of_the_key_file_of_a_running_box_are_reported(
+    box: RunningBox, tmp_path: Path, bunraku: Command
 ) -> None:
     keys = tmp_path / "sensors.keys"
-    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "has other sensors than the running box. Run: bunraku sensors reload" in out
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "has other sensors than the running box. Run: bunraku sensors reload" in out
     keys.write_text(
         "".join(
             f"{one.name}: {{device: {one.device_id}, key: {one.device_id:032x}}}\n" for one in (LEFT, SPARE)
@@ -343,61 +324,85 @@ def test_what_is_wrong_with_the_key_file_of_a_running_box_is_said(
         + f"head: {{device: {LOST.device_id + 1}, key: {7:032x}}}\n"
     )
     states = [LEFT, SPARE, LOST._replace(device_id=LOST.device_id + 1)]
-    box.look(states, lambda _: "", time.monotonic())
+    box.report_sensors(states, lambda _: "", time.monotonic())
     keys.chmod(0o644)
-    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "has other sensors" not in out
-        assert "can be read by other users" in out
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "has other sensors" not in out
+    assert "can be read by other users" in out
     keys.write_text("left-wrist: {devise: 7}\n")
-    with ends(capsys, 0, "--box", str(box.box_file)) as (out, _):
-        assert "unknown field 'devise'" in out
-        assert "goes on with the keys that it has" in out
-    with ends(capsys, 2, "reload", "--box", str(box.box_file)) as (_, err):
-        assert "unknown field 'devise'" in err
-    assert box.obeyed == []
+    out, _ = bunraku("sensors", "--box", box.box_file)
+    assert "unknown field 'devise'" in out
+    assert "goes on with the keys that it has" in out
+    _, err = bunraku("sensors", "reload", "--box", box.box_file, status=2)
+    assert "unknown field 'devise'" in err
+    assert box.orders == []
 
 
-def test_a_key_file_changed_by_hand_reaches_the_box(
-    box: ControlClient, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with ends(capsys, 0, "reload", "--box", str(box.box_file)) as (out, _):
-        assert "The running box took it." in out
-    assert [order.name for order in box.obeyed] == ["reload"]
+def test_a_key_file_changed_by_hand_reaches_the_box(box: RunningBox, bunraku: Command) -> None:
+    out, _ = bunraku("sensors", "reload", "--box", box.box_file)
+    assert "The running box took it." in out
+    assert [order.name for order in box.orders] == ["reload"]
 
 
-def test_watching_through_a_pipe_is_told_at_once(box: ControlClient) -> None:
+@contextmanager
+def watching(box: RunningBox) -> Iterator[subprocess.Popen[str]]:
+    """`bunraku sensors --watch` in a pipe; killed after a minute, which ends every read."""
     command = [sys.executable, "-m", "appliance.cli", "sensors", "--watch", "--box", str(box.box_file)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        while not (line := process.stdout.readline()).startswith("left-wrist"):
-            assert line
+        watchdog = threading.Timer(60.0, process.kill)
+        watchdog.start()
+        try:
+            yield process
+        finally:
+            watchdog.cancel()
+            process.kill()
+
+
+def await_table(process: subprocess.Popen[str]) -> None:
+    """Read up to the next table's row of left-wrist."""
+    assert process.stdout is not None
+    while not (line := process.stdout.readline()).startswith("left-wrist"):
+        assert line, "the command has ended"
+
+
+def test_a_closed_pipe_ends_watching(box: RunningBox) -> None:
+    with watching(box) as process:
+        await_table(process)
+        assert process.stdout is not None and process.stderr is not None
         process.stdout.close()  # as `head` does
         process.wait(60)
         assert process.stderr.read() == ""
 
 
-def test_a_folder_that_is_not_there_and_a_full_disk_are_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_watching_goes_on_until_it_is_interrupted(box: RunningBox) -> None:
+    with watching(box) as process:
+        for _ in range(3):
+            await_table(process)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+        assert process.returncode == 0, err
+
+
+def test_a_missing_folder_and_a_full_disk_are_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     keys = tmp_path / "sensors.keys"
     create_keys(keys, ["head"])
     monkeypatch.setattr(os, "fsync", lambda _: (_ for _ in ()).throw(OSError(errno.ENOSPC, "No space left")))
-    with ends(capsys, 2, "revoke", "head", "--keys", str(keys)) as (_, err):
-        assert "No space left. Nothing was changed. Free some space" in err
+    _, err = bunraku("sensors", "revoke", "head", "--keys", keys, status=2)
+    assert "No space left. Nothing was changed. Free some space" in err
     nowhere = str(tmp_path / "nowhere" / "sensors.keys")
-    with pytest.raises(SystemExit) as ended:  # before it asks for a password or opens a port
-        main(["provision", "--name", "head", "--network", "stage", "--keys", nowhere])
-    assert ended.value.code == 2
-    assert "There is no folder" in capsys.readouterr().err
+    # before it asks for a password or opens a port
+    _, err = bunraku("provision", "--name", "head", "--network", "stage", "--keys", nowhere, status=2)
+    assert "There is no folder" in err
 
 
-def test_without_a_box_a_change_counts_later(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_box_a_change_counts_later(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["head"])
     box_file = tmp_path / "box.yaml"
     box_file.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
-    with ends(capsys, 0, "revoke", "head", "--box", str(box_file)) as (out, _):
-        assert "the change counts when it starts again" in out
+    out, _ = bunraku("sensors", "revoke", "head", "--box", box_file)
+    assert "the change counts when it starts again" in out
     assert load_keys(tmp_path / "sensors.keys") == {}
 
 
@@ -413,60 +418,38 @@ def test_without_a_box_a_change_counts_later(tmp_path: Path, capsys: pytest.Capt
         (["revoke", "head", "--keys", "other.keys"], "not both"),
     ],
 )
-def test_what_cannot_be_done_is_one_clear_line(
-    box: ControlClient, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], complaint: str
+def test_a_refusal_is_one_clear_line(
+    box: RunningBox, tmp_path: Path, bunraku: Command, words: list[str], complaint: str
 ) -> None:
     before = (tmp_path / "sensors.keys").read_bytes()
-    with ends(capsys, 2, *words, "--box", str(box.box_file)) as (_, err):
-        assert complaint in err
-        assert len(err.splitlines()) == 1
+    _, err = bunraku("sensors", *words, "--box", box.box_file, status=2)
+    assert complaint in err
+    assert len(err.splitlines()) == 1
     assert (tmp_path / "sensors.keys").read_bytes() == before
-    assert box.obeyed == []
+    assert box.orders == []
 
 
-def test_a_missing_key_file_or_box_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_a_missing_key_file_or_box_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     monkeypatch.chdir(tmp_path)
     box_file = tmp_path / "box.yaml"
     box_file.write_text("control: {port: 1}\n")
-    with ends(capsys, 2, "--box", str(box_file)) as (_, err):
-        assert "names no key file" in err
-    with ends(capsys, 2, "revoke", "head", "--keys", "sensors.keys") as (_, err):
-        assert "There is no key file sensors.keys" in err
+    _, err = bunraku("sensors", "--box", box_file, status=2)
+    assert "names no key file" in err
+    _, err = bunraku("sensors", "revoke", "head", "--keys", "sensors.keys", status=2)
+    assert "There is no key file sensors.keys" in err
     box_file.write_text("sensors: {keys: nowhere/sensors.keys}\ncontrol: {port: 1}\n")
-    with ends(capsys, 2, "revoke", "head", "--box", str(box_file)) as (_, err):
-        assert "There is no folder" in err
-    with ends(capsys, 2, "strobe", "head", "--box", str(box_file)) as (_, err):
-        assert "No box answers on 127.0.0.1:1." in err
-    with ends(capsys, 2, "--watch", "strobe", "head") as (_, err):
-        assert "behind 'strobe'" in err
+    _, err = bunraku("sensors", "revoke", "head", "--box", box_file, status=2)
+    assert "There is no folder" in err
+    _, err = bunraku("sensors", "strobe", "head", "--box", box_file, status=2)
+    assert "No box answers on 127.0.0.1:1." in err
+    _, err = bunraku("sensors", "--watch", "strobe", "head", status=2)
+    assert "behind 'strobe'" in err
 
 
-def test_watching_goes_on_until_it_is_ended(box: ControlClient) -> None:
-    command = [sys.executable, "-m", "appliance.cli", "sensors", "--watch", "--box", str(box.box_file)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    seen = 0
-    ends_at = time.monotonic() + 60.0
-    tell = box.control.process.handler._send
-
-    def counted(asker: Address, message: Message) -> None:
-        nonlocal seen
-        seen += message[0] == "/sensors/end"
-        tell(asker, message)
-
-    box.control.process.handler._send = counted
-    while seen < 3:
-        assert time.monotonic() < ends_at
-        time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert process.returncode == 0, err
-    assert "left-wrist" in out
-
-
-def test_provision_says_what_is_wrong_before_it_opens_a_port(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_provision_refuses_wrong_options_before_it_opens_a_port(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bunraku: Command
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.stdin", open("/dev/null"))  # noqa: SIM115, PTH123
@@ -479,15 +462,12 @@ def test_provision_says_what_is_wrong_before_it_opens_a_port(
         (["--name", "head", "--network", "n"], "No password came"),
         (["--name", "head"], "There is no serial port /dev/nowhere"),
     ):
-        with pytest.raises(SystemExit) as ended:
-            main(["provision", "--port", "/dev/nowhere", *words])
-        assert ended.value.code == 2
-        assert complaint in capsys.readouterr().err
+        assert complaint in bunraku("provision", "--port", "/dev/nowhere", *words, status=2).err
     assert list(tmp_path.iterdir()) == []
 
 
 class Impostor:
-    """Somebody else on the control port while no box runs; replies with whatever he likes."""
+    """Another program on the control port while no box runs, with replies of the test's choice."""
 
     def __init__(self, folder: Path, replies: list[Message]) -> None:
         self._replies = replies
@@ -504,20 +484,18 @@ class Impostor:
             self._socket.sendto(datagram(reply), asker)
 
 
-OBEYED = "\x1b]0;mine\x07\x1b[2J\x9b31m"
+ESCAPES = "\x1b]0;mine\x07\x1b[2J\x9b31m"
 
 
-def test_what_an_impostor_replies_commands_no_terminal(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_impostor_cannot_control_the_terminal(tmp_path: Path, bunraku: Command) -> None:
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
-    line = ("name", "1", *(OBEYED,) * 2, 50.0, 0.0, 0.0, 0.0, 9, 0, 0, *(OBEYED,) * 4)
-    listed: list[Message] = [("/sensors/sensor", *line), ("/sensors/end", 1, 0.1, OBEYED)]
-    with ends(capsys, 0, "--box", str(Impostor(tmp_path, listed).box_file)) as (out, _):
-        assert "mine" in out
-    told: list[Message] = [("/sensors/reply", "/sensors/strobe", 1, OBEYED)]
-    with ends(capsys, 0, "strobe", "head", "--box", str(Impostor(tmp_path, told).box_file)) as (words, _):
-        assert "mine" in words
+    line = ("name", "1", *(ESCAPES,) * 2, 50.0, 0.0, 0.0, 0.0, 9, 0, 0, *(ESCAPES,) * 4)
+    listed: list[Message] = [("/sensors/sensor", *line), ("/sensors/end", 1, 0.1, ESCAPES)]
+    out, _ = bunraku("sensors", "--box", str(Impostor(tmp_path, listed).box_file))
+    assert "mine" in out
+    told: list[Message] = [("/sensors/reply", "/sensors/strobe", 1, ESCAPES)]
+    words, _ = bunraku("sensors", "strobe", "head", "--box", str(Impostor(tmp_path, told).box_file))
+    assert "mine" in words
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", out + words)
 
 
@@ -534,13 +512,10 @@ def test_what_an_impostor_replies_commands_no_terminal(
         ],
     ],
 )
-def test_nonsense_from_an_impostor_is_no_box(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    replies: list[Message],
-    monkeypatch: pytest.MonkeyPatch,
+def test_nonsense_from_an_impostor_does_not_count_as_a_box(
+    tmp_path: Path, bunraku: Command, replies: list[Message], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(AskedBox.__init__, "__defaults__", (0.2,))
+    monkeypatch.setattr(ControlClient.__init__, "__defaults__", (0.2,))
     create_keys(tmp_path / "sensors.keys", ["left-wrist"])
-    with ends(capsys, 0, "--box", str(Impostor(tmp_path, replies).box_file)) as (out, _):
-        assert "No box answers" in out
+    out, _ = bunraku("sensors", "--box", str(Impostor(tmp_path, replies).box_file))
+    assert "No box answers" in out

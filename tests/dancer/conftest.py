@@ -34,31 +34,28 @@ def skeleton() -> Skeleton:
     return Skeleton(NAMES, PARENTS, OFFSETS, ENDS)
 
 
+def _swinging(skeleton: Skeleton, frames: int, hertz: tuple[float, ...], circle_s: float) -> Recording:
+    """At 50 Hz on the spot: joints 1 to 3 swing at these frequencies, the hip goes around a small circle."""
+    time_s = np.arange(frames) / 50.0
+    poses = np.tile(quaternion.IDENTITY.astype(np.float64), (frames, len(skeleton), 1))
+    for joint, frequency in enumerate(hertz, 1):
+        angle = 0.6 * np.sin(2 * np.pi * frequency * time_s)
+        poses[:, joint] = quaternion.from_axis_angle([0.3, 0.2, 1.0], angle)
+    turn = 2 * np.pi * time_s / circle_s
+    roots = np.stack([0.2 * np.cos(turn), np.full(frames, STANDING_HIP_M), 0.2 * np.sin(turn)], axis=1)
+    return Recording(skeleton, poses, roots, 50.0)
+
+
 @pytest.fixture(scope="session")
 def swaying(skeleton: Skeleton) -> Recording:
-    """Four seconds at 50 Hz on the spot, a closed loop: arms swing, the hip goes once around a circle."""
-    time_s = np.arange(200) / 50.0
-    poses = np.tile(quaternion.IDENTITY.astype(np.float64), (200, len(skeleton), 1))
-    for joint, per_loop in ((1, 1), (2, 2), (3, 3)):
-        angle = 0.6 * np.sin(2 * np.pi * per_loop * time_s / 4.0)
-        poses[:, joint] = quaternion.from_axis_angle([0.3, 0.2, 1.0], angle)
-    turn = 2 * np.pi * time_s / 4.0
-    roots = np.stack([0.2 * np.cos(turn), np.full(200, STANDING_HIP_M), 0.2 * np.sin(turn)], axis=1)
-    return Recording(skeleton, poses, roots, 50.0)
+    """Four seconds that are a closed loop."""
+    return _swinging(skeleton, 200, (0.25, 0.5, 0.75), 4.0)
 
 
 @pytest.fixture(scope="session")
 def open_ended(skeleton: Skeleton) -> Recording:
-    """4.4 seconds on the spot that end in another pose than they start with, some centimetres away."""
-    time_s = np.arange(220) / 50.0
-    poses = np.tile(quaternion.IDENTITY.astype(np.float64), (220, len(skeleton), 1))
-    for joint, hertz in ((1, 0.27), (2, 0.55), (3, 0.83)):
-        poses[:, joint] = quaternion.from_axis_angle(
-            [0.3, 0.2, 1.0], 0.6 * np.sin(2 * np.pi * hertz * time_s)
-        )
-    turn = 2 * np.pi * time_s / 4.1
-    roots = np.stack([0.2 * np.cos(turn), np.full(220, STANDING_HIP_M), 0.2 * np.sin(turn)], axis=1)
-    return Recording(skeleton, poses, roots, 50.0)
+    """4.4 seconds that end in another pose than they start with, some centimetres away."""
+    return _swinging(skeleton, 220, (0.27, 0.55, 0.83), 4.1)
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ def check(skeleton: Skeleton, seed: int) -> None:
     for _ in range(3):  # what the pose before left behind must not show
         pose = random_quaternions(rng, len(skeleton))
         root = rng.normal(size=3).astype(np.float32)
-        figure.stand(pose, root)
+        figure.set_pose(pose, root)
         positions, world = skeleton.forward_kinematics(pose.astype(np.float64), root.astype(np.float64))
         assert np.abs(figure.positions - positions).max() < 1e-5
         assert np.abs(figure.world - world).max() < 1e-5
@@ -64,6 +64,6 @@ def test_the_soles_are_the_foot_and_its_end(skeleton: Skeleton) -> None:
 @pytest.mark.parametrize("name", ["spine", "leg"])
 def test_a_figure_without_feet_has_no_soles(name: str) -> None:
     figure = Figure(Skeleton((name,), (-1,), np.zeros((1, 3))))
-    figure.stand(np.array([[1, 0, 0, 0]], dtype=np.float32), np.ones(3, dtype=np.float32))
+    figure.set_pose(np.array([[1, 0, 0, 0]], dtype=np.float32), np.ones(3, dtype=np.float32))
     assert figure.soles.shape == (0, 3)
     assert figure.positions.tolist() == [[1, 1, 1]]

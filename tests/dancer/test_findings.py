@@ -14,7 +14,7 @@ import pytest
 
 import appliance.show
 from appliance.dancer.blending import Blending
-from appliance.dancer.grounding import Grounding, measure_standing, survey
+from appliance.dancer.grounding import Grounding, survey
 from appliance.dancer.hands import Hands
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.puppet import Puppet
@@ -22,6 +22,7 @@ from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Turni
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
+from appliance.studio.standing import measure_standing
 
 DEFAULT_SHOW = Path(appliance.show.__file__).parent / "default_show"
 HELD_OUT = {"salsa_29": 60.0, "indian_13": 120.0}  # takes kept apart from training, with their true rates
@@ -69,7 +70,7 @@ class Dancer:
             moved = blending.take().copy()
             puppet.restore(moved, pose)
             root, lift = motion.roots()[0].copy(), motion.lift
-            grounding.stand(pose, root, lift)
+            grounding.ground_pose(pose, root, lift)
             rows.append((moved, window[0].copy(), pose, root, grounding.root.copy(), lift))
             motion.advance()
         columns = (np.array(column[SETTLING:]) for column in zip(*rows, strict=True))

@@ -10,8 +10,6 @@ import pytest
 from appliance.dancer.grounding import (
     Grounding,
     GroundingError,
-    Standing,
-    measure_standing,
     sole_positions,
     survey,
 )
@@ -19,6 +17,7 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
+from appliance.studio.standing import Standing, measure_standing
 from tests.dancer.conftest import STANDING_HIP_M
 
 LEGS = ("lThigh", "lShin", "lFoot", "rThigh", "rShin", "rFoot")
@@ -30,7 +29,7 @@ def grounded(phrase: Recording, poses: np.ndarray, on_floor: bool = True) -> np.
     grounding = Grounding(phrase.skeleton, floor if on_floor else None)
     roots = []
     for pose, root, lift in zip(poses, phrase.roots, floor.lifts, strict=True):
-        grounding.stand(pose.astype(np.float32), root.astype(np.float32), float(lift))
+        grounding.ground_pose(pose.astype(np.float32), root.astype(np.float32), float(lift))
         roots.append(grounding.root.copy())
     return np.array(roots)
 

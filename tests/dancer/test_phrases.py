@@ -184,7 +184,7 @@ def test_each_phrase_brings_its_floor_and_nobody_pops(swaying: Recording) -> Non
     for tick in range(300):
         if tick == 50:
             playback.play("high", 1.0)
-        figure = grounding.stand(
+        figure = grounding.ground_pose(
             playback.window()[0], playback.roots()[0], playback.lift, playback.rest_heights
         )
         assert playback.rest_heights is not None

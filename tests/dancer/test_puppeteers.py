@@ -42,7 +42,7 @@ def worn(until_s: float, orientation: tuple[float, ...] = LEFT) -> WornSensor:
     sensor = WornSensor("lShldr")
     sensor.pull(0.0)
     for tick in range(1, round(until_s / TICK_S) + 1):
-        sensor.hear(orientation, tick * TICK_S)
+        sensor.take_reading(orientation, tick * TICK_S)
         sensor.pull(tick * TICK_S)
     return sensor
 
@@ -56,7 +56,7 @@ def test_a_sensor_takes_its_joint_over_half_a_second() -> None:
     sensor.pull(0.0)
     course = []
     for tick in range(1, 40):
-        sensor.hear(LEFT, tick * TICK_S)
+        sensor.take_reading(LEFT, tick * TICK_S)
         course.append(sensor.pull(tick * TICK_S).weight)
     assert course[12] == pytest.approx(0.5, abs=0.06)
     assert course[24] == pytest.approx(1.0)
@@ -90,7 +90,7 @@ def test_after_a_silence_the_joint_is_taken_again_and_led_to_the_new_readings() 
     assert 0.2 < weight < 0.8
     turns = []
     for tick in range(81, 81 + 30):
-        sensor.hear(RIGHT, tick * TICK_S)
+        sensor.take_reading(RIGHT, tick * TICK_S)
         target = sensor.pull(tick * TICK_S)
         turns.append(float(quaternion.angle_between(target.orientation, orientation)))
         assert target.weight >= weight
@@ -108,7 +108,7 @@ def test_a_stage_that_stood_still_goes_on_from_where_it_was(stop_s: float) -> No
     for tick in range(60):
         now = 1.0 + stop_s + tick * TICK_S
         if tick:
-            sensor.hear(RIGHT, now)
+            sensor.take_reading(RIGHT, now)
         target = sensor.pull(now)
         shown.append((target.weight, target.orientation.copy()))
     weights = np.array([weight for weight, _ in shown])
@@ -122,7 +122,7 @@ def test_a_stage_that_stood_still_goes_on_from_where_it_was(stop_s: float) -> No
 
 def test_readings_that_are_heard_right_after_a_stop_are_led_to_as_well() -> None:
     sensor = worn(1.0)
-    sensor.hear(RIGHT, 1.7)
+    sensor.take_reading(RIGHT, 1.7)
     turned = quaternion.angle_between(sensor.pull(1.7).orientation, np.array(LEFT))
     assert turned == pytest.approx(1.2 * LONGEST_STEP_S / 0.5, rel=0.01)
 
@@ -136,7 +136,7 @@ def test_a_turning_axis_does_not_jump_over_a_stop() -> None:
 
 def test_while_it_is_heard_the_target_is_the_newest_reading_at_once() -> None:
     sensor = worn(1.0)
-    sensor.hear(RIGHT, 1.02)
+    sensor.take_reading(RIGHT, 1.02)
     assert quaternion.angle_between(sensor.pull(1.02).orientation, np.array(RIGHT)) < 1e-3
 
 
@@ -151,16 +151,16 @@ def random_matrix(seed: int) -> np.ndarray:
 def test_a_reading_goes_through_the_matrix_of_how_it_is_worn(seed: int) -> None:
     matrix, reading = random_matrix(seed), random_quaternions(np.random.default_rng(seed + 1))
     sensor = WornSensor("lShldr", joint_from_reading=matrix)
-    sensor.hear(reading.tolist(), 0.0)
+    sensor.take_reading(reading.tolist(), 0.0)
     assert sensor.pull(0.0).orientation == pytest.approx(matrix @ reading, abs=1e-6)
 
 
 def test_worn_anew_before_it_is_heard_it_counts_at_once() -> None:
     sensor, matrix = WornSensor("lShldr"), random_matrix(1)
     sensor.wear(matrix)
-    sensor.hear(LEFT, 0.0)
+    sensor.take_reading(LEFT, 0.0)
     sensor.pull(0.0)
-    sensor.hear(LEFT, 0.02)
+    sensor.take_reading(LEFT, 0.02)
     assert sensor.pull(0.02).orientation == pytest.approx(matrix @ np.array(LEFT, np.float32), abs=1e-6)
 
 
@@ -176,7 +176,7 @@ def test_worn_anew_while_it_dances_the_joint_is_led_over(silence_s: float) -> No
     shown = [before]
     for tick in range(51, 90):
         if tick > 50 + silence_s / TICK_S:
-            sensor.hear(LEFT, tick * TICK_S)
+            sensor.take_reading(LEFT, tick * TICK_S)
         shown.append(sensor.pull(tick * TICK_S).orientation.copy())
     steps = quaternion.angle_between(np.array(shown[1:]), np.array(shown[:-1]))
     assert steps.max() < 1.3 * apart / 25  # evenly over half a second
@@ -283,7 +283,7 @@ def test_hands_gather_mask_targets_and_weights() -> None:
     sensor = worn(1.0)
     hands = Hands([FixedOrientation("head", RIGHT, weight=0.5), sensor, Remote("rShldr")], JOINTS)
     for tick in range(51, 100):
-        sensor.hear(LEFT, tick * TICK_S)
+        sensor.take_reading(LEFT, tick * TICK_S)
         hands.pull(tick * TICK_S, WINDOW)
     assert hands.mask.tolist() == [False, True, False, True]
     assert hands.weights == pytest.approx([0.0, 1.0, 0.0, 0.5])
@@ -301,7 +301,7 @@ def test_targets_have_no_sign_jumps_whatever_sign_the_readings_have() -> None:
     before = None
     for tick in range(400):
         reading = quaternion.from_axis_angle([0, 0, 1], 0.03 * tick).astype(np.float32)
-        sensor.hear(reading * rng.choice([-1, 1]), tick * TICK_S)
+        sensor.take_reading(reading * rng.choice([-1, 1]), tick * TICK_S)
         hands.pull(tick * TICK_S, WINDOW)
         if before is not None:
             assert np.sum(before * hands.targets, axis=-1).min() > 0.9
@@ -356,7 +356,7 @@ def test_what_moved_a_joint_while_nothing_held_it_is_not_carried_on() -> None:
     sensor.enabled = False
     carried = []
     for tick in range(60):
-        sensor.hear(quaternion.from_axis_angle([0, 1, 0], 0.12 * tick).tolist(), tick * TICK_S)
+        sensor.take_reading(quaternion.from_axis_angle([0, 1, 0], 0.12 * tick).tolist(), tick * TICK_S)
         sensor.enabled = tick >= 40
         hands.pull(tick * TICK_S, WINDOW)
         carried.append(float(quaternion.angle_between(hands.targets[-1, 1], hands.targets[0, 1])))
@@ -410,7 +410,7 @@ def test_a_smooth_hand_gives_smooth_targets(
         if isinstance(hand, Remote):
             hand.hold((course[tick] * rng.choice([-1, 1])).tolist())
         elif isinstance(hand, WornSensor) and tick not in silent:
-            hand.hear(course[tick] * rng.choice([-1, 1]), tick * TICK_S)
+            hand.take_reading(course[tick] * rng.choice([-1, 1]), tick * TICK_S)
 
     targets, held = held_course(Hands([hand], JOINTS), 300, act)
     step = math.tau * TICK_S / seconds_per_turn
@@ -441,7 +441,7 @@ def test_a_hand_that_is_disabled_lets_go_over_one_second_and_takes_again_over_ha
     sensor.enabled = False
     course = []
     for tick in range(51, 120):
-        sensor.hear(RIGHT, tick * TICK_S)  # the dancer goes on moving
+        sensor.take_reading(RIGHT, tick * TICK_S)  # the dancer goes on moving
         course.append(sensor.pull(tick * TICK_S).weight)
     assert course[24] == pytest.approx(0.5, abs=0.04)
     assert course[48] > 0.0 and course[50] == 0.0
@@ -449,7 +449,7 @@ def test_a_hand_that_is_disabled_lets_go_over_one_second_and_takes_again_over_ha
     sensor.enabled = True
     course = []
     for tick in range(120, 150):
-        sensor.hear(RIGHT, tick * TICK_S)
+        sensor.take_reading(RIGHT, tick * TICK_S)
         course.append(sensor.pull(tick * TICK_S).weight)
     assert course[12] == pytest.approx(0.5, abs=0.06)
     assert course[26] == pytest.approx(1.0)

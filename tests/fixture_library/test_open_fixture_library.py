@@ -14,6 +14,7 @@ from appliance.fixture_library.open_fixture_library import LibraryError, profile
 from appliance.lights.patch import Patch
 from appliance.show.fixture_profile import load_profile
 from appliance.show.lights import LightsConfig, drivable
+from tests.command import Command
 
 MOVER: dict[str, Any] = {
     "name": "Testbeam 1",
@@ -61,16 +62,8 @@ MOVER: dict[str, Any] = {
         "Mode": {
             "defaultValue": 0,
             "capabilities": [
-                {
-                    "dmxRange": [0, 99],
-                    "type": "Generic",
-                    "switchChannels": {"Speed / Sound": "Speed"},
-                },
-                {
-                    "dmxRange": [100, 255],
-                    "type": "Generic",
-                    "switchChannels": {"Speed / Sound": "Sound"},
-                },
+                {"dmxRange": [0, 99], "type": "Generic", "switchChannels": {"Speed / Sound": "Speed"}},
+                {"dmxRange": [100, 255], "type": "Generic", "switchChannels": {"Speed / Sound": "Sound"}},
             ],
         },
         "Speed": {"capability": {"type": "Speed", "speedStart": "slow", "speedEnd": "fast"}},
@@ -203,7 +196,7 @@ def test_matrices_are_read_in_the_order_that_they_ask_for(repeat_for: Any, wante
     assert values["modes"][0]["channels"] == [f"macro {pixel}" for pixel in wanted]
 
 
-def test_modes_larger_than_a_universe_are_left_out_and_said() -> None:
+def test_modes_larger_than_a_universe_are_left_out_and_reported() -> None:
     fixture = {
         **BAR,
         "matrix": {"pixelCount": [300, 1, 1]},
@@ -228,16 +221,12 @@ def test_modes_larger_than_a_universe_are_left_out_and_said() -> None:
     ],
 )
 def test_other_files_are_refused_in_words_and_nothing_is_written(
-    tmp_path: Path, content: str, words: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, content: str, words: str, bunraku: Command
 ) -> None:
-    from appliance.cli.app import main
 
     source = tmp_path / "x.json"
     source.write_text(content)
-    with pytest.raises(SystemExit) as left:
-        main(["lights", "convert", str(source)])
-    assert left.value.code == 2
-    assert words in capsys.readouterr().err
+    assert words in bunraku("lights", "convert", source, status=2).err
     assert [path.name for path in tmp_path.iterdir()] == ["x.json"]
 
 
@@ -257,12 +246,7 @@ def test_a_dimmer_that_glows_at_the_start_of_its_range_is_off_at_nothing() -> No
     dimmer = {
         "capabilities": [
             {"dmxRange": [0, 5], "type": "Intensity", "brightness": "off"},
-            {
-                "dmxRange": [6, 255],
-                "type": "Intensity",
-                "brightnessStart": "dark",
-                "brightnessEnd": "bright",
-            },
+            {"dmxRange": [6, 255], "type": "Intensity", "brightnessStart": "dark", "brightnessEnd": "bright"},
         ]
     }
     strobe = {"name": "S", "availableChannels": {"D": dimmer}, "modes": [{"name": "1", "channels": ["D"]}]}

@@ -25,7 +25,7 @@ from hw_sim.soak.script import KILLS_UNTIL, script
 from hw_sim.soak.unit import PAUSE_S, Unit
 from hw_sim.soak.vitals import Vitals
 from tests.bundles import write_show
-from tests.system.box import PATIENCE_S
+from tests.system.processes import PATIENCE_S
 
 LATE_MS = 15.0
 

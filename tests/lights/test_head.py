@@ -1,4 +1,4 @@
-"""Moving heads: they point where they are told, through any pose, and never flip, jump or race."""
+"""Moving heads: they point at their target, through any pose, and never flip, jump or race."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_a_path_under_the_head_is_followed_without_a_flip(beside: float, way: tu
     assert worst < 5.0
 
 
-def test_right_through_the_zenith_pan_stands_still_and_tilt_changes_sides() -> None:
+def test_through_the_zenith_pan_stays_and_tilt_changes_sides() -> None:
     heads = head()
     settle(heads, (0, 1, -2))
     pan = heads.angles[0]
@@ -113,7 +113,7 @@ def test_right_through_the_zenith_pan_stands_still_and_tilt_changes_sides() -> N
     assert np.abs(np.diff(tilts)).max() < 2.0
 
 
-def test_a_dancer_who_circles_is_followed_beyond_half_a_turn_and_unwound_at_the_end_of_the_range() -> None:
+def test_a_circling_dancer_is_followed_beyond_half_a_turn_and_unwound_at_the_end_of_the_range() -> None:
     """540 degrees: one and a half turns, then the other way of tilt takes over, half a turn back."""
     heads = head(pose="standing", place=[0, 0, 0])
     settle(heads, (0, 1, 2))

@@ -207,7 +207,7 @@ def test_at_the_end_heads_stay_where_they_point() -> None:
     assert any(last[20:24]) and not any(last[:20]) and not any(last[24:])
 
 
-def test_after_a_pause_of_the_whole_machine_nothing_jumps_but_time() -> None:
+def test_a_pause_of_the_whole_machine_makes_no_jump() -> None:
     night = evening(FULL, AIM)
     night.dance(1.0)
     before = night.rig.patch.heads.angles.copy()
@@ -225,7 +225,7 @@ def slow(rate_hz: float) -> Rig:
 
 
 @pytest.mark.parametrize("held_up_s", [0.9, 1.5, 5.0])
-def test_a_machine_that_was_held_up_whole_dims_nothing_and_counts_nothing(held_up_s: float) -> None:
+def test_a_pause_of_the_whole_machine_dims_nothing_and_counts_nothing(held_up_s: float) -> None:
     """The lights wake some passes before the stage does."""
     night = evening()
     night.dance(2.0)
@@ -235,7 +235,7 @@ def test_a_machine_that_was_held_up_whole_dims_nothing_and_counts_nothing(held_u
     assert not night.rig.is_lost
 
 
-def test_lights_that_were_held_up_while_the_stage_died_fade_as_ever() -> None:
+def test_lights_paused_while_the_stage_died_fade_as_usual() -> None:
     night = evening()
     night.dance(1.0)
     night.now += 5.0
@@ -244,7 +244,7 @@ def test_lights_that_were_held_up_while_the_stage_died_fade_as_ever() -> None:
     assert shown[-1] == 0.0 and night.rig.is_lost
 
 
-def test_lights_that_are_held_up_on_their_way_to_the_safe_look_do_not_jump_there() -> None:
+def test_a_pause_during_the_fade_to_the_safe_look_makes_no_jump() -> None:
     night = evening()
     night.dance(1.0)
     night.hang(LOST_S + 0.3 * SAFE_FADE_S)

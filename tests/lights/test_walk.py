@@ -15,12 +15,12 @@ import pytest
 import yaml
 
 from appliance.box.runtime_folder import Claim
-from appliance.cli.app import main
 from appliance.lights.patch import Patch
 from appliance.lights.walk import Walk, introduction, steps, walk
 from appliance.show.bundle import default_show_path
 from hw_sim.dmx.artnet import ArtNetReceiver
 from hw_sim.peers import HOST
+from tests.command import Command
 from tests.lights.rigs import lights
 
 PAR = {"name": "par", "profile": "led-par", "mode": "RGBW", "address": 1}
@@ -50,7 +50,7 @@ def test_every_attribute_of_every_fixture_is_walked_in_the_order_of_the_patch() 
     _, said = walked(patch_of(PAR, HEAD, LAMP))
     assert said[0] == "par (led-par): universe 1, channels 1 to 6"
     assert [line.split(",")[0].strip() for line in said[1:7]] == [
-        *("dimmer", "red", "green", "blue", "white", "strobe"),
+        *("dimmer", "red", "green", "blue", "white", "strobe")
     ]
     assert said[7] == "head (moving-wash): universe 1, channels 21 to 32"
     assert said[8].startswith("  pan, channel 21 and 22:")
@@ -98,11 +98,11 @@ def held_up(patch: Patch, attribute: str) -> Any:
     return np.array(shown)
 
 
-def test_a_walk_that_is_held_up_jumps_over_no_peak() -> None:
+def test_a_delayed_walk_skips_no_peak() -> None:
     assert held_up(patch_of(PAR), "red")[:, 1].max() > 230
 
 
-def test_a_head_that_is_held_up_reaches_both_ends_and_goes_no_faster() -> None:
+def test_a_delayed_head_reaches_both_ends_and_moves_no_faster() -> None:
     patch = patch_of(HEAD)
     levels = held_up(patch, "pan")[1:-1]
     pan = (levels[:, 20] * 256 + levels[:, 21]) / 65535 * 540
@@ -183,53 +183,39 @@ def test_ctrl_c_ends_the_walk_in_the_dark(show: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [
-        (("--fixture", "pra"), "Did you mean 'par'?"),
-        (("--attribute", "dimer"), "Did you mean 'dimmer'?"),
-    ],
+    [(("--fixture", "pra"), "Did you mean 'par'?"), (("--attribute", "dimer"), "Did you mean 'dimmer'?")],
 )
 def test_unknown_names_are_refused_with_the_nearest(
-    show: Path, tmp_path: Path, arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit):
-        main(["lights", "test", "--show", str(show), "--box", str(box(tmp_path, 9)), *arguments])
-    assert words in capsys.readouterr().err
-
-
-def test_a_walk_beside_running_lights_is_refused(
-    show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    show: Path, tmp_path: Path, arguments: tuple[str, ...], words: str, bunraku: Command
 ) -> None:
     file = box(tmp_path, 9)
+    assert words in bunraku("lights", "test", "--show", show, "--box", file, *arguments, status=2).err
+
+
+def test_a_walk_beside_running_lights_is_refused(show: Path, tmp_path: Path, bunraku: Command) -> None:
+    file = box(tmp_path, 9)
     claim = Claim(tmp_path / "run", "lights")
-    with pytest.raises(SystemExit):
-        main(["lights", "test", "--show", str(show), "--box", str(file)])
+    assert "Another lights runs" in bunraku("lights", "test", "--show", show, "--box", file, status=2).err
     claim.close()
-    assert "Another lights runs" in capsys.readouterr().err
 
 
-def test_a_box_without_a_wire_is_told_what_to_add(
-    show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for arguments in (("lights", "test", "--show", str(show)), ("lights", "--show", str(show))):
-        with pytest.raises(SystemExit):
-            main(arguments)
-        assert "No wire leads to the lights. Add one under outputs: dmx:" in capsys.readouterr().err
+def test_a_box_without_a_wire_is_told_what_to_add(show: Path, tmp_path: Path, bunraku: Command) -> None:
+    for command in (["lights", "test"], ["lights"]):
+        words = bunraku(*command, "--show", show, status=os.EX_CONFIG).err
+        assert "No wire leads to the lights. Add one under outputs: dmx:" in words
 
 
-def test_the_rig_is_printed_and_drawn(show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_rig_is_printed_and_drawn(show: Path, tmp_path: Path, bunraku: Command) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "rig.png"
-    with pytest.raises(SystemExit) as left:
-        main(["lights", "show", "--show", str(show), "--box", str(box(tmp_path, 9)), "--out", str(picture)])
-    assert left.value.code == 0
-    said = capsys.readouterr().out
+    said = bunraku("lights", "show", "--show", show, "--box", box(tmp_path, 9), "--out", picture).out
     for words in ("par", "led-par", "21 to 32", "hanging", "rig.png"):
         assert words in said
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_picture_shows_where_heads_point_in_the_mapping_that_is_asked_for(
-    show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_the_picture_shows_where_heads_point_in_the_chosen_mapping(
+    show: Path, tmp_path: Path, bunraku: Command
 ) -> None:
     pytest.importorskip("matplotlib")
     text = (show / "show.yaml").read_text()
@@ -238,10 +224,8 @@ def test_the_picture_shows_where_heads_point_in_the_mapping_that_is_asked_for(
     pictures = []
     for mapping in ("away", "warm"):
         pictures.append(tmp_path / f"{mapping}.png")
-        with pytest.raises(SystemExit) as left:
-            main(["lights", "show", "--show", str(show), "--out", str(pictures[-1]), "--mapping", mapping])
-        assert left.value.code == 0, capsys.readouterr()
+        bunraku("lights", "show", "--show", show, "--out", pictures[-1], "--mapping", mapping)
     assert pictures[0].read_bytes() != pictures[1].read_bytes()
-    with pytest.raises(SystemExit):
-        main(["lights", "show", "--show", str(show), "--mapping", "wram"])
-    assert "Did you mean 'warm'?" in capsys.readouterr().err
+    assert (
+        "Did you mean 'warm'?" in bunraku("lights", "show", "--show", show, "--mapping", "wram", status=2).err
+    )

@@ -95,7 +95,7 @@ def test_a_receiver_that_is_not_there_is_counted_and_disturbs_nobody(
     assert len(take(peer, 3 * 20)) == 3 * 20
     assert (present.sent, present.dropped, present.last_error) == (60, 0, "")
     assert absent.sent + absent.dropped == 60 and absent.dropped > 50
-    assert absent.last_error == "nobody listens on that port"
+    assert absent.last_error == "no program listens on that port"
     outputs.close()
 
 

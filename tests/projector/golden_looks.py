@@ -21,7 +21,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.context import offscreen
 from appliance.projector.picture.renderer import Renderer
-from appliance.projector.still import drawn, moment_of
+from appliance.projector.still import draw_still, moment_of
 from appliance.show.bundle import default_show_path
 from appliance.show.look import STYLES, LookConfig, looks_by_name
 
@@ -52,7 +52,7 @@ def renderer(
 
 
 def difference(a: Picture, b: Picture) -> tuple[float, float]:
-    """How far two pictures are apart in steps of 255: mean and 99th percentile, after a small blur."""
+    """The difference of two pictures in steps of 255: mean and 99th percentile, after a small blur."""
     apart = np.abs(_blurred(a) - _blurred(b))
     return float(apart.mean()), float(np.percentile(apart, 99))
 
@@ -69,5 +69,5 @@ if __name__ == "__main__":
     dance = phrase()
     with offscreen(SIZE) as gl, renderer(gl, dance.skeleton) as looks:
         for style in STYLES:
-            image = drawn(gl, looks, moment_of(dance, AT_S), style, SIZE)
+            image = draw_still(gl, looks, moment_of(dance, AT_S), style, SIZE)
             Image.fromarray(image).save(FOLDER / f"{style}.png", optimize=True)

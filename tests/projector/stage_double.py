@@ -1,4 +1,4 @@
-"""A stage of one's own that writes real shared frames, and a painter whose pictures tell."""
+"""A stage double that writes real shared frames, and a painter with colours that tests can read."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def chain(joints: int) -> Skeleton:
 
 
 class StageDouble:
-    """Writes frames of a skeleton with so many joints, for the show in a folder."""
+    """Writes frames of a skeleton with this many joints, for the show in a folder."""
 
     def __init__(self, folder: Path, show: Path, joints: int = 3) -> None:
         skeleton = chain(joints)
@@ -49,7 +49,7 @@ class StageDouble:
 
 
 class TellingPainter:
-    """Fills the picture: red says how high the dancer is, green how many joints, blue how far a look is."""
+    """Fills the picture: red is the dancer's height, green the number of joints, blue the look's share."""
 
     made = 0
     released = 0

@@ -1,4 +1,4 @@
-"""The alignment outlives the box's power: kept as a whole or not at all, and never a reason not to show."""
+"""The alignment survives a power cut: kept as a whole or not at all, and never a reason to show nothing."""
 
 from __future__ import annotations
 
@@ -87,13 +87,13 @@ def test_a_damaged_file_is_set_aside(tmp_path: Path, said: list[str], text: str)
     assert not path.exists() and path.with_name(FILE_NAME + ".broken").read_text() == text
 
 
-def test_bytes_that_are_no_text(tmp_path: Path, said: list[str]) -> None:
+def test_bytes_that_are_not_text(tmp_path: Path, said: list[str]) -> None:
     (tmp_path / FILE_NAME).write_bytes(b"\xff\xfe\x00")
     assert opened(tmp_path, said).alignment == Alignment()
     assert len(said) == 1
 
 
-def test_a_place_that_takes_no_file_is_said_once_and_the_alignment_holds(
+def test_a_folder_that_cannot_be_written_is_reported_once_and_the_alignment_holds(
     tmp_path: Path, said: list[str]
 ) -> None:
     (tmp_path / "file").write_text("")

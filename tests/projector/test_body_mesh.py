@@ -1,4 +1,4 @@
-"""The body around any skeleton: closed, whole, symmetrical where the skeleton is, and moved by its joints."""
+"""The body around any skeleton: closed, in one piece, as symmetrical as the skeleton, moved by its joints."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def test_weights_are_shares_of_real_joints(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", skeletons.ALL)
-def test_in_the_pose_in_which_it_was_modelled_the_body_is_as_it_was(name: str) -> None:
+def test_in_its_bind_pose_the_body_is_unchanged(name: str) -> None:
     mesh = mesh_of(name)
     vertices, normals = skin(mesh, mesh.bind_positions, mesh.bind_world)
     np.testing.assert_allclose(vertices, mesh.vertices, atol=1e-5)

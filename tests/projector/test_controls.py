@@ -48,7 +48,7 @@ def test_arrows_do_nothing_outside_of_corner_mode(controls: Controls, kept: list
     assert not kept and controls.corner is None
 
 
-def test_tab_goes_round_and_the_grid_is_there_meanwhile(controls: Controls) -> None:
+def test_tab_cycles_through_the_corners_and_the_grid_is_shown(controls: Controls) -> None:
     assert not controls.shows_grid
     strike(controls, "C")
     assert (controls.corner, controls.shows_grid) == (0, True)
@@ -105,7 +105,7 @@ def test_orders(controls: Controls) -> None:
     assert controls.alignment.corners == WHOLE
 
 
-def test_commands_reach_as_far_as_keys() -> None:
+def test_commands_can_do_what_keys_can() -> None:
     _, x, y = FORMS["/projector/corner"].numbers
     assert {x[1:3], y[1:3]} == {(-FARTHEST, 1 + FARTHEST)}
     assert FORMS["/projector/brightness"].numbers[0].most == MOST_BRIGHT

@@ -19,11 +19,11 @@ def mapped(corners: Corners, u: float, v: float) -> np.ndarray:
 
 
 @given(st.lists(near, min_size=8, max_size=8))
-def test_the_four_corners_land_on_the_four_wished_points(moves: list[float]) -> None:
+def test_the_four_corners_land_on_the_four_wanted_points(moves: list[float]) -> None:
     a, b, c, d = ((x + dx, y + dy) for (x, y), dx, dy in zip(WHOLE, moves[::2], moves[1::2], strict=True))
     assert complaint((a, b, c, d)) == ""
-    for (u, v), wished in zip(WHOLE, (a, b, c, d), strict=True):
-        assert np.allclose(mapped((a, b, c, d), u, v), wished, atol=1e-12)
+    for (u, v), wanted in zip(WHOLE, (a, b, c, d), strict=True):
+        assert np.allclose(mapped((a, b, c, d), u, v), wanted, atol=1e-12)
 
 
 @given(st.floats(0, 1), st.floats(0, 1), st.floats(0, 1), st.floats(0, 1))

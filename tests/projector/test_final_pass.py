@@ -78,17 +78,17 @@ def test_mirror_and_upside_down(show: Show) -> None:
 @pytest.mark.parametrize(
     "corners", [((20, 10), (150, 4), (140, 80), (8, 70)), ((40, 30), (120, 20), (130, 60), (30, 85))]
 )
-def test_the_pictures_corners_land_on_the_wished_pixels(show: Show, corners: Corners) -> None:
+def test_the_pictures_corners_land_on_the_wanted_pixels(show: Show, corners: Corners) -> None:
     pinned: Any = tuple((x / SIZE[0], y / SIZE[1]) for x, y in corners)
     lit = show(flat(255), Alignment(pinned))[..., 0] > 127
     depth = depth_inside(corners)
-    clear = np.abs(depth) > 0.01  # pixels: whose centre does not lie on the very edge
+    clear = np.abs(depth) > 0.01  # pixels whose centre is clear of the edge
     assert clear.sum() > 0.99 * clear.size
     assert np.array_equal(lit[clear], depth[clear] > 0)
 
 
 def depth_inside(corners: Corners) -> np.ndarray:
-    """How far within the straight lines between four points each pixel's centre lies, pixels: the oracle."""
+    """Distance of each pixel's centre inside the quadrilateral of four points, pixels: the oracle."""
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
     depth = np.full(x.shape, np.inf)
     for k in range(4):

@@ -32,7 +32,7 @@ def test_nothing_to_say_and_unknown_letters_are_empty() -> None:
 def test_frame_ages_and_rate() -> None:
     meter = Meter()
     for k in range(1001):
-        meter.shown(10 + k / 50, 10 + k / 50 - (0.02 if k else 0.3))
+        meter.note_swap(10 + k / 50, 10 + k / 50 - (0.02 if k else 0.3))
     figures = meter.figures()
     assert figures.rate == pytest.approx(50)
     assert (figures.age_p50_ms, figures.pictures, figures.dances) == (pytest.approx(20), 1001, 1001)
@@ -42,16 +42,16 @@ def test_frame_ages_and_rate() -> None:
 
 def test_the_rate_is_that_of_the_last_seconds() -> None:
     meter = Meter()
-    meter.shown(0.0, None)
+    meter.note_swap(0.0, None)
     for k in range(60):
-        meter.shown(5 + k / 10, None)  # the first looks took a while
+        meter.note_swap(5 + k / 10, None)  # the first looks took a while
     assert meter.figures().rate == pytest.approx(10)
 
 
 def test_pictures_without_a_dance_have_no_age() -> None:
     meter = Meter()
     assert meter.figures().rate == 0
-    meter.shown(1.0, None)
-    meter.shown(1.1, None)
+    meter.note_swap(1.0, None)
+    meter.note_swap(1.1, None)
     assert meter.figures().age_p50_ms is None
     assert "no dance" in meter.figures().sentence()

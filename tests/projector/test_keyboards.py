@@ -100,7 +100,7 @@ def test_no_devices_at_all(tmp_path: Path) -> None:
     assert list(keyboards.pressed()) == [] and not keyboards.is_refused
 
 
-def test_devices_that_may_not_be_read(devices: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_devices_without_read_permission(devices: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plugged(devices)
 
     def refused(*_: object) -> int:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import moderngl
 import numpy as np
 import pytest
@@ -12,41 +10,19 @@ from PIL import Image
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.context import offscreen
 from appliance.projector.picture.renderer import Renderer
-from appliance.projector.still import drawn, moment_of
+from appliance.projector.still import draw_still, moment_of
 from appliance.show.look import STYLES, LookConfig
-from tests.projector.golden_looks import (
-    AT_S,
-    FOLDER,
-    MEAN_LIMIT,
-    P99_LIMIT,
-    SIZE,
-    difference,
-    phrase,
-    renderer,
-)
+from tests.projector.golden_looks import AT_S, FOLDER, MEAN_LIMIT, P99_LIMIT, SIZE, difference, renderer
 from tests.projector.skeletons import mixamo, point, toy
 
 MOST_GPU_BYTES = 25e6
 MOST_DRAW_CALLS = 20
 
 
-@pytest.fixture(scope="module")
-def dance() -> Recording:
-    return phrase()
-
-
-@pytest.fixture(scope="module")
-def ctx() -> Iterator[moderngl.Context]:
-    with offscreen(SIZE) as made:
-        yield made
-
-
-@pytest.fixture(scope="module")
-def drawing(ctx: moderngl.Context, dance: Recording) -> Iterator[tuple[moderngl.Context, Renderer]]:
-    with renderer(ctx, dance.skeleton) as made:
-        yield ctx, made
+@pytest.fixture
+def drawing(gl: moderngl.Context, looks: Renderer) -> tuple[moderngl.Context, Renderer]:
+    return gl, looks
 
 
 def still(skeleton: Skeleton, size: float = 1.0) -> Recording:
@@ -65,9 +41,9 @@ def still(skeleton: Skeleton, size: float = 1.0) -> Recording:
 @pytest.mark.parametrize("style", STYLES)
 def test_golden_picture(style: str, dance: Recording, drawing: tuple[moderngl.Context, Renderer]) -> None:
     golden = np.asarray(Image.open(FOLDER / f"{style}.png").convert("RGB"))
-    mean, p99 = difference(drawn(*drawing, moment_of(dance, AT_S), style, SIZE), golden)
+    mean, p99 = difference(draw_still(*drawing, moment_of(dance, AT_S), style, SIZE), golden)
     assert mean < MEAN_LIMIT and p99 < P99_LIMIT
-    mean, p99 = difference(drawn(*drawing, moment_of(dance, AT_S + 0.04), style, SIZE), golden)
+    mean, p99 = difference(draw_still(*drawing, moment_of(dance, AT_S + 0.04), style, SIZE), golden)
     assert mean > MEAN_LIMIT and p99 > P99_LIMIT
 
 
@@ -75,10 +51,10 @@ def test_same_moment_same_picture_whatever_came_before(
     dance: Recording, drawing: tuple[moderngl.Context, Renderer]
 ) -> None:
     moment = moment_of(dance, 46.2)
-    first = [drawn(*drawing, moment, style, SIZE) for style in STYLES]
+    first = [draw_still(*drawing, moment, style, SIZE) for style in STYLES]
     for style, picture in reversed(list(zip(STYLES, first, strict=True))):
-        drawn(*drawing, moment_of(dance, 3.0), "ink", (180, 320))
-        assert np.array_equal(drawn(*drawing, moment, style, SIZE), picture)
+        draw_still(*drawing, moment_of(dance, 3.0), "ink", (180, 320))
+        assert np.array_equal(draw_still(*drawing, moment, style, SIZE), picture)
 
 
 @pytest.mark.parametrize("size", [(320, 180), (240, 180), (180, 320), (400, 100)])
@@ -86,7 +62,7 @@ def test_edge_is_true_black_and_the_figure_inside(
     size: tuple[int, int], dance: Recording, drawing: tuple[moderngl.Context, Renderer]
 ) -> None:
     for style in STYLES:
-        picture = drawn(*drawing, moment_of(dance, AT_S), style, size)
+        picture = draw_still(*drawing, moment_of(dance, AT_S), style, size)
         rim = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])
         assert not rim.any(), style
         assert picture.max() > 100, style
@@ -95,12 +71,12 @@ def test_edge_is_true_black_and_the_figure_inside(
 def test_cross_fade_mixes_the_two_pictures(
     dance: Recording, drawing: tuple[moderngl.Context, Renderer]
 ) -> None:
-    ctx, looks = drawing
+    gl, looks = drawing
     moment = moment_of(dance, AT_S)
     whole = {
-        style: drawn(ctx, looks, moment, style, SIZE).astype(int) for style in ("ink", "lines", "plaster")
+        style: draw_still(gl, looks, moment, style, SIZE).astype(int) for style in ("ink", "lines", "plaster")
     }
-    target = ctx.framebuffer([ctx.texture(SIZE, 4)])
+    target = gl.framebuffer([gl.texture(SIZE, 4)])
     for before, now, mix in (("ink", "lines", 0.25), ("lines", "plaster", 0.6), ("plaster", "ink", 1.0)):
         looks.draw(moment, now, before, mix, target)
         pixels = np.frombuffer(target.read(components=4), np.uint8).reshape(SIZE[1], SIZE[0], 4)
@@ -111,41 +87,41 @@ def test_cross_fade_mixes_the_two_pictures(
 def test_unknown_look_is_the_first(dance: Recording, drawing: tuple[moderngl.Context, Renderer]) -> None:
     moment = moment_of(dance, AT_S)
     assert np.array_equal(
-        drawn(*drawing, moment, "no such look", SIZE), drawn(*drawing, moment, "plaster", SIZE)
+        draw_still(*drawing, moment, "no such look", SIZE), draw_still(*drawing, moment, "plaster", SIZE)
     )
 
 
-def test_colours_of_the_show(dance: Recording, ctx: moderngl.Context) -> None:
+def test_colours_of_the_show(dance: Recording, gl: moderngl.Context) -> None:
     red = dict.fromkeys(("figure", "light", "accent"), "#ff0000")
     looks = {
         "red": LookConfig(name="red", style="lines", fog=0.0, **red),
         "chalk": LookConfig(name="chalk", style="ink", figure="#ffffff", background="#000000"),
     }
-    with renderer(ctx, dance.skeleton, looks) as made:
+    with renderer(gl, dance.skeleton, looks) as made:
         red_lines, chalk = (
-            drawn(ctx, made, moment_of(dance, AT_S), name, SIZE).astype(int) for name in ("red", "chalk")
+            draw_still(gl, made, moment_of(dance, AT_S), name, SIZE).astype(int) for name in ("red", "chalk")
         )
     assert red_lines[..., 0].max() > 150 and red_lines[..., 1:].max() < 60
     assert chalk.max() > 200 and np.median(chalk) == 0
 
 
 @pytest.mark.parametrize("skeleton", [mixamo(), toy()], ids=["mixamo", "toy"])
-def test_any_skeleton_of_any_size_looks_alike(skeleton: Skeleton, ctx: moderngl.Context) -> None:
+def test_any_skeleton_of_any_size_looks_alike(skeleton: Skeleton, gl: moderngl.Context) -> None:
     pictures = []
     for size in (1.0, 20.0):
         recording = still(skeleton, size)
-        with renderer(ctx, recording.skeleton) as made:
-            pictures.append(drawn(ctx, made, moment_of(recording, 1.0), "plaster", SIZE))
+        with renderer(gl, recording.skeleton) as made:
+            pictures.append(draw_still(gl, made, moment_of(recording, 1.0), "plaster", SIZE))
     assert pictures[0].max() > 100
     mean, p99 = difference(*pictures)
     assert mean < MEAN_LIMIT and p99 < P99_LIMIT
 
 
 @pytest.mark.parametrize("style", STYLES)
-def test_a_single_joint_can_be_shown(style: str, ctx: moderngl.Context) -> None:
+def test_a_single_joint_can_be_shown(style: str, gl: moderngl.Context) -> None:
     recording = still(point())
-    with renderer(ctx, recording.skeleton) as made:
-        assert drawn(ctx, made, moment_of(recording, 0.5), style, SIZE).max() > 20
+    with renderer(gl, recording.skeleton) as made:
+        assert draw_still(gl, made, moment_of(recording, 0.5), style, SIZE).max() > 20
 
 
 def test_first_picture_of_a_show_has_no_past(
@@ -154,20 +130,21 @@ def test_first_picture_of_a_show_has_no_past(
     moment = moment_of(dance, 0.0)
     assert len(moment.trail) == 1
     for style in STYLES:
-        assert drawn(*drawing, moment, style, SIZE).max() > 100
+        assert draw_still(*drawing, moment, style, SIZE).max() > 100
 
 
-def test_trail_of_no_length_leaves_no_trace(dance: Recording, ctx: moderngl.Context) -> None:
+def test_trail_of_no_length_leaves_no_trace(dance: Recording, gl: moderngl.Context) -> None:
     styles = ("lines", "ink", "cloud", "veil")
     looks = {
         f"{style} {trail_s}": LookConfig(name=style, style=style, trail_s=trail_s)
         for style in styles
         for trail_s in (0.0, 1.2)
     }
-    with renderer(ctx, dance.skeleton, looks) as made:
+    with renderer(gl, dance.skeleton, looks) as made:
         for style in styles:
             without, with_ = (
-                drawn(ctx, made, moment_of(dance, AT_S), f"{style} {trail_s}", SIZE) for trail_s in (0.0, 1.2)
+                draw_still(gl, made, moment_of(dance, AT_S), f"{style} {trail_s}", SIZE)
+                for trail_s in (0.0, 1.2)
             )
             assert difference(without, with_)[1] > P99_LIMIT
             assert contrast(without) < 30 < contrast(with_), style
@@ -178,13 +155,13 @@ def contrast(picture: np.ndarray) -> int:
     return int(np.ptp(picture[36:70, 112:142].max(axis=2).astype(int)))
 
 
-def test_cost_at_1080p(dance: Recording, ctx: moderngl.Context) -> None:
-    """GPU memory with the target counted, draw calls; what each takes on a Raspberry Pi 4 is reckoned."""
+def test_cost_at_1080p(dance: Recording, gl: moderngl.Context) -> None:
+    """GPU memory with the target counted, draw calls; time on a Raspberry Pi 4 is estimated."""
     size = 1920, 1080
-    with renderer(ctx, dance.skeleton, size=size) as made:
+    with renderer(gl, dance.skeleton, size=size) as made:
         for style in STYLES:
-            drawn(ctx, made, moment_of(dance, AT_S), style, size)
-            figures = made.figures()
-            assert figures.draw_calls <= MOST_DRAW_CALLS
-            assert figures.gpu_bytes < MOST_GPU_BYTES
-            assert 1.0 < figures.overdraw < 3.0 and figures.pi4_ms > 0
+            draw_still(gl, made, moment_of(dance, AT_S), style, size)
+            cost = made.cost()
+            assert cost.draw_calls <= MOST_DRAW_CALLS
+            assert cost.gpu_bytes < MOST_GPU_BYTES
+            assert 1.0 < cost.overdraw < 3.0 and cost.pi4_ms > 0

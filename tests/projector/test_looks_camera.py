@@ -11,15 +11,9 @@ from appliance.projector.picture.camera import View, view
 from appliance.projector.picture.poses import poses_of
 from appliance.projector.still import moment_of
 from appliance.show.look import CameraConfig
-from tests.projector.golden_looks import phrase
 
 HEIGHT, SOLE = 1.53, 0.05
 ASPECTS = (16 / 9, 4 / 3, 9 / 16)
-
-
-@pytest.fixture(scope="module")
-def dance() -> Recording:
-    return phrase()
 
 
 def seen(moment: Moment, config: CameraConfig, aspect: float) -> tuple[View, np.ndarray]:

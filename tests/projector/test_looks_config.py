@@ -1,4 +1,4 @@
-"""Looks in show.yaml: colours, and what is said of those that are none."""
+"""Looks in show.yaml: colours, and messages about invalid ones."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def gl() -> Iterator[moderngl.Context]:
 
 
 class Evening:
-    """A projector, and time that passes as the test wishes."""
+    """A projector, and time under the test's control."""
 
     def __init__(self, gl: moderngl.Context, folder: Path, show: Path) -> None:
         TellingPainter.made = TellingPainter.released = 0
@@ -40,10 +40,10 @@ class Evening:
         self.said: list[str] = []
         self.controls = Controls(Alignment(), lambda _: None)
         self.show_state = ShowState()
-        self._house = ShowStateWriter(folder)
-        self._reader, self._seen_house = FrameReader(folder), ShowStateReader(folder)
+        self._declared = ShowStateWriter(folder)
+        self._reader, self._show_state = FrameReader(folder), ShowStateReader(folder)
         self.projector = Projector(
-            *(gl, ProjectorConfig(), self._reader, self._seen_house, self.controls, self.said.append),
+            *(gl, ProjectorConfig(), self._reader, self._show_state, self.controls, self.said.append),
             TellingPainter,
         )
         self.now = self._ticked = 1000.0
@@ -52,6 +52,12 @@ class Evening:
 
     def begin(self, joints: int = 3, show: Path | None = None) -> None:
         self.stage = StageDouble(self.folder, show or self.show, joints)
+
+    def lose_stage(self) -> None:
+        """The stage's process ends."""
+        assert self.stage is not None
+        self.stage.close()
+        self.stage = None
 
     def picture(self, size: tuple[int, int] = SIZE, lines: tuple[str, ...] = ()) -> np.ndarray:
         """One display frame later; the stage, if there is one, has ticked meanwhile."""
@@ -64,23 +70,23 @@ class Evening:
         return pixels(self._gl.screen, size)
 
     def colour(self, seconds: float = PERIOD_S) -> tuple[int, int, int]:
-        """What fills the display after so long."""
+        """What fills the display after this time."""
         for _ in range(max(1, round(seconds / PERIOD_S))):
             found = self.picture()
         assert np.ptp(found, axis=(0, 1)).max() <= 1
         red, green, blue = found.reshape(-1, 3).max(axis=0)
         return int(red), int(green), int(blue)
 
-    def set_house(self, show_state: ShowState) -> None:
+    def declare(self, show_state: ShowState) -> None:
         self.show_state = show_state
-        self._house.write(show_state)
+        self._declared.write(show_state)
 
     def close(self) -> None:
         if self.stage is not None:
             self.stage.close()
         self.projector.release()
-        self._house.close()
-        self._seen_house.close()
+        self._declared.close()
+        self._show_state.close()
         self._reader.close()
 
 
@@ -115,7 +121,7 @@ def test_fades_to_black_when_the_stage_hangs_and_comes_back(evening: Evening) ->
     assert TellingPainter.made == 1
 
 
-def test_a_machine_that_was_held_up_whole_shows_no_black(evening: Evening) -> None:
+def test_a_pause_of_the_whole_machine_shows_no_black(evening: Evening) -> None:
     """The projector wakes a few pictures before the stage does."""
     evening.begin()
     assert evening.colour(1.0)[0] == 255
@@ -130,9 +136,7 @@ def test_a_machine_that_was_held_up_whole_shows_no_black(evening: Evening) -> No
 def test_a_stage_that_is_restarted_soon_is_hardly_seen(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    assert evening.stage is not None
-    evening.stage.close()
-    evening.stage = None
+    evening.lose_stage()
     assert evening.colour(0.3)[0] == 255
     evening.begin()
     assert {evening.colour()[0] for _ in range(30)} == {255}
@@ -142,9 +146,7 @@ def test_a_stage_that_is_restarted_soon_is_hardly_seen(evening: Evening) -> None
 def test_a_new_stage_that_has_not_begun_to_dance_takes_no_picture_away(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    assert evening.stage is not None
-    evening.stage.close()
-    evening.stage = None
+    evening.lose_stage()
     evening.colour(0.1)
     coming = StageDouble(evening.folder, evening.show, joints=5)
     assert evening.colour(0.3)[:2] == (255, 76)
@@ -173,7 +175,7 @@ def test_looks_that_were_changed_are_taken_by_the_next_stage(evening: Evening) -
     assert TellingPainter.made == 2 and not evening.said
 
 
-def test_a_show_that_is_broken_meanwhile_is_said_and_shown_in_built_in_looks(evening: Evening) -> None:
+def test_a_show_broken_since_the_start_is_reported_and_shown_in_built_in_looks(evening: Evening) -> None:
     with (evening.show / "show.yaml").open("a") as file:
         file.write("looks: [{name: cold, style: lnes}]\n")
     evening.begin()
@@ -187,10 +189,10 @@ def test_panic_is_black_in_the_very_next_picture(evening: Evening) -> None:
     evening.controls.set_grid(True)
     for _ in range(60):
         assert evening.picture().any() or evening.now < 1000.5
-    evening.set_house(replace(evening.show_state, panic=True))
+    evening.declare(replace(evening.show_state, panic=True))
     assert not evening.picture(lines=("60 pictures/s",)).any()
     assert evening.left_stage is None
-    evening.set_house(replace(evening.show_state, panic=False))
+    evening.declare(replace(evening.show_state, panic=False))
     assert evening.picture().any()
 
 
@@ -203,7 +205,7 @@ def test_panic_that_comes_while_a_picture_is_drawn_is_in_that_picture(
 
     def panics(*arguments: object) -> None:
         draw(*arguments)  # type: ignore[arg-type]
-        evening.set_house(replace(evening.show_state, panic=True))
+        evening.declare(replace(evening.show_state, panic=True))
 
     monkeypatch.setattr(TellingPainter, "draw", panics)
     assert evening.colour() == (0, 0, 0)
@@ -212,20 +214,20 @@ def test_panic_that_comes_while_a_picture_is_drawn_is_in_that_picture(
 def test_blackout_and_master_and_stop(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    evening.set_house(replace(evening.show_state, blackout=True))
+    evening.declare(replace(evening.show_state, blackout=True))
     assert evening.colour() == (0, 0, 0)
-    evening.set_house(ShowState().with_master(0.5, evening.now, 1.0))
+    evening.declare(ShowState().with_master(0.5, evening.now, 1.0))
     assert 180 < evening.colour(0.5)[0] < 200
     assert abs(evening.colour(0.7)[0] - 128) <= 1
-    evening.set_house(ShowState().with_going(False, evening.now, 2.0))
+    evening.declare(ShowState().with_going(False, evening.now, 2.0))
     assert 120 < evening.colour(1.0)[0] < 135
     assert evening.colour(1.1) == (0, 0, 0)
 
 
-def test_looks_fade_as_the_house_says(evening: Evening) -> None:
+def test_looks_fade_as_the_declared_says(evening: Evening) -> None:
     evening.begin()
     evening.colour(1.0)
-    evening.set_house(ShowState().with_look("lines", evening.now, 1.0))
+    evening.declare(ShowState().with_look("lines", evening.now, 1.0))
     assert 120 < evening.colour(0.5)[2] < 135
     assert evening.colour(0.6)[2] == 255
 
@@ -252,7 +254,7 @@ def test_each_look_is_drawn_unseen_before_the_first_is_seen(
     assert set(seen[: first + 1]) == {(0, 0, 0)}
 
 
-def test_a_show_that_is_prepared_is_told_from_a_display_that_hangs(
+def test_preparing_a_show_is_distinguished_from_a_hung_display(
     evening: Evening, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     draw = TellingPainter.draw
@@ -276,6 +278,6 @@ def test_the_window_may_change_its_size(evening: Evening) -> None:
     assert (evening.picture()[..., 0] == 255).all()
 
 
-def test_no_text_unless_it_is_asked_for(evening: Evening) -> None:
+def test_text_appears_on_demand_alone(evening: Evening) -> None:
     assert not evening.picture().any()
     assert evening.picture(lines=("60 pictures/s",)).any()

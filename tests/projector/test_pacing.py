@@ -35,7 +35,7 @@ def test_without_vsync_the_clock_sets_the_pace() -> None:
     pacing = clock.pacing(holds_vsync=False)
     times = []
     for _ in range(120):
-        times.append(pacing.next())
+        times.append(pacing.wait_for_next())
         clock.now += 0.005  # drawing
     assert np.diff(times) == pytest.approx(PERIOD_S)
 
@@ -43,11 +43,11 @@ def test_without_vsync_the_clock_sets_the_pace() -> None:
 def test_missed_pictures_are_not_made_up_for() -> None:
     clock = Clock()
     pacing = clock.pacing(holds_vsync=False)
-    pacing.next()
+    pacing.wait_for_next()
     clock.now += 1.0
-    late = pacing.next()
+    late = pacing.wait_for_next()
     assert late == pytest.approx(clock.now)
-    assert pacing.next() - late == pytest.approx(PERIOD_S)
+    assert pacing.wait_for_next() - late == pytest.approx(PERIOD_S)
 
 
 def test_with_vsync_it_follows_the_display_and_smooths_its_own_jitter() -> None:
@@ -57,7 +57,7 @@ def test_with_vsync_it_follows_the_display_and_smooths_its_own_jitter() -> None:
     for _ in range(600):
         clock.wait_for_display()
         clock.now += random.uniform(0, 0.003)  # this process wakes up late
-        times.append(pacing.next())
+        times.append(pacing.wait_for_next())
     assert pacing.holds_vsync
     assert np.diff(times[60:]).std() < 0.0002
     assert abs(times[-1] - clock.now) < 0.003
@@ -68,11 +68,11 @@ def test_a_display_that_sets_no_pace_is_found_out() -> None:
     pacing = clock.pacing(holds_vsync=True)
     for _ in range(200):
         clock.now += 0.001
-        pacing.next()
+        pacing.wait_for_next()
     assert not pacing.holds_vsync
     begun = clock.now
     for _ in range(60):
-        pacing.next()
+        pacing.wait_for_next()
     assert clock.now - begun == pytest.approx(1.0, abs=0.02)
 
 
@@ -81,5 +81,5 @@ def test_a_slow_graphics_card_is_no_broken_vsync() -> None:
     pacing = clock.pacing(holds_vsync=True)
     for _ in range(200):
         clock.now += 0.07
-        assert pacing.next() == pytest.approx(clock.now)
+        assert pacing.wait_for_next() == pytest.approx(clock.now)
     assert pacing.holds_vsync

@@ -48,7 +48,7 @@ def test_a_slow_display_fades_as_fast() -> None:
 
 
 @pytest.mark.parametrize("held_up_s", [0.5, 1.0, 5.0])
-def test_a_machine_that_was_held_up_whole_is_not_seen(held_up_s: float) -> None:
+def test_a_pause_of_the_whole_machine_is_invisible(held_up_s: float) -> None:
     """The projector wakes some pictures before the stage does."""
     presence = Presence()
     levels(presence, np.arange(0, 1, 1 / RATE))
@@ -56,7 +56,7 @@ def test_a_machine_that_was_held_up_whole_is_not_seen(held_up_s: float) -> None:
     assert set(levels(presence, times, newest=1.0)) == {1.0} and presence.sees_stage
 
 
-def test_a_stage_that_died_while_the_projector_was_held_up_fades_as_ever() -> None:
+def test_a_stage_that_died_during_a_pause_fades_as_usual() -> None:
     presence = Presence()
     levels(presence, np.arange(0, 1, 1 / RATE))
     found = levels(presence, np.arange(6, 7.1, 1 / RATE), newest=1.0)
@@ -64,7 +64,7 @@ def test_a_stage_that_died_while_the_projector_was_held_up_fades_as_ever() -> No
     assert found[0] == 1.0 and found[-1] == 0.0 and not presence.sees_stage
 
 
-def test_who_is_held_up_on_the_way_to_black_does_not_jump_there() -> None:
+def test_a_pause_during_the_fade_to_black_makes_no_jump() -> None:
     presence = Presence()
     levels(presence, np.arange(0, 1, 1 / RATE))
     before = levels(presence, np.arange(1, 1.6, 1 / RATE), newest=1.0)[-1]

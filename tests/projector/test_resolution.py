@@ -27,7 +27,7 @@ class Machine:
         while self.now < end:
             took_s = self.cost(self.resolution.share)
             self.now += max(PERIOD_S, took_s)
-            if self.resolution.drawn(self.now, took_s, look):
+            if self.resolution.note_picture(self.now, took_s, look):
                 self.changes.append((self.now - 100.0, self.resolution.share))
         return self.resolution.share
 
@@ -99,7 +99,7 @@ def test_no_blur_where_smaller_pictures_bring_nothing() -> None:
 
 
 def test_full_pictures_that_were_measured_too_short_are_measured_again() -> None:
-    """Another program began meanwhile."""
+    """Another program started."""
     machine = Machine(by_pixels(1.5 * PERIOD_S, fixed_s=1.1 * PERIOD_S))
     machine.dance(1.2)
     assert machine.resolution.share == SHARES[1]

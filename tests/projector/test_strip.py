@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from appliance.cli.pictures import danced, rendered
+from appliance.cli.pictures import load_dance, render_dance
 from appliance.cli.rehearsal import has_display, rehearsal_picture
-from appliance.projector.strip import COLUMNS, PICTURE, ROWS, strip
+from appliance.projector.strip import COLUMNS, PICTURE, ROWS, render_strip
 from appliance.show.look import looks_by_name
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError
@@ -39,9 +39,7 @@ def write_journal(path: Path, ticks: int = 100) -> Path:
 @pytest.mark.parametrize("look", ["plaster", "lines"])
 def test_ten_instants_side_by_side(tmp_path: Path, look: str) -> None:
     dance = swaying_phrase()
-    out = strip(
-        tmp_path / "deep" / "strip.png", FIGURE, looks_by_name(()), look, dance.poses, dance.roots, 50.0, [2]
-    )
+    out = render_strip(tmp_path / "deep" / "strip.png", dance, looks_by_name(()), look, [2])
     assert Image.open(out).size == (COLUMNS * WIDTH, ROWS * HEIGHT)
     assert out.stat().st_size < LARGEST_BYTES
     pictures = pictures_of(out)
@@ -53,7 +51,7 @@ def test_ten_instants_side_by_side(tmp_path: Path, look: str) -> None:
 
 def test_two_poses_give_two_pictures_and_black(tmp_path: Path) -> None:
     dance = swaying_phrase(0.04)
-    out = strip(tmp_path / "two.png", FIGURE, looks_by_name(()), "plaster", dance.poses, dance.roots, 50.0)
+    out = render_strip(tmp_path / "two.png", dance, looks_by_name(()), "plaster")
     pictures = pictures_of(out)
     assert len(pictures) == COLUMNS
     assert pictures[0].max() > 150
@@ -64,12 +62,12 @@ def test_looks_come_from_the_show(tmp_path: Path) -> None:
     show = write_show(tmp_path / "show")
     with (show / "show.yaml").open("a") as file:
         file.write("looks: [{name: dusk, style: plaster, exposure: 0.3}]\n")
-    dance = danced(show / "phrase.bvh").part(0.0, 0.1)
-    dark = pictures_of(rendered(dance, tmp_path / "dark.png", "dusk", show))
-    bright = pictures_of(rendered(dance, tmp_path / "bright.png", "plaster", None))
+    dance = load_dance(show / "phrase.bvh").part(0.0, 0.1)
+    dark = pictures_of(render_dance(dance, tmp_path / "dark.png", "dusk", show))
+    bright = pictures_of(render_dance(dance, tmp_path / "bright.png", "plaster", None))
     assert 0 < dark[0].mean() < bright[0].mean()
     with pytest.raises(StageError, match=r"There is no look 'plaster'\. There are: dusk"):
-        rendered(dance, tmp_path / "none.png", "plaster", show)
+        render_dance(dance, tmp_path / "none.png", "plaster", show)
 
 
 @pytest.mark.parametrize(
@@ -108,10 +106,10 @@ def test_without_opengl_a_rehearsal_ends_with_a_filmstrip_and_says_why(
 
 
 def test_a_part_of_a_dance_counts_from_either_end(tmp_path: Path) -> None:
-    dance = danced(write_journal(tmp_path / "run.journal"))
+    dance = load_dance(write_journal(tmp_path / "run.journal"))
     assert dance.held == (FIGURE.index("lShldr"),)
-    assert len(dance.part(-1.0, 10.0).poses) == 50
-    assert len(dance.part(-100.0, 10.0).poses) == 100
-    assert len(dance.part(0.5, 0.5).poses) == 25
+    assert len(dance.part(-1.0, 10.0).recording) == 50
+    assert len(dance.part(-100.0, 10.0).recording) == 100
+    assert len(dance.part(0.5, 0.5).recording) == 25
     with pytest.raises(StageError, match="nothing was danced after second 2"):
         dance.part(2.0, 1.0)

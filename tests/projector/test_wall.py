@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import moderngl
 import numpy as np
 import pytest
 
 from appliance.pose.recording import Recording
 from appliance.projector.alignment import Alignment
-from appliance.projector.context import offscreen
 from appliance.projector.controls import Controls
 from appliance.projector.final_pass import FinalPass, picture_size
 from appliance.projector.picture.renderer import Renderer
@@ -18,7 +15,7 @@ from appliance.projector.resolution import SHARES
 from appliance.projector.still import moment_of
 from appliance.show.look import STYLES
 from appliance.show.projector import ProjectorConfig
-from tests.projector.golden_looks import AT_S, P99_LIMIT, SIZE, difference, phrase, renderer
+from tests.projector.golden_looks import AT_S, P99_LIMIT, SIZE, difference, renderer
 from tests.projector.stage_double import pixels
 
 FULL_HD = 1920, 1080
@@ -31,23 +28,6 @@ ALIGNMENTS = {
 }
 MOST_GPU_BYTES = 25e6
 MOST_PI4_MS = 15.0  # of the GPU; the processor's share comes before it and is not counted here
-
-
-@pytest.fixture(scope="module")
-def dance() -> Recording:
-    return phrase()
-
-
-@pytest.fixture(scope="module")
-def gl() -> Iterator[moderngl.Context]:
-    with offscreen(SIZE) as context:
-        yield context
-
-
-@pytest.fixture(scope="module")
-def looks(gl: moderngl.Context, dance: Recording) -> Iterator[Renderer]:
-    with renderer(gl, dance.skeleton) as made:
-        yield made
 
 
 @pytest.mark.parametrize("name", ALIGNMENTS)
@@ -128,8 +108,8 @@ def test_cost_with_the_last_step_at_1080p(
         looks.draw(moment_of(dance, AT_S), style, style, 1.0, wall)
         if wall.framebuffer is not gl.screen:
             final.draw(gl.screen, FULL_HD, controls, 1.0, ())
-        assert looks.figures().gpu_bytes < MOST_GPU_BYTES
-        costs.append(looks.figures().pi4_ms + final.figures().pi4_ms)
+        assert looks.cost().gpu_bytes < MOST_GPU_BYTES
+        costs.append(looks.cost().pi4_ms + final.cost().pi4_ms)
     assert costs[0] < MOST_PI4_MS and costs[-1] < costs[0]
     final.release()
 

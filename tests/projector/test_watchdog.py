@@ -19,11 +19,11 @@ HANGS = """
 import ctypes, sys, time
 from pathlib import Path
 from appliance.projector import watchdog
-from appliance.projector.run import Run, Wish
+from appliance.projector.run import Options, Run
 from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
 
-watchdog._LOOK_S = 0.1
+watchdog.LOOK_S = 0.1
 shown, show = [], Window.show
 
 def hang(window):
@@ -36,7 +36,7 @@ def hang(window):
 
 Window.show = hang
 place = Path(sys.argv[1])
-run = Run(BoxConfig(runtime=place / "run", state=place / "state"), Wish("offscreen", (64, 36)), print)
+run = Run(BoxConfig(runtime=place / "run", state=place / "state"), Options("offscreen", (64, 36)), print)
 run.project(lambda: False)
 """
 
@@ -52,16 +52,16 @@ def over_at(patience: Patience, begin: float, end: float, is_preparing: bool = F
 def test_patience_is_over_after_five_seconds_without_a_picture() -> None:
     patience = Patience()
     assert over_at(patience, 100.0, 160.0) is None  # before the first picture nothing is expected
-    patience.swapped(160.0)
+    patience.note_swap(160.0)
     assert over_at(patience, 160.0, 164.6) is None
-    patience.swapped(164.0)
+    patience.note_swap(164.0)
     assert over_at(patience, 165.0, 190.0) == 164.0 + PATIENCE_S
 
 
-def test_a_show_that_is_prepared_may_take_its_time() -> None:
+def test_preparing_a_show_may_take_long() -> None:
     patience = Patience()
     patience.is_over(99.5, False)
-    patience.swapped(100.0)
+    patience.note_swap(100.0)
     assert over_at(patience, 100.0, 130.0, is_preparing=True) is None
     assert over_at(patience, 130.0, 150.0) == 129.5 + PATIENCE_S
 
@@ -69,13 +69,13 @@ def test_a_show_that_is_prepared_may_take_its_time() -> None:
 def test_a_process_that_was_stopped_blames_no_display() -> None:
     patience = Patience()
     patience.is_over(99.5, False)
-    patience.swapped(100.0)
+    patience.note_swap(100.0)
     assert over_at(patience, 100.0, 102.0) is None
     assert over_at(patience, 160.0, 180.0) == 160.0 + PATIENCE_S
 
 
 def test_the_guard_gives_up_once_and_ends_with_what_it_guards(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watchdog, "_LOOK_S", 0.01)
+    monkeypatch.setattr(watchdog, "LOOK_S", 0.01)
     seen, gave_up = [0.0], threading.Event()
     now, is_well = 100.0, []
 
@@ -91,7 +91,7 @@ def test_the_guard_gives_up_once_and_ends_with_what_it_guards(monkeypatch: pytes
             time.sleep(0.002)
 
     patience = Patience()
-    patience.swapped(100.0)
+    patience.note_swap(100.0)
     with guarded(patience, lambda: False, gave_up.set, clock, is_well.append):
         await_looks()
         for now in (101.5, 103.0, 104.5):  # noqa: B007

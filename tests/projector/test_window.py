@@ -23,7 +23,7 @@ from appliance.projector.loop import Projector
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, ProjectorError
 from appliance.projector.resolution import Resolution
-from appliance.projector.run import Run, Wish
+from appliance.projector.run import Options, Run
 from appliance.projector.sdl import sdl2
 from appliance.projector.window import Window
 from appliance.show.box import BoxConfig
@@ -62,7 +62,7 @@ window.close()
 
 @contextlib.contextmanager
 def virtual_display() -> Iterator[str]:
-    """A real X server on no screen; it does not reset, deaf meanwhile, when a window is closed."""
+    """A real X server without a screen. It does not reset, unresponsive meanwhile, when a window closes."""
     reading, writing = os.pipe()
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", str(writing), "-screen", "0", "640x480x24", "-nolisten", "tcp", "-noreset"],
@@ -83,10 +83,7 @@ def picture(kind: str, **environment: str) -> np.ndarray:
     without = {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}
     clean = {name: value for name, value in os.environ.items() if name not in without}
     done = subprocess.run(
-        [sys.executable, "-c", PICTURE, kind],
-        capture_output=True,
-        check=True,
-        env={**clean, **environment},
+        [sys.executable, "-c", PICTURE, kind], capture_output=True, check=True, env={**clean, **environment}
     )
     return np.frombuffer(done.stdout, np.uint8).reshape(180, 320, 4)[..., :3].astype(int)
 
@@ -121,7 +118,7 @@ def test_a_desktop_that_does_not_answer(no_display: None, monkeypatch: pytest.Mo
         Window(ProjectorConfig(), "window")
 
 
-def test_a_display_that_is_not_there_and_those_that_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_display_is_refused_with_a_list_of_those_present(monkeypatch: pytest.MonkeyPatch) -> None:
     with virtual_display() as display:
         monkeypatch.setenv("DISPLAY", display)
         monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -141,7 +138,7 @@ def test_no_opengl(monkeypatch: pytest.MonkeyPatch) -> None:
             ):
                 GlContext(window)
         with monkeypatch.context() as patched:
-            patched.setattr(context_module, "_ES_3_0", 990)
+            patched.setattr(context_module, "ES_3_0", 990)
             with pytest.raises(ProjectorError, match=r"no OpenGL ES 3.0"):
                 GlContext(window)
         GlContext(window).close()
@@ -176,9 +173,9 @@ def test_a_lost_context_ends_the_projector_with_a_sentence(
         pictures.append(1)
         return 0x8255 if len(pictures) > 3 else 0  # GL_UNKNOWN_CONTEXT_RESET
 
-    monkeypatch.setattr(context_module, "_reset_status", lambda: reset)
+    monkeypatch.setattr(context_module, "reset_status", lambda: reset)
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
-    run = Run(box, Wish("offscreen", (64, 36), seconds=20), print)
+    run = Run(box, Options("offscreen", (64, 36), seconds=20), print)
     try:
         with pytest.raises(
             ProjectorError, match=r"was reset.*sees black.*Start the projector again"
@@ -193,7 +190,7 @@ def test_a_lost_context_ends_the_projector_with_a_sentence(
 def test_keys_and_a_closed_window_arrive(tmp_path: Path) -> None:
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
     said: list[str] = []
-    run = Run(box, Wish("offscreen", (64, 36), seconds=20), said.append)
+    run = Run(box, Options("offscreen", (64, 36), seconds=20), said.append)
     try:
         for symbol, modifier in ((sdl2.SDLK_c, 0), (sdl2.SDLK_LEFT, sdl2.KMOD_LSHIFT), (sdl2.SDLK_q, 0)):
             event = sdl2.SDL_Event()
@@ -207,15 +204,15 @@ def test_keys_and_a_closed_window_arrive(tmp_path: Path) -> None:
     assert "-0.15625" in (tmp_path / "state" / "projector.alignment").read_text()
 
 
-def test_smaller_pictures_are_said_once_and_told_by_the_figures(
+def test_smaller_pictures_are_reported_once_and_stand_in_the_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
     said: list[str] = []
     shares: list[float] = []
-    run = Run(box, Wish("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
+    run = Run(box, Options("offscreen", (64, 36), seconds=20, shows_info=True), said.append)
     monkeypatch.setattr(Resolution, "share", property(lambda _: 0.5))
-    monkeypatch.setattr(Resolution, "drawn", lambda *_: True)
+    monkeypatch.setattr(Resolution, "note_picture", lambda *_: True)
     monkeypatch.setattr(Projector, "draw", lambda *arguments: shares.append(arguments[-1]))
     try:
         run.project(lambda: any("64x36 at 50%" in line for line in said))
@@ -227,14 +224,14 @@ def test_smaller_pictures_are_said_once_and_told_by_the_figures(
     assert set(shares) == {0.5}
 
 
-def test_a_stage_that_was_held_up_with_the_projector_is_no_black_picture(tmp_path: Path) -> None:
+def test_a_pause_of_the_whole_machine_is_not_reported_as_a_black_picture(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), Wish("offscreen", (64, 36)), print)
+    run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), Options("offscreen", (64, 36)), print)
     now = time.monotonic()
 
-    def is_black_told() -> bool:
-        run._report(now)
-        return any(one.name == STAGE_UNSEEN.name and one.active for one in run._fallbacks.happened(now))
+    def is_black_reported() -> bool:
+        run.report(now)
+        return any(one.name == STAGE_UNSEEN.name and one.active for one in run.fallbacks.happened(now))
 
     def draw(pictures: int, stage: StageDouble | None = None) -> None:
         nonlocal now
@@ -242,21 +239,21 @@ def test_a_stage_that_was_held_up_with_the_projector_is_no_black_picture(tmp_pat
             now += 1 / 60
             if stage is not None:
                 stage.write(now)
-            run._projector.draw(now, run._context.gl.screen, (64, 36))
+            run.projector.draw(now, run.context.gl.screen, (64, 36))
 
     with closing(run), closing(StageDouble(folder, write_show(tmp_path / "show"))) as stage:
         draw(60, stage)
-        assert not is_black_told()
+        assert not is_black_reported()
         now += 2.0
         draw(1)
-        assert run._reader.state(now) == "stale" and not is_black_told()
+        assert run.reader.state(now) == "stale" and not is_black_reported()
         draw(60)
-        assert is_black_told()
+        assert is_black_reported()
         draw(60, stage)
-        assert not is_black_told()
+        assert not is_black_reported()
 
 
-def test_keys_have_the_names_that_are_printed_on_them() -> None:
+def test_keys_are_named_as_printed_on_them() -> None:
     window = Window(ProjectorConfig(), "offscreen", (64, 36))
     event = sdl2.SDL_Event()
     event.type = sdl2.SDL_KEYDOWN

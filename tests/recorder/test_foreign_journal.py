@@ -18,7 +18,7 @@ import pytest
 
 from appliance.cli.app import main
 from appliance.cli.replay import replay as replay_journal
-from appliance.cli.run_with_timeout import within
+from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.recorder import chunks, log
 from appliance.recorder.environment import fingerprints
 from appliance.recorder.export import export
@@ -169,7 +169,7 @@ def listed_in_bounds(path: Path) -> str:
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
         return json.dumps([refused.getvalue() or "listed", peak - before]).encode()
 
-    words, peak = json.loads(within(PATIENCE_S, listed))
+    words, peak = json.loads(run_with_timeout(PATIENCE_S, listed))
     assert peak < PEAK, f"{peak >> 20} MB"
     return str(words)
 
@@ -255,7 +255,7 @@ def test_a_fifo_or_a_device_holds_nothing_up(whole: bytes, tmp_path: Path, place
     for make in (os.mkfifo, lambda path: path.symlink_to("/dev/zero")):
         make(path)
         assert "no regular file" in listed_in_bounds(journal) or "no journal is" in listed_in_bounds(journal)
-        within(PATIENCE_S, lambda: str(last_kept(path.parent, "another run")).encode())
+        run_with_timeout(PATIENCE_S, lambda: str(last_kept(path.parent, "another run")).encode())
         path.unlink()
 
 
@@ -269,7 +269,7 @@ def test_a_keeper_passes_by_what_is_no_segment(show: Path, tmp_path: Path) -> No
         night.dance(20)
         return str(len(read_journal(night.kept(folder)).ticks)).encode()
 
-    assert within(PATIENCE_S, kept) == b"20"
+    assert run_with_timeout(PATIENCE_S, kept) == b"20"
 
 
 def test_a_part_that_claims_to_be_enormous_is_refused(tmp_path: Path) -> None:

@@ -85,6 +85,9 @@ def test_a_sensor_pairs_over_the_network(link: SensorLink, radio: Radio) -> None
     assert [type(packet) for packet in radio.hear()] == [wire.Heartbeat]
 
 
+CLOCKS_S = 0.001  # the kernel stamps by its wall clock; the box works out the monotonic time
+
+
 def test_arrival_is_when_it_came_and_not_when_it_was_fetched(link: SensorLink, radio: Radio) -> None:
     radio.pair(link)
     for n in range(20):  # the kernel takes a moment to switch its stamps on after the first socket opened
@@ -94,7 +97,7 @@ def test_arrival_is_when_it_came_and_not_when_it_was_fetched(link: SensorLink, r
         time.sleep(0.015)
         now = time.monotonic()
         (reading,) = link.drain(now)
-        assert before - 0.001 <= reading.arrival <= now
+        assert before - CLOCKS_S <= reading.arrival <= now + CLOCKS_S
         if reading.arrival <= after + 0.002:
             break
     else:

@@ -1,4 +1,4 @@
-"""A small but whole show bundle, with a network that only hands its window on."""
+"""A small but complete show bundle, with a network that passes its window through."""
 
 from __future__ import annotations
 

@@ -86,6 +86,6 @@ def test_a_fault_is_named_with_its_line(tmp_path: Path, text: str, line: int, wo
         assert word in str(caught.value)
 
 
-def test_a_missing_file_is_said(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot be read"):
         load_box(tmp_path / "box.yaml")

@@ -194,7 +194,7 @@ def test_a_report_that_is_no_json_is_a_warning_with_its_line(bundle: Path) -> No
     assert (finding.level, finding.line) == ("warning", 3)
 
 
-def test_a_folder_that_is_not_there_is_one_finding(tmp_path: Path) -> None:
+def test_a_missing_folder_is_one_finding(tmp_path: Path) -> None:
     assert only(tmp_path / "nowhere", repack=False).message == "There is no such show folder."
 
 

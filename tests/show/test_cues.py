@@ -76,9 +76,7 @@ def test_hands_that_move_nothing_are_a_warning_with_their_line(with_cues: Callab
     assert "'forgotten'" in second.message and "[4, 3]" in second.cure and "`hands: []`" in second.cure
 
 
-def test_a_dancer_whose_hands_move_nothing_is_a_warning(
-    bundle: Path, show_yaml: Callable[[str], Path]
-) -> None:
+def test_hands_that_move_nothing_are_a_warning(bundle: Path, show_yaml: Callable[[str], Path]) -> None:
     dancer = "name: x\ndancer:\n  coding_iterations: 6\n  interaction_iterations: 0\n"
     write_checksums(show_yaml(dancer))
     assert verify_bundle(bundle) == []  # there are no hands
@@ -132,7 +130,7 @@ def test_a_fault_is_named_with_its_line(
         assert word in str(caught.value)
 
 
-def test_all_faults_of_all_cues_are_said_at_once(with_cues: Callable[[str], Path]) -> None:
+def test_all_faults_of_all_cues_are_reported_at_once(with_cues: Callable[[str], Path]) -> None:
     cues = "  - {name: a, phrase: b, look: c}\n  - {name: a, hands: [d, e]}\n"
     with pytest.raises(ConfigError) as caught:
         load_show(with_cues(cues))
@@ -140,7 +138,7 @@ def test_all_faults_of_all_cues_are_said_at_once(with_cues: Callable[[str], Path
     assert lines == [0, 0, 1, 1, 1]
 
 
-def test_iterations_that_do_not_fit_this_machine_are_said_beforehand(
+def test_iterations_that_do_not_fit_this_machine_are_reported_beforehand(
     with_cues: Callable[[str], Path],
 ) -> None:
     show = load_show(with_cues("  - {name: a, iterations: [6, 5]}\n  - {name: b, iterations: [20, 3]}\n"))

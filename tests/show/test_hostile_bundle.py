@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from appliance.cli.run_with_timeout import within
+from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.show.bundle import CHECKSUMS, MOST_FILES, write_checksums
 from appliance.show.check import verify_bundle
@@ -27,7 +27,7 @@ def said(directory: Path) -> list[str]:
     def check() -> bytes:
         return json.dumps([f"{found.level} {found}" for found in verify_bundle(directory)]).encode()
 
-    words: list[str] = json.loads(within(PATIENCE_S, check))
+    words: list[str] = json.loads(run_with_timeout(PATIENCE_S, check))
     return words
 
 
@@ -55,7 +55,7 @@ def test_a_link_out_of_the_bundle_is_refused(bundle: Path, name: str, where: str
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_no_word_of_a_private_file_is_told(bundle: Path, tmp_path: Path, name: str) -> None:
+def test_the_contents_of_a_private_file_are_not_disclosed(bundle: Path, tmp_path: Path, name: str) -> None:
     private = tmp_path / "private"
     private.write_text(SECRET)
     (bundle / name).unlink()
@@ -136,7 +136,7 @@ def test_a_rest_pose_that_is_none_is_refused(bundle: Path, rest: str) -> None:
 
 
 @pytest.mark.parametrize("word", [b"[[1.0", b"targets", b"bunraku.joints", b"poses"])
-def test_a_network_whose_words_are_no_text_is_refused(bundle: Path, word: bytes) -> None:
+def test_a_network_with_metadata_that_is_not_text_is_refused(bundle: Path, word: bytes) -> None:
     content = (bundle / "puppet.onnx").read_bytes()
     (bundle / "puppet.onnx").write_bytes(content.replace(word, b"\xd7" + word[1:]))
     assert about(bundle, "puppet.onnx")

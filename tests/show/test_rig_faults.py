@@ -1,4 +1,4 @@
-"""Whole files of a show and a venue with a rig in them: each fault of it is said with file, line and cure."""
+"""Complete files of a show and a venue with a rig: each fault is reported with file, line and cure."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_a_fault_of_the_rig_is_named_with_its_line(
         ("channels: 512", "chanels: 512", ["Unknown key 'chanels'", "Did you mean 'channels'?"]),
         ("channels: 512", "device: /dev/ttyUSB0", ["'device' belongs to usb-pro and open-dmx"]),
         ("host: 10.0.0.5", "host: node.local", ["is not an IPv4 address"]),
-        ("port: 9002", "host: 0.0.0.0", ["from nobody", "senders"]),
+        ("port: 9002", "host: 0.0.0.0", ["no sender may command", "senders"]),
         (
             "port: 9002",
             "senders: [10.0.0.5]",
@@ -148,7 +148,7 @@ def test_two_wires_to_the_same_place_are_refused(tmp_path: Path) -> None:
     assert caught.value.line == 8
 
 
-def test_faults_of_the_rig_and_of_the_rest_are_said_together(bundle: Path) -> None:
+def test_faults_of_the_rig_and_of_other_sections_are_reported_together(bundle: Path) -> None:
     text = SHOW.replace("address: 101", "address: 513").replace("style: plaster", "style: plastre")
     (bundle / "show.yaml").write_text(text)
     with pytest.raises(ConfigError) as caught:
@@ -179,7 +179,7 @@ def test_a_venue_that_hangs_fixtures_where_they_do_not_fit_is_refused(
         assert word in str(problem)
 
 
-def test_a_venue_may_hang_the_rig_otherwise(bundle: Path) -> None:
+def test_a_venue_may_change_the_rig(bundle: Path) -> None:
     (bundle / "show.yaml").write_text(SHOW)
     (bundle / "box.yaml").write_text("lights: {places: [{fixture: wash, universe: 7, address: 1}]}\n")
     show, box = load_show(bundle), load_box(bundle / "box.yaml")

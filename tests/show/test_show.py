@@ -69,7 +69,7 @@ def test_a_sensors_name_is_as_long_as_a_key_file_and_a_wearable_take_it(
 
 
 @pytest.mark.parametrize(("coding", "interaction"), [(10, 9), (2, 1), (1, 1), (64, 63)])
-def test_the_last_pass_is_free_unless_told_otherwise(coding: int, interaction: int) -> None:
+def test_the_last_pass_is_free_by_default(coding: int, interaction: int) -> None:
     assert DancerConfig.model_validate({"coding_iterations": coding}).interaction_iterations == interaction
 
 
@@ -189,7 +189,7 @@ def test_a_broken_skeleton_is_refused_together_with_the_rest(show_yaml: ShowYaml
     }
 
 
-def test_missing_folders_and_files_are_said(bundle: Path) -> None:
+def test_missing_folders_and_files_are_reported(bundle: Path) -> None:
     assert "no such show folder" in str(refusal(bundle / "nowhere"))
     (bundle / "skeleton.bvh").unlink()
     assert "skeleton cannot be read" in str(refusal(bundle))

@@ -148,7 +148,7 @@ def test_an_imu_that_starts_anew_in_mid_dance_goes_on_where_it_was(begin: Begin)
     evening.run(DANCES_S + 1.6)
     evening.device.wearable.inject("brown-out")
     evening.run(3.0)
-    assert any("IMU started anew" in words for words in evening.said)
+    assert any("IMU restarted" in words for words in evening.said)
     evening.errors.clear()
     evening.run(5.0)
     # What the arm turned while the IMU was away cannot be known: less than a second of this dance.

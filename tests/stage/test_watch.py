@@ -126,10 +126,10 @@ def test_a_receiver_that_goes_and_comes_back(cast: StageParts, receiver: OscRece
     counters = cast.outputs.receivers[0]
     assert watch.check(1.0, Health()) == []
     counters.dropped += 3
-    counters.last_error = "nobody listens on that port"
+    counters.last_error = "no program listens on that port"
     [words] = watch.check(2.0, Health())
     assert f"127.0.0.1:{receiver.port}" in words
-    assert "nobody listens on that port" in words
+    assert "no program listens on that port" in words
     counters.dropped += 3
     assert watch.check(3.0, Health()) == []
     [words] = watch.check(4.0, Health())

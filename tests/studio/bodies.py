@@ -85,20 +85,17 @@ def moved(skeleton: Skeleton, seconds: float = 12.0, fps: float = 50.0, seed: in
 
 def z_up(recording: Recording) -> Recording:
     """As a system writes it in which Z points up and the dancer faces -y at rest."""
-    turn = quaternion.from_axis_angle([1.0, 0.0, 0.0], np.pi / 2)
-
-    def turned(vectors: Array) -> Array:
-        return quaternion.rotate(np.broadcast_to(turn, (*vectors.shape[:-1], 4)), vectors)
-
-    poses = recording.poses.copy()
-    poses[..., 1:] = turned(poses[..., 1:])
-    skeleton = replace(recording.skeleton, offsets=turned(recording.skeleton.offsets))
-    return replace(recording, skeleton=skeleton, poses=poses, roots=turned(recording.roots))
+    return _with_axes_turned(recording, [1.0, 0.0, 0.0])
 
 
 def sideways(recording: Recording) -> Recording:
     """As a system writes it in which the dancer faces +x at rest: left and right lie along z."""
-    turn = quaternion.from_axis_angle([0.0, 1.0, 0.0], np.pi / 2)
+    return _with_axes_turned(recording, [0.0, 1.0, 0.0])
+
+
+def _with_axes_turned(recording: Recording, axis: list[float]) -> Recording:
+    """The same motion with the axes of the room and of every joint turned by 90 degrees."""
+    turn = quaternion.from_axis_angle(axis, np.pi / 2)
 
     def turned(vectors: Array) -> Array:
         return quaternion.rotate(np.broadcast_to(turn, (*vectors.shape[:-1], 4)), vectors)

@@ -19,6 +19,12 @@ def _one_thread() -> None:
     torch.set_num_threads(1)
 
 
+@pytest.fixture(autouse=True)
+def _seeded_torch() -> None:
+    """torch draws the same numbers in a test that runs alone as in one that runs after others."""
+    torch.manual_seed(1)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _small_answers() -> Iterator[None]:
     """The answer of a trained dancer is measured on 3 s, and drawn with two figures a strip."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.evaluation.coders import Poses
 from tests.studio.tiny import moving, skeleton
 
@@ -26,14 +29,12 @@ class Pasting:
         windows: Poses,
         coding_iterations: int,
         interaction_iterations: int = 0,
-        mask: NDArray[np.bool_] | None = None,
-        targets: Poses | None = None,
-        weights: NDArray[np.float32] | None = None,
+        hold: HeldJoints[NDArray[Any]] | None = None,
     ) -> tuple[Poses, Poses]:
         made = windows.copy()
-        if mask is not None and targets is not None and interaction_iterations:
-            made[:, :, mask] = quaternion.aligned(targets, windows)[:, :, mask]
-            made = self.answer(made, mask)
+        if hold is not None and interaction_iterations:
+            made[:, :, hold.mask] = quaternion.aligned(hold.targets, windows)[:, :, hold.mask]
+            made = self.answer(made, hold.mask)
         return made, np.zeros((len(windows), 4), dtype=np.float32)
 
     def answer(self, made: Poses, mask: NDArray[np.bool_]) -> Poses:

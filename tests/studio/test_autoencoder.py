@@ -11,6 +11,7 @@ from appliance.studio.autoencoder import losses, rotation
 from appliance.studio.autoencoder.architectures import NETWORKS
 from appliance.studio.autoencoder.autoencoder import Autoencoder, PriorCritic
 from appliance.studio.autoencoder.conditional import matrix_of_products
+from appliance.studio.autoencoder.held_joints import HeldJoints
 from tests.studio.tiny import moving, swaying, untrained
 
 
@@ -28,11 +29,11 @@ def turned(windows: Tensor, degrees: float) -> Tensor:
     return torch.cat([root[:, :, None], windows[:, :, 1:]], dim=2)
 
 
-def held(autoencoder: Autoencoder) -> dict[str, Tensor]:
+def held(autoencoder: Autoencoder) -> HeldJoints[Tensor]:
     mask = torch.zeros(autoencoder.shape.joints, dtype=torch.bool)
     mask[6] = True
     targets = rotation.normalize(torch.randn(8, autoencoder.shape.joints, 4))
-    return {"mask": mask, "targets": targets, "weights": torch.ones(autoencoder.shape.joints)}
+    return HeldJoints(mask, targets, torch.ones(autoencoder.shape.joints))
 
 
 @pytest.mark.parametrize("degrees", [30.0, 90.0, 179.0, -120.0])
@@ -40,8 +41,8 @@ def test_a_dance_turned_about_the_vertical_gives_the_same_dance_turned(degrees: 
     """Why no training data has to be turned about the vertical: every heading is the same to the network."""
     autoencoder = untrained()
     windows, hand = some_windows(), held(autoencoder)
-    straight, latents = autoencoder.iterate(windows, 3, 2, **hand)
-    made, same = autoencoder.iterate(turned(windows, degrees), 3, 2, **hand)
+    straight, latents = autoencoder.iterate(windows, 3, 2, hand)
+    made, same = autoencoder.iterate(turned(windows, degrees), 3, 2, hand)
     apart = rotation.angle_between(made, turned(straight, degrees))
     assert torch.rad2deg(apart).max() < 0.05
     torch.testing.assert_close(same, latents, atol=1e-4, rtol=0)
@@ -50,9 +51,9 @@ def test_a_dance_turned_about_the_vertical_gives_the_same_dance_turned(degrees: 
 def test_a_free_last_pass_does_not_show_the_held_orientation() -> None:
     autoencoder = untrained()
     hand = held(autoencoder)
-    shown, _ = autoencoder.iterate(some_windows(), 4, 4, **hand)
-    free, _ = autoencoder.iterate(some_windows(), 4, 3, **hand)
-    goal = hand["targets"][:, 6].expand(6, 8, 4)
+    shown, _ = autoencoder.iterate(some_windows(), 4, 4, hand)
+    free, _ = autoencoder.iterate(some_windows(), 4, 3, hand)
+    goal = hand.targets[:, 6].expand(6, 8, 4)
     assert torch.rad2deg(rotation.angle_between(shown[:, :, 6], goal)).max() < 0.1
     assert torch.rad2deg(rotation.angle_between(free[:, :, 6], goal)).min() > 5.0
 
@@ -60,9 +61,9 @@ def test_a_free_last_pass_does_not_show_the_held_orientation() -> None:
 def test_a_weight_of_a_half_goes_half_the_way() -> None:
     autoencoder = untrained()
     hand = held(autoencoder)
-    firm, _ = autoencoder.iterate(some_windows(), 1, 1, **hand)
-    loose, _ = autoencoder.iterate(some_windows(), 1, 1, **{**hand, "weights": hand["weights"] * 0.0})
-    half, _ = autoencoder.iterate(some_windows(), 1, 1, **{**hand, "weights": hand["weights"] * 0.5})
+    firm, _ = autoencoder.iterate(some_windows(), 1, 1, hand)
+    loose, _ = autoencoder.iterate(some_windows(), 1, 1, hand._replace(weights=0.0 * hand.weights))
+    half, _ = autoencoder.iterate(some_windows(), 1, 1, hand._replace(weights=0.5 * hand.weights))
     way = rotation.angle_between(loose[:, :, 6], firm[:, :, 6])
     assert way.max() > 0.5
     # The pass in between sees the half-held joint, so the ends of the two ways are not quite the same.
@@ -74,13 +75,11 @@ def test_a_weight_of_a_half_goes_half_the_way() -> None:
 def test_each_window_of_a_batch_may_have_targets_and_weights_of_its_own() -> None:
     autoencoder = untrained()
     windows, hands = some_windows(3), [held(autoencoder) for _ in range(3)]
-    targets = torch.stack([hand["targets"] for hand in hands])
+    targets = torch.stack([hand.targets for hand in hands])
     weights = torch.tensor([0.0, 0.4, 1.0])[:, None].expand(-1, autoencoder.shape.joints)
-    together, _ = autoencoder.iterate(windows, 3, 2, hands[0]["mask"], targets, weights)
+    together, _ = autoencoder.iterate(windows, 3, 2, HeldJoints(hands[0].mask, targets, weights))
     for place, hand in enumerate(hands):
-        alone, _ = autoencoder.iterate(
-            windows[place][None], 3, 2, hand["mask"], hand["targets"], weights[place]
-        )
+        alone, _ = autoencoder.iterate(windows[place][None], 3, 2, hand._replace(weights=weights[place]))
         torch.testing.assert_close(together[place], alone[0], atol=1e-5, rtol=0)
 
 

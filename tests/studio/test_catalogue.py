@@ -10,8 +10,13 @@ import pytest
 from appliance.pose.bvh import write_bvh
 from appliance.show.config_error import ConfigError
 from appliance.studio.data.capture_errors import JUMP, MARKED, CaptureError, sound_frames, without
-from appliance.studio.data.catalogue import CATALOGUES, Catalogue, find_catalogue, read_catalogue
-from appliance.studio.data.catalogue_file import read_catalogue_file
+from appliance.studio.data.catalogue import (
+    CATALOGUES,
+    Catalogue,
+    find_catalogue,
+    read_catalogue,
+    read_catalogue_file,
+)
 from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.data.sources import given, remembered
 from appliance.studio.studio_error import StudioError

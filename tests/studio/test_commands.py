@@ -188,7 +188,7 @@ def test_a_stop_in_the_middle_says_how_to_go_on(tmp_path: Path, recordings: Path
     [
         (["train", "--out", "{tmp}/show"], "--recordings FOLDER"),
         (["train", "--out", "{tmp}/show", "--recordings", "{tmp}"], r"has no .bvh files"),
-        (["train", "--out", "{tmp}/show", "--resume"], "no checkpoint.pt to go on from"),
+        (["train", "--out", "{tmp}/show", "--resume"], "no checkpoint.pt to resume"),
         (["train", "--out", "{tmp}/show", "--recordings", "{rec}", "--true-fps", "sixty"], "PATTERN=FPS"),
         (
             ["train", "--out", "{tmp}/show", "--recordings", "{rec}", "--steps", "2", "--minutes", "1"],

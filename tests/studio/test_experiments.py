@@ -20,6 +20,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import default_show_path
 from appliance.show.config_error import ConfigError
+from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.data.dataset import FPS, WINDOW, Take
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.experiments.claims import claims, pauses
@@ -171,16 +172,14 @@ class Pretender:
         windows: Poses,
         coding_iterations: int,
         interaction_iterations: int = 0,
-        mask: np.ndarray | None = None,
-        targets: Poses | None = None,
-        weights: np.ndarray | None = None,
+        held: HeldJoints[np.ndarray] | None = None,
     ) -> tuple[Poses, Poses]:
         made = windows.copy()
         if self.pausing and coding_iterations > 1:
             made[..., 1] = np.round(made[..., 1] * 8) / 8
             made = quaternion.normalize(made).astype(np.float32)
-        if mask is not None and targets is not None and interaction_iterations == coding_iterations:
-            made[:, :, mask] = targets[:, :, mask]
+        if held is not None and interaction_iterations == coding_iterations:
+            made[:, :, held.mask] = held.targets[:, :, held.mask]
         return made, np.zeros((len(windows), 2), dtype=np.float32)
 
 

@@ -13,6 +13,7 @@ from onnx import numpy_helper
 
 from appliance.pose import quaternion
 from appliance.studio.autoencoder.architectures import NETWORKS
+from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.evaluation.coders import OnnxCoder
 from appliance.studio.export.export import export
 from tests.studio.test_autoencoder import some_windows
@@ -44,19 +45,19 @@ def test_onnx_is_pytorch(network: str, exported: dict[str, Path], coding: int, i
     targets = quaternion.normalize(chance.normal(size=(8, len(NAMES), 4)).astype(np.float32))
     weights = chance.uniform(size=len(NAMES)).astype(np.float32)
     for window in some_windows(4):
-        held = {"mask": mask, "targets": targets, "weights": weights}
-        given = {name: torch.from_numpy(value) for name, value in held.items()}
+        hold = HeldJoints(mask, targets[None], weights)
         with torch.no_grad():
-            trained, latents = autoencoder.iterate(window[None], coding, interaction, **given)
-        played, latent = coder.run(window.numpy(), coding, interaction, **held)
-        same = quaternion.aligned(played, trained[0].numpy())
-        np.testing.assert_allclose(same, trained[0].numpy(), atol=1e-4)
-        np.testing.assert_allclose(latent, latents[0].numpy(), atol=1e-3)
+            hold_tensors = HeldJoints(*map(torch.from_numpy, hold))
+            trained, latents = autoencoder.iterate(window[None], coding, interaction, hold_tensors)
+        played, played_latents = coder.iterate(window[None].numpy(), coding, interaction, hold)
+        same = quaternion.aligned(played, trained.numpy())
+        np.testing.assert_allclose(same, trained.numpy(), atol=1e-4)
+        np.testing.assert_allclose(played_latents, latents.numpy(), atol=1e-3)
 
 
 def test_poses_are_unit_and_without_jumps_of_sign(exported: dict[str, Path]) -> None:
     for path in exported.values():
-        poses, _ = OnnxCoder(path).run(some_windows(3)[1].numpy(), 10)
+        (poses,), _ = OnnxCoder(path).iterate(some_windows(3)[1:2].numpy(), 10)
         np.testing.assert_allclose(np.linalg.norm(poses, axis=-1), 1.0, atol=1e-5)
         assert ((poses[1:] * poses[:-1]).sum(-1) > 0).all()
 

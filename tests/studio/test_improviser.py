@@ -19,7 +19,6 @@ from appliance.studio.improviser.improviser_training import (
     ImproviserSettings,
     ImproviserTraining,
     load_improviser,
-    save_improviser,
 )
 from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence
 from tests.studio.tiny import moving, swaying, untrained
@@ -140,7 +139,7 @@ def test_a_resumed_training_is_the_same_training(tmp_path: Path) -> None:
     half = ImproviserTraining(waves(), [], 4, TINY)
     for _ in range(3):
         half.train_step()
-    save_improviser(half, tmp_path / "half.pt")
+    half.save_checkpoint(tmp_path / "half.pt")
     resumed = ImproviserTraining(waves(), [], 4, TINY)
     resumed.restore(torch.load(tmp_path / "half.pt", weights_only=True))
     for _ in range(3):
@@ -151,7 +150,7 @@ def test_a_resumed_training_is_the_same_training(tmp_path: Path) -> None:
 
 def test_the_same_seed_dances_the_same_and_another_one_does_not(tmp_path: Path) -> None:
     training = ImproviserTraining(waves(), [], 4, TINY)
-    training.run(lambda line: None, lambda: save_improviser(training, tmp_path / "i.pt"))
+    training.run(lambda line: None, lambda: training.save_checkpoint(tmp_path / "i.pt"))
     improviser, _ = load_improviser(tmp_path / "i.pt")
     heard = torch.stack([wave[: BEFORE + 2 * MOVE] for wave in waves()])
     once, again, other = (improviser.improvise(heard, 20, 1.0, seed) for seed in (1, 1, 2))

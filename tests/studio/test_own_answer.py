@@ -12,8 +12,8 @@ import pytest
 
 from appliance.studio.data.dataset import Dataset, Take
 from appliance.studio.evaluation import own_answer, puppetry
-from appliance.studio.evaluation.own_takes import own_takes
-from appliance.studio.evaluation.puppetry_words import sentences, verdict
+from appliance.studio.evaluation.pairs import own_takes
+from appliance.studio.evaluation.puppetry_report import sentences, verdict
 from appliance.studio.studio_error import StudioError
 from tests.studio.puppets import Freezing, Pasting
 from tests.studio.tiny import moving, skeleton, swaying
@@ -99,7 +99,7 @@ def test_a_slow_network_is_measured_on_less(monkeypatch: pytest.MonkeyPatch) -> 
     sizes = []
     for cost in (1e-5, 4e-4, 1e-3, 1e-2):
         monkeypatch.setattr(own_answer, "_seconds_a_pass", lambda _, cost=cost: cost)
-        sizes.append(own_answer._fitting(Pasting(), 4, 3))
+        sizes.append(own_answer.fitting_size(Pasting(), 4, 3))
     assert (sizes[0].pairs, sizes[0].joints, sizes[0].ticks) == (2, 3, 600)
     work = [size.pairs * size.joints * size.ticks for size in sizes]
     assert work == sorted(work, reverse=True) and sizes[-1].ticks == own_answer.FEWEST_TICKS

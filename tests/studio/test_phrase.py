@@ -9,23 +9,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from typer.testing import CliRunner
 
-from appliance.dancer.grounding import measure_standing, survey
+from appliance.dancer.grounding import survey
 from appliance.dancer.loop import is_closed, turns_about_y, yaws
 from appliance.dancer.motion_source import Playback
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
-from appliance.studio import improvise_command
-from appliance.studio.autoencoder.training import Settings, Training, save_checkpoint
+from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.dataset import Take, load_dataset
-from appliance.studio.improviser.footing import smoothed, stand
-from appliance.studio.improviser.improvisation import Wish, run
+from appliance.studio.improviser.footing import plant_feet, smoothed
+from appliance.studio.improviser.improvisation import ImproviseOptions, run
 from appliance.studio.improviser.naturalness import Yardstick, distances, measure
 from appliance.studio.improviser.pace import pace
-from appliance.studio.improviser.phrase import STAGE_M, PhraseWish, closed_loop, on_stage
+from appliance.studio.improviser.phrase import STAGE_M, PhraseOptions, closed_loop, on_stage
 from appliance.studio.improviser.stretches import best_stretches
+from appliance.studio.standing import measure_standing
+from tests.studio.conftest import bunraku
 from tests.studio.tiny import moving, swaying, write_recordings
 
 
@@ -126,7 +126,7 @@ def test_feet_that_slid_stand_and_nothing_is_below_the_floor() -> None:
     roots = np.stack([0.04 * np.sin(2 * np.pi * time / 4), np.full(200, 0.79), 0 * time], axis=1)
     phrase = Recording(sway.skeleton, quaternion.continuous(poses), roots, 50.0)
     before, after = (
-        measure_standing(p.skeleton, p.poses, p.roots, survey(p)) for p in (phrase, stand(phrase, 60))
+        measure_standing(p.skeleton, p.poses, p.roots, survey(p)) for p in (phrase, plant_feet(phrase, 60))
     )
     assert before.slide_cm_s > 3
     assert after.slide_cm_s < 0.4 * before.slide_cm_s
@@ -134,7 +134,7 @@ def test_feet_that_slid_stand_and_nothing_is_below_the_floor() -> None:
 
 
 def test_a_phrase_on_its_feet_is_still_a_cycle() -> None:
-    phrase = stand(closed_loop(swaying(10.0), 0, 300), 20)
+    phrase = plant_feet(closed_loop(swaying(10.0), 0, 300), 20)
     assert is_closed(phrase.poses.astype(np.float32), phrase.roots.astype(np.float32))
     np.testing.assert_allclose(np.linalg.norm(phrase.poses, axis=-1), 1.0, atol=1e-6)
 
@@ -188,7 +188,7 @@ def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     torch.set_num_threads(1)
     training = Training(load_dataset(recordings), Settings(steps=30, latent=8, width=32, batch=32))
     training.run(lambda line: None, lambda: None)
-    save_checkpoint(training, folder / "checkpoint.pt")
+    training.save_checkpoint(folder / "checkpoint.pt")
     return folder / "checkpoint.pt", recordings
 
 
@@ -199,9 +199,9 @@ def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     out = tmp_path / "phrase.bvh"
-    small = PhraseWish(seconds=4.0, seed=4, dances=2, minutes=0.2, finalists=1, settling=5)
-    wish = Wish(checkpoint[0], out, checkpoint[1], steps=2, threads=1, phrase=small)
-    assert run(wish)
+    small = PhraseOptions(seconds=4.0, seed=4, dances=2, minutes=0.2, finalists=1, settling=5)
+    options = ImproviseOptions(checkpoint[0], out, checkpoint[1], steps=2, threads=1, phrase=small)
+    assert run(options)
     phrase = read_bvh(out)
     assert phrase.fps == pytest.approx(50.0) and 3.5 <= phrase.seconds <= 4.5
     assert is_closed(phrase.poses.astype(np.float32), phrase.roots.astype(np.float32))
@@ -215,22 +215,23 @@ def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
     monkeypatch.setattr(
         "appliance.studio.improviser.improvisation.draw_filmstrip", lambda *_, **__: None
     )  # slow
-    assert run(wish)
-    assert "goes on at 100 %" in capsys.readouterr().err
+    assert run(options)
+    assert "continues at 100 %" in capsys.readouterr().err
     assert out.read_bytes() == bytes_before
 
 
-def test_the_commands_options_are_what_is_wished(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    wishes: list[Wish] = []
+def test_the_command_hands_its_options_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    received: list[ImproviseOptions] = []
     monkeypatch.setattr(
-        "appliance.studio.improviser.improvisation.run", lambda wish: bool(wishes.append(wish))
+        "appliance.studio.improviser.improvisation.run", lambda options: bool(received.append(options))
     )
     options = ["--seconds", "75", "--seed", "9", "--minutes", "3", "--temperature", "0.9", "--dances", "5"]
-    words = ["c.pt", "--out", str(tmp_path / "p.bvh"), *options, "--dance-minutes", "2"]
-    result = CliRunner().invoke(improvise_command.app, words)
+    result = bunraku("improvise", "c.pt", "--out", tmp_path / "p.bvh", *options, "--dance-minutes", 2)
     assert result.exit_code == 130  # not done: stopped before its end
-    assert wishes == [
-        Wish(Path("c.pt"), tmp_path / "p.bvh", minutes=3.0, phrase=PhraseWish(75.0, 9, 0.9, 5, 2.0))
+    assert received == [
+        ImproviseOptions(
+            Path("c.pt"), tmp_path / "p.bvh", minutes=3.0, phrase=PhraseOptions(75.0, 9, 0.9, 5, 2.0)
+        )
     ]
 
 
@@ -238,7 +239,6 @@ def test_recordings_of_another_dancer_are_refused(checkpoint: tuple[Path, Path],
     other = write_recordings(tmp_path / "other", seconds=3.0)
     for file in other.glob("*.bvh"):
         file.write_text(file.read_text().replace("lHand", "lPaw"))
-    words = [str(checkpoint[0]), "--recordings", str(other), "--out", str(tmp_path / "p.bvh")]
-    result = CliRunner().invoke(improvise_command.app, words)
+    result = bunraku("improvise", checkpoint[0], "--recordings", other, "--out", tmp_path / "p.bvh")
     assert result.exit_code == 2
     assert not (tmp_path / "p.bvh").exists()

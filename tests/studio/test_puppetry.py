@@ -11,7 +11,7 @@ from appliance.dancer.puppeteers import FixedOrientation
 from appliance.pose import quaternion
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.evaluation import puppetry
-from appliance.studio.evaluation.body_figures import BodyFigures
+from appliance.studio.evaluation.dance_figures import BodyFigures
 from appliance.studio.evaluation.in_play import FollowedOrientation, Rehearsal
 from appliance.studio.evaluation.measurement import Figures, Measurement, Pair
 from appliance.studio.evaluation.nearest import Reference, reference_of, without_heading

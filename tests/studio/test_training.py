@@ -13,7 +13,7 @@ from appliance.studio.autoencoder import losses
 from appliance.studio.autoencoder.answers import AnswerSettings
 from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.autoencoder.repertoire import Nearness
-from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder, save_checkpoint
+from appliance.studio.autoencoder.training import Settings, Training, load_autoencoder
 from appliance.studio.data.dataset import Dataset, load_dataset
 
 FEW = AnswerSettings(reserve=96, wandering=16, nearness=Nearness(neighbours=4, searched=256))
@@ -28,7 +28,7 @@ def dancer(recordings: Path) -> Dataset:
 def run(training: Training, path: Path, until: int | None = None) -> None:
     training.run(
         lambda report: None,
-        lambda: save_checkpoint(training, path),
+        lambda: training.save_checkpoint(path),
         stop=lambda: until is not None and training.step >= until,
     )
 
@@ -146,4 +146,4 @@ def test_a_checkpoint_gives_the_averaged_network(dancer: Dataset, tmp_path: Path
 
 def test_every_joint_is_held_in_some_lesson_also_one_without_a_bone_below_it(dancer: Dataset) -> None:
     without_ends = replace(dancer, skeleton=replace(dancer.skeleton, ends=()))
-    assert Training(without_ends, TINY)._chances().min() > 0.1
+    assert Training(without_ends, TINY).holding_chances().min() > 0.1

@@ -9,7 +9,6 @@ import socket
 import threading
 import time
 import tty
-from types import TracebackType
 
 from hw_sim.firmware_library import CompiledWearable, State
 
@@ -20,9 +19,9 @@ _BOX = (0x7F000001, 9750)  # where the box is, as the simulated radio sees it
 
 
 class Bench:
-    """A context. Virtual time keeps step with the clock on the wall, in a thread.
+    """A context. A thread keeps virtual time in step with real time.
 
-    `pulls_at`: the cable comes loose as soon as the wearable was told this; `plug_in` puts it back.
+    `pulls_at`: the cable comes loose as soon as the wearable has received this; `plug_in` puts it back.
     """
 
     def __init__(self, box_port: int | None = None) -> None:
@@ -43,9 +42,7 @@ class Bench:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._is_over.set()
         self._thread.join()
         self.pull_out()
@@ -72,26 +69,27 @@ class Bench:
             return self._wearable.flash_image()
 
     def _live(self) -> None:
-        began, waiting, told = time.monotonic(), b"", b""
+        began, waiting, received_last = time.monotonic(), b"", b""
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
             radio.setblocking(False)
             while not self._is_over.wait(TURN_S):
                 with self._turning:
                     with contextlib.suppress(BlockingIOError):
                         received = os.read(self._master, 4096) if self._master >= 0 else b""
-                        waiting, told = waiting + received, told[-200:] + received if self.pulls_at else b""
+                        waiting += received
+                        received_last = received_last[-200:] + received if self.pulls_at else b""
                     waiting = waiting[self._wearable.put_serial(waiting) :]
                     self._wearable.step_until(round((time.monotonic() - began) * 1e6))
-                    said = self._wearable.take_serial()
+                    sent = self._wearable.take_serial()
                     self._use_radio(radio)
                     self.state = State(self._wearable.status.state)
-                    is_pulled = bool(self.pulls_at) and self.pulls_at in told
+                    is_pulled = bool(self.pulls_at) and self.pulls_at in received_last
                     with contextlib.suppress(BlockingIOError):
-                        if said and self._master >= 0 and not is_pulled:  # what it says now arrives nowhere
-                            os.write(self._master, said)
+                        if sent and self._master >= 0 and not is_pulled:  # what it sends now is lost
+                            os.write(self._master, sent)
                 if is_pulled:
                     self.pull_out()
-                    self.pulls_at, waiting, told = b"", b"", b""
+                    self.pulls_at, waiting, received_last = b"", b"", b""
 
     def _use_radio(self, radio: socket.socket) -> None:
         for sent in self._wearable.take_datagrams():

@@ -1,16 +1,14 @@
-"""The real box as a process of its own, with its own ports and a receiver that listens."""
+"""The real box as a process, with its own ports and an OSC receiver."""
 
 from __future__ import annotations
 
 import contextlib
 import fcntl
+import json
 import os
 import signal
 import socket
-import subprocess
-import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,83 +17,97 @@ import yaml
 from appliance.sensor.keys import SensorKey, create_keys
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports
-from tests.system.processes import BUNRAKU, PATIENCE_S, await_that, children_that_say, says, started
+from tests.system.processes import BUNRAKU, Process, children_running, has_argument, run_bunraku, wait_until
+from tests.system.wearables import Wearables
 
 PLAY = (*BUNRAKU, "play")
 JOURNAL = {"journal": {"folder": "run.journal", "minutes": 1}}
 
 
-@dataclass
-class Box:
-    """A running `bunraku play`; `sensors` and `control` are its ports, `words` what it says."""
+class Box(Process):
+    """A running `bunraku play`; `sensors` and `control` are its ports."""
 
-    process: subprocess.Popen[bytes]
-    receiver: OscReceiver
-    sensors: int
-    control: int
-    keys: dict[str, SensorKey]
-    words_file: Path
-    command: list[str]
+    def __init__(
+        self,
+        folder: Path,
+        command: Sequence[str | Path],
+        receiver: OscReceiver,
+        ports: tuple[int, int],
+        keys: dict[str, SensorKey],
+    ) -> None:
+        self.box_file, self.runtime = folder / "box.yaml", folder / "runtime"
+        self.receiver, self.keys = receiver, keys
+        self.sensors, self.control = ports
+        super().__init__(folder / "words.txt", command)
 
     @property
     def key(self) -> SensorKey:
         """Of the only or first sensor."""
         return next(iter(self.keys.values()))
 
-    @property
-    def words(self) -> str:
-        return self.words_file.read_text()
+    def wearables(self, **options: Any) -> Wearables:
+        """All sensors of the key file, as emulated wearables, once the box runs; a context."""
+        self.frames(1)
+        return Wearables(list(self.keys.values()), self.sensors, **options)
 
     def frames(self, count: int) -> list[list[Any]]:
         """The next `count` frame messages: tick, frame time, sensor sequence, late."""
         found: list[list[Any]] = []
-        until = time.monotonic() + PATIENCE_S
-        while len(found) < count:
-            assert time.monotonic() < until, self.words
-            assert self.process.poll() is None or found, self.words
-            found += [arguments for _, address, arguments in self.receiver.poll(0.05) if "frame" in address]
+
+        def has_all() -> bool:
+            arrived = [arguments for _, address, arguments in self.receiver.poll(0.05) if "frame" in address]
+            assert arrived or found or self.process.poll() is None, self.words
+            found.extend(arrived)
+            return len(found) >= count
+
+        wait_until(has_all, lambda: self.words, pause=lambda: None)
         return found
 
     def last_frames(self) -> list[list[Any]]:
-        """Those that the process, which has ended, had sent and the test has not taken yet."""
+        """Frame messages that the ended process had sent and the test has not taken yet."""
         return [arguments for _, address, arguments in self.receiver.poll() if "frame" in address]
 
     def frame_that(self, is_wanted: Callable[[list[Any]], bool]) -> list[Any]:
         """The next frame message that is as wanted."""
-        until = time.monotonic() + PATIENCE_S
-        while True:
-            for frame in self.frames(1):
-                if is_wanted(frame):
-                    return frame
-            assert time.monotonic() < until, self.words
+        return wait_until(
+            lambda: next(filter(is_wanted, self.frames(1)), None), lambda: self.words, pause=lambda: None
+        )
 
-    def await_words(self, words: str, count: int = 1) -> None:
-        """Until it has said this so often."""
-        until = time.monotonic() + PATIENCE_S
-        while self.words.count(words) < count:
-            assert time.monotonic() < until and self.process.poll() is None, self.words
-            self.receiver.poll(0.05)
+    def pause(self) -> None:
+        """Frames that arrive meanwhile are dropped: what a test reads next is new."""
+        self.receiver.poll(0.05)
+
+    def listed_sensors(self) -> dict[str, dict[str, Any]]:
+        """What `bunraku sensors --json` lists, by name."""
+
+        def answer() -> dict[str, Any]:
+            done = run_bunraku("sensors", "--json", "--box", self.box_file)
+            assert done.returncode == 0, done.stderr
+            listed: dict[str, Any] = json.loads(done.stdout)
+            return listed if listed["box"] else {}
+
+        return {sensor["name"]: sensor for sensor in wait_until(answer, lambda: self.words)["sensors"]}
 
     def kill_and_restart(self) -> None:
-        """As systemd does it: gone in the middle of a tick, and the same command again."""
+        """As systemd does it: killed in the middle of a tick, then the same command again."""
         self.end(signal.SIGKILL)
         self.receiver.poll()
-        with self.words_file.open("ab") as words:
-            self.process = started(self.command, words)
+        self.start()
 
     def end(self, number: int = signal.SIGTERM) -> int:
-        """Send a signal and give the exit status.
-
-        Show control of a killed box ends by itself: while it holds the port, the next box would be refused.
-        """
-        companions = children_that_say(self.process.pid, "appliance.show_control")
+        """Send a signal and return the exit status, once the box's show control has let go of its port."""
+        companions = children_running(self.process.pid, "appliance.show_control")
         with ending_emulators(self.process.pid):
-            self.process.send_signal(number)
-            status = self.process.wait(PATIENCE_S)
-        await_that(
-            lambda: not any(says(pid, "appliance.show_control") for pid in companions), lambda: self.words
+            status = super().end(number)
+        wait_until(
+            lambda: not any(has_argument(pid, "appliance.show_control") for pid in companions),
+            lambda: f"show control outlives its box:\n{self.words}",
         )
         return status
+
+    def kill(self) -> None:
+        with ending_emulators(self.process.pid):
+            super().kill()
 
 
 @contextlib.contextmanager
@@ -108,10 +120,10 @@ def playing(
     command: Sequence[str] = PLAY,
     names: Sequence[str] = ("left-wrist",),
 ) -> Iterator[Box]:
-    """A box that dances this show, with these sensors in its key file; `settings` go over its own."""
+    """A box that dances this show, with these sensors in its key file; `settings` override its own."""
     keys = create_keys(folder / "sensors.keys", names)
     sensors, control = free_ports(2)
-    with OscReceiver(HOST) as receiver, (folder / "words.txt").open("wb") as words:
+    with OscReceiver(HOST) as receiver:
         frames = {"host": HOST, "port": receiver.port, "frame_message": True}
         box: dict[str, Any] = {
             "sensors": {"udp": {"host": HOST, "port": sensors}, "keys": "sensors.keys"},
@@ -122,29 +134,23 @@ def playing(
         for section, values in (settings or {}).items():
             box[section] = {**box.get(section, {}), **values} if section in ("sensors", "outputs") else values
         (folder / "box.yaml").write_text(yaml.safe_dump(box))
-        full = [*command, "--show", str(show), "--box", str(folder / "box.yaml"), *arguments]
-        process = started(full, words)
-        running = Box(process, receiver, sensors, control, keys, folder / "words.txt", full)
-        try:
+        full = [*command, "--show", show, "--box", folder / "box.yaml", *arguments]
+        with Box(folder, full, receiver, (sensors, control), keys) as running:
             yield running
-        finally:
-            with ending_emulators(running.process.pid):
-                running.process.kill()
-                running.process.wait()
 
 
 @contextlib.contextmanager
 def ending_emulators(box: int) -> Iterator[None]:
-    """A box that is killed inside leaves its emulated sensors behind."""
-    emulators = children_that_say(box, "emulate")
+    """A box that is killed leaves its emulated sensors behind: kill those too."""
+    emulators = children_running(box, "emulate")
     yield
     for pid in emulators:
-        if says(pid, "emulate"):
+        if has_argument(pid, "emulate"):
             os.kill(pid, signal.SIGKILL)
 
 
 def await_end_of_keeper(runtime: Path) -> None:
-    """It ends with its box and lets go of its lock; a power cut would have taken it in the same moment."""
+    """Wait until the keeper has released its lock: it ends after its box, where a power cut takes both."""
 
     def is_gone() -> bool:
         with contextlib.suppress(BlockingIOError):
@@ -153,10 +159,11 @@ def await_end_of_keeper(runtime: Path) -> None:
         return False
 
     with (runtime / "keeper.lock").open() as lock:
-        await_that(is_gone, "the keeper outlives its box")
+        wait_until(is_gone, "the keeper outlives its box")
 
 
 def is_free(port: int) -> bool:
+    """Whether nothing is bound to this UDP port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
         try:
             one.bind((HOST, port))

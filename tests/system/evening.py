@@ -1,6 +1,6 @@
-"""An evening: eight compiled wearables dance, one thing after the other goes wrong, a stranger attacks.
+"""An evening: eight compiled wearables dance, one fault follows the other, and an attacker is at work.
 
-`python -m tests.system.evening --picture out/evening.png` plays it and draws it; the tests play it and judge.
+`python -m tests.system.evening --picture out/evening.png` plays and draws it; the tests play and judge it.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from typing import NamedTuple
 
 from hw_sim import motions
 from hw_sim.firmware_library import State, Status
-from tests.system.lockstep import EPOCH_S, Believed, Lockstep, LockstepSensor, lockstep
-from tests.system.stranger import Stranger
+from tests.system.attacker import Attacker
+from tests.system.lockstep import EPOCH_S, Accepted, Lockstep, LockstepSensor, lockstep
 
 NAMES = ["left-wrist", "right-wrist", "left-elbow", "right-elbow", "head", "chest", "left-knee", "right-knee"]
-# Trouble that never ends: shares of bus transactions, and of datagrams.
+# Constant trouble: shares of bus transactions, and of datagrams.
 SMALL_TROUBLE = {"nack": 1e-3, "zero read": 3e-4, "torn read": 3e-4, "flipped bit": 3e-4, "loss": 4e-3}
 LOOK_S = 0.1
 TRIES_PER_LOOK = 20
 
 
 class Act(NamedTuple):
-    """Something that happens at a time of the evening, in seconds; `sensor` None: to all."""
+    """An event at a time of the evening, in seconds; `sensor` None: for all."""
 
     at: float
     sensor: int | None
@@ -36,20 +36,20 @@ class Act(NamedTuple):
 
 
 class Look(NamedTuple):
-    """How one wearable was at a moment."""
+    """The state of one wearable at one moment."""
 
     at: float
     state: State | None  # None: off
-    believed: int  # readings since the look before
+    accepted: int  # readings since the previous look
 
 
 @dataclass
 class Evening:
-    """What happened, for the tests and the picture. Times are seconds since the evening began."""
+    """A record for the tests and the picture. Times are seconds since the evening began."""
 
     sensors: list[LockstepSensor]
     acts: list[Act]
-    believed: list[Believed] = field(default_factory=list)
+    accepted: list[Accepted] = field(default_factory=list)
     counts: Counter[str] = field(default_factory=Counter)
     attacks: Counter[str] = field(default_factory=Counter)
     looks: list[list[Look]] = field(default_factory=lambda: [[] for _ in NAMES])
@@ -58,7 +58,7 @@ class Evening:
 
 
 def script() -> list[Act]:
-    """The acts in order. Dancing goes on all the time; each wearable dances for well over 30 s."""
+    """The acts in order. All wearables dance all the time, each for well over 30 s."""
 
     def switch(sensor: int, is_on: bool) -> Callable[[Lockstep], None]:
         return lambda stage: stage.sensors[sensor].wearable.power(is_on)
@@ -98,10 +98,10 @@ def script() -> list[Act]:
 def play(seed: int = 1) -> Evening:
     """The whole evening."""
     with lockstep(NAMES, seed, lambda number: motions.dance(100 * seed + number)) as stage:
-        evening = Evening(stage.sensors, script(), believed=stage.believed)
-        stranger = Stranger(("127.0.0.1", stage.port), [one.address for one in stage.sensors], seed)
-        stage.overheard = stranger.overhear
-        stage.look = _watching(evening, stage, stranger)
+        evening = Evening(stage.sensors, script(), accepted=stage.accepted)
+        attacker = Attacker(("127.0.0.1", stage.port), [one.address for one in stage.sensors], seed)
+        stage.overheard = attacker.overhear
+        stage.look = _watching(evening, stage, attacker)
         for sensor in stage.sensors:
             for trouble, share in SMALL_TROUBLE.items():
                 sensor.wearable.set_trouble(trouble, share)
@@ -109,16 +109,16 @@ def play(seed: int = 1) -> Evening:
         for act in evening.acts:
             stage.run(act.at - (stage.now - EPOCH_S))
             act.happen(stage)
-        stranger.close()
+        attacker.close()
         evening.end = stage.now - EPOCH_S
         evening.finals = [sensor.wearable.status for sensor in stage.sensors]
         stage.box_off()
-        evening.counts, evening.attacks = stage.counts, stranger.counts
+        evening.counts, evening.attacks = stage.counts, attacker.counts
     return evening
 
 
-def _watching(evening: Evening, stage: Lockstep, stranger: Stranger) -> Callable[[float], None]:
-    """Looks at every wearable each 0.1 s, and lets the stranger act."""
+def _watching(evening: Evening, stage: Lockstep, attacker: Attacker) -> Callable[[float], None]:
+    """Sample every wearable each 0.1 s, and let the attacker act."""
     seen = 0
     next_look = stage.now
 
@@ -127,17 +127,17 @@ def _watching(evening: Evening, stage: Lockstep, stranger: Stranger) -> Callable
         if now < next_look:
             return
         next_look += LOOK_S
-        stranger.act(TRIES_PER_LOOK)
-        believed = Counter(one.reading.sensor for one in stage.believed[seen:])
-        seen = len(stage.believed)
+        attacker.act(TRIES_PER_LOOK)
+        accepted = Counter(one.reading.sensor for one in stage.accepted[seen:])
+        seen = len(stage.accepted)
         for sensor, looks in zip(stage.sensors, evening.looks, strict=True):
-            looks.append(Look(now - EPOCH_S, sensor.state, believed[sensor.key.name]))
+            looks.append(Look(now - EPOCH_S, sensor.state, accepted[sensor.key.name]))
 
     return look
 
 
 def main() -> None:
-    """Play, say what happened, draw."""
+    """Play, report, draw."""
     parser = argparse.ArgumentParser(description=__doc__, prog="python -m tests.system.evening")
     parser.add_argument("--picture", type=Path, default=Path("out/evening.png"))
     parser.add_argument("--seed", type=int, default=1)
@@ -147,7 +147,7 @@ def main() -> None:
     took_s = time.monotonic() - began
     print(f"{len(evening.sensors)} wearables, {evening.end:g} s of virtual time in {took_s:.1f} s")
     print("box:", dict(sorted((word, count) for word, count in evening.counts.items() if count)))
-    print("stranger:", dict(evening.attacks))
+    print("attacker:", dict(evening.attacks))
     from tests.system.evening_picture import draw_evening
 
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The picture of an evening: eight wearables over time, what they did, what the tick got, what went wrong."""
+"""The picture of an evening: eight wearables over time, their states, accepted readings and faults."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def draw_evening(path: Path, evening: Evening) -> None:
             _draw_act(axes, act)
         _legend(axes)
         axes.set(
-            title="An evening in virtual time: firmware compiled, box real, a stranger attacking throughout",
+            title="An evening in virtual time: firmware compiled, box real, an attacker throughout",
             xlabel="s",
             xlim=(0.0, evening.end),
             ylim=(len(NAMES) - 0.3, -1.15),
@@ -54,18 +54,18 @@ def draw_evening(path: Path, evening: Evening) -> None:
 
 
 def _draw_row(axes: Any, row: int, looks: list[Look]) -> None:
-    """A band in the state's colour, and in it the rate of believed readings."""
+    """A band in the state's colour, with the rate of accepted readings in it."""
     at = np.array([one.at for one in looks])
     for state, (_, colour) in STATES.items():
         spans = [(one.at - LOOK_S, LOOK_S) for one in looks if one.state == state]
         axes.broken_barh(spans, (row - 0.25, 0.6), color=colour, linewidth=0)
-    rate = np.convolve([one.believed / LOOK_S for one in looks], np.full(SMOOTHED, 1 / SMOOTHED), "same")
+    rate = np.convolve([one.accepted / LOOK_S for one in looks], np.full(SMOOTHED, 1 / SMOOTHED), "same")
     top = row + 0.35 - 0.6 * np.minimum(rate / FULL_RATE_HZ, 1.0)
     axes.plot(at, top, color=IVORY, linewidth=0.9)
 
 
 def _lit(lamp: list[tuple[float, bool]]) -> list[tuple[float, float]]:
-    """When the lamp was on: beginnings and lengths; a flash is drawn as long as the eye can see here."""
+    """When the lamp was on: starts and lengths; a flash is drawn long enough to be seen."""
     return [
         (on - EPOCH_S, max(off - on, SHORTEST_DRAWN_S)) for (on, is_on), (off, _) in pairwise(lamp) if is_on
     ]
@@ -89,7 +89,7 @@ def _legend(axes: Any) -> None:
     from matplotlib.patches import Patch
 
     entries: list[Any] = [Patch(color=colour, label=words) for words, colour in STATES.values()]
-    entries.append(Line2D([], [], color=IVORY, linewidth=0.9, label="readings believed (top: 50 a second)"))
+    entries.append(Line2D([], [], color=IVORY, linewidth=0.9, label="accepted readings (top: 50 a second)"))
     entries.append(Line2D([], [], color=LAMP, linewidth=4, label="lamp"))
-    entries.append(Line2D([], [], color=VERMILION, marker="v", linestyle="", label="what goes wrong"))
+    entries.append(Line2D([], [], color=VERMILION, marker="v", linestyle="", label="fault"))
     axes.legend(handles=entries, loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=7, frameon=False)

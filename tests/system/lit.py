@@ -1,18 +1,20 @@
-"""A rig that hangs over the real box: an Art-Net node that takes its levels, and the lights' process."""
+"""A rig for the real box: an Art-Net node that receives its levels, and the lights' process."""
 
 from __future__ import annotations
 
 import contextlib
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from hw_sim.dmx.artnet import ArtNetReceiver
 from hw_sim.peers import HOST
-from tests.system.processes import PATIENCE_S, Process
+from tests.bundles import write_show
+from tests.system.box import PLAY, Box, playing
+from tests.system.processes import BUNRAKU, Process, wait_until
 
 PAN, DIMMER, PAR, SAFE = 0, 4, 20, 0.2
-RIG = {
+RIG: dict[str, Any] = {
     "fixtures": [
         {"name": "head", "profile": "moving-wash", "address": 1, "place": [1.5, 3.5, 1.0]},
         {"name": "par", "profile": "led-par", "address": 21, "place": [-2, 3.5, 0]},
@@ -33,30 +35,39 @@ RIG = {
 
 
 class Node:
-    """An Art-Net node: the newest levels of a universe, and all that came."""
+    """An Art-Net node: the newest levels of each universe, and everything that arrived."""
 
     def __init__(self, receiver: ArtNetReceiver) -> None:
         self._receiver = receiver
         self.levels: dict[int, bytes] = {}
         self.arrivals: list[tuple[float, int, bytes]] = []
 
-    def look(self) -> None:
+    def receive(self) -> None:
+        """Take what has arrived."""
         for arrival, packet in self._receiver.poll(0.05):
             self.levels[packet.port_address] = packet.levels
             self.arrivals.append((arrival, packet.port_address, packet.levels))
 
     def await_levels(self, is_wanted: Callable[[bytes], bool], universe: int = 1) -> None:
-        until = time.monotonic() + PATIENCE_S
-        while not (universe in self.levels and is_wanted(self.levels[universe])):
-            assert time.monotonic() < until, self.levels.get(universe, b"nothing")[:32]
-            self.look()
+        """Wait until the newest levels are as wanted."""
+        wait_until(
+            lambda: universe in self.levels and is_wanted(self.levels[universe]),
+            lambda: f"universe {universe} has {self.levels.get(universe, b'')[:32].hex() or 'nothing'}",
+            self.receive,
+        )
 
     def await_dance(self) -> None:
-        """Fully lit, by a first mapping that says so."""
+        """Fully lit, as the first mapping has it."""
         self.await_levels(lambda levels: levels[DIMMER] == 255 and levels[PAR] == 255)
 
     def await_safe(self) -> None:
         self.await_levels(lambda levels: levels[DIMMER] == 0 and levels[PAR] == round(255 * SAFE))
+
+
+def artnet(port: int, *universes: int) -> dict[str, Any]:
+    """Settings of a box that sends these universes to a node on this port."""
+    wires = [{"universe": one, "wire": "artnet", "host": HOST, "port": port} for one in universes]
+    return {"outputs": {"dmx": wires}}
 
 
 @contextlib.contextmanager
@@ -65,10 +76,21 @@ def node() -> Iterator[tuple[Node, int]]:
         yield Node(receiver), receiver.port
 
 
+@contextlib.contextmanager
+def lit_box(
+    folder: Path, rig: dict[str, Any], *universes: int, command: Sequence[str] = PLAY
+) -> Iterator[tuple[Node, Box]]:
+    """A box with this rig, its universes (1 and 2) on a node."""
+    show = write_show(folder / "show", lights=rig)
+    with node() as (lamp, port):
+        settings = artnet(port, *(universes or (1, 2)))
+        with playing(show, folder, settings=settings, command=command) as box:
+            yield lamp, box
+
+
 class LightsProcess(Process):
     """`bunraku lights`."""
 
     def __init__(self, folder: Path, terminal: int | None = None) -> None:
-        super().__init__(
-            folder / "lights.txt", "lights", "--box", str(folder / "box.yaml"), terminal=terminal
-        )
+        command = [*BUNRAKU, "lights", "--box", folder / "box.yaml"]
+        super().__init__(folder / "lights.txt", command, terminal)

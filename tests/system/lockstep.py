@@ -1,4 +1,4 @@
-"""Compiled wearables and the box's real link in one virtual time, over real sockets on this machine."""
+"""Compiled wearables and the box's real link in shared virtual time, over real sockets."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WAYPOINT_S = 0.01
 
 
 class Measured(NamedTuple):
-    """A reading as the wearable signed it, and how the hand stood then."""
+    """A reading as the wearable signed it, and the hand at that time."""
 
     orientation: motions.Quaternion  # as sent, sensor axes
     hand: motions.Quaternion  # true, sensor axes, but for the heading that the IMU started with
@@ -36,7 +36,7 @@ class Measured(NamedTuple):
 
 
 class LockstepSensor:
-    """One compiled wearable with a real UDP socket of its own. Times are seconds of virtual time."""
+    """One compiled wearable with its own UDP socket. Times are seconds of virtual time."""
 
     def __init__(self, key: SensorKey, motion: motions.Motion, seed: int, box_port: int) -> None:
         self.key = key
@@ -65,7 +65,7 @@ class LockstepSensor:
         return State(status.state) if status.is_on else None
 
     def step(self, now: float) -> list[bytes]:
-        """Receives, runs on to `now`, sends; gives what the box said and what left, as the air heard it."""
+        """Receive, run to `now`, send; returns the datagrams from the box and to it, as on the air."""
         heard = []
         while (received := self._receive()) is not None:
             data, (host, port) = received
@@ -100,7 +100,7 @@ class LockstepSensor:
         return data
 
     def _remember(self, data: bytes) -> None:
-        """What the wearable claims to have measured, and the truth at that moment of its clock."""
+        """Keep what the wearable measured, and the truth at that moment of its clock."""
         packet = wire.READING.decode(data)
         assert isinstance(packet, wire.Reading)
         at = (self.wearable.status.booted_at_us + packet.sensor_time_us) * 1e-6
@@ -109,8 +109,8 @@ class LockstepSensor:
 
 
 @dataclass
-class Believed:
-    """What the link gave to the tick."""
+class Accepted:
+    """A reading that the link gave to the tick."""
 
     at: float
     reading: SensorReading
@@ -118,7 +118,7 @@ class Believed:
 
 @dataclass
 class Lockstep:
-    """The wearables, the box, and who else is there; `run` moves them all on together."""
+    """The wearables, the box, and listeners on the air; `run` advances them together."""
 
     sensors: list[LockstepSensor]
     port: int
@@ -126,7 +126,7 @@ class Lockstep:
     tick_s: float = STEP_S
     now: float = EPOCH_S
     link: SensorLink | None = None  # None: the box is off
-    believed: list[Believed] = field(default_factory=list)
+    accepted: list[Accepted] = field(default_factory=list)
     counts: Counter[str] = field(default_factory=Counter)  # of links that were closed
     overheard: Callable[[bytes], None] = lambda data: None
     look: Callable[[float], None] = lambda now: None  # after each step
@@ -142,12 +142,12 @@ class Lockstep:
         self.link = None
 
     def access_point(self, is_on: bool, in_s: float = 0.0) -> None:
-        """On or off after so long; told ahead, because a wearable may block on joining meanwhile."""
+        """Switch it on or off in `in_s`: announced ahead, because a wearable may block while joining."""
         for sensor in self.sensors:
             sensor.wearable.set_access_point(is_on, round((self.now + in_s) * 1e6))
 
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
-        """Until then, or until `until` holds, and says whether it did."""
+        """Run for `seconds`, or until `until` holds; returns whether it did."""
         end = self.now + seconds
         while self.now < end - 1e-9:
             self.now = round(self.now + STEP_S, 6)
@@ -155,7 +155,7 @@ class Lockstep:
                 for data in sensor.step(self.now):
                     self.overheard(data)
             if self.link is not None and round(self.now / STEP_S) % round(self.tick_s / STEP_S) == 0:
-                self.believed += (Believed(self.now, one) for one in self.link.drain(self.now))
+                self.accepted += (Accepted(self.now, one) for one in self.link.drain(self.now))
                 self.link.send_due(self.now)
             self.look(self.now)
             if until():
@@ -167,9 +167,9 @@ class Lockstep:
 def lockstep(
     names: list[str], seed: int, motion_of: Callable[[int], motions.Motion], tick_s: float = STEP_S
 ) -> Iterator[Lockstep]:
-    """Wearables that are provisioned and switched off, an access point that is on, a box that is off.
+    """Provisioned wearables that are off, an access point that is on, a box that is off.
 
-    tick_s: how often the box drains and tends, a multiple of STEP_S.
+    tick_s: how often the box drains and sends, a multiple of STEP_S.
     """
     chance = random.Random(f"lockstep {seed}")
     [port] = free_ports(1)

@@ -1,4 +1,4 @@
-"""Networks of a test's own: Linux network namespaces, and a cable between two of them."""
+"""Private networks for tests: Linux network namespaces, and a cable between two of them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 _CLONE_NEWNET = 0x40000000
@@ -18,7 +17,7 @@ _numbers = itertools.count()
 
 
 def why_not() -> str | None:
-    """Why this test run has no networks of its own; None when it has."""
+    """Why this machine cannot make networks; None if it can."""
     if shutil.which("ip") is None:
         return "the command ip (Debian package iproute2) is missing"
     name = _name("try")
@@ -29,7 +28,7 @@ def why_not() -> str | None:
 
 
 class Namespace:
-    """A network with a loopback interface of its own; no port in it is taken."""
+    """A network with its own loopback interface, all ports free."""
 
     def __init__(self, what: str) -> None:
         self.name = _name(what)
@@ -39,9 +38,7 @@ class Namespace:
         _ip("-n", self.name, "link", "set", "lo", "up")
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         _ip("netns", "delete", self.name)
 
     def command(self, *words: str) -> list[str]:
@@ -50,7 +47,7 @@ class Namespace:
 
     @contextlib.contextmanager
     def entered(self) -> Iterator[None]:
-        """Inside, sockets that this thread opens are in this network, and stay there."""
+        """Inside, this thread opens its sockets in this network; they stay there."""
         with Path("/proc/thread-self/ns/net").open() as outside:
             with Path("/run/netns", self.name).open() as inside:
                 _set_namespace(inside.fileno())
@@ -61,7 +58,7 @@ class Namespace:
 
 
 class Cable:
-    """Between two networks, plugged in; it is gone with either. Addresses like 10.77.0.1/24."""
+    """Joins two networks until one of them is deleted. Addresses like 10.77.0.1/24."""
 
     def __init__(self, one: Namespace, one_address: str, two: Namespace, two_address: str) -> None:
         self._near, self._end = one, _name("a")
@@ -73,16 +70,16 @@ class Cable:
             _ip("-n", network.name, "link", "set", end, "up")
 
     def pull_out(self) -> None:
-        """At the first one's end."""
+        """Take down the first network's end."""
         _ip("-n", self._near.name, "link", "set", self._end, "down")
 
     def plug_in(self) -> None:
-        """Again."""
+        """Bring it up again."""
         _ip("-n", self._near.name, "link", "set", self._end, "up")
 
 
 def _name(what: str) -> str:
-    """At most 15 letters, as interfaces want it; two test runs do not meet."""
+    """At most 15 letters, the limit for interfaces; different in each test run."""
     return f"bk{os.getpid() % 100000}{what[:6]}{next(_numbers)}"
 
 

@@ -1,4 +1,4 @@
-"""The real Open Lighting Architecture daemon as the lights' other end: configured, started, read back."""
+"""The real Open Lighting Architecture daemon as a receiver of lights: configured, started, read back."""
 
 from __future__ import annotations
 
@@ -14,34 +14,32 @@ import urllib.parse
 import urllib.request
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from hw_sim.peers import free_ports
 from tests.system.namespace import Namespace
+from tests.system.processes import wait_until
 
-STARTS_WITHIN_S = 30.0
-FOLLOWS_WITHIN_S = 20.0
-# Everything that it can do and that no test asks for: each would open ports or devices of its own.
+# Plugins that no test needs are switched off: each would open ports or devices.
 PLUGINS = (
     *("artnet", "dummy", "e131", "espnet", "ftdidmx", "gpio", "karate", "kinet", "milinst", "opendmx"),
     *("openpixelcontrol", "osc", "pathport", "renard", "sandnet", "shownet", "spi", "stageprofi", "uartdmx"),
     *("usbdmx", "usbserial"),
 )
-NOBODY = "nobody"  # olad refuses to run as root
+USER = "nobody"  # olad refuses to run as root
 
 Settings = Mapping[str, str | int | Sequence[str]]
 
 
 def why_not() -> str | None:
-    """Why it cannot be asked here; None when it can."""
+    """Why it cannot run here; None if it can."""
     return None if shutil.which("olad") else "olad (Debian package ola) is missing"
 
 
 class Olad:
-    """One daemon with a configuration of its own, in a network of its own where one is given.
+    """One daemon with its own configuration, in a network if one is given.
 
-    plugins: those that are on, with their settings. patched: universe of each port; a port is named
+    plugins: those switched on, with their settings. patched: universe of each port; a port is named
     plugin-device-direction-number, like 2-1-I-0 for the first Art-Net input.
     """
 
@@ -56,7 +54,7 @@ class Olad:
         self.port = 0
 
     def start(self) -> None:
-        """Returns when it answers."""
+        """Start it and wait until it answers."""
         if not any(self._folder.iterdir()):
             self._configure()
         with self._inside():
@@ -65,22 +63,23 @@ class Olad:
         words += ["--no-register-with-dns-sd", *(("-i", "lo") if self._network else ())]
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                self._network.command(*self._as_nobody(words)) if self._network else self._as_nobody(words),
+                self._network.command(*self._as_user(words)) if self._network else self._as_user(words),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )
-        give_up = time.monotonic() + STARTS_WITHIN_S
-        while True:
+        process = self._process
+
+        def answers() -> bool:
             with contextlib.suppress(OSError):
-                self.ask("json/server_stats")
-                return
-            assert self._process.poll() is None, f"olad ended:\n{self.log}"
-            assert time.monotonic() < give_up, f"olad does not answer:\n{self.log}"
-            time.sleep(0.05)
+                return bool(self.ask("json/server_stats"))
+            assert process.poll() is None, f"olad ended:\n{self.log}"
+            return False
+
+        wait_until(answers, lambda: f"olad does not answer:\n{self.log}")
 
     def stop(self) -> None:
-        """Ends it; what was patched stays for the next start."""
+        """End it; its configuration stays for the next start."""
         if self._process is not None:
             self._process.terminate()
             try:
@@ -98,39 +97,36 @@ class Olad:
             raise
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._end()
 
     @property
     def log(self) -> str:
-        """What it said."""
+        """Its output so far."""
         return self._log.read_text(errors="replace") if self._log.exists() else ""
 
     def levels(self, universe: int) -> bytes:
-        """512 levels as it has them now."""
+        """The 512 levels that it has now."""
         answer = self.ask(f"get_dmx?u={universe}")
         digits = answer.partition("[")[2].partition("]")[0]
         return bytes(int(level) for level in digits.split(",") if level.strip()).ljust(512, b"\0")
 
-    def follow(self, universe: int, levels: bytes) -> float:
-        """Wait until it has exactly these; when that was seen, monotonic seconds."""
-        give_up = time.monotonic() + FOLLOWS_WITHIN_S
-        while True:
-            found, now = self.levels(universe), time.monotonic()
-            if found == levels:
-                return now
-            assert now < give_up, f"it has {found[:8].hex()}..., not {levels[:8].hex()}...\n{self.log}"
-            time.sleep(0.01)
+    def await_levels(self, universe: int, levels: bytes) -> float:
+        """Wait until it has exactly these levels; the time of that, monotonic seconds."""
 
-    def shine(self, universe: int, levels: bytes) -> None:
-        """Set levels by itself, as from its own console."""
+        def missing() -> str:
+            return f"it has {self.levels(universe)[:8].hex()}..., not {levels[:8].hex()}...\n{self.log}"
+
+        wait_until(lambda: self.levels(universe) == levels, missing)
+        return time.monotonic()
+
+    def set_levels(self, universe: int, levels: bytes) -> None:
+        """Set levels as from its own console."""
         shown = ",".join(str(level) for level in levels)
         self.ask("set_dmx", urllib.parse.urlencode({"u": universe, "d": shown}).encode())
 
     def ask(self, path: str, form: bytes | None = None) -> str:
-        """One page of its web server. Raises OSError."""
+        """Read one page of its web server. Raises OSError."""
         with (
             self._inside(),
             urllib.request.urlopen(f"http://127.0.0.1:{self.port}/{path}", form, timeout=5) as answer,
@@ -159,15 +155,15 @@ class Olad:
         ports = "".join(f"{port} = {universe}\n" for port, universe in self._patched.items())
         (self._folder / "ola-port.conf").write_text(ports)
         if os.geteuid() == 0:
-            owner = pwd.getpwnam(NOBODY)
+            owner = pwd.getpwnam(USER)
             for path in (self._folder, *self._folder.iterdir()):
                 os.chown(path, owner.pw_uid, owner.pw_gid)
 
     @staticmethod
-    def _as_nobody(words: list[str]) -> list[str]:
+    def _as_user(words: list[str]) -> list[str]:
         if os.geteuid() != 0:
             return words
-        owner = pwd.getpwnam(NOBODY)
+        owner = pwd.getpwnam(USER)
         return ["setpriv", f"--reuid={owner.pw_uid}", f"--regid={owner.pw_gid}", "--clear-groups", *words]
 
 
@@ -183,7 +179,7 @@ def sacn_node(address: str) -> dict[str, Settings]:
 
 @contextlib.contextmanager
 def shared_folder() -> Iterator[Path]:
-    """A folder that the daemon's user can look into; a test's own cannot."""
+    """A folder that the daemon's user can read, unlike a test's own."""
     with tempfile.TemporaryDirectory(prefix="widgets-") as name:
         Path(name).chmod(0o755)
         yield Path(name)

@@ -1,7 +1,7 @@
-"""The long run: all outputs of a real box at once, each counted at its other end; memory and handles watched.
+"""The long run: all outputs of a real box at once, each counted by its receiver; memory and handles watched.
 
 `python -m tests.system.outputs_run --minutes 10 --report out/outputs` runs it and writes outputs.json; exit
-status 1 when something was missing, did not follow, grew or ended. A test runs it for some seconds.
+status 1 if frames are missing, lamps do not follow, or a process grows or ends. A test runs it for seconds.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from typing import Any
 
 from appliance.pose.bvh import read_bvh
 from appliance.show.bundle import default_show_path
-from tests.system.venue import LAMPS, PATIENCE_S, Venue, venue
+from tests.system.processes import wait_until
+from tests.system.venue import LAMPS, Venue, venue
 
-SETTLED_SHARE = 0.2  # of the run: what a process takes until then is its start
+SETTLED_SHARE = 0.2  # of the run: growth before that is start-up
 MOST_GROWTH_MB, MOST_HANDLES = 6.0, 2
 LOOK_S = 1.0
-HEARD_S = 1.0  # a lamp shows a height that the joint had at most so long ago
-FOLLOWED_SHARE = 0.9  # of the looks: lights or olad may be held up for longer than that
+HEARD_S = 1.0  # a lamp may show a height of the joint that is this old
+FOLLOWED_SHARE = 0.9  # of the samples: lights or olad may be held up for longer than that
 OFF_BY = 3  # of 255: rounding, and the height between two frames
 LAST_FRAME_S = 5.0
 STALL_S, NAP_S = 0.02, 0.005
@@ -35,19 +36,19 @@ STALL_S, NAP_S = 0.02, 0.005
 
 @dataclass
 class Heard:
-    """What one receiver got: ticks as they came, and how many were marked late."""
+    """What one receiver got: ticks in order of arrival, and how many were marked late."""
 
     ticks: list[int] = field(default_factory=list)
     late: int = 0
 
     @property
     def missing(self) -> int:
-        """Ticks that never came between the first and the last."""
+        """Ticks between the first and the last that never arrived."""
         return max(self.ticks) - min(self.ticks) + 1 - len(set(self.ticks)) if self.ticks else 0
 
 
 class Stalls:
-    """How long this machine kept a thread waiting that only wanted to nap: its own part in what is late."""
+    """How long this machine delays a thread that only naps: its own share in late frames."""
 
     def __init__(self) -> None:
         self.count, self.worst_s = 0, 0.0
@@ -69,7 +70,7 @@ class Stalls:
 
 
 class Measurement:
-    """One run: hears, looks once a second, and has figures at the end."""
+    """One run: receives, samples once a second, and gives figures at the end."""
 
     def __init__(self, running: Venue) -> None:
         self._venue = running
@@ -83,41 +84,46 @@ class Measurement:
         self.handles: dict[str, list[int]] = {}
 
     def await_dance(self) -> None:
-        """Until all of it runs: frames at every receiver, the lamps lit, the projector and sensor at work."""
-        until = time.monotonic() + PATIENCE_S
-        while True:
-            self.hear(0.1)
-            is_ready = {
-                "frames": all(heard.ticks for heard in self._heard.values()) and bool(self._frames),
-                "processes": {"control", "lights"} <= self._venue.pids().keys(),
-                "lamps": all(self._follows(self._level(universe), universe) for universe in LAMPS),
-                "sensor": "neutral pose taken" in self._venue.said("stage"),
-                "picture": self._is_picture_there(self._venue.said("projector")),
-            }
-            if all(is_ready.values()):
-                return
+        """Wait until all of it runs: frames at every receiver, lamps lit, projector and sensor at work."""
+        is_ready: dict[str, bool] = {}
+
+        def words() -> str:
+            outputs = [f"{name}: {self._venue.words(name)}" for name in ("stage", "sensor", "projector")]
+            return "\n".join([str(is_ready), *outputs])
+
+        def all_ready() -> bool:
+            self.receive(0.1)
+            is_ready.update(
+                frames=all(heard.ticks for heard in self._heard.values()) and bool(self._frames),
+                processes={"control", "lights"} <= self._venue.pids().keys(),
+                lamps=all(self._follows(self._level(universe), universe) for universe in LAMPS),
+                sensor="neutral pose taken" in self._venue.words("stage"),
+                picture=self._is_picture_there(self._venue.words("projector")),
+            )
             ended = [name for name, process in self._venue.processes.items() if process.poll() is not None]
-            told = {name: self._venue.said(name) for name in ("stage", "sensor", "projector")}
-            assert not ended and time.monotonic() < until, f"{ended or is_ready}: {told}"
+            assert not ended, f"{ended} ended: {words()}"
+            return all(is_ready.values())
+
+        wait_until(all_ready, words)
 
     @staticmethod
     def _is_picture_there(said: str) -> bool:
-        """A processor that draws is said after some pictures of the dance; a graphics card draws at once."""
+        """Without a graphics card the projector says so after some pictures of the dance."""
         return "The picture is" in said and ("llvmpipe" not in said or "No graphics card draws here" in said)
 
     def run(self, seconds: float) -> None:
-        """Hear and look for so long."""
+        """Receive and sample for this long."""
         end = time.monotonic() + seconds
         look_at = 0.0
         while (now := time.monotonic()) < end:
-            self.hear(0.02)
+            self.receive(0.02)
             if now >= look_at:
                 look_at = now + LOOK_S
-                self._look_at_lamps()
-                self._look_at_processes()
+                self._sample_lamps()
+                self._sample_processes()
 
-    def hear(self, wait_s: float) -> None:
-        """Take what has come to the receivers."""
+    def receive(self, wait_s: float) -> None:
+        """Take what has arrived at the receivers."""
         for name, receiver in self._venue.osc.items():
             for arrival, address, arguments in receiver.poll(wait_s):
                 if address == "/bunraku/frame":
@@ -132,12 +138,12 @@ class Measurement:
                 self._frames.append(self._frames[-1] + step if self._frames else packet.frame)
 
     def figures(self, seconds: float, statuses: dict[str, int], stalls: Stalls) -> dict[str, Any]:
-        """All of it, as JSON, once the stage has ended and every receiver had time for the last frame."""
+        """All figures, for JSON, once the stage has ended and every receiver had time for the last frame."""
         until = time.monotonic() + LAST_FRAME_S
-        self.hear(0.2)
+        self.receive(0.2)
         heard = {**self._heard, "oscdump": _dumped(self._venue.dump)}
         while len({one.ticks[-1] for one in heard.values() if one.ticks}) > 1 and time.monotonic() < until:
-            self.hear(0.2)
+            self.receive(0.2)
             heard["oscdump"] = _dumped(self._venue.dump)
         positions = Heard(self._frames)
         receivers = {
@@ -160,8 +166,8 @@ class Measurement:
             },
             "memory_mb": {name: _ends(values) for name, values in self.memory_mb.items()},
             "handles": {name: _ends(values) for name, values in self.handles.items()},
-            "projector": self._venue.said("projector").strip().splitlines()[-1],
-            "stage": [line for line in self._venue.said("stage").splitlines() if line.startswith("Danced")],
+            "projector": self._venue.words("projector").strip().splitlines()[-1],
+            "stage": [line for line in self._venue.words("stage").splitlines() if line.startswith("Danced")],
             "statuses": statuses,
             "stalls_over_20_ms": stalls.count,
             "worst_stall_ms": round(1e3 * stalls.worst_s, 1),
@@ -174,8 +180,8 @@ class Measurement:
             while heights[0][0] < arrival - HEARD_S:
                 heights.popleft()
 
-    def _look_at_lamps(self) -> None:
-        """Whether each lamp shows a height that its joint had in the last moments."""
+    def _sample_lamps(self) -> None:
+        """Note whether each lamp shows a recent height of its joint."""
         for universe, lamp in self.lamps.items():
             level = self._level(universe)
             lamp["looks"] += 1
@@ -186,17 +192,17 @@ class Measurement:
         return self._venue.daemon.levels(universe)[0]
 
     def _follows(self, level: int, universe: int) -> bool:
-        self.hear(0.0)
+        self.receive(0.0)
         shares = [255.0 * share for _, share in self._heights[universe]]
         return bool(shares) and min(shares) - OFF_BY <= level <= max(shares) + OFF_BY
 
-    def _look_at_processes(self) -> None:
+    def _sample_processes(self) -> None:
         for name, pid in self._venue.pids().items():
             try:
                 status = Path(f"/proc/{pid}/status").read_text()
                 open_files = sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir())
             except OSError:
-                continue  # it has ended: the statuses at the end will say so
+                continue  # it has ended: its exit status tells
             resident = re.search(r"VmRSS:\s+(\d+)", status)
             self.memory_mb.setdefault(name, []).append(int(resident[1]) / 1024 if resident else 0.0)
             self.handles.setdefault(name, []).append(open_files)
@@ -205,8 +211,8 @@ class Measurement:
 def faults(figures: dict[str, Any], judge_growth: bool = True) -> list[str]:
     """What is wrong; empty when all is well. Growth cannot be judged in a run of seconds.
 
-    A slot that the stage itself skipped, because this machine stood still, is none that a receiver missed,
-    and neither is one whose datagram found the receiver's socket full.
+    Not counted as missing: slots that the stage skipped because this machine stood still, and datagrams that
+    the kernel dropped because the receiver's socket was full.
     """
     skipped = sum(int(number) for line in figures["stage"] for number in re.findall(r"skipped (\d+)", line))
     found = [
@@ -231,7 +237,7 @@ def faults(figures: dict[str, Any], judge_growth: bool = True) -> list[str]:
 
 
 def measure(seconds: float, folder: Path, picture: str = "320x180") -> dict[str, Any]:
-    """Build the venue, run, end it; the figures."""
+    """Build the venue, run it, end it, and return the figures."""
     stalls = Stalls()
     with venue(folder, picture) as running:
         measurement = Measurement(running)
@@ -244,7 +250,7 @@ def measure(seconds: float, folder: Path, picture: str = "320x180") -> dict[str,
 
 
 def table(figures: dict[str, Any]) -> list[str]:
-    """What a person reads."""
+    """The figures as lines of text."""
     lines = [f"{figures['seconds']:g} s"]
     lines += [f"  {name:<14} {one}" for name, one in figures["receivers"].items()]
     lines += [f"  lamp {name:<9} {lamp}" for name, lamp in figures["lamps"].items()]
@@ -257,7 +263,7 @@ def table(figures: dict[str, Any]) -> list[str]:
 
 
 def _dumped(file: Path) -> Heard:
-    """What the real oscdump printed: address, type tags, tick, time, sequence, late."""
+    """The real oscdump's output: address, type tags, tick, time, sequence, late."""
     heard = Heard()
     for line in file.read_text().splitlines():
         found = re.search(r"/bunraku/frame \S+ (\d+) \S+ -?\d+ (\d)$", line.strip())
@@ -268,7 +274,7 @@ def _dumped(file: Path) -> Heard:
 
 
 def _ends(values: list[float] | list[int]) -> tuple[float, float]:
-    """How much at first, once settled, and in the end: medians of a tenth of the run each."""
+    """The value once settled and at the end: medians of a tenth of the run each."""
     few = max(1, len(values) // 10)
     settled = values[int(SETTLED_SHARE * len(values)) :]
     return round(median(settled[:few]), 1), round(median(values[-few:]), 1)

@@ -1,4 +1,4 @@
-"""The processes of a box under test: started, heard, ended, and as the kernel lists them."""
+"""The processes of a box under test: started, awaited, ended, and as the kernel lists them."""
 
 from __future__ import annotations
 
@@ -10,85 +10,117 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO, Self, TypeVar
+from typing import IO, Any, Self, TypeVar
 
-PATIENCE_S = 60.0  # for a machine that is busy with other things; nothing here waits without a reason
+PATIENCE_S = 60.0  # for a busy machine; nothing waits that long without a fault
+POLL_S = 0.02
 BUNRAKU = (sys.executable, "-m", "appliance.cli")
 
 Found = TypeVar("Found")
 
 
-def await_that(find: Callable[[], Found], missing: str | Callable[[], object] = "it never came") -> Found:
-    """What `find` gives as soon as it gives something; fails after PATIENCE_S and says what is missing."""
-    until = time.monotonic() + PATIENCE_S
+def wait_until(
+    find: Callable[[], Found],
+    missing: str | Callable[[], object] = "it never came",
+    pause: Callable[[], object] = lambda: time.sleep(POLL_S),
+) -> Found:
+    """The first true value that `find` returns; fails after PATIENCE_S with what is missing."""
+    give_up = time.monotonic() + PATIENCE_S
     while not (found := find()):
-        assert time.monotonic() < until, missing() if callable(missing) else missing
-        time.sleep(0.02)
+        assert time.monotonic() < give_up, missing() if callable(missing) else missing
+        pause()
     return found
 
 
-def started(command: Sequence[str], words: IO[bytes] | int) -> subprocess.Popen[bytes]:
-    """A process whose words go into this file or terminal at once."""
+def run(command: Sequence[str | Path], **options: Any) -> subprocess.CompletedProcess[str]:
+    """One command, from start to end, with its output as text; fails after PATIENCE_S."""
+    return subprocess.run(
+        command, **{"capture_output": True, "text": True, "check": False, "timeout": PATIENCE_S} | options
+    )
+
+
+def run_bunraku(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
+    """One command of bunraku, from start to end."""
+    return run([*BUNRAKU, *arguments], **options)
+
+
+def start(command: Sequence[str | Path], output: IO[bytes] | int) -> subprocess.Popen[bytes]:
+    """Start a process that writes to this file or terminal without a buffer."""
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
-        stdout=words,
+        stdout=output,
         stderr=subprocess.STDOUT,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
 
 
 class Process:
-    """One command of bunraku by itself, as systemd runs it. A context, which kills it."""
+    """A command with its output in a file, or on a terminal. A context, which kills it."""
 
-    def __init__(self, words_file: Path, *arguments: str, terminal: int | None = None) -> None:
-        self.words_file = words_file
-        self._command, self._terminal = (*BUNRAKU, *arguments), terminal
+    def __init__(self, words_file: Path, command: Sequence[str | Path], terminal: int | None = None) -> None:
+        self.words_file, self.command, self._terminal = words_file, list(map(str, command)), terminal
         self.start()
 
     def start(self) -> None:
-        with self.words_file.open("ab") as words:
-            self.process = started(self._command, words if self._terminal is None else self._terminal)
+        with self.words_file.open("ab") as output:
+            self.process = start(self.command, output if self._terminal is None else self._terminal)
 
     @property
     def words(self) -> str:
+        """All output so far."""
         return self.words_file.read_text()
 
-    def await_words(self, words: str) -> None:
-        """Until it has said this."""
-        await_that(lambda: words in self.words or self.process.poll() is not None, lambda: self.words)
-        assert words in self.words, self.words
+    def pause(self) -> None:
+        """What to do between two looks at the output."""
+        time.sleep(POLL_S)
+
+    def await_words(self, words: str, count: int = 1) -> None:
+        """Wait until the output has these words `count` times."""
+
+        def has_words() -> bool:
+            return self.words.count(words) >= count
+
+        wait_until(
+            lambda: has_words() or self.process.poll() is not None,
+            lambda: f"'{words}' never came:\n{self.words}",
+            self.pause,
+        )
+        assert has_words(), self.words
 
     def end(self, number: int = signal.SIGTERM) -> int:
-        """Send a signal and give the exit status."""
+        """Send a signal and return the exit status."""
         self.process.send_signal(number)
         return self.process.wait(PATIENCE_S)
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.wait()
+        self.kill()
 
 
 def children(pid: int) -> list[int]:
-    """The processes that this one has started and that live."""
+    """The living processes that this one has started."""
     found: list[int] = []
     for task in Path(f"/proc/{pid}/task").glob("*/children"):
-        with contextlib.suppress(OSError):  # a thread that has ended meanwhile
+        with contextlib.suppress(OSError):  # a thread that has just ended
             found += map(int, task.read_text().split())
     return found
 
 
-def says(pid: int, word: str) -> bool:
-    """Whether its command line has this word; one that has ended has none."""
+def has_argument(pid: int, word: str) -> bool:
+    """Whether this word stands on the command line of a process; False once it has ended."""
     try:
         return word.encode() in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
     except OSError:
         return False
 
 
-def children_that_say(pid: int, word: str) -> list[int]:
-    """Those of its children whose command line has this word."""
-    return [child for child in children(pid) if says(child, word)]
+def children_running(pid: int, word: str) -> list[int]:
+    """The children with this word on their command line."""
+    return [child for child in children(pid) if has_argument(child, word)]

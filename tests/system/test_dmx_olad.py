@@ -1,4 +1,4 @@
-"""Our universes as the real Open Lighting Architecture receives them: Art-Net, sACN, and a USB widget."""
+"""Our universes as the real Open Lighting Architecture receives them: Art-Net, sACN, a USB widget."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from tests.outputs.dmx.conftest import config, universe
 from tests.system import namespace, olad
 from tests.system.namespace import Cable, Namespace
 from tests.system.olad import Olad
+from tests.system.processes import wait_until
 
 pytestmark = pytest.mark.skipif(olad.why_not() is not None, reason=str(olad.why_not()))
 
@@ -30,27 +31,27 @@ Venue = tuple[Namespace, Namespace, Cable]
 
 
 class Sender:
-    """Offers the same universe 40 times a second, as the lights do, until it falls silent."""
+    """Offers the same universe 40 times a second, as the lights do, until it ends."""
 
     def __init__(self, wires: list[DmxConfig], state: Path | None, network: Namespace | None = None) -> None:
         self._universes = open_universes(wires, state)
         self._network = network
-        self._silent = threading.Event()
+        self._ended = threading.Event()
         self._goodbye = False
         self.levels = bytes(512)
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
-    def fall_silent(self) -> float:
-        """Without a word, as a box whose power is cut; when, monotonic seconds."""
-        self._silent.set()
+    def cut_power(self) -> float:
+        """Stop without sending anything more; the time of that, monotonic seconds."""
+        self._ended.set()
         self._thread.join()
         return time.monotonic()
 
     def close(self) -> float:
-        """As at the end of a show; when, monotonic seconds."""
+        """End as a show does; the time of that, monotonic seconds."""
         self._goodbye = True
-        return self.fall_silent()
+        return self.cut_power()
 
     def __enter__(self) -> Sender:
         return self
@@ -60,13 +61,13 @@ class Sender:
 
     def _run(self) -> None:
         if self._network is None:
-            self._shine()
+            self._send_all()
         else:
             with self._network.entered():
-                self._shine()
+                self._send_all()
 
-    def _shine(self) -> None:
-        while not self._silent.wait(0.005):
+    def _send_all(self) -> None:
+        while not self._ended.wait(0.005):
             self._each(lambda one, now: one.offer(self.levels, now))
         if self._goodbye:
             self._each(lambda one, now: one.close(now))
@@ -104,9 +105,9 @@ def test_art_net(art_net: Namespace | None) -> None:
     ):
         for seed in (1, 2, 3):
             box.levels = universe(seed)
-            daemon.follow(1, universe(seed))
+            daemon.await_levels(1, universe(seed))
         box.levels = bytes(512)
-        daemon.follow(1, bytes(512))
+        daemon.await_levels(1, bytes(512))
 
 
 def test_art_net_net_and_subnet(art_net: Namespace | None) -> None:
@@ -114,24 +115,24 @@ def test_art_net_net_and_subnet(art_net: Namespace | None) -> None:
     with (
         Olad(node, {ART_NET_IN: 4}, art_net) as daemon,
         Sender([config("artnet", universe=4, number=5 << 8 | 3 << 4 | 4)], None, art_net) as box,
-        Sender([config("artnet", universe=4)], None, art_net) as stranger,
+        Sender([config("artnet", universe=4)], None, art_net) as other,
     ):
-        stranger.levels = universe(9)
+        other.levels = universe(9)
         box.levels = universe(1)
-        daemon.follow(4, universe(1))
+        daemon.await_levels(4, universe(1))
 
 
-def test_an_art_net_node_that_was_away_follows_again(art_net: Namespace | None) -> None:
+def test_an_art_net_node_follows_again_after_a_restart(art_net: Namespace | None) -> None:
     with (
         Olad(olad.art_net_node(), {ART_NET_IN: 1}, art_net) as daemon,
         Sender([config("artnet")], None, art_net) as box,
     ):
         box.levels = universe(1)
-        daemon.follow(1, universe(1))
+        daemon.await_levels(1, universe(1))
         daemon.stop()
         box.levels = universe(2)
         daemon.start()
-        daemon.follow(1, universe(2))
+        daemon.await_levels(1, universe(2))
 
 
 @pytest.fixture
@@ -156,22 +157,22 @@ def test_of_two_boxes_the_higher_priority_is_seen_and_the_other_takes_over(
         Sender([by_multicast(100)], tmp_path / "second", network) as second,
     ):
         second.levels = universe(100)
-        daemon.follow(1, universe(100))
+        daemon.await_levels(1, universe(100))
         with Sender([by_multicast(150)], tmp_path / "first", network) as first:
             first.levels = universe(150)
-            daemon.follow(1, universe(150))
-            second.levels = universe(101)  # what the lower one does is not seen
+            daemon.await_levels(1, universe(150))
+            second.levels = universe(101)  # the lower priority is not seen
             time.sleep(0.2)
             assert daemon.levels(1) == universe(150)
             ended = first.close()
-            # Three Stream_Terminated: nobody waits until the source counts as lost.
-            assert daemon.follow(1, universe(101)) - ended < LOST_AFTER_S
+            # Three Stream_Terminated end it at once, before the source counts as lost.
+            assert daemon.await_levels(1, universe(101)) - ended < LOST_AFTER_S
         with Sender([by_multicast(150)], tmp_path / "first", network) as first:
             first.levels = universe(151)
-            daemon.follow(1, universe(151))
-            ended = first.fall_silent()
-            # At the earliest, its last keep-alive may be 1 s old; its lights stay until it counts as lost.
-            assert daemon.follow(1, universe(101)) - ended > LOST_AFTER_S - 1.0
+            daemon.await_levels(1, universe(151))
+            ended = first.cut_power()
+            # Its lights stay until it counts as lost; its last keep-alive may be 1 s old by then.
+            assert daemon.await_levels(1, universe(101)) - ended > LOST_AFTER_S - 1.0
 
 
 def test_sacn_unicast_survives_a_still_picture(venue: Venue, tmp_path: Path) -> None:
@@ -182,7 +183,7 @@ def test_sacn_unicast_survives_a_still_picture(venue: Venue, tmp_path: Path) -> 
         Sender([by_multicast(100)], tmp_path / "moving", network) as moving,
     ):
         still.levels, moving.levels = universe(7), universe(8)
-        daemon.follow(1, universe(7))
+        daemon.await_levels(1, universe(7))
         until = time.monotonic() + 2 * LOST_AFTER_S
         while time.monotonic() < until:  # keep-alives alone hold it
             assert daemon.levels(1) == universe(7)
@@ -196,13 +197,13 @@ def test_a_cable_pulled_out_and_back(venue: Venue, tmp_path: Path) -> None:
         Sender([by_multicast(100)], tmp_path, network) as box,
     ):
         box.levels = universe(1)
-        daemon.follow(1, universe(1))
+        daemon.await_levels(1, universe(1))
         cable.pull_out()
         box.levels = universe(2)
         time.sleep(0.3)
         assert daemon.levels(1) == universe(1)
         cable.plug_in()
-        daemon.follow(1, universe(2))
+        daemon.await_levels(1, universe(2))
 
 
 def test_preview_is_for_visualisers_alone(venue: Venue, tmp_path: Path) -> None:
@@ -215,14 +216,14 @@ def test_preview_is_for_visualisers_alone(venue: Venue, tmp_path: Path) -> None:
         Sender([by_multicast(100)], tmp_path / "s", network) as show,
     ):
         preview.levels, show.levels = universe(1), universe(2)
-        daemon.follow(1, universe(2))
+        daemon.await_levels(1, universe(2))
         time.sleep(0.2)
         assert daemon.levels(1) == universe(2)
 
 
 @pytest.fixture
 def widget() -> Iterator[UsbProWidget]:
-    """Under a name that no second test run locks at the same time."""
+    """With a name that no other test run uses."""
     with olad.shared_folder() as folder, UsbProWidget(folder / f"ttyUSB{os.getpid()}") as plugged_in:
         yield plugged_in
 
@@ -235,23 +236,18 @@ def widget_out(widget: UsbProWidget) -> str:
     return f"5-{widget.serial_number:08x}-O-0"
 
 
-def shows(widget: UsbProWidget, daemon: Olad, levels: bytes) -> None:
-    give_up = time.monotonic() + olad.FOLLOWS_WITHIN_S
-    while widget.levels != levels:
-        assert time.monotonic() < give_up, daemon.log
-        time.sleep(0.01)
+def await_widget(widget: UsbProWidget, daemon: Olad, levels: bytes) -> None:
+    wait_until(lambda: widget.levels == levels, lambda: daemon.log)
 
 
-def test_olad_takes_our_widget_for_a_real_one(widget: UsbProWidget) -> None:
+def test_olad_recognizes_our_widget_as_a_real_one(widget: UsbProWidget) -> None:
     with Olad(with_widget(widget), {widget_out(widget): 1}) as daemon:
-        give_up = time.monotonic() + olad.FOLLOWS_WITHIN_S
-        while "Enttec Usb Pro Device, Serial #: 01234567, firmware 1.44" not in daemon.ask("json/get_ports"):
-            assert time.monotonic() < give_up, daemon.log
-            time.sleep(0.05)
+        device = "Enttec Usb Pro Device, Serial #: 01234567, firmware 1.44"
+        wait_until(lambda: device in daemon.ask("json/get_ports"), lambda: daemon.log)
         assert {GET_PARAMETERS, GET_SERIAL} <= set(widget.labels)
         for seed in (1, 2):
-            daemon.shine(1, universe(seed))
-            shows(widget, daemon, universe(seed))
+            daemon.set_levels(1, universe(seed))
+            await_widget(widget, daemon, universe(seed))
 
 
 def test_from_our_art_net_through_olad_to_the_widget(widget: UsbProWidget, art_net: Namespace | None) -> None:
@@ -262,6 +258,6 @@ def test_from_our_art_net_through_olad_to_the_widget(widget: UsbProWidget, art_n
     ):
         for seed in (1, 2):
             box.levels = universe(seed)
-            shows(widget, daemon, universe(seed))
+            await_widget(widget, daemon, universe(seed))
         box.levels = bytes(512)
-        shows(widget, daemon, bytes(512))
+        await_widget(widget, daemon, bytes(512))

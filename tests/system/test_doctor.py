@@ -1,4 +1,4 @@
-"""`bunraku doctor`: each check against a machine that is laid out as files, and the command on this one."""
+"""`bunraku doctor`: each check against a machine made of files, and the command on this machine."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from appliance.cli.doctor.sample import Sample, sample
 from appliance.release.choice import Aside, Choice
 from appliance.show.box import BoxConfig
 from tests.bundles import write_show
-from tests.system.box import PATIENCE_S, playing
+from tests.system.box import playing
+from tests.system.processes import run_bunraku
 
-DOCTOR = (sys.executable, "-m", "appliance.cli", "doctor")
+Check = Callable[[HostView], Iterable[Finding]]
 STAGE_PID = 4711
 
 
@@ -32,6 +33,11 @@ def lay(root: Path, path: str, content: str = "") -> None:
     file = root / path.lstrip("/")
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(content)
+
+
+def lay_choice(root: Path, choice: Choice) -> None:
+    lay(root, "run/bunraku/chosen.json")
+    choice.write(root / "run/bunraku/chosen.json")
 
 
 def verdicts(found: Iterable[Finding]) -> list[tuple[str, str]]:
@@ -48,17 +54,15 @@ def quiet(late_ms: tuple[float, ...] = (0.1,) * 200, **changes: object) -> Sampl
     return Sample(**{**usual, **changes})  # type: ignore[arg-type]
 
 
-def test_every_finding_that_is_not_well_says_what_to_do(tmp_path: Path) -> None:
-    """On a machine of which nothing is known, too, no check raises."""
+def test_every_finding_but_ok_has_a_cure(tmp_path: Path) -> None:
+    """Also on a machine that reveals nothing; no check raises."""
     for finding in findings(HostView(tmp_path)):
         assert finding.words.endswith("."), finding
         assert bool(finding.cure) == (finding.verdict != "ok"), finding
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_no_check_stumbles_over_nonsense(
-    check: Callable[[HostView], Iterable[Finding]], tmp_path: Path
-) -> None:
+def test_no_check_stumbles_over_nonsense(check: Check, tmp_path: Path) -> None:
     for path in (
         *("proc/meminfo", "proc/mounts", "proc/swaps", "proc/net/udp", f"proc/{STAGE_PID}/stat"),
         *("sys/class/thermal/thermal_zone0/temp", "sys/class/watchdog/watchdog0/state"),
@@ -71,7 +75,7 @@ def test_no_check_stumbles_over_nonsense(
 
 
 @pytest.mark.parametrize(("policy", "verdict"), [("1", "ok"), ("0", "wrong")], ids=["fifo", "ordinary"])
-def test_the_stage_that_dances_is_asked_for_its_priority(tmp_path: Path, policy: str, verdict: str) -> None:
+def test_the_priority_of_the_running_stage_is_read(tmp_path: Path, policy: str, verdict: str) -> None:
     fields = " ".join(["S", *["0"] * 36, "70", policy, "0"])
     lay(tmp_path, f"/proc/{STAGE_PID}/stat", f"{STAGE_PID} (bunraku (play)) {fields}")
     found = only(processor.realtime_rights(HostView(tmp_path, stage=RunningStage(STAGE_PID, {}))))
@@ -80,7 +84,7 @@ def test_the_stage_that_dances_is_asked_for_its_priority(tmp_path: Path, policy:
         assert "70" in found.words
 
 
-def test_this_process_s_own_numbers_are_where_they_are_looked_for() -> None:
+def test_the_kernel_s_figures_are_found_for_this_process() -> None:
     patient = HostView(stage=RunningStage(os.getpid(), {}))
     assert only(processor.realtime_rights(patient)).verdict == "wrong"  # tests are ordinary
     assert only(processor.locked_memory(patient)).verdict == "better"
@@ -94,7 +98,7 @@ def test_late_wake_ups(late_ms: tuple[float, ...], verdict: str) -> None:
     assert only(processor.wake_ups(quiet(late_ms))).verdict == verdict
 
 
-def test_who_else_uses_the_cores_is_named() -> None:
+def test_other_users_of_the_cores_are_named() -> None:
     assert only(processor.others(quiet(shares=(("cron", 12, 0.01),)))).verdict == "ok"
     found = only(processor.others(quiet(shares=(("updatedb", 77, 0.9), ("cron", 12, 0.01)))))
     assert found.verdict == "better"
@@ -110,7 +114,7 @@ def test_interrupts_and_a_host_that_takes_time_away() -> None:
     assert found == [("interrupts", "better"), ("virtual machine", "better")]
 
 
-def test_a_second_of_looking_sees_a_busy_process_and_wakes_each_time() -> None:
+def test_a_sample_of_a_second_sees_a_busy_process_and_wakes_each_time() -> None:
     with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:
         try:
             seen = sample(70, frozenset())
@@ -122,31 +126,55 @@ def test_a_second_of_looking_sees_a_busy_process_and_wakes_each_time() -> None:
     assert busy.pid not in [pid for _, pid, _ in unseen.shares]
 
 
-@pytest.mark.parametrize(("governor", "verdict"), [("performance", "ok"), ("ondemand", "better")])
-def test_the_processor_s_pace(tmp_path: Path, governor: str, verdict: str) -> None:
-    lay(tmp_path, "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", f"{governor}\n")
-    assert only(processor.governor(HostView(tmp_path))).verdict == verdict
-
-
-@pytest.mark.parametrize(("millidegrees", "verdict"), [(48000, "ok"), (74500, "better"), (85000, "wrong")])
-def test_warmth(tmp_path: Path, millidegrees: int, verdict: str) -> None:
-    lay(tmp_path, "/sys/class/thermal/thermal_zone0/temp", "31000\n")
-    lay(tmp_path, "/sys/class/thermal/thermal_zone1/temp", f"{millidegrees}\n")
-    found = only(processor.warmth(HostView(tmp_path)))
-    assert found.verdict == verdict
-    assert f"{millidegrees / 1000:.0f} degrees" in found.words
+GOVERNOR = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"
+THERMAL = "/sys/class/thermal"
+THROTTLED = "/sys/devices/platform/soc/soc:firmware/get_throttled"
+WATCHDOG = "/sys/class/watchdog/watchdog0"
 
 
 @pytest.mark.parametrize(
-    ("bits", "verdict"),
-    [("0", "ok"), ("50005", "wrong"), ("4", "wrong"), ("50000", "better"), ("80000", "better")],
+    ("check", "files", "verdict", "words"),
+    [
+        (processor.governor, {GOVERNOR: "performance"}, "ok", ""),
+        (processor.governor, {GOVERNOR: "ondemand"}, "better", "ondemand"),
+        *(
+            (
+                processor.warmth,
+                {f"{THERMAL}/thermal_zone0/temp": "31000", f"{THERMAL}/thermal_zone1/temp": millidegrees},
+                verdict,
+                f"{int(millidegrees) / 1000:.0f} degrees",
+            )
+            for millidegrees, verdict in (("48000", "ok"), ("74500", "better"), ("85000", "wrong"))
+        ),
+        (processor.power, {THROTTLED: "0"}, "ok", ""),
+        (processor.power, {THROTTLED: "50005"}, "wrong", "voltage"),
+        (processor.power, {THROTTLED: "4"}, "wrong", "slowed down"),
+        (processor.power, {THROTTLED: "50000"}, "better", "voltage"),
+        (processor.power, {THROTTLED: "80000"}, "better", "slowed down"),
+        *(
+            (storage.system_partition, {"/proc/mounts": f"proc /proc proc rw 0 0\n{line}"}, verdict, "")
+            for line, verdict in (
+                ("overlay / overlay rw,lowerdir=/ro 0 0", "ok"),
+                ("/dev/sda2 / ext4 ro,noatime 0 0", "ok"),
+                ("/dev/sda2 / ext4 rw,relatime 0 0", "better"),
+            )
+        ),
+        (box_state.watchdog, {f"{WATCHDOG}/state": "active", f"{WATCHDOG}/timeout": "10"}, "ok", "10 s"),
+        (box_state.watchdog, {f"{WATCHDOG}/state": "inactive", f"{WATCHDOG}/timeout": "10"}, "better", ""),
+        (box_state.watchdog, {}, "better", ""),
+    ],
 )
-def test_a_pi_that_starves_or_is_slowed_down(tmp_path: Path, bits: str, verdict: str) -> None:
-    lay(tmp_path, "/sys/devices/platform/soc/soc:firmware/get_throttled", f"{bits}\n")
-    assert only(processor.power(HostView(tmp_path))).verdict == verdict
+def test_the_verdict_on_files_of_the_kernel(
+    check: Check, files: dict[str, str], verdict: str, words: str, tmp_path: Path
+) -> None:
+    for path, content in files.items():
+        lay(tmp_path, path, f"{content}\n")
+    found = only(check(HostView(tmp_path)))
+    assert found.verdict == verdict
+    assert words in found.words
 
 
-def test_a_machine_without_such_a_sign_says_nothing_about_its_power(tmp_path: Path) -> None:
+def test_a_machine_that_reports_no_throttling_has_no_finding_about_power(tmp_path: Path) -> None:
     assert list(processor.power(HostView(tmp_path))) == []
     lay(tmp_path, "/sys/class/hwmon/hwmon2/name", "rpi_volt\n")
     lay(tmp_path, "/sys/class/hwmon/hwmon2/in0_lcrit_alarm", "1\n")
@@ -161,20 +189,7 @@ def test_folders_that_cannot_be_written_or_are_not_named(tmp_path: Path) -> None
     assert only(storage.data_folders(HostView(box=nowhere))).verdict in ("wrong", "better")  # no room in it
 
 
-@pytest.mark.parametrize(
-    ("line", "verdict"),
-    [
-        ("overlay / overlay rw,lowerdir=/ro 0 0", "ok"),
-        ("/dev/sda2 / ext4 ro,noatime 0 0", "ok"),
-        ("/dev/sda2 / ext4 rw,relatime 0 0", "better"),
-    ],
-)
-def test_a_system_that_can_be_written_can_be_damaged(tmp_path: Path, line: str, verdict: str) -> None:
-    lay(tmp_path, "/proc/mounts", f"proc /proc proc rw 0 0\n{line}\n")
-    assert only(storage.system_partition(HostView(tmp_path))).verdict == verdict
-
-
-def test_a_data_partition_that_did_not_come(tmp_path: Path) -> None:
+def test_a_missing_data_partition(tmp_path: Path) -> None:
     lay(tmp_path, "/etc/fstab", "# a comment\nLABEL=data /data ext4 nofail 0 2\n")
     lay(tmp_path, "/proc/mounts", "overlay / overlay rw 0 0\n/dev/sdb1 /media/bunraku vfat ro 0 0\n")
     assert verdicts(storage.media(HostView(tmp_path))) == [("data partition", "wrong"), ("stick", "ok")]
@@ -201,19 +216,15 @@ def test_memory_and_swap(tmp_path: Path) -> None:
     assert "zram" not in swap.words
 
 
-def test_a_show_that_was_refused_is_told(tmp_path: Path) -> None:
-    (tmp_path / "run/bunraku").mkdir(parents=True)
-    Choice(refused=("show.yaml:3: no such key.", "It is not danced.")).write(
-        tmp_path / "run/bunraku/chosen.json"
-    )
+def test_a_refused_show_is_reported(tmp_path: Path) -> None:
+    lay_choice(tmp_path, Choice(refused=("show.yaml:3: no such key.", "It is not danced.")))
     found = list(storage.choice(HostView(tmp_path)))
     assert [one.verdict for one in found] == ["ok", "better"]
     assert "show.yaml:3: no such key.\nIt is not danced." in found[1].words
 
 
-def test_a_show_that_was_put_aside_is_told_as_such(tmp_path: Path) -> None:
-    (tmp_path / "run/bunraku").mkdir(parents=True)
-    Choice(aside=(Aside("new+", "The show did not dance."),)).write(tmp_path / "run/bunraku/chosen.json")
+def test_a_show_put_aside_is_reported(tmp_path: Path) -> None:
+    lay_choice(tmp_path, Choice(aside=(Aside("new+", "The show did not dance."),)))
     found = list(storage.choice(HostView(tmp_path)))
     assert [one.verdict for one in found] == ["ok", "better"]
     assert found[1].words == "The show did not dance."
@@ -221,12 +232,11 @@ def test_a_show_that_was_put_aside_is_told_as_such(tmp_path: Path) -> None:
 
 def test_a_box_that_is_on_and_does_not_dance_is_wrong(tmp_path: Path) -> None:
     assert only(box_state.stage(HostView(tmp_path))).verdict == "ok"
-    (tmp_path / "run/bunraku").mkdir(parents=True)
-    Choice().write(tmp_path / "run/bunraku/chosen.json")
+    lay_choice(tmp_path, Choice())
     assert only(box_state.stage(HostView(tmp_path))).verdict == "wrong"
 
 
-def test_a_release_that_was_put_aside_is_told(tmp_path: Path) -> None:
+def test_a_release_put_aside_is_reported(tmp_path: Path) -> None:
     lay(tmp_path, "/data/bunraku-releases/0.2.0.aside", "its stage did not dance\n")
     found = only(storage.releases(HostView(tmp_path)))
     assert found.verdict == "better"
@@ -234,15 +244,7 @@ def test_a_release_that_was_put_aside_is_told(tmp_path: Path) -> None:
     assert "bunraku-install --use 0.2.0" in found.cure
 
 
-@pytest.mark.parametrize(("state", "verdict"), [("active", "ok"), ("inactive", "better"), (None, "better")])
-def test_the_watchdog(tmp_path: Path, state: str | None, verdict: str) -> None:
-    if state is not None:
-        lay(tmp_path, "/sys/class/watchdog/watchdog0/state", f"{state}\n")
-        lay(tmp_path, "/sys/class/watchdog/watchdog0/timeout", "10\n")
-    assert only(box_state.watchdog(HostView(tmp_path))).verdict == verdict
-
-
-def test_how_the_dance_fares() -> None:
+def test_the_health_of_the_dance() -> None:
     health = {"rate_hz": 50.0, "ticks": 5000, "late": 3, "skipped": 0, "complaints": []}
     assert only(box_state.stage(HostView(stage=RunningStage(1, health)))).verdict == "ok"
     found = list(
@@ -252,7 +254,7 @@ def test_how_the_dance_fares() -> None:
     assert only(box_state.stage(HostView())).verdict == "ok"
 
 
-def test_fallbacks_that_are_in_force_are_told_with_their_words() -> None:
+def test_fallbacks_in_force_are_reported_with_their_words() -> None:
     told = (
         ("stage", Fallen("sensor-silent", 3, True, "Sensor left-wrist is silent.")),
         ("lights", Fallen("wire-gone", 1, False, "It is back.")),
@@ -275,7 +277,7 @@ def test_radios(tmp_path: Path) -> None:
     assert verdicts(venue.radios(HostView(tmp_path))) == [("bluetooth", "better"), ("wi-fi", "better")]
 
 
-def test_a_network_that_nothing_is_plugged_into(tmp_path: Path) -> None:
+def test_a_network_without_a_cable(tmp_path: Path) -> None:
     lay(tmp_path, "/sys/class/net/eth0/carrier", "0\n")
     (tmp_path / "sys/class/net/eth0/device").mkdir()
     assert only(venue.network(HostView(tmp_path))).verdict == "better"
@@ -331,17 +333,11 @@ def test_a_port_that_another_process_holds_is_wrong_and_it_is_named(tmp_path: Pa
 @pytest.mark.realtime
 def test_beside_a_dancing_box_it_finds_the_box_and_costs_it_no_frame(tmp_path: Path) -> None:
     with playing(write_show(tmp_path / "show"), tmp_path) as box:
-        first = box.frames(70)[-1]  # after a second the stage has told its figures
-        done = subprocess.run(
-            [*DOCTOR, "--box", str(tmp_path / "box.yaml"), "--json"],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=PATIENCE_S,
-        )
+        first = box.frames(70)[-1]  # after a second the stage has published its health
+        done = run_bunraku("doctor", "--box", box.box_file, "--json")
         found = {one["what"]: one for one in json.loads(done.stdout)}
         rate = re.match(r"(\d+\.\d) Hz; \d+ of \d+ ticks", found["stage"]["words"])
-        assert rate and float(rate[1]) > 25.0, found["stage"]  # this machine may have been held up
+        assert rate and float(rate[1]) > 25.0, found["stage"]  # this machine may have been busy
         assert found["port for sensors"]["words"].endswith("the box listens.")
         assert found["port for commands"]["verdict"] == "ok"
         assert "appliance" not in found["other programs"]["words"]
@@ -350,10 +346,9 @@ def test_beside_a_dancing_box_it_finds_the_box_and_costs_it_no_frame(tmp_path: P
     assert done.returncode == any(one["verdict"] == "wrong" for one in found.values())
 
 
-def test_a_broken_box_file_is_one_more_thing_that_is_wrong(tmp_path: Path) -> None:
+def test_a_broken_box_file_is_one_more_finding(tmp_path: Path) -> None:
     (tmp_path / "box.yaml").write_text("sensors: {udp: {prot: 9750}}\n")
-    command = [*DOCTOR, "--box", str(tmp_path / "box.yaml")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    done = run_bunraku("doctor", "--box", tmp_path / "box.yaml")
     assert done.returncode == 1
     assert "wrong" in done.stdout.splitlines()[0]
     assert "Did you mean 'port'?" in " ".join(done.stdout.split())

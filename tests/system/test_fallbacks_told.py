@@ -1,4 +1,4 @@
-"""What lights and projector do when a wire or the stage is away is told to the box, by the real processes."""
+"""Lights and projector report their fallbacks to the box when a wire or the stage is away."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
-import yaml
 
 from appliance.box.fallback import Fallen
 from appliance.box.process_health import ProcessHealth
@@ -20,16 +19,13 @@ from hw_sim.dmx.usb_pro import UsbProWidget
 from tests.bundles import write_show
 from tests.system.box import Box, playing
 from tests.system.lit import RIG, LightsProcess
-from tests.system.processes import await_that
+from tests.system.processes import wait_until
 from tests.system.test_projector import Projection
 
 
 @pytest.fixture
 def show(tmp_path: Path) -> Path:
-    folder = write_show(tmp_path / "show", hands=[])
-    config = yaml.safe_load((folder / "show.yaml").read_text()) | {"lights": RIG}
-    (folder / "show.yaml").write_text(yaml.safe_dump(config))
-    return folder
+    return write_show(tmp_path / "show", hands=[], lights=RIG)
 
 
 @contextmanager
@@ -40,24 +36,26 @@ def lit(show: Path, folder: Path, device: Path) -> Iterator[Box]:
         yield box
 
 
-def await_told(runtime: Path, name: str, is_wanted: Callable[[Fallen], bool]) -> Fallen:
+def await_fallback(runtime: Path, name: str, is_wanted: Callable[[Fallen], bool]) -> Fallen:
     with closing(ProcessHealth(runtime)) as processes:
 
-        def found() -> list[Fallen]:
-            told = (one for _, one in processes.fallbacks(time.monotonic()))
-            return [one for one in told if one.name == name and is_wanted(one)]
+        def find() -> Fallen | None:
+            reported = (one for _, one in processes.fallbacks(time.monotonic()))
+            return next((one for one in reported if one.name == name and is_wanted(one)), None)
 
-        return await_that(found, f"{name} was not told")[0]
+        fallen = wait_until(find, f"{name} was not reported")
+        assert fallen is not None
+        return fallen
 
 
 def test_a_wire_that_is_away_and_back(show: Path, tmp_path: Path) -> None:
     widget = UsbProWidget(tmp_path / "ttyUSB7")
     with lit(show, tmp_path, widget.path) as box, LightsProcess(tmp_path) as lights:
-        away = await_told(tmp_path / "runtime", DMX_AWAY.name, lambda one: one.active)
+        away = await_fallback(box.runtime, DMX_AWAY.name, lambda one: one.active)
         assert away.times == 1
         assert "it is not plugged in" in away.words
         with widget:
-            await_told(tmp_path / "runtime", DMX_AWAY.name, lambda one: not one.active)
+            await_fallback(box.runtime, DMX_AWAY.name, lambda one: not one.active)
             assert lights.end() == 0
         box.frames(5)
 
@@ -67,19 +65,19 @@ def test_a_stage_that_is_lost_and_back(show: Path, tmp_path: Path) -> None:
         lights.await_words("The stage dances, and the lights with it.")
         box.kill_and_restart()
         box.end(signal.SIGKILL)
-        lost = await_told(tmp_path / "runtime", LIGHTS_SAFE.name, lambda one: one.active)
+        lost = await_fallback(box.runtime, LIGHTS_SAFE.name, lambda one: one.active)
         assert "fade to their safe look" in lost.words
         box.kill_and_restart()
-        await_told(tmp_path / "runtime", LIGHTS_SAFE.name, lambda one: not one.active)
+        await_fallback(box.runtime, LIGHTS_SAFE.name, lambda one: not one.active)
 
 
 def test_a_picture_without_a_stage_and_with_one(tmp_path: Path) -> None:
     show = write_show(tmp_path / "show", hands=[])
-    with playing(show, tmp_path, "--alone") as box, Projection(tmp_path / "box.yaml", tmp_path) as projection:
+    with playing(show, tmp_path, "--alone") as box, Projection(box.box_file, tmp_path) as projection:
         projection.await_dance()
         box.end(signal.SIGKILL)
-        await_told(tmp_path / "runtime", PICTURE_BLACK.name, lambda one: one.active)
+        await_fallback(box.runtime, PICTURE_BLACK.name, lambda one: one.active)
         box.kill_and_restart()
-        await_told(tmp_path / "runtime", PICTURE_BLACK.name, lambda one: not one.active)
+        await_fallback(box.runtime, PICTURE_BLACK.name, lambda one: not one.active)
         assert projection.end(signal.SIGKILL) == -signal.SIGKILL
-        await_told(tmp_path / "runtime", "projector-died", lambda one: one.active)
+        await_fallback(box.runtime, "projector-died", lambda one: one.active)

@@ -1,10 +1,9 @@
-"""The firewall lets in what a running box listens to beyond loopback, nothing else; nft takes its rules."""
+"""The firewall admits what a running box listens to beyond loopback and nothing else; nft takes its rules."""
 
 from __future__ import annotations
 
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ from appliance.cli.firewall import rules
 from appliance.show.box import load_box
 from tests.bundles import write_show
 from tests.system.box import playing
-from tests.system.processes import children
+from tests.system.processes import children, run
 
 LISTED = re.compile(r"^UNCONN\s+\d+\s+\d+\s+(\S+?)(?:%\w+)?:(\d+)\s", re.MULTILINE)
 
@@ -25,7 +24,7 @@ def box_file(folder: Path, text: str) -> Path:
 
 
 def opened(text: str) -> set[int]:
-    """Ports that the rules let in from the network, without those for addresses by DHCP."""
+    """Ports that the rules open to the network, without those for DHCP and DNS."""
     return {int(port) for port in re.findall(r"udp dport (\d+) accept", text)} - {67, 68, 53}
 
 
@@ -38,7 +37,7 @@ def test_sensors_are_let_in_where_the_box_listens(tmp_path: Path) -> None:
     assert "ip daddr 192.168.4.1 udp dport 9751 accept" in rules(load_box(path))
 
 
-def test_commands_are_let_in_from_those_who_are_listed_alone(tmp_path: Path) -> None:
+def test_commands_are_let_in_from_listed_senders_alone(tmp_path: Path) -> None:
     senders = "[192.168.0.20, 192.168.4.0/24]"
     path = box_file(tmp_path, f"control: {{host: 0.0.0.0, port: 9002, senders: {senders}}}\n")
     text = rules(load_box(path))
@@ -61,13 +60,11 @@ def test_nft_takes_the_rules_twice(tmp_path: Path) -> None:
     )
     (tmp_path / "rules").write_text(rules(load_box(path), ["wlan0"]))
     twice = f"nft -f {tmp_path}/rules && nft -f {tmp_path}/rules && nft list ruleset"
-    done = subprocess.run(
-        ["unshare", "--net", "sh", "-c", twice], capture_output=True, text=True, check=False
-    )
+    done = run(["unshare", "--net", "sh", "-c", twice])
     if "Operation not permitted" in done.stderr:
-        pytest.skip("this machine gives no process a network of its own")
+        pytest.skip("this machine does not allow network namespaces")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("udp dport 9750") == 1, "the rules of before went"
+    assert done.stdout.count("udp dport 9750") == 1, "the old rules are replaced"
     assert done.stdout.count("policy drop") == 2
 
 
@@ -93,15 +90,15 @@ def test_what_the_rules_let_in_is_what_a_running_box_listens_to(tmp_path: Path) 
 
 
 def listened_to(pid: int) -> set[int]:
-    """UDP ports of a box and its companions that are open to more than this machine."""
+    """UDP ports of a box and its companions that other machines can reach."""
     pids = {pid, *children(pid)}
     ports = set()
-    listed = subprocess.run(["ss", "-lunpH"], capture_output=True, text=True, check=True).stdout
+    listed = run(["ss", "-lunpH"], check=True).stdout
     for line in listed.splitlines():
         found = LISTED.match(line)
         owners = {int(one) for one in re.findall(r"pid=(\d+)", line)}
         if found and owners & pids and not found[1].startswith("127."):
             ports.add(int(found[2]))
-    tcp = subprocess.run(["ss", "-ltnpH"], capture_output=True, text=True, check=True).stdout
+    tcp = run(["ss", "-ltnpH"], check=True).stdout
     assert not {int(one) for one in re.findall(r"pid=(\d+)", tcp)} & pids, "no TCP port was opened"
     return ports

@@ -1,4 +1,4 @@
-"""Files that the box finds in its folders: no FIFO, device or enormous file holds it up or ends it."""
+"""Files in the box's folders: no FIFO, device or enormous file blocks or ends it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import pytest
 
 from appliance.box.block import BlockReader, BlockWriter
 from appliance.box.checkpoint import Checkpoint, packed, read_checkpoint, unpacked
-from appliance.cli.run_with_timeout import within
+from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.fixture_library.convert import convert_file
 from appliance.outputs.dmx.identity import component_identifier
 from appliance.pose.bvh import BvhError, read_bvh, write_bvh
@@ -73,7 +73,7 @@ def recording(path: Path) -> None:
         read_bvh(path)
 
 
-def place(path: Path) -> None:
+def checkpoint(path: Path) -> None:
     assert read_checkpoint(path) is None
 
 
@@ -87,7 +87,7 @@ def device(path: Path) -> None:
 
 def enormous(path: Path) -> None:
     path.touch()
-    os.truncate(path, 1 << 40)  # and no room taken
+    os.truncate(path, 1 << 40)  # sparse
 
 
 def deep(path: Path) -> None:
@@ -95,8 +95,8 @@ def deep(path: Path) -> None:
 
 
 @pytest.mark.parametrize("made", [fifo, device, enormous, deep])
-@pytest.mark.parametrize("read", [keys, memory, alignment, identity, fixture, choice, recording, place])
-def test_nothing_is_held_up_or_ended(
+@pytest.mark.parametrize("read", [keys, memory, alignment, identity, fixture, choice, recording, checkpoint])
+def test_foreign_files_block_and_end_nothing(
     tmp_path: Path, made: Callable[[Path], None], read: Callable[[Path], None]
 ) -> None:
     made(tmp_path / "found.json")
@@ -106,11 +106,11 @@ def test_nothing_is_held_up_or_ended(
         return str(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10).encode()
 
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
-    assert int(within(PATIENCE_S, done)) < max(PEAK, before + (100 << 20))
+    assert int(run_with_timeout(PATIENCE_S, done)) < max(PEAK, before + (100 << 20))
 
 
-def test_a_block_whose_slots_are_enormous_or_none_is_refused(tmp_path: Path) -> None:
-    """Its header vouches for itself with a checksum, and for nothing else."""
+def test_a_block_with_enormous_slots_or_none_is_refused(tmp_path: Path) -> None:
+    """The checksum covers the header alone."""
     path = tmp_path / "block"
     for slots, capacity in ((0, 100), (2, 0xFFFFFFC0), (2, 1 << 30)):
         header = struct.pack("<8s16sIIII", b"bunraku\n", b"test", 1, 1, slots, capacity)
@@ -126,7 +126,7 @@ def test_a_block_whose_slots_are_enormous_or_none_is_refused(tmp_path: Path) -> 
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
             return json.dumps([block.complaint, peak]).encode()
 
-        complaint, peak = json.loads(within(PATIENCE_S, read))
+        complaint, peak = json.loads(run_with_timeout(PATIENCE_S, read))
         assert "is damaged" in complaint
         assert peak < max(PEAK, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10) + (100 << 20))
 
@@ -137,13 +137,13 @@ def test_a_block_of_this_box_is_still_read(tmp_path: Path) -> None:
     assert reader.read() == b"x" * (1 << 24)
 
 
-def test_a_place_whose_names_are_nested_too_deeply_is_none() -> None:
+def test_a_checkpoint_with_names_nested_too_deeply_is_refused() -> None:
     payload = packed(Checkpoint("show", "phrase", 0.0, (0.0, 1.0)))
     assert unpacked(payload) is not None
     assert unpacked(payload[: payload.index(b'["show"')] + DEEP) is None
 
 
-def test_a_recording_that_claims_very_much_takes_no_more_memory_than_it_has(tmp_path: Path) -> None:
+def test_a_recording_that_claims_many_frames_takes_no_memory_for_them(tmp_path: Path) -> None:
     path = tmp_path / "claims.bvh"
     write_bvh(path, swaying_phrase(0.1))
     whole = path.read_text()
@@ -158,11 +158,11 @@ def test_a_recording_that_claims_very_much_takes_no_more_memory_than_it_has(tmp_
             read_bvh(path)
         return b"refused"
 
-    assert within(PATIENCE_S, read) == b"refused"
+    assert run_with_timeout(PATIENCE_S, read) == b"refused"
 
 
-def test_slow_frames_that_stand_for_days_are_refused(tmp_path: Path) -> None:
-    """At the stage's rate each of them would become five hundred."""
+def test_slow_frames_that_last_for_days_are_refused(tmp_path: Path) -> None:
+    """Each would become five hundred frames at the stage's rate."""
     path = tmp_path / "slow.bvh"
     write_bvh(path, swaying_phrase(100.0))
     lines = path.read_text().splitlines()
@@ -174,7 +174,7 @@ def test_slow_frames_that_stand_for_days_are_refused(tmp_path: Path) -> None:
 
 
 def forged(facts: object, arrays: bytes) -> bytes:
-    """What a bundle may bring as its prepared phrase."""
+    """A prepared phrase that a bundle may bring."""
     words = json.dumps(facts).encode() if not isinstance(facts, bytes) else facts
     words = words.ljust(-(-(28 + len(words)) // 64) * 64 - 28)
     body = words + arrays
@@ -222,5 +222,5 @@ def test_a_prepared_phrase_that_is_no_file_is_read_again(
         found = PhraseCache(show, None).phrase(show / "phrase.bvh", FIGURE, grounded=True)
         return str(found and len(found[0])).encode()
 
-    assert within(PATIENCE_S, read) == b"150"
+    assert run_with_timeout(PATIENCE_S, read) == b"150"
     assert LARGEST < 1 << 40

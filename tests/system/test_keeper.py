@@ -1,4 +1,4 @@
-"""The real keeper and a disk that hangs: what lies on other disks is kept meanwhile, and the keeper ends."""
+"""The real keeper and a disk that hangs: files on other disks are kept meanwhile, and the keeper ends."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from appliance.stage.recorder import FORMAT, KIND
 from tests.box import disks
 from tests.bundles import write_show
 from tests.recorder.night import Night
-from tests.system.processes import Process, await_that, children
+from tests.system.processes import BUNRAKU, Process, children, wait_until
 
 MEMORY = b'{"neutral": [], "profiles": {}}'
 
 
 class Keeper(Process):
-    """`bunraku keep`, and the stage's memory that it carries: a night as a test dances it, a place."""
+    """`bunraku keep`, and the memory that it mirrors: a night danced by the test, a checkpoint."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.runtime = folder, folder / "runtime"
@@ -45,7 +45,7 @@ class Keeper(Process):
         self.box_file.write_text(
             yaml.safe_dump({"runtime": "runtime", "state": "state", "journal": {"folder": "disk/journal"}})
         )
-        super().__init__(folder / "words.txt", "keep", "--box", str(self.box_file))
+        super().__init__(folder / "words.txt", [*BUNRAKU, "keep", "--box", self.box_file])
 
     @property
     def journal(self) -> Path:
@@ -56,19 +56,26 @@ class Keeper(Process):
             return len(read_journal(self.journal).ticks)
         return 0
 
-    def goes_on(self, ended: bool = False) -> None:
-        """The place moves, and is on the disk soon after."""
+    def dance(self, ticks: int, kept: int) -> None:
+        """Dance more ticks, and wait until the disk has `kept` in all."""
+        self.night.dance(ticks)
+        wait_until(lambda: self.kept_ticks() == kept, lambda: self.words)
+
+    def follow_place(self, ended: bool = False) -> None:
+        """Move the checkpoint on, and wait until the disk has it."""
         self.position_s += 0.02
         place = Checkpoint("A show", "main", self.position_s, (0.0, 30.0))
         self.place.write(replace(place, ended=ended))
-        await_that(lambda: self.kept_place() == self.position_s, lambda: f"it stays behind: {self.words}")
+        wait_until(
+            lambda: self.kept_place() == self.position_s, lambda: f"the disk stays behind: {self.words}"
+        )
 
     def kept_place(self) -> float | None:
         place = read_checkpoint(self.folder / "state" / FILE)
         return None if place is None else place.position_s
 
     def fallbacks(self) -> set[str]:
-        """Those in force, as consoles hear them."""
+        """The keeper's fallbacks in force, as consoles see them."""
         with closing(ProcessHealth(self.runtime)) as processes:
             found = processes.fallbacks(time.monotonic())
         return {one.name for process, one in found if process == "keeper" and one.active}
@@ -83,7 +90,7 @@ def keeper(tmp_path: Path) -> Iterator[Keeper]:
 
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of its own for the journal, which can be made to hang."""
+    """A separate disk for the journal, which can be made to hang."""
     if reason := disks.why_not():
         pytest.skip(reason)
     with disks.disk(disks.made_image(tmp_path / "image", megabytes=16), tmp_path / "disk") as folder:
@@ -91,30 +98,29 @@ def disk(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_a_journal_on_a_disk_that_hangs_holds_up_neither_place_nor_end(disk: Path, keeper: Keeper) -> None:
-    keeper.night.dance(50)
-    await_that(lambda: keeper.kept_ticks() == 50, lambda: keeper.words)
-    keeper.goes_on()
+    keeper.dance(50, kept=50)
+    keeper.follow_place()
     with disks.frozen(disk):
         keeper.night.dance(50)
         for _ in range(3):
-            keeper.goes_on()
-        await_that(lambda: keeper.fallbacks() == {JOURNAL_STOPPED.name}, "the fallback is not told")
+            keeper.follow_place()
+        wait_until(lambda: keeper.fallbacks() == {JOURNAL_STOPPED.name}, "the fallback is not reported")
         assert "The journal: the disk has not answered for 5 s" in keeper.words
-        keeper.goes_on()
+        keeper.follow_place()
         assert keeper.end() == 0
         assert "The journal: the disk does not answer" in keeper.words
-        keeper.start()  # what hangs still holds nothing that this one needs
-        keeper.goes_on()
-        keeper.goes_on(ended=True)
-    await_that(lambda: keeper.kept_ticks() == 100, lambda: keeper.words)
-    await_that(lambda: not keeper.fallbacks(), lambda: keeper.words)
+        keeper.start()  # the process that still hangs holds nothing that this one needs
+        keeper.follow_place()
+        keeper.follow_place(ended=True)
+    wait_until(lambda: keeper.kept_ticks() == 100, lambda: keeper.words)
+    wait_until(lambda: not keeper.fallbacks(), lambda: keeper.words)
     assert keeper.end() == 0
     (run,) = read_journal(keeper.journal).runs
     numbers = run.tick_numbers.tolist()
     assert numbers == list(range(1, 101))
 
 
-def test_what_a_keeper_left_is_not_waited_for_on_a_disk_that_hangs(disk: Path, keeper: Keeper) -> None:
+def test_the_rest_that_a_keeper_left_does_not_wait_for_a_disk_that_hangs(disk: Path, keeper: Keeper) -> None:
     keeper.end()
     keeper.night.dance(10)
     keeper.place.write(Checkpoint("A show", "main", 7.5, (0.0, 30.0), ended=True))
@@ -126,60 +132,53 @@ def test_what_a_keeper_left_is_not_waited_for_on_a_disk_that_hangs(disk: Path, k
 
 
 def test_a_file_that_does_not_answer_holds_up_its_own_mirror_alone(tmp_path: Path) -> None:
-    """Without a disk to freeze: a pipe without a writer, which waits for one when it is opened."""
+    """A pipe in place of a frozen disk: opening it waits for a writer."""
     (tmp_path / "state").mkdir()
     os.mkfifo(tmp_path / "state" / FILE_NAME)
     (tmp_path / "disk").mkdir()
     (tmp_path / "runtime").mkdir(mode=0o700)
     with closing(memory_record(tmp_path / "state").writer(tmp_path / "runtime")) as memory:
         memory.write(MEMORY)
-        keeper = Keeper(tmp_path)
-        try:
-            keeper.goes_on()
-            keeper.night.dance(20)
-            await_that(lambda: keeper.kept_ticks() == 20, lambda: keeper.words)
-            await_that(lambda: keeper.fallbacks() == {SENSORS_NOT_KEPT.name}, "the fallback is not told")
-            keeper.goes_on(ended=True)
+        with Keeper(tmp_path) as keeper:
+            keeper.follow_place()
+            keeper.dance(20, kept=20)
+            wait_until(lambda: keeper.fallbacks() == {SENSORS_NOT_KEPT.name}, "the fallback is not reported")
+            keeper.follow_place(ended=True)
             assert keeper.end() == 0
-        finally:
-            keeper.process.kill()
-            keeper.process.wait()
 
 
 def test_a_journal_of_another_release_costs_neither_place_nor_keeper(keeper: Keeper) -> None:
     with closing(RingFileWriter.new(keeper.runtime / JOURNAL_FILE, KIND, FORMAT, [(1, 500)] * 3)) as other:
         other.rings[0].write(b"\xff\xfe")
         other.publish()
-        keeper.goes_on()
-        await_that(lambda: JOURNAL_STOPPED.name in keeper.fallbacks(), lambda: keeper.words)
-        keeper.goes_on()
+        keeper.follow_place()
+        wait_until(lambda: JOURNAL_STOPPED.name in keeper.fallbacks(), lambda: keeper.words)
+        keeper.follow_place()
     assert keeper.process.poll() is None
     assert "Traceback" not in keeper.words
 
 
 def test_a_mirror_that_dies_is_started_again_and_the_others_go_on(keeper: Keeper) -> None:
-    keeper.goes_on()
-    keeper.night.dance(20)
-    await_that(lambda: keeper.kept_ticks() == 20, lambda: keeper.words)
+    keeper.follow_place()
+    keeper.dance(20, kept=20)
     for process in children(keeper.process.pid):
         os.kill(process, signal.SIGKILL)
-    keeper.goes_on()
-    keeper.night.dance(20)
-    await_that(lambda: keeper.kept_ticks() == 40, lambda: keeper.words)
-    assert "has died" in keeper.words and "carried to the disk again" in keeper.words
+    keeper.follow_place()
+    keeper.dance(20, kept=40)
+    assert "has died" in keeper.words
+    wait_until(lambda: "carried to the disk again" in keeper.words, lambda: keeper.words)
     assert keeper.end() == 0
 
 
 def test_mirrors_end_with_a_keeper_that_is_killed(keeper: Keeper) -> None:
-    keeper.goes_on()
-    await_that(lambda: len(children(keeper.process.pid)) == 3, "not all have started")
+    keeper.follow_place()
+    wait_until(lambda: len(children(keeper.process.pid)) == 3, "not all have started")
     processes = children(keeper.process.pid)
-    keeper.process.kill()
-    keeper.process.wait()
-    await_that(lambda: not any(map(lives, processes)), "they outlive their keeper")
+    keeper.kill()
+    wait_until(lambda: not any(map(is_alive, processes)), "they outlive their keeper")
 
 
-def lives(process: int) -> bool:
+def is_alive(process: int) -> bool:
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:

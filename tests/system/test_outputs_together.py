@@ -10,7 +10,7 @@ from tests.system import venue
 from tests.system.outputs_run import faults, measure, table
 
 SECONDS, LONG_SECONDS = 8.0, 60.0
-PICTURE = "128x72"  # a processor that draws has something left for the others
+PICTURE = "128x72"  # so that software rendering leaves time for the others
 
 pytestmark = pytest.mark.skipif(venue.why_not() is not None, reason=str(venue.why_not()))
 
@@ -24,12 +24,12 @@ def test_nothing_is_missing_and_everything_follows(figures: dict[str, Any]) -> N
     assert faults(figures, judge_growth=False) == [], "\n".join(table(figures))
 
 
-def test_every_receiver_heard_the_same_dance(figures: dict[str, Any]) -> None:
+def test_every_receiver_got_the_same_dance(figures: dict[str, Any]) -> None:
     receivers = figures["receivers"]
     assert set(receivers) == {"ai-toolbox", "vmc", "oscdump", "PosiStageNet"}
     most = max(one["frames"] for one in receivers.values())
     for one in receivers.values():
-        # Who was held up until its socket was full has lost a datagram or more of each frame that is missing.
+        # A receiver with a full socket has lost at least one datagram of each frame that is missing.
         assert most - one["lost"] <= one["frames"], receivers
     assert min(one["frames"] for one in receivers.values()) > 5 * SECONDS
 

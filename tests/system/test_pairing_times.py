@@ -1,4 +1,4 @@
-"""How long a sensor takes into the show: medians over seeds, in virtual time, with the box's 20 ms tick."""
+"""How long a sensor takes to join the show: medians over seeds, in virtual time, with 20 ms ticks."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ SEEDS = range(1, 16)
 TICK_S = 0.02
 
 
-def _run_until_believed(stage: Lockstep) -> float:
+def _run_until_accepted(stage: Lockstep) -> float:
     """The time at which the tick got the next reading."""
-    before = len(stage.believed)
-    assert stage.run(20.0, until=lambda: len(stage.believed) > before)
-    return stage.believed[before].at
+    before = len(stage.accepted)
+    assert stage.run(20.0, until=lambda: len(stage.accepted) > before)
+    return stage.accepted[before].at
 
 
 @pytest.fixture(scope="module")
@@ -30,14 +30,14 @@ def times_s() -> dict[str, list[float]]:
             stage.box_on()
             stage.run(0.001 * seed)
             sensor.wearable.power(True)
-            believed_at = _run_until_believed(stage)
-            times["switch"].append(believed_at - EPOCH_S)
-            times["network"].append(believed_at - sensor.wearable.status.joined_at_us * 1e-6)
+            accepted_at = _run_until_accepted(stage)
+            times["switch"].append(accepted_at - EPOCH_S)
+            times["network"].append(accepted_at - sensor.wearable.status.joined_at_us * 1e-6)
             stage.run(3.0 + 0.07 * seed)
             stage.box_off()
             stage.box_on()
             restarted_at = stage.now
-            times["restart"].append(_run_until_believed(stage) - restarted_at)
+            times["restart"].append(_run_until_accepted(stage) - restarted_at)
     return times
 
 

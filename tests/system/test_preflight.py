@@ -17,27 +17,28 @@ from appliance.box.durable import alone_in
 from appliance.cli import candidate
 from appliance.cli import preflight as commands
 from appliance.cli.preflight import ANEW, Options, candidate_problems, preflight
-from appliance.cli.run_with_timeout import TimedOutError, within
+from appliance.cli.run_with_timeout import TimedOutError, run_with_timeout
 from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice
 from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
 from appliance.show.show import load_show
 from appliance.stage.phrase_cache import FOLDER, SUFFIX
 from tests.bundles import write_show
+from tests.system.processes import run
 
 PATIENCE_S = 120.0
 PREFLIGHT = (sys.executable, "-m", "appliance.cli.preflight")
-HEAVY = (
-    "numpy",
-    "onnxruntime",
-    "yaml",
-    "pydantic",
-    "typer",
-    "argparse",
-    "subprocess",
-    "dataclasses",
-    "hashlib",
-)
+HEAVY = {
+    *("numpy", "onnxruntime", "yaml", "pydantic", "typer"),
+    *("argparse", "subprocess", "dataclasses", "hashlib"),
+}
+
+
+def choice_in(folder: Path) -> Choice:
+    """The choice that a preflight has left in a folder."""
+    choice = Choice.read(folder / CHOSEN)
+    assert choice is not None
+    return choice
 
 
 class Machine:
@@ -60,22 +61,17 @@ class Machine:
         return Options(self.boot, self.stick, self.data, self.run)
 
     def bring(self, name: str) -> Path:
-        """A sound show of this name onto the stick."""
-        show = write_show(self.stick / "show")
-        file = show / "show.yaml"
-        file.write_text(file.read_text().replace("A test", name))
+        """Put a sound show of this name onto the stick."""
+        show = write_show(self.stick / "show", name=name)
         write_checksums(show)
         return show
 
     def preflight(self, *more: str) -> subprocess.CompletedProcess[str]:
-        command = [*PREFLIGHT, *self.arguments, *more]
-        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+        return run([*PREFLIGHT, *self.arguments, *more], timeout=PATIENCE_S)
 
     @property
     def choice(self) -> Choice:
-        choice = Choice.read(self.run / CHOSEN)
-        assert choice is not None
-        return choice
+        return choice_in(self.run)
 
     @property
     def dances(self) -> str:
@@ -108,7 +104,7 @@ def test_a_show_that_was_checked_is_prepared_for_its_first_start(machine: Machin
     machine.bring("Spring")
     machine.preflight()
     show = machine.choice.first.show
-    assert list((show / FOLDER).glob(f"*{SUFFIX}")), "its phrase would be read at each power-on"
+    assert list((show / FOLDER).glob(f"*{SUFFIX}")), "each power-on would read its phrase again"
     assert not checksum_problems(show)
 
 
@@ -151,7 +147,7 @@ def test_a_box_file_that_does_not_fit_leaves_the_show(machine: Machine) -> None:
     assert f"{machine.stick}/box.yaml:3" in " ".join(machine.choice.refused)
 
 
-def test_a_run_folder_that_takes_nothing_is_said(machine: Machine) -> None:
+def test_a_missing_run_folder_is_reported(machine: Machine) -> None:
     machine.run.rmdir()
     done = machine.preflight()
     assert done.returncode == 1
@@ -165,18 +161,18 @@ def test_a_wrong_option_ends_with_two(machine: Machine) -> None:
 def test_with_nothing_new_nothing_heavy_is_imported(machine: Machine) -> None:
     machine.bring("Spring")
     machine.preflight()
-    asked = (
+    code = (
         "import sys\nfrom pathlib import Path\n"
         "from appliance.cli.preflight import Options, preflight\n"
         f"folders = [Path(one) for one in {[str(one) for one in machine.options[:4]]}]\n"
         "assert preflight(Options(*folders), print, 10.0) == 0\n"
-        f"print(*({set(HEAVY)} & set(sys.modules)))\n"
+        f"print(*({HEAVY} & set(sys.modules)))\n"
     )
-    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    done = run([sys.executable, "-c", code], check=True)
     assert done.stdout.strip() == ""
 
 
-def test_what_danced_before_is_chosen_before_anything_new_is_looked_at(
+def test_the_show_that_danced_before_is_chosen_before_anything_new_is_read(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     machine.bring("Spring")
@@ -186,23 +182,23 @@ def test_what_danced_before_is_chosen_before_anything_new_is_looked_at(
 
     def broken(source: str, folder: Path) -> None:
         seen.append(Choice.read(machine.run / CHOSEN))
-        raise RecursionError("nobody thought of this")
+        raise RecursionError("an unforeseen error")
 
     monkeypatch.setattr(commands, "look", broken)
     said: list[str] = []
     assert preflight(machine.options._replace(stick=machine.stick / "none"), said.append, 10.0) == 0
     assert seen[0] is not None and seen[0].first == machine.choice.first
     assert machine.dances == "Spring"
-    assert "nobody thought of this" in said[0] and said[0] in machine.choice.refused
+    assert "an unforeseen error" in said[0] and said[0] in machine.choice.refused
 
 
-def test_a_preflight_that_never_ends_holds_up_nothing(
+def test_a_preflight_that_never_ends_blocks_no_other(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     machine.bring("Spring")
     machine.preflight()
     (machine.run / CHOSEN).unlink()
-    monkeypatch.setattr(commands, "_TURN_S", 0.1)
+    monkeypatch.setattr(commands, "TURN_S", 0.1)
     said: list[str] = []
     with alone_in(machine.data):
         assert preflight(machine.options, said.append, 10.0) == 0
@@ -228,18 +224,18 @@ def test_two_preflights_at_once_take_turns(machine: Machine) -> None:
 
 
 def test_a_check_that_takes_all_memory_ends_alone(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Else systemd ends the preflight with it, for both are one unit's."""
+    """Otherwise systemd would end the preflight with it: both belong to one unit."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    monkeypatch.setattr(candidate, "verified", lambda show, box: bytearray(memory // 2))
+    monkeypatch.setattr(candidate, "verified_parts", lambda show, box: bytearray(memory // 2))
 
     def check() -> bytes:
         return str(candidate.main("show", "box")).encode()
 
-    assert within(60.0, check) == b"1"
+    assert run_with_timeout(60.0, check) == b"1"
 
 
 def test_a_power_cut_at_any_moment_leaves_whole_shows_alone(machine: Machine, chance: random.Random) -> None:
-    """Killed while it copies, checks or writes; the next one chooses what is whole."""
+    """Killed while it copies, checks or writes; the next preflight chooses a whole show."""
     machine.bring("Spring")
     machine.preflight()
     for number in range(8):
@@ -254,14 +250,14 @@ def test_a_power_cut_at_any_moment_leaves_whole_shows_alone(machine: Machine, ch
 
 
 def late(machine: Machine, uptime_s: float) -> list[str]:
-    """As when a stick is plugged in; in a fork, for the preflight makes itself unimportant then."""
+    """As when a stick is plugged in; in a fork, because a late preflight lowers its own priority."""
     said: list[str] = []
 
     def in_a_fork() -> bytes:
         assert preflight(machine.options._replace(late=True), said.append, uptime_s) == 0
         return "\n".join(said).encode()
 
-    return within(60.0, in_a_fork).decode().splitlines()
+    return run_with_timeout(60.0, in_a_fork).decode().splitlines()
 
 
 def test_a_stick_right_after_power_on_dances_at_once(machine: Machine) -> None:
@@ -282,7 +278,7 @@ def test_a_stick_in_the_middle_of_the_show_waits_for_the_next_power_on(machine: 
     assert machine.dances == "Spring"
 
 
-def test_a_broken_stick_in_the_middle_of_the_show_is_said(machine: Machine) -> None:
+def test_a_broken_stick_in_the_middle_of_the_show_is_reported(machine: Machine) -> None:
     machine.preflight()
     show = machine.bring("Spring")
     (show / "puppet.onnx").unlink()
@@ -291,8 +287,8 @@ def test_a_broken_stick_in_the_middle_of_the_show_is_said(machine: Machine) -> N
     assert machine.choice.first.show == EMBEDDED_SHOW
 
 
-def acting(folder: Path, monkeypatch: pytest.MonkeyPatch, does: str) -> None:
-    """What stands in for the interpreter that checks a show does this instead."""
+def replace_checker(folder: Path, monkeypatch: pytest.MonkeyPatch, does: str) -> None:
+    """Let a shell command stand in for the interpreter that checks a show."""
     script = folder / "python"
     script.write_text(f"#!/bin/sh\n{does}\n")
     script.chmod(0o755)
@@ -300,12 +296,12 @@ def acting(folder: Path, monkeypatch: pytest.MonkeyPatch, does: str) -> None:
 
 
 def test_a_check_that_crashes_refuses_the_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    acting(tmp_path, monkeypatch, "kill -SEGV $$")
+    replace_checker(tmp_path, monkeypatch, "kill -SEGV $$")
     assert "crashed (signal 11)" in candidate_problems(tmp_path, APPLIANCE_BOX)[0]
 
 
 def test_a_check_that_hangs_refuses_the_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    acting(tmp_path, monkeypatch, "exec sleep 60")
+    replace_checker(tmp_path, monkeypatch, "exec sleep 60")
     monkeypatch.setattr(commands, "CHECK_S", 0.2)
     assert "did not end" in candidate_problems(tmp_path, APPLIANCE_BOX)[0]
 
@@ -313,24 +309,24 @@ def test_a_check_that_hangs_refuses_the_show(tmp_path: Path, monkeypatch: pytest
 def test_a_stick_that_hangs_is_given_up(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     machine.bring("Spring")
     monkeypatch.setattr(commands, "look", lambda source, folder: time.sleep(60))
-    monkeypatch.setattr(commands, "_PATIENCE_S", 0.2)
+    monkeypatch.setattr(commands, "STICK_S", 0.2)
     said: list[str] = []
     assert preflight(machine.options, said.append, 10.0) == 0
     assert "could not be read (not within 0.2 s)" in said[0]
     assert machine.choice.first.show == EMBEDDED_SHOW
 
 
-def _crash() -> bytes:
+def crash() -> bytes:
     os.kill(os.getpid(), signal.SIGSEGV)
     return b""
 
 
-def test_what_crashes_is_given_up_at_once() -> None:
+def test_a_crash_ends_the_wait_at_once() -> None:
     with pytest.raises(TimedOutError, match="crashed"):
-        within(60.0, _crash)
+        run_with_timeout(60.0, crash)
 
 
-def test_what_is_given_up_is_ended_with_all_that_it_started() -> None:
+def test_a_timeout_ends_all_processes_that_were_started() -> None:
     reading, writing = os.pipe()
     os.set_inheritable(writing, True)
 
@@ -340,9 +336,9 @@ def test_what_is_given_up_is_ended_with_all_that_it_started() -> None:
         return b""
 
     with pytest.raises(TimedOutError, match="not within"):
-        within(0.5, endless)
+        run_with_timeout(0.5, endless)
     os.close(writing)
-    assert select.select([reading], [], [], PATIENCE_S)[0], "another process still holds the other end"
+    assert select.select([reading], [], [], PATIENCE_S)[0], "a process still holds the other end"
     assert os.read(reading, 1) == b""
     os.close(reading)
 

@@ -1,4 +1,4 @@
-"""A show that did not dance stays away when a stick comes late, and each is told with words of its own."""
+"""A show put aside because it did not dance stays so when a stick is plugged in late."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from appliance.cli import preflight as commands
 from appliance.cli.preflight import preflight
-from appliance.cli.run_with_timeout import within
+from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.shared_frame import FrameWriter
 from appliance.release.choice import CHOSEN
@@ -18,27 +18,29 @@ from tests.bundles import FIGURE
 from tests.show_control.doubles import facts
 from tests.system.test_preflight import Machine, late
 
-STARTS = 4  # the fourth one puts a new show aside that never danced
+STARTS = 4  # at the fourth one a new show that never danced is put aside
 SECONDS_AFTER_POWER_ON, MID_SHOW = 20.0, 3600.0
 
 
 @pytest.fixture
 def put_aside(tmp_path: Path) -> Machine:
-    """A box that had Winter before, whose new show Spring, from the stick, did not dance tonight."""
+    """A box that has danced Winter; its new show Spring, from the stick, failed to dance tonight."""
     machine = Machine(tmp_path)
     for name in ("Winter", "Spring"):
         machine.bring(name)
         assert machine.preflight().returncode == 0
-    starts_that_fail(machine)
+    fail_to_start(machine)
     assert machine.dances == "Winter"
     assert "did not dance" in only_aside(machine)
     return machine
 
 
-def starts_that_fail(machine: Machine) -> None:
-    """The stage, each start in a process of its own that dies before its first frame."""
+def fail_to_start(machine: Machine) -> None:
+    """Start the stage until it gives up: each process dies before its first frame."""
     for _ in range(STARTS):
-        within(60.0, lambda: pair_to_dance(machine.run / CHOSEN, time.monotonic(), print).id.encode())
+        run_with_timeout(
+            60.0, lambda: pair_to_dance(machine.run / CHOSEN, time.monotonic(), print).id.encode()
+        )
 
 
 def only_aside(machine: Machine) -> str:
@@ -46,8 +48,8 @@ def only_aside(machine: Machine) -> str:
     return words
 
 
-def dances_for_long(machine: Machine) -> None:
-    """The keeper sees that what was chosen dances."""
+def dance_for_long(machine: Machine) -> None:
+    """Let the keeper see the chosen show dance."""
     now = time.monotonic()
     shown = facts(started=now - 60.0, show_directory=machine.choice.first.show.resolve())
     writer, frame = FrameWriter(machine.run, shown), JointFrame(len(FIGURE))
@@ -66,7 +68,7 @@ def power_on(machine: Machine) -> None:
 
 
 @pytest.mark.parametrize("arrival", ["the same stick", "a broken show"])
-def test_what_was_put_aside_stays_so_whatever_comes_late(put_aside: Machine, arrival: str) -> None:
+def test_a_show_put_aside_stays_so_whatever_is_plugged_in_late(put_aside: Machine, arrival: str) -> None:
     words = only_aside(put_aside)
     if arrival == "a broken show":
         (put_aside.bring("Summer") / "puppet.onnx").unlink()
@@ -75,24 +77,24 @@ def test_what_was_put_aside_stays_so_whatever_comes_late(put_aside: Machine, arr
     assert ("puppet.onnx" in refused) == (arrival == "a broken show")
     assert only_aside(put_aside) == words
     assert words not in refused
-    dances_for_long(put_aside)
+    dance_for_long(put_aside)
     (put_aside.stick / "show").rename(put_aside.stick / "gone")
     power_on(put_aside)
     assert put_aside.dances == "Winter"
     assert only_aside(put_aside) == words
 
 
-def test_a_new_show_that_dances_at_once_has_what_danced_behind_it(put_aside: Machine) -> None:
+def test_behind_a_new_show_that_dances_at_once_stands_the_one_that_danced_before(put_aside: Machine) -> None:
     bad = put_aside.choice.aside[0].id
     put_aside.bring("Summer")
     late(put_aside, SECONDS_AFTER_POWER_ON)
     assert put_aside.dances == "Summer"
     assert bad not in {pair.id for pair in put_aside.choice.pairs}
-    starts_that_fail(put_aside)
+    fail_to_start(put_aside)
     assert put_aside.dances == "Winter"
 
 
-def test_what_is_put_aside_while_a_stick_is_checked_stays_so(
+def test_a_show_put_aside_while_a_stick_is_checked_stays_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     machine = Machine(tmp_path)
@@ -103,7 +105,7 @@ def test_what_is_put_aside_while_a_stick_is_checked_stays_so(
     check = commands.candidate_problems
 
     def while_the_stage_fails(show: Path, box: Path) -> list[str]:
-        starts_that_fail(machine)
+        fail_to_start(machine)
         return check(show, box)
 
     monkeypatch.setattr(commands, "candidate_problems", while_the_stage_fails)
@@ -111,7 +113,7 @@ def test_what_is_put_aside_while_a_stick_is_checked_stays_so(
     def stick() -> bytes:
         return bytes([preflight(machine.options._replace(late=True), print, SECONDS_AFTER_POWER_ON)])
 
-    assert within(60.0, stick) == b"\0"
+    assert run_with_timeout(60.0, stick) == b"\0"
     assert machine.dances == "Summer"
     assert bad not in {pair.id for pair in machine.choice.pairs}
     assert "did not dance" in only_aside(machine)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -11,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from appliance.box.durable import alone_in
-from appliance.cli.run_with_timeout import within
+from appliance.cli.run_with_timeout import run_with_timeout
 from appliance.keeper.mirror import Mirror
 from appliance.keeper.mirror_process import MirrorProcess
 from appliance.outputs.joint_frame import JointFrame
@@ -19,14 +18,15 @@ from appliance.outputs.shared_frame import FrameWriter
 from appliance.release.choice import CHOSEN, Choice, Pair
 from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair_to_dance
 from tests.bundles import FIGURE, write_show
-from tests.show_control.doubles import facts, until
+from tests.show_control.doubles import facts
+from tests.system.processes import run, wait_until
+from tests.system.test_preflight import choice_in
 
-PATIENCE_S = 60.0
 NEW, BEFORE = "new+", "before+"
 
 
 class Evening:
-    """The runtime folder of a box, and starts of its stage that end as a test wants."""
+    """The runtime folder of a box, and its stage, started and ended as a test wants."""
 
     def __init__(self, folder: Path) -> None:
         self.run, self.data = folder / "run", folder / "data"
@@ -45,7 +45,7 @@ class Evening:
         Choice(pairs[:2], data=self.data).write(self.data / CHOSEN)
 
     def start(self, danced_s: float | None) -> str:
-        """A start in a process of its own, which dies after so long (None: before its first frame)."""
+        """Which pair a stage takes that dies after `danced_s` (None: before its first frame)."""
 
         def begin() -> bytes:
             pair = pair_to_dance(self.run / CHOSEN, time.monotonic(), lambda words: None)
@@ -53,19 +53,19 @@ class Evening:
                 self._leave_frames(danced_s)
             return pair.id.encode()
 
-        return within(60.0, begin).decode()
+        return run_with_timeout(60.0, begin).decode()
 
     def dance(self, seconds: float, rehearsal: bool = False) -> None:
-        """A stage dances what was chosen for so long, and dies."""
+        """A stage dances the chosen show for this long, and dies."""
 
         def dance() -> bytes:
             self._leave_frames(seconds, rehearsal)
             return b""
 
-        within(60.0, dance)
+        run_with_timeout(60.0, dance)
 
     def _leave_frames(self, seconds: float, rehearsal: bool = False) -> None:
-        """In the shared frame, as a stage that is killed does."""
+        """Leave a shared frame behind, as a killed stage does."""
         now = time.monotonic()
         directory = self.choice.first.show.resolve()
         started = {"pid": os.getpid(), "started": now - seconds, "rehearsal": rehearsal}
@@ -76,15 +76,11 @@ class Evening:
 
     @property
     def choice(self) -> Choice:
-        choice = Choice.read(self.run / CHOSEN)
-        assert choice is not None
-        return choice
+        return choice_in(self.run)
 
     @property
     def kept(self) -> Choice:
-        choice = Choice.read(self.data / CHOSEN)
-        assert choice is not None
-        return choice
+        return choice_in(self.data)
 
 
 @pytest.fixture
@@ -156,7 +152,7 @@ def proof_of(evening: Evening) -> Mirror:
     return Mirror(MirroredProof(evening.run, evening.run / CHOSEN), print)
 
 
-def test_who_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(evening: Evening) -> None:
+def test_a_show_that_danced_for_ten_seconds_is_proven_on_the_disk_and_in_memory(evening: Evening) -> None:
     proof = proof_of(evening)
     evening.dance(seconds=9.0)
     proof.turn(time.monotonic())
@@ -176,7 +172,7 @@ def test_a_keeper_that_starts_while_the_show_dances_keeps_the_proof(evening: Eve
     )
     try:
         process.supervise(time.monotonic())
-        until(lambda: evening.kept.first.good)
+        wait_until(lambda: evening.kept.first.good)
     finally:
         process.request_end()
         while not process.has_ended:
@@ -192,7 +188,7 @@ def test_a_rehearsal_proves_nothing(evening: Evening) -> None:
     proof.last_turn(time.monotonic())
 
 
-def test_what_was_put_aside_is_let_go_once_another_one_has_danced(evening: Evening) -> None:
+def test_a_show_put_aside_is_dropped_once_another_one_has_danced(evening: Evening) -> None:
     for _ in range(4):
         evening.start(danced_s=None)
     proof = proof_of(evening)
@@ -204,7 +200,7 @@ def test_what_was_put_aside_is_let_go_once_another_one_has_danced(evening: Eveni
     proof.last_turn(time.monotonic())
 
 
-def test_a_preflight_that_reads_a_stick_does_not_hold_up_the_keeper(evening: Evening) -> None:
+def test_a_preflight_that_reads_a_stick_does_not_block_the_keeper(evening: Evening) -> None:
     proof = proof_of(evening)
     evening.dance(seconds=10.5)
     now = time.monotonic()
@@ -221,12 +217,12 @@ def test_a_show_that_is_gone_with_its_disk_is_not_even_tried(evening: Evening) -
     (evening.run.parent / "new" / "show.yaml").unlink()
     assert evening.start(danced_s=None) == BEFORE
     assert "cannot be found any more" in evening.choice.refused[0]
-    assert evening.choice.aside == (), "it is there again, perhaps, after the next power-on"
+    assert evening.choice.aside == (), "it may be there again after the next power-on"
     (evening.run.parent / "before" / "show.yaml").unlink()
     assert evening.start(danced_s=None) == ""
 
 
-def test_a_proof_that_cannot_be_kept_is_said_and_tried_again(evening: Evening) -> None:
+def test_a_proof_that_cannot_be_kept_is_reported_and_tried_again(evening: Evening) -> None:
     proof = proof_of(evening)
     evening.dance(seconds=10.5)
     temporary = evening.data / f".{CHOSEN}.new"
@@ -244,7 +240,7 @@ def test_a_proof_that_cannot_be_kept_is_said_and_tried_again(evening: Evening) -
 
 
 def test_a_broken_chosen_show_gives_way_on_the_real_stage(evening: Evening, tmp_path: Path) -> None:
-    """The real command, started again and again as a unit does it."""
+    """The real command, restarted as its unit does."""
     (tmp_path / "new" / "show.yaml").write_text("dancer: nobody\n")
     write_show(tmp_path / "before")
     box = tmp_path / "box.yaml"
@@ -255,8 +251,8 @@ def test_a_broken_chosen_show_gives_way_on_the_real_stage(evening: Evening, tmp_
     play = [sys.executable, "-m", "appliance.start", "play", "--alone", "--seconds", "0.3"]
     play += ["--chosen", str(evening.run / CHOSEN)]
     for _ in range(3):
-        assert subprocess.run(play, capture_output=True, check=False, timeout=PATIENCE_S).returncode == 2
-    done = subprocess.run(play, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+        assert run(play).returncode == 2
+    done = run(play)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "is put aside" in done.stdout
     assert "A test" in done.stdout

@@ -1,4 +1,4 @@
-"""The real projector beside the real box: before it, with it, after it; whatever it does, frames go on."""
+"""The real projector beside the real box, started before, with and after it; the frames always go on."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import contextlib
 import os
 import re
 import signal
-import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,36 +19,35 @@ from appliance.show.bundle import default_show_path
 from tests.bundles import write_show
 from tests.show_control.doubles import Asker
 from tests.system.box import Box, playing
-from tests.system.processes import BUNRAKU, PATIENCE_S, Process, await_that
+from tests.system.processes import BUNRAKU, Process, run_bunraku, wait_until
 
-PROJECT = (*BUNRAKU, "project")
 SIZE = "128x72"
 
 
 class Projection(Process):
-    """`bunraku project` without a display; what it shows lies in a folder of pictures."""
+    """`bunraku project` without a display; its pictures go into a folder."""
 
     def __init__(self, box_file: Path, folder: Path) -> None:
         self.pictures = Path(tempfile.mkdtemp(dir=folder))
         shown = ("--offscreen", SIZE, "--frames", str(self.pictures))
-        super().__init__(self.pictures / "words.txt", "project", "--box", str(box_file), *shown)
+        super().__init__(self.pictures / "words.txt", [*BUNRAKU, "project", "--box", box_file, *shown])
 
     def newest(self) -> np.ndarray | None:
-        """What is on the wall: the newest picture that is whole."""
+        """What is on the wall: the newest complete picture."""
         found = sorted(self.pictures.glob("*.png"))[:-1]
         for path in found[:-1]:
             path.unlink()
         return np.asarray(Image.open(found[-1]).convert("RGB")) if found else None
 
     def await_picture(self, is_wanted: Callable[[np.ndarray], bool]) -> None:
-        """Until such a picture is on the wall."""
+        """Wait until such a picture is on the wall."""
 
         def is_there() -> bool:
             assert self.process.poll() is None, self.words
             picture = self.newest()
             return picture is not None and is_wanted(picture)
 
-        await_that(is_there, lambda: self.words)
+        wait_until(is_there, lambda: self.words)
 
     def await_black(self) -> None:
         self.await_picture(lambda picture: not picture.any())
@@ -81,11 +79,11 @@ def test_started_first_it_waits_in_the_dark_and_outlives_two_stages(tmp_path: Pa
             assert projection.end() == 0
             box.frames(5)
     assert re.search(r"Shown: [\d.]+ pictures/s, frame age at the swap \d+ ms p50", projection.words)
-    assert projection.words.count("No graphics card draws here") == 1  # however many stages there were
+    assert projection.words.count("No graphics card draws here") == 1  # once for two stages
 
 
 def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path: Path) -> None:
-    with Projection(tmp_path / "box.yaml", tmp_path) as projection:
+    with Projection(box.box_file, tmp_path) as projection:
         projection.await_dance()
         projection.process.send_signal(signal.SIGSTOP)
         hung = box.frames(100)
@@ -94,7 +92,7 @@ def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path
         projection.await_dance()
         assert projection.end(signal.SIGKILL) == -signal.SIGKILL
         box.frames(25)
-    with Projection(tmp_path / "box.yaml", tmp_path) as projection:
+    with Projection(box.box_file, tmp_path) as projection:
         projection.await_dance()
         assert projection.end(signal.SIGINT) == 0
     box.frames(5)
@@ -102,10 +100,7 @@ def test_a_hung_and_a_killed_projector_do_not_touch_the_stage(box: Box, tmp_path
 
 
 def test_panic_and_alignment_by_osc(box: Box, tmp_path: Path) -> None:
-    with (
-        Projection(tmp_path / "box.yaml", tmp_path) as projection,
-        contextlib.closing(Asker(box.control)) as asker,
-    ):
+    with Projection(box.box_file, tmp_path) as projection, contextlib.closing(Asker(box.control)) as asker:
         projection.await_dance()
         assert asker.ask("/panic", 1)[2] == 1
         projection.await_black()
@@ -119,7 +114,7 @@ def test_panic_and_alignment_by_osc(box: Box, tmp_path: Path) -> None:
         done, words = asker.order("/projector/corner", 1, 1.0, 1.0)[2:]
         assert not done and "fold" in words
         projection.end()
-    with Projection(tmp_path / "box.yaml", tmp_path) as projection:
+    with Projection(box.box_file, tmp_path) as projection:
         projection.await_picture(lambda seen: seen[40:].max() > 100 and not seen[:36].any())
 
 
@@ -128,22 +123,14 @@ def test_without_a_display_it_says_so(tmp_path: Path) -> None:
         pytest.skip("this machine has a display of its own")
     without = {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}
     environment = {name: value for name, value in os.environ.items() if name not in without}
-    done = subprocess.run(
-        PROJECT, capture_output=True, text=True, env=environment, check=False, timeout=PATIENCE_S
-    )
+    done = run_bunraku("project", env=environment)
     assert done.returncode == NO_DISPLAY
     assert re.fullmatch(r"bunraku: There is no display .* Plug the projector in .*\n", done.stderr)
 
 
 def test_no_room_for_pictures(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    done = subprocess.run(
-        [*PROJECT, "--offscreen", SIZE, "--frames", str(tmp_path / "file")],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=PATIENCE_S,
-    )
+    done = run_bunraku("project", "--offscreen", SIZE, "--frames", tmp_path / "file")
     assert done.returncode == NO_PLACE
     assert "pictures cannot be written there" in done.stderr and "Traceback" not in done.stderr
 
@@ -157,6 +144,5 @@ def test_no_room_for_pictures(tmp_path: Path) -> None:
     ],
 )
 def test_options_that_make_no_sense(arguments: tuple[str, ...], words: str) -> None:
-    command = [*PROJECT, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    done = run_bunraku("project", *arguments)
     assert done.returncode == 2 and words in done.stderr.replace("\n", " ")

@@ -1,8 +1,7 @@
-"""`bunraku provision` and `bunraku sensors` as processes: all sides agree, and no secret leaks."""
+"""The real `bunraku provision` and `sensors`: box, key file and wearable agree; no secret leaks."""
 
 from __future__ import annotations
 
-import json
 import os
 import pty
 import select
@@ -22,8 +21,8 @@ from appliance.sensor.link import open_link
 from appliance.sensor.provisioning.wearable_console import WearableConsole
 from hw_sim.firmware_library import State
 from tests.system.bench import NETWORK, PASSWORD, Bench
-from tests.system.box import PATIENCE_S, Box, playing
-from tests.system.processes import BUNRAKU, await_that
+from tests.system.box import JOURNAL, Box, playing
+from tests.system.processes import BUNRAKU, PATIENCE_S, run_bunraku, wait_until
 from tests.system.snoop import Snoop
 
 pytestmark = pytest.mark.realtime
@@ -38,22 +37,24 @@ ON_A_TERMINAL = (
 
 
 def bunraku(*words: str, stdin: str = "", status: int = 0) -> str:
-    """What a command says that ends with this status; a box that was held up for too long is told again."""
-    command, said, until = words, "", time.monotonic() + PATIENCE_S
-    while True:
-        done = subprocess.run(
-            [*BUNRAKU, *command], input=stdin, capture_output=True, text=True, timeout=120, check=False
-        )
-        said += done.stdout + done.stderr
+    """The output of a command that ends with this status; repeated while a slow box does not answer."""
+    command, output = words, ""
+
+    def has_ended() -> bool:
+        nonlocal command, output
+        done = run_bunraku(*command, input=stdin, timeout=120)
+        output += done.stdout + done.stderr
         assert "Traceback" not in done.stderr
-        if done.returncode == status or "not answer" not in said or time.monotonic() > until:
-            assert done.returncode == status, said
-            return said
+        assert done.returncode == status or "not answer" in output, output
         if words[:2] not in (
             ("sensors", "strobe"),
             ("sensors", "neutral"),
         ):  # the key file is changed already
             command = ("sensors", "reload", "--box", words[words.index("--box") + 1])
+        return done.returncode == status
+
+    wait_until(has_ended, lambda: output)
+    return output
 
 
 def provision(bench: Bench, *words: str, status: int = 0, password: str = PASSWORD + "\n") -> str:
@@ -61,35 +62,29 @@ def provision(bench: Bench, *words: str, status: int = 0, password: str = PASSWO
     return bunraku("provision", "--port", bench.device, *network, *words, stdin=password, status=status)
 
 
-def listed(box: Box) -> dict[str, dict[str, Any]]:
-    """What `bunraku sensors --json` tells, by name."""
-    told = json.loads(bunraku("sensors", "--json", "--box", box_file(box)))
-    assert told["box"]
-    return {sensor["name"]: sensor for sensor in told["sensors"]}
-
-
-def box_file(box: Box) -> str:
-    return str(box.words_file.with_name("box.yaml"))
-
-
 def resting_box(folder: Path) -> str:
-    """The box file of a box that is not running; whichever else runs on this machine is not asked."""
+    """The box file of a box that does not run; without a control port, no other box is asked."""
     path = folder / "resting.yaml"
     path.write_text("sensors: {keys: sensors.keys}\ncontrol: null\n")
     return str(path)
 
 
 def await_state(box: Box, name: str, state: str) -> dict[str, Any]:
-    until = time.monotonic() + PATIENCE_S
-    while (sensor := listed(box).get(name, {})).get("state") != state:
-        assert time.monotonic() < until, (sensor, box.words)
+    """Wait until the box lists the sensor in this state."""
+
+    def listed() -> dict[str, Any] | None:
+        sensor = box.listed_sensors().get(name, {})
+        return sensor if sensor.get("state") == state else None
+
+    sensor = wait_until(listed, lambda: f"{name} is not {state}: {box.words}")
+    assert sensor is not None
     return sensor
 
 
 def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path) as box, Bench(box.sensors) as bench:
         box.frames(1)
-        said = provision(bench, "--name", "left-wrist", "--box", box_file(box))
+        said = provision(bench, "--name", "left-wrist", "--box", str(box.box_file))
         assert "The running box took it. The box knows 1 sensor now." in said
         assert f"looks for its box on '{NETWORK}'" in said
         assert "listens to this machine alone" in said
@@ -99,9 +94,9 @@ def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: P
         assert sensor["firmware"] == "1.0.0"
         assert sensor["way"].startswith("127.0.0.1:")
         assert sensor["imu"]
-        assert "flashes for 10 s" in bunraku("sensors", "strobe", "left-wrist", "--box", box_file(box))
-        assert "stand still now" in bunraku("sensors", "neutral", "--box", box_file(box))
-        table = bunraku("sensors", "--box", box_file(box))
+        assert "flashes for 10 s" in bunraku("sensors", "strobe", "left-wrist", "--box", str(box.box_file))
+        assert "stand still now" in bunraku("sensors", "neutral", "--box", str(box.box_file))
+        table = bunraku("sensors", "--box", str(box.box_file))
         assert "gyro" in table
         assert "linked" in table
 
@@ -109,20 +104,20 @@ def test_a_running_box_lets_a_new_wearable_in_replaces_it_and_forgets_it(show: P
             bench.plug_in()
             words = bunraku(
                 *("sensors", "replace", "left-wrist", "--port", spare.device, "--network", NETWORK),
-                *("--box", box_file(box)),
+                *("--box", str(box.box_file)),
                 stdin=PASSWORD + "\n",
             )
             assert "left-wrist has its new key" in words
             spare.pull_out()
             await_state(box, "left-wrist", "linked")
             assert spare.state == State.LINKED
-            assert f"{listed(box)['left-wrist']['id']}" != sensor["id"]
+            assert f"{box.listed_sensors()['left-wrist']['id']}" != sensor["id"]
             assert "left-wrist is revoked" in bunraku(
-                "sensors", "revoke", "left-wrist", "--box", box_file(box)
+                "sensors", "revoke", "left-wrist", "--box", str(box.box_file)
             )
-            assert listed(box) == {}
+            assert box.listed_sensors() == {}
             box.await_words("but not left-wrist of this show: the dancer moves freely there")
-            await_that(lambda: spare.state != State.LINKED)
+            wait_until(lambda: spare.state != State.LINKED)
         assert box.end() == 0
 
 
@@ -130,29 +125,30 @@ def test_a_spare_takes_over_the_name_while_the_box_plays(show: Path, tmp_path: P
     with playing(show, tmp_path, names=["left-wrist", "spare-1"]) as box, Bench(box.sensors) as spare:
         box.frames(1)
         before = load_keys(tmp_path / "sensors.keys")
-        provision(spare, "--name", "spare-1", "--box", box_file(box))
+        provision(spare, "--name", "spare-1", "--box", str(box.box_file))
         spare.pull_out()
         await_state(box, "spare-1", "linked")
-        words = bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", box_file(box))
+        words = bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", str(box.box_file))
         assert "left-wrist is now the sensor that was spare-1" in words
         assert "took it" in words
         box.frame_that(lambda frame: frame[2] > 0)
-        assert listed(box)["left-wrist"]["state"] == "linked"
-        assert listed(box)["spare-1"]["id"] == f"{before['left-wrist'].device_id:08x}"
+        assert box.listed_sensors()["left-wrist"]["state"] == "linked"
+        assert box.listed_sensors()["spare-1"]["id"] == f"{before['left-wrist'].device_id:08x}"
         assert box.end() == 0
 
 
-def test_a_new_board_s_readings_are_believed_by_cable(tmp_path: Path) -> None:
+def test_a_new_board_s_readings_are_accepted_by_cable(tmp_path: Path) -> None:
     with Bench() as bench:
         provision(bench, "--name", "left-wrist", "--box", resting_box(tmp_path))
         keys = load_keys(tmp_path / "sensors.keys")
-        believed, link = 0, open_link(keys, serial=[(bench.device, 115200)])
-        until = time.monotonic() + PATIENCE_S
-        while believed < 50:
-            assert time.monotonic() < until
-            believed += len(link.drain(time.monotonic()))
+        link, accepted = open_link(keys, serial=[(bench.device, 115200)]), []
+
+        def drain() -> bool:
+            accepted.extend(link.drain(time.monotonic()))
             link.send_due(time.monotonic())
-            time.sleep(0.004)
+            return len(accepted) >= 50
+
+        wait_until(drain, "the readings stop", lambda: time.sleep(0.004))
         (state,) = link.states(time.monotonic())
         link.close()
     assert (state.state, state.way, state.firmware) == ("linked", bench.device, "1.0.0")
@@ -199,27 +195,18 @@ def test_a_box_that_holds_the_cable_is_named(show: Path, tmp_path: Path) -> None
         settings = {"sensors": {"serial": [{"device": bench.device}]}}
         with playing(show, tmp_path, settings=settings) as box:
             box.frames(10)
-            words = provision(bench, "--name", "left-wrist", "--box", box_file(box), password="", status=2)
+            words = provision(
+                bench, "--name", "left-wrist", "--box", str(box.box_file), password="", status=2
+            )
             assert "in use by another program. Stop the running bunraku" in words
             assert box.end() == 0
 
 
-def test_the_password_is_asked_for_on_the_terminal_and_not_shown(tmp_path: Path) -> None:
+def test_the_password_is_read_on_the_terminal_without_echo(tmp_path: Path) -> None:
     keys = tmp_path / "sensors.keys"
-    command = [
-        *BUNRAKU,
-        "provision",
-        "--port",
-        "",
-        "--name",
-        "head",
-        "--box",
-        resting_box(tmp_path),
-        "--network",
-        NETWORK,
-    ]
     with Bench() as bench:
-        command[command.index("--port") + 1] = bench.device
+        command = [*BUNRAKU, "provision", "--port", bench.device, "--name", "head"]
+        command += ["--box", resting_box(tmp_path), "--network", NETWORK]
         master, slave = pty.openpty()
         process = subprocess.Popen([*ON_A_TERMINAL, *command], stdin=slave, stdout=slave, stderr=slave)
         os.close(slave)
@@ -246,27 +233,26 @@ def read_until(master: int, words: bytes) -> bytes:
     return shown
 
 
-def test_no_secret_is_anywhere_that_others_can_see(show: Path, tmp_path: Path) -> None:
+def test_no_secret_is_visible_to_other_users(show: Path, tmp_path: Path) -> None:
     password_file = tmp_path / "password"
     password_file.write_text(PASSWORD + "\n")
     password_file.chmod(0o600)
-    journal = {"journal": {"folder": "run.journal", "minutes": 1}}
     snoop, before, said = Snoop(tmp_path), os.umask(0), ""
     try:
-        with playing(show, tmp_path, settings=journal) as box, Bench(box.sensors) as bench, snoop.looking():
+        with playing(show, tmp_path, settings=JOURNAL) as box, Bench(box.sensors) as bench, snoop:
             box.frames(1)
             secrets = secrets_of(box.key)
             for name in ("left-wrist", "spare-1"):
                 said += provision(
-                    bench, "--name", name, "--password-file", str(password_file), "--box", box_file(box)
+                    bench, "--name", name, "--password-file", str(password_file), "--box", str(box.box_file)
                 )
                 secrets += secrets_of(load_keys(tmp_path / "sensors.keys")[name])
-            said += provision(bench, "--name", "x y", "--box", box_file(box), status=2)
+            said += provision(bench, "--name", "x y", "--box", str(box.box_file), status=2)
             bench.pull_out()
             await_state(box, "spare-1", "linked")
-            said += bunraku("sensors", "--box", box_file(box))
-            said += bunraku("sensors", "--json", "--box", box_file(box))
-            said += bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", box_file(box))
+            said += bunraku("sensors", "--box", str(box.box_file))
+            said += bunraku("sensors", "--json", "--box", str(box.box_file))
+            said += bunraku("sensors", "replace", "left-wrist", "spare-1", "--box", str(box.box_file))
             box.frame_that(lambda frame: frame[2] > 0)
             assert box.end() == 0
             said += box.words
@@ -276,7 +262,7 @@ def test_no_secret_is_anywhere_that_others_can_see(show: Path, tmp_path: Path) -
     segments = segments_of(tmp_path / "run.journal")
     recorded = [one.data for _, segment in segments for one in chunks.chunks(segment)]
     assert recorded
-    assert NETWORK.encode() in seen  # it does look
+    assert NETWORK.encode() in seen  # the snoop works
     for secret in secrets:
         assert secret not in seen
         assert secret not in said.encode()

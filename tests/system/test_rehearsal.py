@@ -1,4 +1,4 @@
-"""A rehearsal with emulated sensors in a real venue: what the venue's box keeps stays as it was."""
+"""A rehearsal with emulated sensors on a venue's box: the files that the box keeps stay as they were."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ def rehearse(box: Box, *arguments: str) -> None:
     box.command = venue
 
 
-def test_a_rehearsal_leaves_what_the_venue_keeps_and_the_show_goes_on_behind_it(tmp_path: Path) -> None:
+def test_a_rehearsal_changes_no_file_of_the_venue_and_the_show_goes_on_afterwards(tmp_path: Path) -> None:
     show = write_show(tmp_path / "show")
-    runtime = tmp_path / "runtime"
     with playing(show, tmp_path, settings=VENUE) as box:
+        runtime = box.runtime
         box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
         box.frames(60)
         box.end(signal.SIGKILL)
         await_end_of_keeper(runtime)
-        memory = memory_record(tmp_path / "state").writer(runtime)  # learnt, and not on the disk yet
+        memory = memory_record(tmp_path / "state").writer(runtime)  # not on the disk yet
         memory.write(memory_text({}, PROFILES).encode())
         memory.close()
         kept = {name: files_of(tmp_path / name) for name in ("state", "journal")}
@@ -64,7 +64,7 @@ def test_a_rehearsal_leaves_what_the_venue_keeps_and_the_show_goes_on_behind_it(
     assert read_memory((tmp_path / "state" / FILE_NAME).read_bytes())[1] == PROFILES
 
 
-def test_a_rehearsal_that_is_killed_is_not_gone_on_with(tmp_path: Path) -> None:
+def test_a_killed_rehearsal_is_not_resumed(tmp_path: Path) -> None:
     show = write_show(tmp_path / "show")
     with playing(show, tmp_path, "--emulate", settings=VENUE) as box:
         box.frames(20)
@@ -77,12 +77,12 @@ def test_a_rehearsal_that_is_killed_is_not_gone_on_with(tmp_path: Path) -> None:
         assert "the show goes on" not in box.words
 
 
-def test_a_rehearsal_is_called_one_in_the_shared_frame(tmp_path: Path) -> None:
-    """So the keeper of an installed box does not take its show for one that has proven itself."""
+def test_the_shared_frame_marks_a_rehearsal(tmp_path: Path) -> None:
+    """So that the keeper of an installed box does not count it as proof of the show."""
     show = write_show(tmp_path / "show")
     with (
         playing(show, tmp_path, "--emulate", settings=VENUE) as box,
-        closing(FrameReader(tmp_path / "runtime")) as reader,
+        closing(FrameReader(box.runtime)) as reader,
     ):
         box.frames(1)
         reader.newest(time.monotonic())

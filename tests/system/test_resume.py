@@ -1,10 +1,12 @@
-"""The real box, killed in the middle of its dance: it goes on at the place of the phrase where it was."""
+"""The real box, killed in the middle of its dance: it goes on at the same place of the phrase."""
 
 from __future__ import annotations
 
 import shutil
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,65 +16,79 @@ import pytest
 from appliance.box.checkpoint import FILE, Checkpoint, CheckpointReader, packed, read_checkpoint
 from appliance.box.record import SlotFile
 from tests.system.box import Box, await_end_of_keeper, playing
-from tests.system.processes import await_that
+from tests.system.processes import wait_until
 
 PLAY = (sys.executable, "-m", "appliance.start", "play")
 PHRASE_S, TICK_S = 3.0, 0.02
-NO_REALTIME = {"realtime": {"enabled": False}, "control": None, "state": "state"}
+KEPT = {"journal": {"folder": "journal"}}
+NO_REALTIME: dict[str, Any] = {"realtime": {"enabled": False}, "control": None, "state": "state"}
 
 
-def place_in(folder: Path) -> Checkpoint:
-    reader = CheckpointReader(folder / "runtime")
-    place = reader.read()
-    reader.close()
+@contextmanager
+def playing_alone(show: Path, folder: Path, **settings: Any) -> Iterator[Box]:
+    """A stage without companions."""
+    with playing(show, folder, "--alone", command=PLAY, settings=NO_REALTIME | settings) as box:
+        yield box
+
+
+def checkpoint_of(box: Box) -> Checkpoint:
+    with closing(CheckpointReader(box.runtime)) as reader:
+        place = reader.read()
     assert place is not None
     return place
 
 
+def await_kept_checkpoint(box: Box) -> None:
+    """Wait until the keeper has written another checkpoint to the disk."""
+    path = box.box_file.with_name("state") / FILE
+    before = read_checkpoint(path)
+    wait_until(lambda: read_checkpoint(path) not in (None, before), lambda: box.words, box.pause)
+
+
 def danced(frames: list[list[Any]]) -> int:
-    """In how many of them the phrase went on: one that is late repeats a pose."""
+    """In how many frames the phrase went on: a late one repeats a pose."""
     return sum(not frame[3] for frame in frames)
 
 
 def has_gone_on(from_s: float, to_s: float, least: int, most: int) -> bool:
-    """Whether a phrase, which begins again at its end, has gone on for so many ticks."""
+    """Whether a phrase, which loops, has gone on for this many ticks."""
     gone_on_s = (to_s - from_s - TICK_S * (least - 0.5)) % PHRASE_S
     return gone_on_s <= TICK_S * (most - least + 1)
 
 
 def goes_on_at(box: Box, count: int) -> float:
-    """Where the phrase goes on, as the box says it the `count`-th time."""
+    """Where the phrase goes on, as the box reports it for the `count`-th time."""
     box.await_words("goes on at", count)
     return float(box.words.split("goes on at ")[count].split()[0])
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
-def test_goes_on_where_it_was_however_it_died(show: Path, tmp_path: Path, how: int) -> None:
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+def test_goes_on_at_the_same_place_however_it_died(show: Path, tmp_path: Path, how: int) -> None:
+    with playing_alone(show, tmp_path) as box:
         frames = box.frames(30)
         box.end(how)
         frames += box.last_frames()
-        died_at = place_in(tmp_path)
-        # It may have died after its last frame had left, and before it had noted that.
+        died_at = checkpoint_of(box)
+        # It may have died between sending its last frame and writing the checkpoint.
         assert not died_at.ended and has_gone_on(0.0, died_at.position_s, danced(frames) - 1, danced(frames))
         box.kill_and_restart()
         frames = box.frames(10)
-        assert goes_on_at(box, 1) == pytest.approx(died_at.position_s, abs=0.051)  # said to a tenth
-        now = place_in(tmp_path)
+        assert goes_on_at(box, 1) == pytest.approx(died_at.position_s, abs=0.051)  # reported to a tenth
+        now = checkpoint_of(box)
         assert (now.restarts, now.power_cuts) == (1, 0)
         assert has_gone_on(died_at.position_s, now.position_s, danced(frames) - 1, now.tick + 1)
-        if how == signal.SIGABRT:  # the watchdog's: it says which line hung
+        if how == signal.SIGABRT:  # the watchdog's: the traceback shows the line that hung
             assert "Fatal Python error: Aborted" in box.words and "run.py" in box.words
 
 
 def test_twelve_kills_in_a_row(show: Path, tmp_path: Path) -> None:
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+    with playing_alone(show, tmp_path) as box:
         began_at_s = 0.0
         for kill in range(1, 13):
-            frames = box.frames(2)  # the first of them is noted: it goes on behind it
+            frames = box.frames(2)  # the first has a checkpoint by now
             box.end(signal.SIGKILL)
             frames += box.last_frames()
-            died_at = place_in(tmp_path)
+            died_at = checkpoint_of(box)
             assert died_at.restarts == kill - 1
             assert died_at.tick in (frames[-2][0], frames[-1][0])
             assert has_gone_on(began_at_s, died_at.position_s, danced(frames) - 1, danced(frames))
@@ -82,26 +98,25 @@ def test_twelve_kills_in_a_row(show: Path, tmp_path: Path) -> None:
 
 
 def test_a_show_that_was_ended_begins_at_the_beginning(show: Path, tmp_path: Path) -> None:
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+    with playing_alone(show, tmp_path) as box:
         box.frames(20)
         assert box.end() == 0
-        assert place_in(tmp_path).ended
+        assert checkpoint_of(box).ended
         box.kill_and_restart()
         box.frames(5)
-        now = place_in(tmp_path)
+        now = checkpoint_of(box)
         assert has_gone_on(0.0, now.position_s, 0, now.tick + 1)
         assert box.end() == 0
         assert "the show goes on" not in box.words
 
 
 def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Path) -> None:
-    settings = {**NO_REALTIME, "journal": {"folder": "journal"}}
-    with playing(show, tmp_path, command=PLAY, settings=settings) as box:
-        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
+    with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME | KEPT) as box:
+        await_kept_checkpoint(box)
         assert box.end() == 0
         place = read_checkpoint(tmp_path / "state" / FILE)
         assert place is not None and place.ended
-        shutil.rmtree(tmp_path / "runtime")
+        shutil.rmtree(box.runtime)
         box.kill_and_restart()
         box.frames(2)
         assert box.end() == 0
@@ -109,50 +124,42 @@ def test_a_show_that_was_ended_is_ended_on_the_disk_too(show: Path, tmp_path: Pa
 
 
 def test_after_a_power_cut_the_disk_s_place_is_taken(show: Path, tmp_path: Path) -> None:
-    """The whole box with its keeper. What a power cut takes is memory: the runtime folder and the boot id."""
-    settings = {**NO_REALTIME, "journal": {"folder": "journal"}}
-    with playing(show, tmp_path, command=PLAY, settings=settings) as box:
-        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
+    """The whole box with its keeper. A power cut takes the memory: the runtime folder and the boot id."""
+    with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME | KEPT) as box:
+        await_kept_checkpoint(box)
         box.frames(60)
-        await_carried(tmp_path)
+        await_kept_checkpoint(box)
         box.end(signal.SIGKILL)
-        await_end_of_keeper(tmp_path / "runtime")
-        at_cut = place_in(tmp_path)
+        await_end_of_keeper(box.runtime)
+        at_cut = checkpoint_of(box)
         on_disk = read_checkpoint(tmp_path / "state" / FILE)
         assert on_disk is not None and not on_disk.ended and on_disk.tick <= at_cut.tick
-        shutil.rmtree(tmp_path / "runtime")
-        _as_of_another_boot(tmp_path / "state" / FILE, on_disk)
+        shutil.rmtree(box.runtime)
+        mark_as_of_another_boot(tmp_path / "state" / FILE, on_disk)
         box.kill_and_restart()
         box.frames(5)
         assert goes_on_at(box, 1) == pytest.approx(on_disk.position_s, abs=0.051)
         assert "After a power cut the show goes on" in box.words
-        assert place_in(tmp_path).power_cuts == 1
+        assert checkpoint_of(box).power_cuts == 1
 
 
 def test_a_box_without_a_journal_keeps_its_place_on_the_disk_too(show: Path, tmp_path: Path) -> None:
     with playing(show, tmp_path, command=PLAY, settings=NO_REALTIME) as box:
-        box.frame_that(lambda frame: read_checkpoint(tmp_path / "state" / FILE) is not None)
+        await_kept_checkpoint(box)
         assert box.end() == 0
         place = read_checkpoint(tmp_path / "state" / FILE)
         assert place is not None and place.ended
 
 
-def await_carried(folder: Path) -> None:
-    """Until the keeper has brought another place to the disk: it works, however busy the machine is."""
-    before = read_checkpoint(folder / "state" / FILE)
-    await_that(lambda: read_checkpoint(folder / "state" / FILE) != before)
-
-
-def _as_of_another_boot(path: Path, place: Checkpoint) -> None:
+def mark_as_of_another_boot(path: Path, place: Checkpoint) -> None:
     file = SlotFile(path)
     file.write(packed(replace(place, boot="of another boot")))
     file.close()
 
 
 @pytest.mark.parametrize("resume", ["never", "after_crash"])
-def test_the_box_file_says_whether_it_goes_on(show: Path, tmp_path: Path, resume: str) -> None:
-    settings = {**NO_REALTIME, "resume": resume}
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=settings) as box:
+def test_the_box_file_decides_whether_it_goes_on(show: Path, tmp_path: Path, resume: str) -> None:
+    with playing_alone(show, tmp_path, resume=resume) as box:
         box.frames(20)
         box.kill_and_restart()
         box.frames(3)
@@ -160,10 +167,10 @@ def test_the_box_file_says_whether_it_goes_on(show: Path, tmp_path: Path, resume
         assert ("the show goes on" in box.words) == (resume == "after_crash")
 
 
-def test_a_return_measures_nothing_and_reads_no_phrase(show: Path, tmp_path: Path) -> None:
-    with playing(show, tmp_path, "--alone", command=PLAY, settings=NO_REALTIME) as box:
+def test_a_restart_measures_nothing_and_reads_no_phrase(show: Path, tmp_path: Path) -> None:
+    with playing_alone(show, tmp_path) as box:
         box.frames(5)
-        runtime = tmp_path / "runtime"
+        runtime = box.runtime
         measured = (runtime / "admission").read_bytes()
         [phrase] = (runtime / "prepared").iterdir()
         made = phrase.stat().st_mtime_ns

@@ -25,11 +25,13 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.recorder.reading import read_journal
 from hw_sim.peers import HOST, free_ports
 from tests.bundles import write_show
-from tests.show_control.doubles import Asker, until
-from tests.system.box import JOURNAL, PATIENCE_S, PLAY, Box, is_free, playing
-from tests.system.processes import children_that_say
+from tests.show_control.doubles import Asker
+from tests.system.box import JOURNAL, PLAY, Box, is_free, playing
+from tests.system.processes import BUNRAKU, PATIENCE_S, Process, children_running, run, wait_until
 
 pytestmark = pytest.mark.realtime
+
+CONTROL = (*BUNRAKU, "control", "--box")
 
 CUES: list[dict[str, Any]] = [
     {"name": "calm", "iterations": [2, 1], "look": "lines", "fade_s": 0.1},
@@ -50,48 +52,45 @@ SPINNING = (
     "main(['play', *sys.argv[1:]])",
 )
 
-# Becomes a box that stands still once, in the middle of its 100th tick or the first one after that is not
-# skipped: its turn goes on with a time of before.
-STANDING = (
+# Becomes a box that stops itself once, within its 100th tick or the next one that is not skipped: the tick
+# goes on later with its old time.
+STOPPING = (
     sys.executable,
     "-c",
     "import os, signal, sys\n"
     "from appliance.cli.app import main\n"
     "from appliance.stage.tick import Tick\n"
-    "run, stood = Tick.run, []\n"
-    "def stand(self, slot):\n"
+    "run, stopped = Tick.run, []\n"
+    "def stop(self, slot):\n"
     "    run(self, slot)\n"
-    "    if slot.tick >= 100 and not stood:\n"
-    "        stood.append(slot.tick)\n"
+    "    if slot.tick >= 100 and not stopped:\n"
+    "        stopped.append(slot.tick)\n"
     "        os.kill(os.getpid(), signal.SIGSTOP)\n"
-    "Tick.run = stand\n"
+    "Tick.run = stop\n"
     "main(['play', *sys.argv[1:]])",
 )
 
 
 @pytest.fixture(scope="module")
 def show(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = write_show(tmp_path_factory.mktemp("bundle") / "show")
-    settings = yaml.safe_load((folder / "show.yaml").read_text())
-    (folder / "show.yaml").write_text(yaml.safe_dump(settings | {"cues": CUES}))
-    return folder
+    return write_show(tmp_path_factory.mktemp("bundle") / "show", cues=CUES)
 
 
-def show_state(folder: Path) -> ShowState:
-    with contextlib.closing(ShowStateReader(folder / "runtime")) as reader:
+def show_state(box: Box) -> ShowState:
+    with contextlib.closing(ShowStateReader(box.runtime)) as reader:
         return reader.read()
 
 
 @contextlib.contextmanager
 def asking(box: Box) -> Iterator[Asker]:
-    """Once show control answers: it starts after the first tick."""
-    until(lambda: answers(box.control))
+    """A client of show control, once it answers: it starts after the first tick."""
+    wait_until(lambda: answers(box.control))
     with contextlib.closing(Asker(box.control)) as asker:
         yield asker
 
 
 def answers(port: int) -> bool:
-    """Whether a ping is answered: a flood may drop one, and before the start there is no port."""
+    """Whether a ping is answered: a flood may drop one, and before the start the port is closed."""
     with contextlib.closing(Asker(port)) as asker, contextlib.suppress(ConnectionRefusedError):
         asker.tell("/ping")
         return asker.hear(0.5) == ["/pong"]
@@ -107,19 +106,19 @@ def status(asker: Asker) -> dict[str, Any]:
 
 
 def await_status(asker: Asker, **wanted: Any) -> None:
-    """Until it is all so at once: of a stage that is held up for half a second, it says that it hangs."""
-    until(lambda: wanted.items() <= status(asker).items())
+    """Wait until all of it holds at once: a stage delayed by half a second is reported as hung meanwhile."""
+    wait_until(lambda: wanted.items() <= status(asker).items())
 
 
-def await_stage(folder: Path, state: str) -> None:
-    """Until the stage itself says so: show control knows of a stop before the phrase stands."""
-    with contextlib.closing(FrameReader(folder / "runtime")) as reader:
-        until(lambda: (reader.health() or {}).get("state") == state)
+def await_stage(box: Box, state: str) -> None:
+    """Wait until the stage itself reports this state: show control stops before the phrase does."""
+    with contextlib.closing(FrameReader(box.runtime)) as reader:
+        wait_until(lambda: (reader.health() or {}).get("state") == state)
 
 
 def control_of(pid: int) -> int:
-    """The process of show control among a box's children."""
-    [found] = children_that_say(pid, "appliance.show_control")
+    """The process id of a box's show control."""
+    [found] = children_running(pid, "appliance.show_control")
     return found
 
 
@@ -143,28 +142,28 @@ def test_real_osc_tools_command_the_box_and_hear_its_heartbeat(show: Path, tmp_p
                 lines = [line for line in heard.read_text().splitlines() if "/bunraku/status" in line]
                 return any(all(word in line for word in words) for line in lines)
 
-            def says_after(*command: str, words: str) -> bool:
-                """Or else it must be sent again: a stage that is held up for too long refuses an order."""
+            def confirms(*command: str, words: str) -> bool:
+                """Send a command; the caller repeats it, because a delayed stage refuses orders."""
                 send(*command)
                 soon = time.monotonic() + 2.0
                 while not says(words) and time.monotonic() < soon:
                     time.sleep(0.05)
                 return says(words)
 
-            until(lambda: says('"dancing" "A test"'))
-            until(lambda: says_after("/iterations", "ii", "5", "4", words=' 5 4 "main"'))
-            until(lambda: says_after("/cue", "s", "storm", words='"storm" "ink"'))
+            wait_until(lambda: says('"dancing" "A test"'))
+            wait_until(lambda: confirms("/iterations", "ii", "5", "4", words=' 5 4 "main"'))
+            wait_until(lambda: confirms("/cue", "s", "storm", words='"storm" "ink"'))
             send("/master", "f", "0.25")
-            until(lambda: says('"dancing"', '"storm" "ink"', " 0.250000 0 0 "))
+            wait_until(lambda: says('"dancing"', '"storm" "ink"', " 0.250000 0 0 "))
             send("/blackout", "T")
-            until(lambda: says('"blackout"'))
+            wait_until(lambda: says('"blackout"'))
             send("/panic")
-            until(lambda: says('"panic"'))
+            wait_until(lambda: says('"panic"'))
             send("/blackout", "F")
             send("/go")
             send("/stop", "f", "0.1")
-            until(lambda: says('"stopped"'))
-            await_stage(tmp_path, "stopped")
+            wait_until(lambda: says('"stopped"'))
+            await_stage(box, "stopped")
             box.receiver.poll()
             box.frames(20)
             assert box.end() == 0
@@ -193,11 +192,11 @@ def test_cues_stop_and_go_reach_the_dance_and_are_answered(show: Path, tmp_path:
         assert asker.order("/hold", "lShldr", 1)[2] == 1
         asker.ask("/stop", 0)
         await_status(asker, state="stopped")
-        await_stage(tmp_path, "stopped")
+        await_stage(box, "stopped")
         box.receiver.poll()
         box.frames(30)
         assert asker.ask("/go")[2] == 1
-        await_stage(tmp_path, "dancing")
+        await_stage(box, "dancing")
         box.receiver.poll()
         box.frames(60)
         assert box.end() == 0
@@ -210,21 +209,17 @@ def test_cues_stop_and_go_reach_the_dance_and_are_answered(show: Path, tmp_path:
     assert "Traceback" not in box.words
 
 
-def hangs(box: Box) -> None:
-    box.process.send_signal(signal.SIGSTOP)
-
-
-@pytest.mark.parametrize("command", [PLAY, STANDING], ids=["anywhere", "within a tick"])
+@pytest.mark.parametrize("command", [PLAY, STOPPING], ids=["anywhere", "within a tick"])
 def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(
     show: Path, tmp_path: Path, command: Sequence[str]
 ) -> None:
     with playing(show, tmp_path, command=command) as box, asking(box) as asker:
         box.frames(20)
         if command is PLAY:
-            hangs(box)
-        until(lambda: "State:\tT" in Path(f"/proc/{box.process.pid}/status").read_text())
+            box.process.send_signal(signal.SIGSTOP)
+        wait_until(lambda: "State:\tT" in Path(f"/proc/{box.process.pid}/status").read_text())
         assert asker.ask("/panic")[2] == 1
-        assert show_state(tmp_path).panic
+        assert show_state(box).panic
         await_status(asker, state="hung")
         assert status(asker)["panic"] == 1
         assert "The stage does not answer" in asker.ask("/cue", "storm")[3]
@@ -234,30 +229,29 @@ def test_panic_works_while_the_stage_hangs_and_it_goes_on_afterwards(
         box.process.send_signal(signal.SIGCONT)
         box.frames(20)
         await_status(asker, state="panic", cue="storm", coding=5, interaction=4)  # declared while it hung
-        assert show_state(tmp_path).panic
+        assert show_state(box).panic
         assert asker.ask("/go")[2] == 1
         await_status(asker, state="dancing")
         assert box.end() == 0
 
 
 def test_panic_works_while_the_stage_spins(show: Path, tmp_path: Path) -> None:
-    settings = {"realtime": {"enabled": False}}  # it would take a whole core of the tests' machine
+    settings = {"realtime": {"enabled": False}}  # with real-time priority it would take a whole core
     with playing(show, tmp_path, command=SPINNING, settings=settings) as box, asking(box) as asker:
         box.frame_that(lambda frame: frame[0] >= 100)
         await_status(asker, state="hung")
         assert asker.ask("/panic")[2] == 1
-        assert show_state(tmp_path).panic
+        assert show_state(box).panic
         box.process.kill()
 
 
 def test_a_cue_called_while_the_dance_is_away_is_in_force_when_it_comes_back(
     show: Path, tmp_path: Path
 ) -> None:
-    """Show control is a unit of its own, and outlives the stage."""
-    control = [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")]
+    """Show control is a separate unit and outlives the stage."""
     with (
         playing(show, tmp_path, "--alone") as box,
-        process(control, tmp_path / "control.txt"),
+        Process(tmp_path / "control.txt", [*CONTROL, box.box_file]),
         asking(box) as asker,
     ):
         await_status(asker, state="dancing")
@@ -282,8 +276,8 @@ def test_a_killed_box_leaves_no_process_behind_and_panic_is_in_force_when_it_com
             assert asker.order("/cue", "storm")[2] == 1
             asker.ask("/panic")
         box.end(signal.SIGKILL)
-        until(lambda: is_free(box.control))
-        until(lambda: not Path(f"/proc/{control}").exists())
+        wait_until(lambda: is_free(box.control))
+        wait_until(lambda: not Path(f"/proc/{control}").exists())
         box.kill_and_restart()
         with asking(box) as asker:
             box.await_words("Still from before: Panic is in force")
@@ -300,7 +294,7 @@ def test_a_show_that_ends_as_usual_leaves_nothing_in_force(show: Path, tmp_path:
         with asking(box) as asker:
             asker.ask("/panic")
         assert box.end() == 0
-        assert show_state(tmp_path) == ShowState()
+        assert show_state(box) == ShowState()
         assert is_free(box.control)
         left = {"stage.lock", "place", "journal", "prepared", "admission"}  # for the next start
         left |= {"keeper.lock", "keeper.health", "sensors.memory"}
@@ -312,10 +306,10 @@ def test_show_control_that_is_killed_comes_back_and_misses_nothing(show: Path, t
         asker.ask("/panic")
         control = control_of(box.process.pid)
         os.kill(control, signal.SIGKILL)
-        asker.tell("/master", 0.5)  # the port is there all the time
+        asker.tell("/master", 0.5)  # the port stays open
         assert asker.hear()[:3] == ["/reply", "/master", 1]  # type: ignore[index]
-        assert show_state(tmp_path).panic
-        assert show_state(tmp_path).master == 0.5
+        assert show_state(box).panic
+        assert show_state(box).master == 0.5
         assert control_of(box.process.pid) != control
         assert box.end() == 0
     assert "Show control was killed (signal 9)." in box.words
@@ -329,7 +323,7 @@ def test_a_flood_does_not_touch_the_dance(show: Path, tmp_path: Path) -> None:
         for number in range(20_000):
             flood.tell(*(("/player/jump", 0.5), ("/iterations", 3, 2), ("/nonsense",))[number % 3])
         frames = box.frames(50)
-        until(lambda: answers(box.control))
+        wait_until(lambda: answers(box.control))
         assert box.end() == 0
         flood.close()
     numbers = [frame[0] for frame in frames]
@@ -341,27 +335,14 @@ def test_a_flood_does_not_touch_the_dance(show: Path, tmp_path: Path) -> None:
     assert "Traceback" not in box.words
 
 
-@contextlib.contextmanager
-def process(command: Sequence[str], words: Path, **more: Any) -> Iterator[subprocess.Popen[bytes]]:
-    with words.open("ab") as out:
-        one = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, **more
-        )
-    try:
-        yield one
-    finally:
-        one.kill()
-        one.wait()
-
-
 def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_both(
     show: Path, tmp_path: Path
 ) -> None:
-    """As units of their own: `bunraku play --alone` and `bunraku control`."""
-    control = [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")]
+    """As separate units: `bunraku play --alone` and `bunraku control`."""
     with playing(show, tmp_path, "--alone") as box:
+        control = [*CONTROL, box.box_file]
         box.await_words("commands by a process of their own")
-        with process(control, tmp_path / "control.txt") as first:
+        with Process(tmp_path / "control.txt", control) as first:
             with asking(box) as asker:
                 await_status(asker, state="dancing")
                 box.end(signal.SIGKILL)
@@ -369,19 +350,16 @@ def test_as_a_process_of_its_own_it_outlives_the_stage_and_its_panic_outlives_bo
                 assert asker.ask("/panic")[2] == 1
                 box.kill_and_restart()
                 await_status(asker, state="panic")
-            first.send_signal(signal.SIGKILL)
-            first.wait()
-        assert show_state(tmp_path).panic
-        with process(control, tmp_path / "control.txt") as second, asking(box) as asker:
+            first.kill()
+        assert show_state(box).panic
+        with Process(tmp_path / "control.txt", control) as second, asking(box) as asker:
             await_status(asker, state="panic")
-            with process(control, tmp_path / "third.txt") as third:
-                assert third.wait(PATIENCE_S) == 2
-            assert "cannot be opened for commands" in (tmp_path / "third.txt").read_text()
-            second.send_signal(signal.SIGTERM)
-            assert second.wait(PATIENCE_S) == 0
+            third = run(control)
+            assert third.returncode == 2 and "cannot be opened for commands" in third.stderr
+            assert second.end() == 0
         assert is_free(box.control)
         assert box.end() == 0
-        assert show_state(tmp_path).panic  # nobody ended the show: its units were stopped
+        assert show_state(box).panic  # the units were stopped, which ends no show
     assert "Traceback" not in (tmp_path / "control.txt").read_text()
 
 
@@ -402,7 +380,7 @@ def test_a_socket_that_systemd_has_opened_is_taken(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE) as started:
         try:
             assert started.stdout is not None
-            assert select.select([started.stdout], [], [], PATIENCE_S)[0], "it does not start"
+            assert select.select([started.stdout], [], [], PATIENCE_S)[0], "show control does not start"
             with contextlib.closing(Asker(int(started.stdout.readline()))) as asker:
                 assert asker.ask("/ping") == ["/pong"]
             started.terminate()
@@ -413,53 +391,37 @@ def test_a_socket_that_systemd_has_opened_is_taken(tmp_path: Path) -> None:
 
 def test_a_descriptor_that_is_no_port_is_refused(tmp_path: Path) -> None:
     (tmp_path / "box.yaml").write_text("runtime: runtime\n")
-    command = [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")]
-    no_socket = [*command, "--socket-fd", "77"]
-    done = subprocess.run(no_socket, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    command = [*CONTROL, tmp_path / "box.yaml", "--socket-fd"]
+    done = run([*command, "77"])
     assert done.returncode == 2
     assert "is no open socket" in done.stderr
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as stream:
-        done = subprocess.run(
-            [*command, "--socket-fd", str(stream.fileno())],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=PATIENCE_S,
-            pass_fds=[stream.fileno()],
-        )
+        done = run([*command, str(stream.fileno())], pass_fds=[stream.fileno()])
     assert "is not UDP over IPv4" in done.stderr
 
 
 @pytest.mark.parametrize(
     ("box", "complaint", "status"),
     [
-        ("control: null\n", "nobody commands this box", os.EX_CONFIG),
-        ("control: {host: 0.0.0.0}\n", "box.yaml:1: Commands are heard on 0.0.0.0, but from nobody", 2),
+        ("control: null\n", "this box takes no commands", os.EX_CONFIG),
+        ("control: {host: 0.0.0.0}\n", "box.yaml:1: Commands are heard on 0.0.0.0, but no sender", 2),
         ("control:\n  senders: [192.168.4.300]\n", "box.yaml:2: '192.168.4.300' is neither", 2),
         ("control: {heartbeat: [{port: 0}]}\n", "box.yaml:1: 'control.heartbeat[0].port' is 0", 2),
         ("control: {sender: []}\n", "Did you mean 'senders'?", 2),
     ],
 )
-def test_what_is_wrong_with_its_settings_is_one_clear_line(
+def test_wrong_settings_are_reported_in_one_clear_line(
     tmp_path: Path, box: str, complaint: str, status: int
 ) -> None:
     (tmp_path / "box.yaml").write_text(box)
-    done = subprocess.run(
-        [sys.executable, "-m", "appliance.cli", "control", "--box", str(tmp_path / "box.yaml")],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=PATIENCE_S,
-    )
+    done = run([*CONTROL, tmp_path / "box.yaml"])
     assert done.returncode == status
     assert complaint in done.stderr
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_a_window_that_nobody_reads_and_a_stopped_terminal_hold_up_no_panic(
-    show: Path, tmp_path: Path
-) -> None:
-    """A reader of what the box says may stop reading: a full pipe stops no process."""
+def test_a_full_pipe_at_the_output_blocks_no_panic(show: Path, tmp_path: Path) -> None:
+    """The reader of the box's output may stop reading."""
     reading, writing = os.pipe()
     [port] = free_ports(1)
     (tmp_path / "box.yaml").write_text(yaml.safe_dump({"runtime": "runtime", "control": {"port": port}}))
@@ -472,7 +434,7 @@ def test_a_window_that_nobody_reads_and_a_stopped_terminal_hold_up_no_panic(
     os.set_blocking(writing, True)
     running = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=writing, stderr=subprocess.DEVNULL)
     try:
-        until(lambda: answers(port))
+        wait_until(lambda: answers(port))
         asker = Asker(port)
         assert asker.ask("/panic")[2] == 1
         asker.close()

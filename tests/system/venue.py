@@ -1,4 +1,4 @@
-"""A whole venue in a network of its own: the box, a sensor, a projector, and real and own receivers."""
+"""A whole venue in its own network: the box, a sensor, a projector, and receivers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import contextlib
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,16 +20,16 @@ from hw_sim.posistagenet import PsnReceiver
 from tests.system import namespace, olad
 from tests.system.namespace import Namespace
 from tests.system.olad import Olad
-from tests.system.processes import BUNRAKU, PATIENCE_S, children_that_say, started
+from tests.system.processes import BUNRAKU, PATIENCE_S, children_running, start, wait_until
 
 SENSOR = "left-wrist"
-STAND_STILL_S = 20.0  # the neutral pose takes 1.5 s; a busy machine makes pauses, and it begins again
+STAND_STILL_S = 20.0  # the neutral pose takes 1.5 s, and starts over at each pause of a busy machine
 LAMPS = {1: ("lHand", 2.0), 2: ("rFoot", 1.0)}  # universe: the joint whose height it shows, metres of full
 ART_NET_IN = {"2-1-I-0": 1, "2-1-I-1": 2}
 
 
 def why_not() -> str | None:
-    """Why a venue cannot be built here; None when it can."""
+    """Why a venue cannot be built here; None if it can."""
     if shutil.which("oscdump") is None:
         return "oscdump (Debian package liblo-tools) is missing"
     return olad.why_not() or namespace.why_not()
@@ -38,7 +37,7 @@ def why_not() -> str | None:
 
 @dataclass
 class Venue:
-    """Everything that runs. `processes`: by name; `dump`: what oscdump prints; `ports`: of the receivers."""
+    """All that runs. `processes`: by name; `dump`: the output of oscdump; `ports`: of the receivers."""
 
     folder: Path
     network: Namespace
@@ -49,25 +48,25 @@ class Venue:
     ports: dict[str, int]
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
-    def said(self, name: str) -> str:
-        """What a process said so far."""
+    def words(self, name: str) -> str:
+        """The output of a process so far."""
         return (self.folder / f"{name}.txt").read_text(errors="replace")
 
     def pids(self) -> dict[str, int]:
-        """All processes by name, the stage's companions among them."""
+        """All process ids by name, including the stage's companions."""
         found = {name: process.pid for name, process in self.processes.items()}
         for name, word in (("control", "appliance.show_control"), ("lights", "lights")):
-            for pid in children_that_say(found["stage"], word):
+            for pid in children_running(found["stage"], word):
                 found[name] = pid
         return found
 
     def lost(self, name: str) -> int:
-        """Datagrams for a receiver that found its socket full: it was held up, and the box has sent them."""
+        """Datagrams that the box sent and the kernel dropped, because the receiver's socket was full."""
         with self.network.entered():
             return sum(int(row.split()[-1]) for row in _sockets(self.ports[name]))
 
     def end(self) -> dict[str, int]:
-        """Ask the box's own processes to end; their exit statuses."""
+        """End the box's own processes and return their exit statuses."""
         own = {name: self.processes[name] for name in ("sensor", "projector", "stage")}
         for process in own.values():
             process.terminate()
@@ -76,7 +75,7 @@ class Venue:
 
 @contextlib.contextmanager
 def venue(folder: Path, picture: str = "320x180") -> Iterator[Venue]:
-    """Start all of it; the receivers listen before the box begins. picture: the projector's size, pixels."""
+    """Start it all, the receivers before the box. picture: the projector's size, pixels."""
     show = lit_show(folder / "show")
     create_keys(folder / "sensors.keys", [SENSOR])
     with contextlib.ExitStack() as opened:
@@ -121,7 +120,7 @@ def venue(folder: Path, picture: str = "320x180") -> Iterator[Venue]:
 
 
 def lit_show(folder: Path) -> Path:
-    """The default show with a lamp in each of two universes that shows how high a joint is."""
+    """The default show with one lamp in each of two universes, as bright as a joint is high."""
     shutil.copytree(default_show_path(), folder)
     show = yaml.safe_load((folder / "show.yaml").read_text())
     show["lights"] = {
@@ -151,7 +150,7 @@ def lit_show(folder: Path) -> Path:
 
 
 def _dump(running: Venue, opened: contextlib.ExitStack) -> None:
-    """The real oscdump, of which the lines about frames are kept."""
+    """Start the real oscdump and keep its lines about frames."""
     port = running.ports["oscdump"]
     with running.dump.open("wb") as kept:
         dump = subprocess.Popen(running.network.command("oscdump", str(port)), stdout=subprocess.PIPE)
@@ -159,22 +158,20 @@ def _dump(running: Venue, opened: contextlib.ExitStack) -> None:
         keep = subprocess.Popen(["grep", "--line-buffered", "/bunraku/frame"], stdin=dump.stdout, stdout=kept)
         opened.callback(_stop, keep)
     running.processes["oscdump"] = dump
-    until = time.monotonic() + PATIENCE_S
     with running.network.entered():
-        while not _sockets(port):
-            assert dump.poll() is None and time.monotonic() < until, "oscdump does not listen"
-            time.sleep(0.02)
+        wait_until(lambda: dump.poll() is not None or _sockets(port), "oscdump does not listen")
+    assert dump.poll() is None, "oscdump has ended"
 
 
 def _sockets(port: int) -> list[str]:
-    """What the kernel tells of those that are bound to this UDP port, in the network of this thread."""
+    """The kernel's lines about sockets bound to this UDP port, in the network of this thread."""
     tables = [Path(f"/proc/thread-self/net/{table}").read_text().splitlines() for table in ("udp", "udp6")]
     return [row for rows in tables for row in rows if row.split()[1].endswith(f":{port:04X}")]
 
 
 def _start(opened: contextlib.ExitStack, command: Sequence[str], words: Path) -> subprocess.Popen[bytes]:
     with words.open("wb") as out:
-        process = started(command, out)
+        process = start(command, out)
     opened.callback(_stop, process)
     return process
 

@@ -1,4 +1,4 @@
-"""Emulated wearables for the real box, in a thread: to dance, be switched off, carried away, plugged in."""
+"""Emulated wearables for the real box, in a thread: dancing, switched off, out of reach, on a cable."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
-from types import TracebackType
 
 from appliance.sensor.keys import SensorKey
 from hw_sim.device import Lane
@@ -24,7 +23,7 @@ HOST = "127.0.0.1"
 
 
 class Radio(UdpSender):
-    """A lane by the network that can be lost, both directions at once, without the sensor being told."""
+    """A network lane that can lose both directions at once; the sensor does not notice."""
 
     in_reach = True
 
@@ -38,10 +37,9 @@ class Radio(UdpSender):
 
 
 class Wearables:
-    """A context: the sensors run from its beginning to its end, on a venue's network.
+    """A context: the sensors run inside it, on a venue's network.
 
-    Their wearers stand still until they are told to `dance`: the box takes the neutral pose, however often
-    the readings pause meanwhile.
+    Their wearers stand still until `dance`, so the box takes the neutral pose however often readings pause.
     """
 
     def __init__(
@@ -68,19 +66,17 @@ class Wearables:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
 
     def dance(self) -> None:
-        """All of them, from the next moment on."""
+        """Make all wearers move from now on."""
         for wearer in self._wearers:
             self.do(wearer.start_moving)
 
     def do(self, wish: Callable[[float], None]) -> None:
-        """In the sensors' own thread, with the time of the moment."""
+        """Call `wish` in the sensors' own thread, with the current time."""
         self._wishes.put(wish)
 
     def _run(self) -> None:

@@ -26,7 +26,7 @@ def every_s(trace: Trace) -> list[float]:
     return [round(after[0] - before[0], 2) for before, after in pairwise(trace)]
 
 
-def test_standing_still_is_asked_for_by_a_slow_blink(shown: dict[str, Trace]) -> None:
+def test_a_slow_blink_asks_to_stand_still(shown: dict[str, Trace]) -> None:
     assert lit_s(shown["neutral"]) == [0.5] * 8
     assert every_s(shown["neutral"]) == [1.0] * 7
 
@@ -36,7 +36,7 @@ def test_a_dancing_sensor_is_hardly_seen(shown: dict[str, Trace]) -> None:
     assert every_s(shown["linked"]) == [3.0] * 2
 
 
-def test_a_sensor_that_is_looked_for_flickers(shown: dict[str, Trace]) -> None:
+def test_a_strobed_sensor_flickers(shown: dict[str, Trace]) -> None:
     assert set(lit_s(shown["strobe"])) == {0.05}
     assert set(every_s(shown["strobe"])) == {0.1}
 

@@ -75,7 +75,7 @@ def findings(host: HostView) -> Iterator[Finding]:
 
 
 def _sampled(host: HostView) -> Sample:
-    """A second, in which the box's own processes may use what they use."""
+    """A sample of one second, without the box's own processes."""
     ours = {os.getpid()}
     ours |= {int(folder.name) for folder in host.found("/proc/[0-9]*") if host.is_bunraku(folder)}
     return sample(host.box.realtime.priority, frozenset(ours))

@@ -30,8 +30,8 @@ class RunningStage:
 class HostView:
     """A machine seen from `root`: what /proc, /sys and /etc say is read from there.
 
-    `is_here`: it is this machine, so that its clock, ports and processor can be asked as well. Nothing here
-    raises where a file is missing or cannot be read.
+    `is_here`: it is this machine, so its clock, ports and processor can be examined too. Nothing here raises
+    for a missing or unreadable file.
     """
 
     root: Path = Path("/")
@@ -43,11 +43,11 @@ class HostView:
         return self.root == Path("/")
 
     def at(self, path: Path | str) -> Path:
-        """Where this absolute path of the machine lies for us."""
+        """This absolute path of the machine, below `root`."""
         return self.root / str(path).lstrip("/")
 
     def text(self, path: Path | str) -> str | None:
-        """What a file says, without blanks at its ends; None where it says nothing."""
+        """The text of a file, stripped; None if it cannot be read or is empty."""
         try:
             return self.at(path).read_text(errors="replace").strip()
         except OSError:
@@ -72,13 +72,13 @@ class HostView:
     def is_bunraku(self, process: Path) -> bool:
         """Whether Python runs the box there: one of its modules, or the script `bunraku` that is its command.
 
-        Where the program lies says nothing: a checkout has the same name, and all that is started in it.
+        The program's folder proves nothing: everything started in a checkout has the same one.
         """
         program, *words = (self.text(process / "cmdline") or "").split("\0")
         if not Path(program).name.startswith("python"):
             return False
         while words and words[0].startswith("-") and words[0] != "-m":
-            del words[: 1 + (words[0] in ("-W", "-X"))]  # these two take the word behind them
+            del words[: 1 + (words[0] in ("-W", "-X"))]  # these two options take the next word
         if words[:1] == ["-m"]:
             return words[1:2] == ["appliance"] or "".join(words[1:2]).startswith("appliance.")
         return Path("".join(words[:1])).name == "bunraku"
@@ -90,7 +90,7 @@ class HostView:
 
 
 def running_stage(box: BoxConfig) -> RunningStage | None:
-    """The stage of this box, if one runs; root finds it as well, in the folder of the box's own user."""
+    """The stage of this box, if one runs; root also looks in the folder of the box's own user."""
     folder = box.runtime
     if folder is None and (RUN / "frame").exists():
         folder = RUN

@@ -70,7 +70,7 @@ def locked_memory(host: HostView) -> Iterator[Finding]:
 
 
 def wake_ups(seen: Sample) -> Iterator[Finding]:
-    """How late a thread of the stage's kind wakes: nothing that we write can be more punctual."""
+    """How late a thread like the stage's wakes: no software can be more punctual than that."""
     what, late = "wake-ups", seen.late_ms
     worst = late[-1]
     words = f"Of {len(late)} in a second the latest came {worst:.1f} ms after its time."
@@ -100,7 +100,7 @@ def others(seen: Sample) -> Iterator[Finding]:
         verdict = wrong if total > 0.8 * seen.cores else better
         yield verdict(
             what,
-            f"{names}. The dance goes before them, projector and lights do not.",
+            f"{names}. The dance has priority over them; projector and lights do not.",
             "End what the show does not need; `top` shows more.",
         )
     else:
@@ -108,7 +108,7 @@ def others(seen: Sample) -> Iterator[Finding]:
 
 
 def interrupts(seen: Sample) -> Iterator[Finding]:
-    """What runs before the dance: interrupts, and a virtual machine's host."""
+    """What takes precedence over the dance: interrupts, and the host of a virtual machine."""
     if seen.interrupts > BUSY_SHARE:
         yield better(
             "interrupts",

@@ -11,7 +11,7 @@ from appliance.box.realtime import borrowed_priority
 
 PERIOD_S = 0.005
 SECONDS = 1.0
-_BELOW = 1  # the stage's priority is this much higher: it never waits for this sample
+_BELOW = 1  # below the stage's priority, which never waits for this sample
 _STEAL, _IRQ, _SOFTIRQ = 7, 5, 6  # columns of /proc/stat
 
 

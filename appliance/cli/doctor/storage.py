@@ -35,7 +35,7 @@ def data_folders(host: HostView) -> Iterator[Finding]:
 
 
 def _folder(host: HostView, folder: Path) -> Finding:
-    """One of them, or the nearest one above it that is there."""
+    """The verdict on one of them, or on its nearest existing parent."""
     what, there = "data", host.at(folder)
     while not there.exists() and there != there.parent:
         there = there.parent
@@ -89,7 +89,7 @@ def media(host: HostView) -> Iterator[Finding]:
 
 
 def system_partition(host: HostView) -> Iterator[Finding]:
-    """On an appliance a power cut finds nothing to damage."""
+    """On an appliance the system partition is read-only: a power cut cannot damage it."""
     kind, options = host.mounts().get("/", ("", ()))
     if not kind:
         return
@@ -104,7 +104,7 @@ def system_partition(host: HostView) -> Iterator[Finding]:
 
 
 def wear(host: HostView) -> Iterator[Finding]:
-    """An eMMC tells how much of its life is over; SD cards do not."""
+    """An eMMC reports its wear; SD cards do not."""
     for device in host.found("/sys/block/mmcblk*/device"):
         name, kind = device.parent.name, host.text(device / "type")
         steps = [int(word, 0) for word in (host.text(device / "life_time") or "").split()]

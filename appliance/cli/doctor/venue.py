@@ -82,12 +82,12 @@ def network(host: HostView) -> Iterator[Finding]:
 
 
 def _is_card(host: HostView, name: str) -> bool:
-    """A real one, and none that a program made."""
+    """Whether it is hardware, not made by a program."""
     return host.at(f"/sys/class/net/{name}/device").exists()
 
 
 def radios(host: HostView) -> Iterator[Finding]:
-    """Wi-Fi that sleeps or is switched off, Bluetooth that disturbs, a Pi's own access point."""
+    """Wi-Fi that saves power or is switched off, Bluetooth that interferes, a Pi's own access point."""
     for switch in host.found("/sys/class/rfkill/rfkill*"):
         kind, name = host.text(switch / "type"), host.text(switch / "name")
         blocked = host.text(switch / "soft") == "1" or host.text(switch / "hard") == "1"
@@ -118,7 +118,7 @@ def radios(host: HostView) -> Iterator[Finding]:
 
 
 def _is_access_point(host: HostView) -> bool:
-    """As `bunraku-access-point` makes it."""
+    """Whether `bunraku-access-point` has made one."""
     return bool(host.found("/data/network/sensors.nmconnection"))
 
 

@@ -1,1 +1,1 @@
-"""`bunraku sensors` and `provision`: what the running box knows of its sensors, and which are let in."""
+"""`bunraku sensors` and `provision`: what the running box knows of its sensors, and which ones it admits."""

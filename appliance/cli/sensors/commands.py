@@ -39,6 +39,7 @@ Axes = Annotated[
     str | None, typer.Option(metavar="MAP,SIGN", help="How the IMU sits: two hexadecimal registers, 24,00.")
 ]
 Name = Annotated[str, typer.Argument(help="The sensor's name, as in the key file.")]
+NameOrAll = Annotated[str | None, typer.Argument(help="Left out: all sensors of the show.")]
 
 sensors = command_group("List the sensors as the running box sees them; find, replace, revoke or rename one.")
 
@@ -54,11 +55,11 @@ def provision(
     axes: Axes = None,
 ) -> None:
     """Give a wearable its name, its network and a fresh key, once, by cable."""
+    from appliance.cli.sensors.box_keys import box_keys_of
     from appliance.cli.sensors.provision import provision_sensor
-    from appliance.cli.sensors.venue import venue
 
-    place = venue(box, keys)
-    raise typer.Exit(provision_sensor(place, name, port, network, password_file, fusion, axes))
+    box_keys = box_keys_of(box, keys)
+    raise typer.Exit(provision_sensor(box_keys, name, port, network, password_file, fusion, axes))
 
 
 @sensors.callback(invoke_without_command=True)
@@ -72,42 +73,28 @@ def list_them(
     """List the sensors as the running box sees them; find, replace, revoke or rename one."""
     if is_for_subcommand(context, box, keys, watch, as_json):
         return
+    from appliance.cli.sensors.box_keys import box_keys_of
     from appliance.cli.sensors.listing import list_sensors
-    from appliance.cli.sensors.venue import venue
 
-    list_sensors(venue(box, keys), watch, as_json)
+    list_sensors(box_keys_of(box, keys), watch, as_json)
 
 
 @sensors.command()
 def strobe(name: Name, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Let a sensor's light flash for 10 s, to find it in a drawer."""
-    from appliance.cli.sensors.venue import send_command, venue
-
-    send_command(venue(box, keys), "/sensors/strobe", name)
+    _send("/sensors/strobe", name, box, keys)
 
 
 @sensors.command()
-def neutral(
-    name: Annotated[str | None, typer.Argument(help="Left out: all sensors of the show.")] = None,
-    box: ThisBoxFile = None,
-    keys: KeyFile = None,
-) -> None:
+def neutral(name: NameOrAll = None, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Take the neutral pose again: how the sensor sits on the dancer, who stands still now."""
-    from appliance.cli.sensors.venue import send_command, venue
-
-    send_command(venue(box, keys), "/sensors/neutral", name)
+    _send("/sensors/neutral", name, box, keys)
 
 
 @sensors.command()
-def heading(
-    name: Annotated[str | None, typer.Argument(help="Left out: all sensors of the show.")] = None,
-    box: ThisBoxFile = None,
-    keys: KeyFile = None,
-) -> None:
+def heading(name: NameOrAll = None, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Reset the heading alone: the dancer faces the front now."""
-    from appliance.cli.sensors.venue import send_command, venue
-
-    send_command(venue(box, keys), "/sensors/heading", name)
+    _send("/sensors/heading", name, box, keys)
 
 
 @sensors.command()
@@ -126,12 +113,12 @@ def replace(
     box: ThisBoxFile = None,
     keys: KeyFile = None,
 ) -> None:
-    """Put a spare, or a new wearable on a cable, in the place of a broken one."""
+    """Put a spare, or a new wearable on a cable, in place of a broken one."""
+    from appliance.cli.sensors.box_keys import box_keys_of, edit_keys
     from appliance.cli.sensors.provision import provision_sensor
-    from appliance.cli.sensors.venue import edit_keys, venue
     from appliance.stage.stage_error import StageError
 
-    place = venue(box, keys)
+    box_keys = box_keys_of(box, keys)
     if (spare is None) == (port is None):
         raise StageError(
             f"Name a spare (bunraku sensors replace {broken} SPARE), or the --port of a new one."
@@ -141,19 +128,19 @@ def replace(
             f"{broken} is now the sensor that was {spare}; the broken one is called {spare} from now on. "
             "Put it on, switch it on, stand still for a breath."
         )
-        raise typer.Exit(edit_keys(place, lambda change: change.swap(broken, spare), words))
+        raise typer.Exit(edit_keys(box_keys, lambda change: change.swap(broken, spare), words))
     raise typer.Exit(
-        provision_sensor(place, broken, port, network, password_file, fusion, axes, takes_over=True)
+        provision_sensor(box_keys, broken, port, network, password_file, fusion, axes, takes_over=True)
     )
 
 
 @sensors.command()
 def revoke(name: Name, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Let a stolen or lost sensor in no more: its key is removed."""
-    from appliance.cli.sensors.venue import edit_keys, venue
+    from appliance.cli.sensors.box_keys import box_keys_of, edit_keys
 
     words = f"{name} is revoked: its key opens nothing any more. To use it again, provision it again."
-    raise typer.Exit(edit_keys(venue(box, keys), lambda change: change.remove(name), words))
+    raise typer.Exit(edit_keys(box_keys_of(box, keys), lambda change: change.remove(name), words))
 
 
 @sensors.command()
@@ -164,19 +151,25 @@ def rename(
     keys: KeyFile = None,
 ) -> None:
     """Give a sensor another name."""
-    from appliance.cli.sensors.venue import edit_keys, venue
+    from appliance.cli.sensors.box_keys import box_keys_of, edit_keys
 
     words = f"{name} is now {new}. Shows name it by that."
-    raise typer.Exit(edit_keys(venue(box, keys), lambda change: change.rename(name, new), words))
+    raise typer.Exit(edit_keys(box_keys_of(box, keys), lambda change: change.rename(name, new), words))
 
 
 @sensors.command("reload")
 def read_again(box: ThisBoxFile = None, keys: KeyFile = None) -> None:
     """Let the running box read the key file that you changed by hand."""
-    from appliance.cli.sensors.venue import clear_errors, reload_and_say, venue
+    from appliance.cli.sensors.box_keys import box_keys_of, clear_errors, reload_and_say
     from appliance.sensor.keys import load_keys
 
-    place = venue(box, keys)
-    with clear_errors(place.keys):
-        load_keys(place.keys)
-    raise typer.Exit(reload_and_say(place))
+    box_keys = box_keys_of(box, keys)
+    with clear_errors(box_keys.keys):
+        load_keys(box_keys.keys)
+    raise typer.Exit(reload_and_say(box_keys))
+
+
+def _send(address: str, name: str | None, box: Path | None, keys: Path | None) -> None:
+    from appliance.cli.sensors.box_keys import box_keys_of, send_command
+
+    send_command(box_keys_of(box, keys), address, name)

@@ -25,7 +25,7 @@ _ENDING = (int, float, str)
 
 
 class NoBoxError(Exception):
-    """No box answers: a sentence for people."""
+    """No box answers; the message is for the user."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +62,13 @@ class ControlClient:
 
     @property
     def has_port(self) -> bool:
-        """Whether it can be asked at all."""
+        """Whether the box file gives it a control port."""
         return self._control is not None
 
     def ask(self, address: str, *arguments: str) -> Answer:
-        """Have one command carried out. Raises NoBoxError.
+        """Send one command and return its answer. Raises NoBoxError.
 
-        After the reply that it was not carried out in time, a second one may follow, and is waited for.
+        After the reply that it was not carried out in time a second one may follow; this waits for it.
         """
         answer, asked = None, time.monotonic()
         with contextlib.closing(self._replies((address, *arguments))) as replies:
@@ -78,11 +78,11 @@ class ControlClient:
                     if answer.done or time.monotonic() - asked < ERRAND_S:  # refused, for good
                         return answer
         if answer is None:
-            raise self._nobody()
+            raise self._no_box()
         return answer
 
     def roll(self) -> Roll:
-        """How all its sensors are. Raises NoBoxError."""
+        """The state of all its sensors. Raises NoBoxError."""
         lines: list[RosterLine] = []
         with contextlib.closing(self._replies(("/sensors/list",))) as replies:
             for about, values in replies:
@@ -93,7 +93,7 @@ class ControlClient:
                     return Roll(lines, float(age_s), Path(_shown(key_file)) if key_file else None)
                 elif about == REPLY and values[:2] == ["/sensors/list", 0]:
                     raise NoBoxError(readable(str(values[-1])))
-        raise self._nobody()
+        raise self._no_box()
 
     def _replies(self, message: Message) -> Generator[tuple[str, list[Any]], None, None]:
         """Replies of the box until the timeout; none when no port is open there.
@@ -109,10 +109,10 @@ class ControlClient:
             while (left_s := until - time.monotonic()) > 0:
                 asker.settimeout(left_s)
                 received = asker.recv(_LARGEST_DATAGRAM)
-                with contextlib.suppress(ValueError):  # no OSC: what listens there may be no box
+                with contextlib.suppress(ValueError):  # not OSC: another program may use the port
                     yield from messages_in(received)
 
-    def _nobody(self) -> NoBoxError:
+    def _no_box(self) -> NoBoxError:
         if self._control is None:
             return NoBoxError(
                 "This box file has no control port that could be asked. Write `control: {port: 9002}` in it."
@@ -122,7 +122,7 @@ class ControlClient:
 
 
 def _is_made_of(kinds: Sequence[type], values: Sequence[object]) -> bool:
-    """Whether these are finite numbers and texts as a box sends them: on its port, anyone may listen."""
+    """Whether these are finite numbers and texts as a box sends them: any program may hold its port."""
     return len(values) == len(kinds) and all(
         isinstance(value, int | float) and math.isfinite(value) if kind is float else isinstance(value, kind)
         for value, kind in zip(values, kinds, strict=True)

@@ -1,4 +1,4 @@
-"""`bunraku provision`: which port, which file, the password; each step as it is done; the box told."""
+"""`bunraku provision`: port, key file, password; prints each step; tells the running box."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from appliance.cli.sensors.venue import (
+from appliance.cli.sensors.box_keys import (
     NOT_TAKEN,
-    Venue,
+    BoxKeys,
     clear_errors,
     people_console,
     reload_keys,
@@ -34,7 +34,7 @@ STDIN = Path("-")
 
 
 def provision_sensor(
-    place: Venue,
+    box_keys: BoxKeys,
     name: str,
     port: str | None,
     network: str | None,
@@ -43,34 +43,34 @@ def provision_sensor(
     axes: str | None,
     takes_over: bool = False,
 ) -> int:
-    """Provision the wearable on a serial port; the exit status. Raises StageError, and then it is not."""
+    """Provision the wearable on a serial port; returns the exit status. StageError: it is not provisioned."""
     console = people_console()
 
     def say(what: str, words: str) -> None:
         _step(console, what, words)
 
-    require_folder(place.keys)
+    require_folder(box_keys.keys)
     try:
-        settings = Settings(name, network or "", "", _udp_port(place), fusion, _axes(axes))
+        settings = Settings(name, network or "", "", _udp_port(box_keys), fusion, _axes(axes))
         is_asked = network is not None and password_file is None and sys.stdin.isatty()
         if not is_asked:
             settings = replace(settings, password=_read_password(network, password_file))
         device = port or only_wearable(found_ports())
-        with clear_errors(place.keys), WearableConsole(device) as cable:
+        with clear_errors(box_keys.keys), WearableConsole(device) as cable:
             if is_asked:  # last of all, so that it is not typed in vain
                 settings = replace(settings, password=_ask_password(settings.network))
             with console.status(f"Asking {escape(device)}"):
-                done = provision(cable, place.keys, settings, say, takes_over)
+                done = provision(cable, box_keys.keys, settings, say, takes_over)
     except (ConsoleError, NoWearableError, ProvisioningError) as error:
         raise StageError(str(error)) from None
     except KeyboardInterrupt:
         raise StageError(
-            f"Stopped half-way: {place.keys} was not changed, and the wearable may have its new key. "
+            f"Stopped half-way: {box_keys.keys} was not changed, and the wearable may have its new key. "
             "Run this again: that mends it."
         ) from None
-    is_well, words = reload_keys(place)
+    is_well, words = reload_keys(box_keys)
     _step(console, "box", words, is_well)
-    for hint in _hints(place, done, settings, device):
+    for hint in _hints(box_keys, done, settings, device):
         console.print(hint, markup=False, soft_wrap=True)
     return 0 if is_well else NOT_TAKEN
 
@@ -113,8 +113,8 @@ def _read_password(network: str | None, file: Path | None) -> str:
     return line.rstrip("\r\n")
 
 
-def _udp_port(place: Venue) -> int:
-    udp = place.box.sensors.udp
+def _udp_port(box_keys: BoxKeys) -> int:
+    udp = box_keys.box.sensors.udp
     return udp.port if udp is not None and udp.port else DEFAULT_PORT
 
 
@@ -130,15 +130,15 @@ def _axes(text: str | None) -> tuple[int, int] | None:
     return mapped, sign
 
 
-def _hints(place: Venue, done: Provisioned, settings: Settings, device: str) -> list[str]:
-    """What to do next, and what in the box file would keep the wearable from coming in."""
-    name, sensors = done.sensor.name, place.box.sensors
+def _hints(box_keys: BoxKeys, done: Provisioned, settings: Settings, device: str) -> list[str]:
+    """What to do next, and what in the box file would keep the wearable out."""
+    name, sensors = done.sensor.name, box_keys.box.sensors
     hints = [""]
     if settings.network:
         hints.append(
             f"{name} is ready: unplug it, switch it on, and it looks for its box on '{settings.network}'."
         )
-        if place.box.path is not None and (why := out_of_reach(sensors)):
+        if box_keys.box.path is not None and (why := out_of_reach(sensors)):
             hints.append(why)
     else:
         hints.append(f"{name} is ready: it speaks to the box by cable, as long as it is plugged in.")

@@ -24,7 +24,7 @@ _NONE = Text("-", style="dim")
 
 
 def unheard(keys: Mapping[str, SensorKey]) -> list[RosterLine]:
-    """The sensors of a key file, of which nothing else is known."""
+    """The sensors of a key file, with nothing else known about them."""
     return [
         RosterLine(
             *(key.name, f"{key.device_id:08x}", "", "", 0.0, 0.0, UNKNOWN_S, UNKNOWN_S, BATTERY_UNKNOWN),
@@ -35,7 +35,7 @@ def unheard(keys: Mapping[str, SensorKey]) -> list[RosterLine]:
 
 
 class SensorTable:
-    """A row for each sensor, coloured where one should look; several tables where one is too wide."""
+    """A row for each sensor, problems coloured; several tables where one is too wide."""
 
     def __init__(self, lines: Sequence[RosterLine]) -> None:
         self._lines = lines
@@ -62,7 +62,7 @@ class SensorTable:
 
 
 def known_table(lines: Sequence[RosterLine]) -> Table:
-    """Names and ids alone, for sensors that no box tells about."""
+    """Names and ids alone, without a running box."""
     table = _bare_table()
     table.add_column("name")
     table.add_column("id")

@@ -1,4 +1,4 @@
-"""A pose to model a body in, for skeletons whose limbs lie in each other at rest."""
+"""A pose to model a body in, for skeletons with limbs that intersect at rest."""
 
 from __future__ import annotations
 

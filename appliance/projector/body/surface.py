@@ -36,8 +36,8 @@ def surface_of(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
     """Vertices and normals (V, 3), triangles (F, 3), of the zero level of a field, negative inside.
 
-    The field must be positive all around. Closed and without edges of more than two triangles: where the
-    samples would leave it open what is meant, the gap is filled.
+    The field must be positive all around. The mesh is closed, and no edge has more than two triangles: where
+    the samples are ambiguous, the gap is filled.
     """
     field, codes = _without_ambiguity(field)
     cells = np.argwhere((codes > 0) & (codes < 255))
@@ -53,8 +53,8 @@ def surface_of(
 
 
 def _without_ambiguity(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """The field and each cell's corners inside, as bits; where two sheets would share a cell, its sample
-    outside that is nearest to the surface is put inside, until there is no such cell."""
+    """The field, and each cell's inside corners as bits. Where two sheets would share a cell, its outside
+    sample nearest to the surface is put inside, until no such cell is left."""
     while True:
         codes = _codes(field < 0)
         doubtful = np.argwhere(_DOUBTFUL[codes])

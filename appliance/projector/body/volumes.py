@@ -79,7 +79,7 @@ class Cut:
 class Group:
     """Slabs and cuts in the order in which they are made; `softness` of where the group joins the others.
 
-    bones: what says which joints move the group besides its slabs: the fingers of a mitten.
+    bones: which joints move the group besides its slabs: the fingers of a mitten.
     """
 
     steps: tuple[Slab | Cut, ...]
@@ -92,7 +92,7 @@ class Group:
 
     @property
     def movers(self) -> list[Slab]:
-        """What says which joint moves which part; bones stand for all slabs of the joint of the first one."""
+        """What decides which joint moves which part; bones replace all slabs of the first bone's joint."""
         by_bones = self.bones[0].owner if self.bones else None
         return [*(slab for slab in self.slabs if slab.owner != by_bones), *self.bones]
 

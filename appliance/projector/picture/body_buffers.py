@@ -1,4 +1,4 @@
-"""The body's surface on the GPU: fine for the eye, coarse for its shadows; and what little light reaches."""
+"""The body's surface on the GPU: fine for the eye, coarse for shadows; and how much light reaches it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from appliance.projector.body.skinning import BodyMesh
 from appliance.projector.picture.vertices import layout, packed
 
-COARSE = 0.02  # of the figure's height: vertices so close are one in its shadow
-OCCLUDER = 0.03  # of the figure's height: how large the points are that keep light from each other
+COARSE = 0.02  # of the figure's height: vertices closer than this are merged for shadows
+OCCLUDER = 0.03  # of the figure's height: size of the points that shade each other
 SMOOTHINGS = 6
-REACH = 0.22  # of the figure's height: what is further away keeps no light off
+REACH = 0.22  # of the figure's height: points further away cast no shade
 
 Floats = NDArray[np.float32]
 PARTS = ("position", "normal", "joints", "weights")
@@ -77,7 +77,7 @@ def merged(
 def openness(positions: Floats, normals: Floats, faces: NDArray[np.int32]) -> Floats:
     """(V,) 0..1: how much of the light from all around reaches each point of a body with spread limbs.
 
-    Reckoned for one point of each cell, then smoothed along the surface.
+    Computed for one point of each cell, then smoothed along the surface.
     """
     first, cell = cells(positions, OCCLUDER)
     at, facing = positions[first], normals[first]

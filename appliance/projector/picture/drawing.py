@@ -1,4 +1,4 @@
-"""Drawing: a shader program with what it draws; each use is put down, for the cost of a picture."""
+"""Drawing: a shader program with what it draws; each use is counted towards the cost of a picture."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Drawing:
         ]
         for unit, name in enumerate(self._textures):
             self._uniforms.pop(name).value = unit
-        self._sent: dict[str, Any] = {}  # what each uniform holds: to send it again takes time for nothing
+        self._sent: dict[str, Any] = {}  # what each uniform holds: sending it again would waste time
 
     def draw(
         self,

@@ -1,4 +1,4 @@
-"""Glow: light that spills around what is bright, reckoned in small pictures; and the dark room around it."""
+"""Glow: light that spills around bright parts, computed in small pictures; and the dark room around it."""
 
 from __future__ import annotations
 

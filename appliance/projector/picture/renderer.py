@@ -17,7 +17,7 @@ from appliance.projector.picture.looks.plaster import Plaster
 from appliance.projector.picture.looks.veil import Veil
 from appliance.projector.picture.poses import poses_of
 from appliance.projector.picture.scene import Easel, Scene
-from appliance.projector.picture.tally import Figures
+from appliance.projector.picture.tally import Cost
 from appliance.projector.picture.wall import Wall, flat
 from appliance.show.look import LookConfig, Style
 
@@ -62,8 +62,8 @@ class Renderer:
     ) -> None:
         """Draw onto `target`; mix 0: only look_before, 1: only look. Unknown names: the first look.
 
-        While two looks cross-fade, the camera moves from the one's place to the other's, and both see the
-        figure from there: it changes what it is made of, not where it is.
+        While two looks cross-fade, the camera moves from one look's place to the other's, and both draw the
+        figure from there: its material changes, not its place.
         """
         first = next(iter(self._looks.values()))
         now, before = self._looks.get(look, first), self._looks.get(look_before, first)
@@ -80,9 +80,9 @@ class Renderer:
         for layer, opacity in layers:
             self._styles[layer.style].draw(scene, layer, opacity, wall)
 
-    def figures(self) -> Figures:
-        """What the last picture took."""
-        return self._easel.tally.figures(self._pixels, self._easel.gpu_bytes + self._target_bytes)
+    def cost(self) -> Cost:
+        """The cost of the last picture."""
+        return self._easel.tally.cost(self._pixels, self._easel.gpu_bytes + self._target_bytes)
 
     def release(self) -> None:
         """Give the GPU's memory back."""

@@ -41,7 +41,7 @@ class Scene:
 
     @cached_property
     def inputs(self) -> dict[str, Any]:
-        """What shaders know of the moment and of the camera."""
+        """The shaders' inputs about the moment and the camera."""
         view = self.view
         return {
             "projection": view.projection,
@@ -130,7 +130,7 @@ class Easel:
     def lay(
         self, fragment: str, wall: Wall, opacity: float, inputs: dict[str, Any], box: Box = WHOLE
     ) -> None:
-        """The last step of a look: onto the wall; opacity 1 in place of what was there, else over it.
+        """The last step of a look: onto the wall; opacity 1 replaces what was there, less blends over it.
 
         fragment: names the shader; where it is simpler outside of a box, its part FRAME is drawn there.
         """
@@ -138,7 +138,7 @@ class Easel:
         wall.framebuffer.viewport = (0, 0, *wall.display)
         if opacity == 1.0:
             self.ctx.enable_only(moderngl.NOTHING)
-            wall.framebuffer.clear()  # a GPU that draws in tiles would else fetch the picture before
+            wall.framebuffer.clear()  # else a GPU that draws in tiles would fetch the previous picture
         else:
             self.ctx.enable_only(moderngl.BLEND)
             self.ctx.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA

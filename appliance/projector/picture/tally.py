@@ -1,4 +1,4 @@
-"""Tally: what a picture takes, counted, and the time that it takes on a Raspberry Pi 4, reckoned."""
+"""Tally: what a picture costs, counted, and its time on a Raspberry Pi 4, estimated."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 # operations and 1.4 thousand million samples a second. Published scores of glmark2 as a whole are 290 and 425
 # for the 4, 880 for the 5: 2.1 to 3 times, where units and clock say 2.9. Memory: units that do nothing but
 # read got 7.2 GB/s (py-videocore6's summation); 5 leaves room for writing, the display and the processor.
-# All in all a half more or less: no rate was measured with these shaders.
+# All in all within a factor of 1.5: no rate was measured with these shaders.
 _OPERATIONS_S, _FETCHES_S, _BYTES_S = 14e9, 1.4e9, 5e9
 _DRAW_CALL_S = 30e-6  # of the driver, state and uniforms included
 _VERTEX_PASSES = 2  # the GPU goes over vertices twice: for where they are, and to draw them
@@ -79,7 +79,7 @@ class Use:
 
     @property
     def seconds(self) -> float:
-        """On a Raspberry Pi 4, reckoned, without its memory: operations or fetches, whichever is more."""
+        """On a Raspberry Pi 4, estimated, without its memory: operations or fetches, whichever is more."""
         operations, fetches = _FRAGMENT[self.fragment]
         vertex_operations, vertex_fetches = _VERTEX[self.vertex]
         shaded, placed = self.pixels, self.vertices * _VERTEX_PASSES
@@ -93,12 +93,12 @@ class Use:
 
 
 @dataclass(frozen=True)
-class Figures:
-    """What one picture takes.
+class Cost:
+    """The cost of one picture.
 
     overdraw: pixels shaded by all passes, for each pixel of the picture; moved_bytes: textures read and
     targets written; gpu_bytes: textures and buffers, a texture that is drawn onto included, a display not;
-    pi4_ms: milliseconds of a Raspberry Pi 4's GPU, reckoned, not measured.
+    pi4_ms: milliseconds of a Raspberry Pi 4's GPU, estimated, not measured.
     """
 
     draw_calls: int
@@ -122,21 +122,21 @@ class Tally:
         self._moved_bytes = 0.0
 
     def clear(self) -> None:
-        """A new picture begins."""
+        """Start with a new picture."""
         self._uses.clear()
         self._moved_bytes = 0.0
 
     def count_bytes(self, count: float) -> None:
-        """Bytes that are read from memory or written to it."""
+        """Count bytes read from memory or written to it."""
         self._moved_bytes += count
 
     def count_draw_call(self, use: Use) -> None:
-        """Note one."""
+        """Count one draw call."""
         self._uses.append(use)
 
-    def figures(self, picture_pixels: int, gpu_bytes: int) -> Figures:
+    def cost(self, picture_pixels: int, gpu_bytes: int) -> Cost:
         """The sums, for a picture of `picture_pixels` pixels."""
-        return Figures(
+        return Cost(
             draw_calls=len(self._uses),
             triangles=sum(use.triangles for use in self._uses),
             vertices=sum(use.vertices for use in self._uses),

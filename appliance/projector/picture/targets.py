@@ -14,7 +14,7 @@ _FRAMEBUFFER, _DEPTH = 0x8D40, 0x8D00  # GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT
 
 
 class Target:
-    """A texture of four bytes a pixel that can be drawn into, with depth where it is asked for."""
+    """A texture of four bytes a pixel that can be drawn into, optionally with depth."""
 
     def __init__(
         self, ctx: moderngl.Context, tally: Tally, size: tuple[int, int], depth: bool = False
@@ -33,20 +33,20 @@ class Target:
         return self.size[0] * self.size[1]
 
     def start(self, colour: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)) -> None:
-        """What is drawn next goes here, over one colour."""
+        """Draw here from now on, over one colour."""
         self.buffer.use()
         self.buffer.viewport = (0, 0, *self.size)
         self.buffer.clear(*colour)
         self._tally.count_bytes(4 * self.pixels)
 
     def keep(self, channels: str, depth: bool = True) -> None:
-        """What is drawn next changes these channels ('r' to 'a') alone, and depth only if wanted."""
+        """Restrict drawing to these channels ('r' to 'a'), and depth only if wanted."""
         self.buffer.color_mask = ("r" in channels, "g" in channels, "b" in channels, "a" in channels)
         self.buffer.depth_mask = depth
         self.buffer.use()
 
     def forget_depth(self) -> None:
-        """Right after the last drawing with depth: a GPU that draws in tiles then never stores it."""
+        """Discard depth right after its last use: a GPU that draws in tiles then never stores it."""
         if self._invalidate is not None:
             self._invalidate(_FRAMEBUFFER, 1, ctypes.byref(ctypes.c_uint(_DEPTH)))
 

@@ -1,4 +1,4 @@
-"""Wall: what a picture is laid onto, in which shape and how bright: a texture, or the display itself."""
+"""Wall: the surface that a picture is laid onto, its shape and brightness: a texture, or the display."""
 
 from __future__ import annotations
 

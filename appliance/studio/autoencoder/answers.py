@@ -1,14 +1,13 @@
-"""Lessons in answering: from a window and a hand to what the dancer does with that joint held so.
+"""Lessons in answering: from a window and a hand to what the dancer does with that joint held.
 
-Dances with hands are iterated as on stage: a number of passes with one to three joints held as they are at
-another moment, sometimes frozen, sometimes as no dancer ever held them, then one pass of the dancer's
-own. The gradient runs back through all of them: what is asked for is what the audience sees in the end, and
-a good part of it after the first pass. Dances come in pairs, one a few poses after the other: so the network
-learns how an answer changes from tick to tick.
+Dances with hands are iterated as on stage: some passes with one to three joints held as they are at another
+moment (sometimes frozen, sometimes as no dancer ever held them), then one free pass. The gradient runs back
+through all passes: the loss is on what the audience sees in the end, and partly on the first pass. Dances
+come in pairs, one a few poses after the other, so that the network learns how an answer changes from tick to
+tick.
 
-Windows without a hand should come out as they went in; some are disturbed and led back. Others wander: they
-are coded over and over, and the longer they have wandered the more they are pulled to what the dancer
-usually does.
+Windows without a hand should come out unchanged; some are disturbed and led back. Others wander: they are
+coded again and again, and are pulled the more towards what the dancer usually does the longer they wander.
 """
 
 from __future__ import annotations
@@ -29,18 +28,18 @@ _LATER_POSES = 8  # at most, of the second dance of a pair
 _DISTURBED_JOINTS = 0.15
 _WILD_SPEED = 0.06  # half angles (radians) a pose of hands that no dancer had: about a turn a second
 _WEAK_SHARE, _FULL_SHARE = 0.25, 0.45  # of the lessons: with 2 passes, with the most; the others lie between
-_FULL_PROGRESS = 0.4  # of the training, when the most passes are reached: a new network would run away
-_SEARCH_EVERY = 16  # lessons, after which what the wandering windows are pulled to is looked up anew
-_PULL_AGE = 10  # passes until a wandering window is pulled fully
+_FULL_PROGRESS = 0.4  # of the training, when the most passes are reached: an untrained network would diverge
+_SEARCH_EVERY = 16  # lessons between two searches for what the wandering windows are pulled to
+_PULL_AGE = 10  # passes until a wandering window is pulled with full strength
 
 
 @dataclass(frozen=True)
 class AnswerSettings:
-    """How answering is taught. Shares are of dances, steps and pulls of the way that is left."""
+    """How answering is taught. Shares are of dances; step and pull are shares of the remaining way."""
 
-    step: float = 0.6  # of the way to the answer in one pass
+    step: float = 0.6  # towards the answer in one pass
     passes: int = 10  # at most, the last one without hands
-    reserve: int = 1024  # dances whose answers are searched for together
+    reserve: int = 1024  # dances with answers that are searched for together
     uses: int = 2  # of each dance, with different numbers of passes
     light: float = 0.4  # weights between 0 and 1
     frozen: float = 0.3  # hands that stand still
@@ -54,7 +53,7 @@ class AnswerSettings:
 
 
 class Answers:
-    """Lessons for a network that is told its hands."""
+    """Lessons for a conditional network."""
 
     def __init__(self, windows: Tensor, chances: Tensor, settings: AnswerSettings) -> None:
         """windows (N, T, M, 4), heading-free; chances (M,): how often each joint is held."""
@@ -77,7 +76,7 @@ class Answers:
         return [self._dances(pairs, progress), self._without_hands(max(batch - 2 * pairs, 2))]
 
     def follow(self, lesson: Lesson, made: Tensor) -> None:
-        """The wandering windows go on from what the network made of them."""
+        """Replace the wandering windows by what the network made of them."""
         if lesson.rows is not None:
             self._wandering[lesson.rows] = made[-len(lesson.rows) :].detach()
             self._age[lesson.rows] += 1
@@ -104,7 +103,7 @@ class Answers:
         return Lesson(start, self._on_the_way(start, answer, held, passes - 1), passes, hands)
 
     def _passes(self, progress: float) -> int:
-        """2, the most, or any number between; the most grows at the beginning."""
+        """2, the maximum, or any number in between; the maximum grows at the beginning."""
         most = 2 + round((self._settings.passes - 2) * min(progress / _FULL_PROGRESS, 1.0))
         kind = float(torch.rand(()))
         if kind < _WEAK_SHARE:
@@ -112,7 +111,7 @@ class Answers:
         return most if kind < _WEAK_SHARE + _FULL_SHARE else int(torch.randint(2, most + 1, ()))
 
     def _on_the_way(self, start: Tensor, answer: Tensor, held: Tensor, passes: int) -> Tensor:
-        """Where a dance should be after passes with its hands; the joints held are there at once."""
+        """Where a dance should be after so many passes with hands; held joints arrive at once."""
         share = 1 - (1 - self._settings.step) ** passes
         share_of_each = held.clamp_min(share)[:, None, :, None].expand_as(answer[..., :1])
         return slerp_towards(start, answer, share_of_each)
@@ -162,13 +161,13 @@ class Answers:
         return self._recorded[torch.randint(len(self._recorded), (count,), device=self._recorded.device)]
 
     def _pairs_of_moments(self, later: Tensor) -> Tensor:
-        """(2 * pairs, T, M, 4): recorded windows, each followed by the one `later` (pairs,) poses on."""
+        """(2 * pairs, T, M, 4): recorded windows, each followed by that `later` (pairs,) poses on."""
         first = torch.randint(len(self._recorded), later.shape, device=later.device)
         second = (first + later).clamp(max=len(self._recorded) - 1)
         return self._recorded[torch.stack([first, second], dim=1).flatten()]
 
     def _disturbed(self, windows: Tensor) -> Tensor:
-        """Some of the windows with some joints on the way to those of another window."""
+        """The windows; in some, a few joints are moved towards those of another window."""
         count, joints, device = len(windows), windows.shape[2], windows.device
         share = torch.rand(count, 1, 1, 1, device=device)
         taken = torch.rand(count, 1, joints, 1, device=device) < _DISTURBED_JOINTS
@@ -196,7 +195,7 @@ def _twice(values: Tensor) -> Tensor:
 
 
 def _turning_anywhere(windows: Tensor, later: Tensor) -> Tensor:
-    """Orientations (R, T, M, 4) anywhere, turning about any axis; the second of a pair `later` poses on."""
+    """Random orientations (R, T, M, 4) turning about random axes; the second of a pair `later` poses on."""
     count, poses, joints, _ = windows.shape
     pairs, device = count // 2, windows.device
     start = _twice(rotation.normalize(torch.randn(pairs, 1, joints, 4, device=device)))

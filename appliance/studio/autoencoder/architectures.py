@@ -1,4 +1,4 @@
-"""Every architecture by the name that the command line has for it."""
+"""The architectures by their names on the command line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NETWORKS: dict[str, tuple[Callable[[Shape], Network], dict[str, int]]] = {
 
 
 def build(name: str, window: int, joints: int, **sizes: int) -> tuple[Network, Shape]:
-    """A network by name, its sizes overridden where given (latent, width, depth)."""
+    """A network by name; sizes that are not 0 (latent, width, depth) override its own."""
     make, defaults = NETWORKS[name]
     shape = Shape(window, joints, **{**defaults, **{k: v for k, v in sizes.items() if v}})
     return make(shape), shape

@@ -1,7 +1,7 @@
-"""The adversarial autoencoder of 'Puppeteering an AI': what runs around every network, and the iteration.
+"""The adversarial autoencoder of 'Puppeteering an AI': heading removal around any network, and the iteration.
 
-A window is turned so that its middle pose faces the same way (heading removed, put back at the end): the
-dancer's habits do not depend on where the audience sits, so no network has to learn them for each heading.
+Each window is turned so that its middle pose faces +Z, and turned back at the end: a dancer's habits do not
+depend on where the audience sits, so no network has to learn them for each heading.
 """
 
 from __future__ import annotations
@@ -11,16 +11,17 @@ from torch import Tensor, nn
 
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.conditional import Conditional
+from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.autoencoder.networks import Network, Shape
 
-NEAR = 1.0 - 1e-6  # length of a goal: its cosine with a pose stays below 1, so that no weight vanishes
+NEAR = 1.0 - 1e-6  # length of a goal: keeps its cosine with a pose below 1, so that no weight vanishes
 
 
 class Autoencoder(nn.Module):
     """Windows (B, T, M, 4) in, windows out; `iterate` is the paper's iterative autoencoding."""
 
     def __init__(self, network: Network, shape: Shape, rest: Tensor) -> None:
-        """rest: (M, 4) mean heading-free orientation of each joint, the hemisphere all signs follow."""
+        """rest (M, 4): mean heading-free orientation of each joint; all signs follow its hemisphere."""
         super().__init__()
         self.network, self.shape = network, shape
         self.rest: Tensor
@@ -46,15 +47,15 @@ class Autoencoder(nn.Module):
     def encode_held(self, windows: Tensor, start: Tensor, goal: Tensor, held: Tensor) -> Tensor:
         """Latents (B, Z) of heading-free windows, overwritten by goal (B, T, M, 4) as held (B, M) says.
 
-        A conditional network is told the goal and the window that the iteration started with; for every
-        other one the window's joints are overwritten by SLERP.
+        A conditional network sees the goal and the window that the iteration started with; for any other
+        network SLERP overwrites the window's joints.
         """
         if isinstance(self.network, Conditional):
             return self.network.encode_held(windows, start, goal, held)
         return self.encode(slerp_towards(windows, goal, held[:, None, :, None]))
 
     def decode_raw(self, latents: Tensor, start: Tensor | None = None, held: Tensor | None = None) -> Tensor:
-        """Latents -> heading-free windows before normalisation; start and held: as encode_held had them."""
+        """Latents -> heading-free windows before normalisation; start and held as given to encode_held."""
         if start is not None and held is not None and isinstance(self.network, Conditional):
             raw = self.network.decode_held(latents, start, held)
         else:
@@ -69,24 +70,21 @@ class Autoencoder(nn.Module):
         windows: Tensor,
         coding_iterations: int,
         interaction_iterations: int = 0,
-        mask: Tensor | None = None,
-        targets: Tensor | None = None,
-        weights: Tensor | None = None,
+        hold: HeldJoints[Tensor] | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Iterative autoencoding: (B, T, M, 4) -> the same, and the last latents (B, Z).
 
-        In the first interaction_iterations passes the held joints (mask (M,)) are overwritten before coding
-        by targets (T, M, 4), one orientation for each pose of the window, as far as weights (M,) say; or
-        (B, T, M, 4) and (B, M), others for each window. Where all passes are interactive, the result is
-        overwritten too, so that the held orientation shows; otherwise the last pass is the dancer's own.
+        The first interaction_iterations passes overwrite the held joints before coding. If all passes are
+        interactive, the result is overwritten too, so that the held orientation shows; otherwise the last
+        pass is the dancer's own.
         """
         facing = self.facing(windows)
         x = start = self.without_heading(windows, facing)
         latents = x.new_zeros(len(x), self.shape.latent)
         held, goal = x.new_zeros(len(x), self.shape.joints), x
-        if mask is not None and targets is not None and weights is not None:
-            held = (mask.float() * weights).expand(len(x), -1)
-            goal = self.without_heading(targets.expand_as(x), facing)
+        if hold is not None:
+            held = (hold.mask.float() * hold.weights).expand(len(x), -1)
+            goal = self.without_heading(hold.targets.expand_as(x), facing)
         for k in range(coding_iterations):
             if k < interaction_iterations:
                 latents = self.encode_held(x, start, goal, held)
@@ -114,7 +112,7 @@ def slerp_towards(x: Tensor, goal: Tensor, weight: Tensor) -> Tensor:
 
 
 class PriorCritic(nn.Module):
-    """Tells latents from samples of the prior, a standard Gaussian; dense 512, 512, ELU (the paper's)."""
+    """Discriminates latents from samples of the prior, a standard Gaussian; dense 512, 512, ELU (paper)."""
 
     def __init__(self, latent: int, width: int = 512) -> None:
         super().__init__()

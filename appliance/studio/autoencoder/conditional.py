@@ -1,13 +1,13 @@
-"""The conditional autoencoder: the compact default, told which joints are held and how.
+"""The conditional autoencoder: the compact default, conditioned on the held joints and the phrase.
 
-A plain autoencoder sees a held joint only as an odd number among its inputs, and learns to copy it with the
-rest. This one takes the held joints out of the window and sees their targets as rotation matrices instead:
-one for each pose, without the double cover of quaternions, so that a hand that turns through whole
-revolutions never makes its input jump. Beside them it sees the window that the iteration began with: the
-phrase is where the answer starts from, and however often it is coded, its own gestures are not forgotten.
-What it is told costs the iteration nothing: it is computed once for a window and enters as the bias of the
-first layer, and, for the phrase's gestures that a latent of 64 numbers would smooth away, of the last. A pass
-in which nothing is held is told nothing: it is a plain autoencoder.
+A plain autoencoder sees a held joint only as an unusual input among others, and learns to copy it with them.
+This one removes the held joints from the window and takes their targets as rotation matrices instead, one for
+each pose: without the double cover of quaternions, a hand that turns through whole revolutions never makes
+the input jump. Its second condition is the window with which the iteration began: the answer starts from the
+phrase, and further iterations do not forget the phrase's own gestures. The condition is computed once for
+each window, so iterations cost no more: it is the bias of the first layer and, for gestures that a latent of
+64 numbers would smooth away, of the last. A pass without held joints has no condition: it is a plain
+autoencoder.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from appliance.studio.autoencoder.networks import Mlp, MlpDecoder, MlpEncoder, Shape
 
-# A rotation matrix, row by row, from the products of a quaternion's parts (w, x, y, z) x (w, x, y, z).
+# A rotation matrix, row by row, from the products of a quaternion's components (w, x, y, z) x (w, x, y, z).
 _PRODUCTS = (
     ({"ww": 1, "xx": 1, "yy": -1, "zz": -1}, {"xy": 2, "wz": -2}, {"xz": 2, "wy": 2}),
     ({"xy": 2, "wz": 2}, {"ww": 1, "xx": -1, "yy": 1, "zz": -1}, {"yz": 2, "wx": -2}),
@@ -26,7 +26,7 @@ _PRODUCTS = (
 
 
 def matrix_of_products() -> Tensor:
-    """(16, 9): products of the parts of a unit quaternion, flat, to its rotation matrix, flat."""
+    """(16, 9): maps the flat products of a unit quaternion's components to its flat rotation matrix."""
     table = torch.zeros(16, 9)
     for entry, products in enumerate(entry for row in _PRODUCTS for entry in row):
         for parts, factor in products.items():
@@ -35,7 +35,7 @@ def matrix_of_products() -> Tensor:
 
 
 class ConditionalEncoder(MlpEncoder):
-    """The encoder of an mlp with one more input: the targets of the held joints."""
+    """The encoder of an mlp with a condition: the targets of the held joints, and the first window."""
 
     def __init__(self, shape: Shape) -> None:
         super().__init__(shape)
@@ -46,7 +46,7 @@ class ConditionalEncoder(MlpEncoder):
         self.register_buffer("matrix", matrix_of_products(), persistent=False)
 
     def condition(self, start: Tensor, targets: Tensor, held: Tensor) -> Tensor:
-        """What the first layer adds (B, W) for the first window and targets (B, T, M, 4), held by (B, M)."""
+        """Bias (B, W) of the first layer from first window and targets (B, T, M, 4), held by (B, M)."""
         products = (targets[..., :, None] * targets[..., None, :]).flatten(-2)
         matrices = torch.matmul(products, self.matrix) * held[:, None, :, None]
         curves = torch.matmul(self.time.curves, matrices.flatten(2)).flatten(1)
@@ -61,7 +61,7 @@ class ConditionalEncoder(MlpEncoder):
 
 
 class ConditionalDecoder(MlpDecoder):
-    """The decoder of an mlp with one more input: the window that the iteration began with."""
+    """The decoder of an mlp with a condition: the window with which the iteration began."""
 
     def __init__(self, shape: Shape) -> None:
         super().__init__(shape)
@@ -77,7 +77,7 @@ class ConditionalDecoder(MlpDecoder):
 
 
 class Conditional(Mlp):
-    """The mlp that knows the held joints, and while any is held the window that it began with."""
+    """The mlp conditioned on the held joints and, while any is held, on the first window."""
 
     encoder: ConditionalEncoder
     decoder: ConditionalDecoder
@@ -87,7 +87,7 @@ class Conditional(Mlp):
         self.encoder, self.decoder = ConditionalEncoder(shape), ConditionalDecoder(shape)
 
     def encode_held(self, window: Tensor, start: Tensor, targets: Tensor, held: Tensor) -> Tensor:
-        """Latents (B, Z) of windows whose joints give way to targets (B, T, M, 4) by held (B, M)."""
+        """Latents (B, Z) of windows whose joints targets (B, T, M, 4) replace by weights held (B, M)."""
         left = (window * (1 - held)[:, None, :, None]).flatten(1)
         latent: Tensor = self.encoder(left, self.encoder.condition(start, targets, held))
         return latent

@@ -1,4 +1,4 @@
-"""Lessons: what a network is shown in a training step and what it should make of it."""
+"""Lessons: the input of a training step and the output that it should give."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from appliance.studio.autoencoder import rotation
 
 @dataclass(frozen=True)
 class Hands:
-    """Joints held in the passes of a lesson, in all but the last as on stage.
+    """Joints held in all passes of a lesson but the last, as on stage.
 
     goal (B, T, M, 4): their orientations; held (B, M): how firmly; first (B, T, M, 4): the windows that the
-    first pass should give. The second half of the batch are the same dances a few poses later.
+    first pass should give. The second half of the batch has the same dances a few poses later.
     """
 
     goal: Tensor
@@ -27,9 +27,9 @@ class Hands:
 
 @dataclass(frozen=True)
 class Lesson:
-    """A batch of B heading-free windows (B, T, M, 4) and what should come out of a number of passes.
+    """A batch of heading-free windows (B, T, M, 4) and what should come out after a number of passes.
 
-    rows: where the windows that go on wandering stand in their pool.
+    rows: places of its wandering windows in their pool.
     """
 
     windows: Tensor
@@ -40,23 +40,23 @@ class Lesson:
 
 
 class Lessons(Protocol):
-    """Gives lessons, and learns what became of them."""
+    """A source of lessons that sees the network's results."""
 
     def draw(self, batch: int, progress: float) -> list[Lesson]:
         """The next lessons, `batch` windows in all, at a progress of 0 to 1 through the training."""
 
     def follow(self, lesson: Lesson, made: Tensor) -> None:
-        """Take note of the windows that the network made of a lesson."""
+        """Receive the windows that the network made of a lesson."""
 
     def state(self) -> dict[str, Any]:
-        """What the lessons to come depend on beside the random numbers, for `restore`."""
+        """What later lessons depend on besides the random numbers, for `restore`."""
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on as the lessons did that gave this state."""
+        """Continue from a state."""
 
 
 class Copies:
-    """The papers' autoencoder: what goes in should come out."""
+    """Lessons of the papers' autoencoder: the output should equal the input."""
 
     def __init__(self, windows: Tensor, noise_degrees: float = 0.0) -> None:
         self._windows, self._noise_degrees = windows, noise_degrees
@@ -76,7 +76,7 @@ class Copies:
 
 
 def _shaken(windows: Tensor, degrees: float) -> Tensor:
-    """The windows with every joint turned by one small random rotation a window."""
+    """The windows, each joint turned by one small random rotation per window."""
     if degrees <= 0:
         return windows
     half = (

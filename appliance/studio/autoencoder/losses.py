@@ -1,4 +1,4 @@
-"""What the autoencoder is trained for: rotations, their pace, unit norm, positions, and the prior."""
+"""Losses of the autoencoder: rotations, their pace, unit norm, positions, and the prior."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import PriorCritic
 
 ENERGY = 1.12  # of the dance's own: blending the overlapping windows takes about a tenth of it away again
-POSITION_POSES = 2  # of a window's 8, drawn anew each step: as good a gradient at a quarter of the cost
+POSITION_POSES = 2  # of a window's 8, redrawn each step: as good a gradient at a quarter of the cost
 
 
 @dataclass(frozen=True)
 class LossWeights:
-    """Weights of the losses. Ratios of unit norm and positions as in the papers; the prior's as measured."""
+    """Weights of the losses. Unit norm and positions as in the papers; the prior's as measured."""
 
     rotation: float = 1.0
     pace: float = 1.0
@@ -52,11 +52,11 @@ def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSke
 def advance_losses(raw: Tensor, windows: Tensor) -> dict[str, Tensor]:
     """What changes from the first half of a batch to its second, the same dances a few poses later.
 
-    Overlapping windows are blended: the dance moves as fast as its windows change from one tick to the next,
-    however fast each of them moves by itself. In radians, as `pace`: advance, the change as a vector; energy,
-    how much each joint changes on average over the batch. Of an answer that it cannot foretell a network
-    makes the mean, which hardly moves; so how much a joint should move is asked for beside where to, and on
-    average: asked for in each window, the size would be learned as shyly as the direction.
+    Overlapping windows are blended: the dance moves as fast as its windows change from tick to tick, however
+    fast each of them moves by itself. In radians, as `pace`: advance, the change as a vector; energy,
+    how much each joint changes on average over the batch. A network answers what it cannot
+    predict with the mean, which hardly moves. Therefore energy rewards how much joints move, beside where
+    they move to, and as an average over the batch: per window, it would shrink as the direction does.
     """
     (made, later), (given, given_later) = rotation.normalize(raw).chunk(2), windows.chunk(2)
     change, wanted = later - made, given_later - given
@@ -66,16 +66,16 @@ def advance_losses(raw: Tensor, windows: Tensor) -> dict[str, Tensor]:
 
 
 def prior_loss(critic: PriorCritic, latents: Tensor) -> Tensor:
-    """What the encoder pays where the critic can tell its latents from the prior; gradient reaches it."""
+    """The encoder's loss: how well the critic tells its latents from the prior. Has a gradient."""
     logits = critic(latents)
     return functional.binary_cross_entropy_with_logits(logits, torch.ones_like(logits))
 
 
 def critic_loss(critic: PriorCritic, latents: Tensor, noise: Tensor, steepness: float = 1.0) -> Tensor:
-    """What the critic pays for taking latents (detached here) for the prior's noise or the reverse.
+    """The critic's loss for confusing latents (detached here) with samples of the prior.
 
-    steepness weighs a penalty on its slope at the prior's samples (R1, Mescheder et al. 2018): without it the
-    critic grows ever steeper, wins every time, and drags the latents about instead of shaping them.
+    steepness: weight of a penalty on its slope at the prior's samples (R1, Mescheder et al. 2018). Without it
+    the critic grows ever steeper, always wins, and drags the latents around instead of shaping them.
     """
     noise = noise.detach().requires_grad_()
     made, true = critic(latents.detach()), critic(noise)

@@ -1,7 +1,7 @@
-"""The networks: encoders and decoders of a window of poses, one class an architecture.
+"""The networks: encoders and decoders of a window of poses, one class for each architecture.
 
 Each maps a flat window (B, 8 * M * 4) to a latent (B, Z) and back to raw quaternions of the same shape.
-architectures.py names them for the command line.
+architectures.py has their names on the command line.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Shape:
     latent: int
     width: int
     depth: int = 1
-    curves: int = 4  # of the window's 8 degrees of freedom in time, how many the mlp sees
+    curves: int = 4  # cosines in time that the mlp sees, of the 8 that the window's poses could have
 
     @property
     def pose(self) -> int:
@@ -47,7 +47,7 @@ class Network(nn.Module):
         return window
 
     def start_at(self, rest: Tensor) -> None:
-        """Let the decoder's first answer be a standing dancer, (M * 4), not noise."""
+        """Make the rest pose (M * 4) the decoder's first output, not noise."""
         self.decoder.start_at(rest)  # type: ignore[operator]
 
 
@@ -112,7 +112,7 @@ class MlpDecoder(nn.Module):
         return self.time.unfold(self.stack(latent))
 
     def start_at(self, rest: Tensor) -> None:
-        """Let the first output be the rest pose (M * 4), held still."""
+        """Make the rest pose (M * 4), held still, the first output."""
         still = self.time.project(rest.repeat(self.time.shape.window)[None])[0]
         _start_at(self.stack[-1], still)
 
@@ -142,7 +142,7 @@ class Mlp(Network):
 
     @torch.no_grad()
     def standardise(self, mean: Tensor, deviation: Tensor) -> None:
-        """Move latents of this mean and deviation (Z,) to the prior's 0 and 1; windows come out as before."""
+        """Map latents of this mean and deviation (Z,) to the prior's 0 and 1; windows stay the same."""
         last, first = self.encoder.stack[-1], self.decoder.stack[0]
         assert isinstance(last, nn.Linear) and isinstance(first, nn.Linear)
         last.weight /= deviation[:, None]
@@ -151,7 +151,7 @@ class Mlp(Network):
         first.weight *= deviation
 
 
-class _ConvEncoder(nn.Module):
+class ConvEncoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window, self.pose = shape.window, shape.pose
@@ -167,7 +167,7 @@ class _ConvEncoder(nn.Module):
         return latent
 
 
-class _ConvDecoder(nn.Module):
+class ConvDecoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window, self.width = shape.window, shape.width
@@ -186,14 +186,14 @@ class _ConvDecoder(nn.Module):
 
 
 class Conv(Network):
-    """Convolution along time: neighbours in time share weights."""
+    """Convolution along time, with shared weights."""
 
     def __init__(self, shape: Shape) -> None:
         super().__init__()
-        self.encoder, self.decoder = _ConvEncoder(shape), _ConvDecoder(shape)
+        self.encoder, self.decoder = ConvEncoder(shape), ConvDecoder(shape)
 
 
-class _LstmEncoder(nn.Module):
+class LstmEncoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window, self.pose = shape.window, shape.pose
@@ -206,7 +206,7 @@ class _LstmEncoder(nn.Module):
         return latent
 
 
-class _LstmDecoder(nn.Module):
+class LstmDecoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window = shape.window
@@ -233,10 +233,10 @@ class Lstm(Network):
 
     def __init__(self, shape: Shape) -> None:
         super().__init__()
-        self.encoder, self.decoder = _LstmEncoder(shape), _LstmDecoder(shape)
+        self.encoder, self.decoder = LstmEncoder(shape), LstmDecoder(shape)
 
 
-class _AutoregressiveDecoder(nn.Module):
+class AutoregressiveDecoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window, self.pose, self.width = shape.window, shape.pose, shape.width
@@ -261,8 +261,8 @@ class _AutoregressiveDecoder(nn.Module):
 
 
 class LstmAutoregressive(Network):
-    """The paper's encoder with a decoder that is fed each pose that it made."""
+    """The paper's encoder with a decoder that receives each of its own poses as input."""
 
     def __init__(self, shape: Shape) -> None:
         super().__init__()
-        self.encoder, self.decoder = _LstmEncoder(shape), _AutoregressiveDecoder(shape)
+        self.encoder, self.decoder = LstmEncoder(shape), AutoregressiveDecoder(shape)

@@ -1,10 +1,10 @@
-"""The repertoire: every window of the recordings, searched for what the dancer does with a joint held so.
+"""The repertoire: the recorded windows, searched for what the dancer does while a joint is held.
 
-What the dancer usually does near a window is the mean of the nearest recorded windows, weighted by how near
-they are (a kernel regression); with a hand, of the nearest ones among those whose joint is held so. One
-nearest window alone would jump between takes from tick to tick. The answer is what the hand changes: from the
-usual without it to the usual with it, and on top of that what the window has of its own, as far as `own`
-says: with 1, a hand that holds a joint where the phrase has it anyway changes nothing.
+What the dancer usually does near a window is the mean of the nearest recorded windows, weighted by their
+nearness (a kernel regression); with a hand, nearness includes how the joint is held. A single nearest window
+would jump between takes from tick to tick. The answer is the usual with the hand, plus the share `own` of
+what distinguishes the window from the usual without it: with 1, a hand that holds a joint where the phrase
+has it changes nothing.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from torch import Tensor
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import slerp_towards
 
-_SEARCH_ROWS = 512  # at a time: a search is a matrix product
-_BELIEVED_RADIANS = 1.5  # a hand that far from all that the dancer does counts e^-1
-_SHARPNESS = 3.0  # the furthest of the neighbours counts e^-3 of the nearest
+_SEARCH_ROWS = 512  # at a time: each search is a matrix product
+_BELIEVED_RADIANS = 1.5  # a hand this far from everything that the dancer does has weight e^-1
+_SHARPNESS = 3.0  # the furthest neighbour has e^-3 of the nearest one's weight
 
 
 @dataclass(frozen=True)
 class Nearness:
     """What makes a recorded window the answer to a hand.
 
-    Summed are squared chords (half the angle) of the joints that nobody holds, and of their change over the
-    window times `change`; the held joints' squared angle to the hand (radians) times `hand`, and the squared
-    chord between their changes times `hand_change`.
+    The sum of: squared chords (half the angle) of the free joints, and of their change over the window times
+    `change`; the held joints' squared angle to the hand (radians) times `hand`, and the squared chord between
+    their changes times `hand_change`.
     """
 
     neighbours: int = 60
-    searched: int = 24_000  # windows at most, evenly spaced: always the same, so that there is one answer
+    searched: int = 24_000  # windows at most, evenly spaced: always the same ones, for one answer
     change: float = 1.5
     hand: float = 120.0
     hand_change: float = 2.0
-    own: float = 0.85  # of what distinguishes the window from the usual, kept in the joints that nobody holds
+    own: float = 0.85  # of what distinguishes the window from the usual, kept in the free joints
 
 
 class Repertoire:
@@ -56,7 +56,7 @@ class Repertoire:
         return torch.cat([self._mean_of_the_nearest(cost) for cost in costs])
 
     def answers(self, windows: Tensor, hands: Tensor, held: Tensor) -> Tensor:
-        """What the dancer does nearest to windows with hands, both (L, T, M, 4), that hold by (L, M)."""
+        """What the dancer does near windows with hands, both (L, T, M, 4), held by weights (L, M)."""
         rows = (torch.split(all_rows, _SEARCH_ROWS) for all_rows in (windows, hands, held))
         return torch.cat([self._answers(*row) for row in zip(*rows, strict=True)])
 
@@ -93,7 +93,7 @@ class Repertoire:
         return rotation.normalize(torch.einsum("lk,lktmq->ltmq", share, self._windows[nearest]))
 
     def _distance_of_the_free(self, windows: Tensor, held: Tensor) -> Tensor:
-        """(L, N): squared distance of windows to the recorded ones in all joints that nobody holds."""
+        """(L, N): squared distance of windows to the recorded ones in the free joints."""
         free = (held == 0).float()
         features = _features(middle(windows), change(windows), self._nearness.change) * free[..., None]
         theirs = self._features
@@ -105,7 +105,7 @@ class Repertoire:
 
 
 def middle(windows: Tensor) -> Tensor:
-    """(N, T, M, 4) -> (N, M, 4): the orientation halfway through."""
+    """(N, T, M, 4) -> (N, M, 4): the orientation in the middle of the window."""
     half = windows.shape[1] // 2
     return rotation.normalize(windows[:, half - 1] + _same_side(windows[:, half], windows[:, half - 1]))
 

@@ -57,9 +57,9 @@ def angle_between(a: Tensor, b: Tensor) -> Tensor:
 
 
 class MovingSkeleton(torch.nn.Module):
-    """Forward kinematics of the moving joints alone; the still joints between them are folded in.
+    """Forward kinematics of the moving joints alone; the still joints between them are folded into the bones.
 
-    The root joint stays at the origin: what is compared is the figure, not its way through the room.
+    The root joint stays at the origin: the figure is compared, not its path through the room.
     """
 
     def __init__(self, skeleton: Skeleton, moving: tuple[int, ...], still_pose: Tensor) -> None:

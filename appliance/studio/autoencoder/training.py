@@ -21,16 +21,15 @@ from appliance.studio.autoencoder.conditional import Conditional
 from appliance.studio.autoencoder.lessons import Copies, Lesson, Lessons
 from appliance.studio.autoencoder.networks import Mlp
 from appliance.studio.autoencoder.repertoire import Nearness
-from appliance.studio.course import Course
-from appliance.studio.data.bones import reaches
 from appliance.studio.data.dataset import WINDOW, Dataset, windows
+from appliance.studio.training_loop import TrainingLoop
 
-SHORTEST_REACH = 0.04  # of the longest limb's, for what a joint without any bone below it counts
+SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below it counts as
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to train. minutes bounds the wall time and paces the learning rate; steps does so where given."""
+    """How to train. minutes bounds the wall time and paces the learning rate, unless steps is given."""
 
     network: str = DEFAULT
     latent: int = 0
@@ -42,7 +41,7 @@ class Settings:
     batch: int = 256
     learning_rate: float = 1e-3
     critic_learning_rate: float = 5e-4
-    smoothing: float = 0.999  # of the averaged weights that are kept
+    smoothing: float = 0.999  # of the averaged weights
     latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
     input_noise_degrees: float = 0.0
     mirror: bool = True
@@ -66,7 +65,7 @@ class Settings:
 
 @dataclass
 class Report:
-    """What the loop tells while it runs: one line of history every report_every steps."""
+    """A line of the training's history."""
 
     step: int
     seconds: float
@@ -75,8 +74,11 @@ class Report:
     held_out_degrees: float | None = None
 
 
-class Training(Course[Report]):
+class Training(TrainingLoop[Report]):
     """State of a training: networks, optimisers, averages, history."""
+
+    report_type = Report
+    saved = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer")
 
     def __init__(self, dataset: Dataset, settings: Settings, device: str = "cpu") -> None:
         super().__init__(settings)
@@ -110,15 +112,13 @@ class Training(Course[Report]):
         )
         conditional = isinstance(network, Conditional)
         self.lessons: Lessons = (
-            Answers(self.train_windows, self._chances(), settings.answers)
+            Answers(self.train_windows, self.holding_chances(), settings.answers)
             if conditional
             else Copies(self.train_windows, settings.input_noise_degrees)
         )
-        self._critic_paid = torch.zeros((), device=self.device)
-        self.origin: dict[str, Any] = {}  # where the recordings lie and what is known of them
+        self._critic_loss = torch.zeros((), device=self.device)
 
-    def line(self, means: Mapping[str, float]) -> Report:
-        """Mean losses since the last line, and the error on takes kept apart."""
+    def report(self, means: Mapping[str, float]) -> Report:
         return Report(self.step, self.seconds, self.fraction, dict(means), self.held_out_degrees())
 
     def train_step(self) -> dict[str, Tensor]:
@@ -126,35 +126,35 @@ class Training(Course[Report]):
         settings = self.settings
         self._pace_learning()
         total = torch.zeros((), device=self.device)
-        told: dict[str, Tensor] = {}
+        reported: dict[str, Tensor] = {}
         latents = []
         for lesson in self.lessons.draw(settings.batch, self.fraction):
             raw, coded, parts = self._code(lesson)
-            weight, words = (settings.weights.hands, "_with_hands") if lesson.hands else (1.0, "")
+            weight, suffix = (settings.weights.hands, "_with_hands") if lesson.hands else (1.0, "")
             for name, part in parts.items():
                 total = total + weight * getattr(settings.weights, name) * part
-                told[name + words] = part
+                reported[name + suffix] = part
             latents.append(coded)
             self.lessons.follow(lesson, rotation.normalize(raw.detach()))
         coded = torch.cat(latents)
         if self.step % settings.critic_every == 0:
-            self._critic_paid = self._train_critic(coded)
+            self._critic_loss = self._train_critic(coded)
         prior = losses.prior_loss(self.critic, coded)
         self.optimizer.zero_grad(set_to_none=True)
         (total + settings.weights.prior * prior).backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.autoencoder.parameters(), 1.0)
         self.optimizer.step()
-        self._average()
+        self._average_weights(self.averaged, self.autoencoder)
         self.step += 1
         with torch.no_grad():
             spread = {"latent_mean": coded.mean(0).abs().mean(), "latent_std": coded.std(0).mean()}
-        told = {**told, "prior": prior, "critic": self._critic_paid, **spread}
-        return {name: part.detach() for name, part in told.items()}
+        reported |= {"prior": prior, "critic": self._critic_loss, **spread}
+        return {name: part.detach() for name, part in reported.items()}
 
     def _code(self, lesson: Lesson) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
-        """The passes of a lesson: raw windows (B, T, M, 4) and latents (B, Z) of the last, and the losses.
+        """Run a lesson's passes: raw windows (B, T, M, 4) and latents (B, Z) of the last, and the losses.
 
-        The latents are noisy where they are decoded, and come without the noise: so the critic sees them.
+        The decoder sees noisy latents; those that are returned, for the critic, have no noise.
         """
         windows, hands, parts = lesson.windows, lesson.hands, {}
         for taken in range(lesson.passes - 1 if hands is not None else 0):
@@ -178,18 +178,18 @@ class Training(Course[Report]):
         self.critic_optimizer.step()
         return loss.detach()
 
-    def _chances(self) -> Tensor:
-        """(M,): how often a joint is held while learning: more, the more of the body hangs on it.
+    def holding_chances(self) -> Tensor:
+        """(M,): relative frequency with which each joint is held: the more of the body hangs on it, the more.
 
-        A head or hand whose bone has no end in the file counts as short: it must be learned as well.
+        A head or hand whose bone has no end in the file counts as short, so that it is learned too.
         """
-        reach = reaches(self.dataset.skeleton)[list(self.dataset.moving)]
+        reach = self.dataset.skeleton.reaches[list(self.dataset.moving)]
         share = np.maximum(reach / max(float(reach.max()), 1e-9), SHORTEST_REACH)
         return torch.tensor(np.sqrt(share), dtype=torch.float32, device=self.device)
 
     @torch.no_grad()
     def held_out_degrees(self, sample: int = 2048) -> float | None:
-        """Mean joint angle error in degrees of the averaged network on windows of takes kept apart."""
+        """Mean joint angle error in degrees of the averaged network on windows of held-out takes."""
         if not len(self.held_windows):
             return None
         rows = torch.linspace(0, len(self.held_windows) - 1, min(sample, len(self.held_windows))).long()
@@ -205,37 +205,22 @@ class Training(Course[Report]):
         return latents.mean(0), latents.std(0).clamp_min(1e-3)
 
     def state(self) -> dict[str, Any]:
-        """Everything that a resumed training needs, and the moments that load_autoencoder takes out."""
+        """Everything that a resumed training needs, and the latent moments that load_autoencoder removes."""
         return {
+            **self._shared_state(),
             "settings": asdict(self.settings),
             "joints": list(self.dataset.moving_names),
             "shape": asdict(self.autoencoder.shape),
-            "autoencoder": self.autoencoder.state_dict(),
-            "averaged": self.averaged.state_dict(),
-            "critic": self.critic.state_dict(),
-            "optimizer": self.optimizer.state_dict(),
-            "critic_optimizer": self.critic_optimizer.state_dict(),
-            "random": torch.get_rng_state(),
             "random_gpu": torch.cuda.get_rng_state(self.device) if self.device.type == "cuda" else None,
             "latent_moments": self.latent_moments(),
             "lessons": self.lessons.state(),
-            "origin": self.origin,
-            "step": self.step,
-            "seconds": self.seconds,
-            "history": [asdict(line) for line in self.history],
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on where a saved training stood."""
-        for name in ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer"):
-            getattr(self, name).load_state_dict(state[name])
+        super().restore(state)
         self.lessons.restore(state["lessons"])
-        torch.set_rng_state(state["random"].cpu())
         if self.device.type == "cuda" and state.get("random_gpu") is not None:
             torch.cuda.set_rng_state(state["random_gpu"].cpu(), self.device)
-        self.origin = state.get("origin", {})
-        self.step, self.seconds = state["step"], state["seconds"]
-        self.history = [Report(**line) for line in state["history"]]
 
     def _heading_free(self, poses: np.ndarray[Any, np.dtype[np.float32]]) -> Tensor:
         return torch.cat(
@@ -247,32 +232,18 @@ class Training(Course[Report]):
 
     def _pace_learning(self) -> None:
         warm = min(1.0, (self.step + 1) / 200)
-        cosine = 0.5 * (1 + math.cos(math.pi * self.fraction))
+        cosine = self._cosine()
         for group in self.optimizer.param_groups:
             group["lr"] = self.settings.learning_rate * warm * max(cosine, 0.005)
         for group in self.critic_optimizer.param_groups:
             group["lr"] = self.settings.critic_learning_rate * max(cosine, 0.1)
 
-    @torch.no_grad()
-    def _average(self) -> None:
-        keep = min(self.settings.smoothing, (self.step + 1) / (self.step + 10))
-        means: list[Tensor] = list(self.averaged.parameters())
-        values: list[Tensor] = list(self.autoencoder.parameters())
-        torch._foreach_lerp_(means, values, 1 - keep)
-
-
-def save_checkpoint(training: Training, path: Path) -> None:
-    """Write the whole state; the old file stays until the new one is complete."""
-    partial = path.with_suffix(".partial")
-    torch.save(training.state(), partial)
-    partial.replace(path)
-
 
 def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]]:
     """The averaged network of a checkpoint, its joint names, and the whole state.
 
-    The critic shapes the latents, but their mean and scale stay some tenths off the prior's, because other
-    losses pull at them; what is left is taken out here exactly, without a change to any window.
+    The critic shapes the latents, but other losses keep their mean and scale some tenths off the prior's; the
+    rest is removed here exactly, without a change to any window.
     """
     state = torch.load(path, map_location="cpu", weights_only=True)
     shape = state["shape"]

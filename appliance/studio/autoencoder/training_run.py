@@ -1,4 +1,4 @@
-"""A training as people see it: progress, checkpoints, pictures, and a stop that loses nothing."""
+"""Runs a training: progress, checkpoints, pictures, and a stop that loses nothing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn
 from torch import nn
 
-from appliance.studio.autoencoder.training import Report, Training, save_checkpoint
+from appliance.studio.autoencoder.training import Report, Training
 from appliance.studio.data.dataset import window_starts
 from appliance.studio.evaluation.coders import TorchCoder
 from appliance.studio.evaluation.pictures import draw_losses, draw_reconstruction
@@ -33,7 +33,7 @@ class TrainingRun:
         self._line = ""
 
     def run(self) -> bool:
-        """Train until done or asked to stop (Ctrl-C, SIGTERM). True when done; the checkpoint is written."""
+        """Train until done or stopped (Ctrl-C, SIGTERM). True if done; always writes the checkpoint."""
         with stop_signals() as stop_asked, self._progress() as progress:
             self.console.print("Ctrl-C stops without losing anything.")
             bar = progress.add_task("training", total=1.0, words="")
@@ -60,7 +60,7 @@ class TrainingRun:
         return f"{steps_a_second:.1f} steps/s, {_clock(left)} left. {self._line}"
 
     def _report(self, report: Report) -> None:
-        """Every half minute: a line of history; a filmstrip when its time has come."""
+        """Print and store a line of history; draw a filmstrip if one is due."""
         held = (
             ""
             if report.held_out_degrees is None
@@ -92,36 +92,36 @@ class TrainingRun:
         draw_reconstruction(path, coder, take, title)
 
     def _save(self) -> None:
-        save_checkpoint(self.training, self.checkpoint)
+        self.training.save_checkpoint(self.checkpoint)
         self._write_history()
         if self.training.history:
             history = [asdict(line) for line in self.training.history]
             draw_losses(self.folder / "pictures" / "losses.png", history)
 
     def _write_history(self) -> None:
-        told = {
+        record = {
             "settings": asdict(self.training.settings),
             "parameters": parameters(self.training.autoencoder.network),
             "history": [asdict(line) for line in self.training.history],
         }
         partial = self.folder / ".training.json"
-        partial.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+        partial.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
         partial.replace(self.folder / "training.json")
 
 
 def parameters(network: nn.Module) -> int:
-    """How many numbers a network learns."""
+    """The number of learned parameters."""
     return sum(parameter.numel() for parameter in network.parameters())
 
 
 def time_left_s(seconds: float, fraction: float) -> float:
-    """Seconds to go if it goes on as it went."""
+    """Remaining seconds at the pace so far."""
     return seconds * (1 - fraction) / fraction if fraction > 0 else 0.0
 
 
 @contextmanager
 def stop_signals() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C or SIGTERM came; a second one stops at once."""
+    """Yields a function: whether Ctrl-C or SIGTERM arrived. A second signal stops at once."""
     asked = False
 
     def ask(number: int, frame: object) -> None:

@@ -1,9 +1,8 @@
-"""Lengths of a skeleton's bones: how far limbs reach, which joints are their ends, how large a body is."""
+"""Lengths of a skeleton's bones: which joints are limb ends or small parts, and the span of a body."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from appliance.pose.skeleton import Skeleton
 
@@ -11,27 +10,16 @@ SMALL = 0.042  # of the body's span: a finger has 0.04 at most, a toe 0.03, a he
 LIMB_END = 0.15  # of the skeleton's reach: what hangs below a head, hand or foot is no longer than this
 
 
-def reaches(skeleton: Skeleton) -> NDArray[np.float64]:
-    """(J,): length in metres of the longest chain of bones below each joint."""
-    reach = np.zeros(len(skeleton))
-    for joint, offset in skeleton.ends:
-        reach[joint] = max(reach[joint], float(np.linalg.norm(offset)))
-    for joint in reversed(range(1, len(skeleton))):
-        above = skeleton.parents[joint]
-        reach[above] = max(reach[above], reach[joint] + float(np.linalg.norm(skeleton.offsets[joint])))
-    return reach
-
-
 def small_parts(skeleton: Skeleton) -> set[int]:
-    """Fingers, toes, eyes: joints below which there is little, or nothing where their own bone is short."""
-    reach, least = reaches(skeleton), SMALL * span_m(skeleton)
+    """Fingers, toes, eyes: joints with little below them, or with nothing below and a short bone."""
+    reach, least = skeleton.reaches, SMALL * span_m(skeleton)
     known = (reach > 0) | (np.linalg.norm(skeleton.offsets, axis=-1) < least)
     return set(np.flatnonzero(known & (reach < least)).tolist()) - {0}
 
 
 def span_m(skeleton: Skeleton) -> float:
-    """The longest way along bones from one end of the body to another: a hand to a foot."""
-    reach, longest = reaches(skeleton), 0.0
+    """The longest path along bones between two ends of the body: from a hand to a foot."""
+    reach, longest = skeleton.reaches, 0.0
     for joint in range(len(skeleton)):
         arms = [
             reach[child] + float(np.linalg.norm(skeleton.offsets[child]))
@@ -43,8 +31,8 @@ def span_m(skeleton: Skeleton) -> float:
 
 
 def limb_ends(skeleton: Skeleton) -> set[int]:
-    """Heads, hands, feet and what is smaller: by their names, or because little hangs below them."""
-    reach = reaches(skeleton)
+    """Heads, hands, feet and smaller parts: by name, or because little is below them."""
+    reach = skeleton.reaches
     small = set(np.flatnonzero(reach <= LIMB_END * reach[0]).tolist())
     heads = {joint for joint, name in enumerate(skeleton.names) if "head" in name.casefold()}
     return (small | heads | set(skeleton.feet)) - {0}

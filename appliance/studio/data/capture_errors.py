@@ -14,14 +14,14 @@ from appliance.pose.recording import Recording
 from appliance.studio.data.bones import limb_ends, small_parts
 from appliance.studio.data.jumps import Runs, bend_limits, bends, jumps, runs, visible
 
-SNAP = 0.5  # of a jump's limit: no error by itself, but a way in which a joint is put into a wrong place
-FAR_DEGREES = 110.0  # head, hand or foot from its usual orientation: more than a neck, wrist or ankle turns
-AWAY_DEGREES = 60.0  # any other joint that a jump brings there and a jump takes away
-GAP_DEGREES = 30.0  # to where the joint is at all other times: it never passes there
-PASSING_S = 0.5  # so long it may pass nearer: on the way there and back
+SNAP = 0.5  # of a jump's limit: no error by itself, but it can put a joint into a wrong place
+FAR_DEGREES = 110.0  # head, hand or foot from its usual orientation: no neck, wrist or ankle turns that far
+AWAY_DEGREES = 60.0  # any other joint that jumps there and away again
+GAP_DEGREES = 30.0  # to where the joint is at all other times: it never passes through here
+PASSING_S = 0.5  # how long it may pass nearer, on the way there and back
 TOUCHING_S = 0.1  # between a stretch and the jump that put the joint there
 BLOCK = 256
-SLACK_S = 0.02  # people copy seconds from a picture
+SLACK_S = 0.02  # tolerance of seconds that were read from a picture
 
 JUMP, APART, MARKED = "jump", "apart", "marked"
 REASONS = {
@@ -50,8 +50,8 @@ def find_capture_errors(
 ) -> list[list[CaptureError]]:
     """Errors of each take of one dancer, at its recorded rate; moving: the joints to look at.
 
-    A finger or a toe that twitches costs no frame: nobody sees it, and gloves twitch all the time.
-    usual: joints to orientations (4,) in which they usually are; for the others it is the mean of the takes.
+    A twitching finger or toe masks no frame: it is invisible, and gloves twitch all the time.
+    usual: usual orientations (4,) by joint; the default is the mean over the takes.
     """
     if not recordings:
         return []
@@ -67,7 +67,7 @@ def find_capture_errors(
     ]
     ends = limb_ends(skeleton)
     for joint in judged:
-        if joint:  # a root may stand anywhere
+        if joint:  # a root may have any orientation
             cuts = snapped if joint in ends else jumped
             looked_at = _Joint(recordings, joint, jumped, joint in ends, (usual or {}).get(joint))
             for stretch in looked_at.apart([one.get(joint, []) for one in cuts]):
@@ -76,7 +76,7 @@ def find_capture_errors(
 
 
 def without(errors: Sequence[CaptureError], kept: Sequence[tuple[float, float]]) -> list[CaptureError]:
-    """What is left of errors where spans of seconds are known to be sound."""
+    """The errors outside spans of seconds that are known to be sound."""
     left = list(errors)
     for start, end in kept:
         left = [
@@ -94,7 +94,7 @@ def _outside(span: tuple[float, float], start: float, end: float) -> list[tuple[
 
 
 def sound_frames(count: int, fps: float, errors: Sequence[CaptureError]) -> NDArray[np.bool_]:
-    """(count,) poses at a rate that no error touches."""
+    """(count,): poses at `fps` that no error touches."""
     sound = np.ones(count, dtype=bool)
     for error in errors:
         sound[max(int(np.floor(error.start_s * fps)), 0) : int(np.ceil(error.end_s * fps)) + 1] = False
@@ -111,7 +111,7 @@ class _Stretch:
 
 
 class _Joint:
-    """One joint in all takes: its orientations, jumps, and how far it is from where it usually is."""
+    """One joint in all takes: its orientations, jumps, and distance from its usual orientation."""
 
     def __init__(
         self,
@@ -154,7 +154,7 @@ class _Joint:
         )
 
     def _is_put(self, one: _Stretch) -> bool:
-        """Whether a jump put the end of a limb beyond what a body can."""
+        """Whether a jump put the end of a limb beyond what a body can do."""
         near = TOUCHING_S * self.fps[one.take]
         return self.limb_end and any(
             abs(last - one.first) <= near or abs(first - one.end) <= near
@@ -175,7 +175,7 @@ class _Joint:
         return float(np.degrees(2 * np.arccos(min(np.sort(near)[-1 - passing], 1.0))))
 
     def _fitted(self, one: _Stretch) -> _Stretch:
-        """Of the end of a limb all frames in which it is too far, and none before and after them."""
+        """The stretch; for the end of a limb, exactly the frames in which it is too far."""
         if not self.limb_end:
             return one
         far = self.away[one.take] > self.far
@@ -207,7 +207,7 @@ def _free(cuts: Sequence[tuple[int, int]], count: int) -> NDArray[np.bool_]:
 
 
 def _mean(poses: Sequence[Array], jumped: Sequence[Sequence[tuple[int, int]]]) -> Array:
-    """Where a joint usually is: the mean (Markley et al. 2007) of what is not far from the mean of all."""
+    """Usual orientation: the mean (Markley et al. 2007) of all that is not far from the overall mean."""
     q = np.concatenate([one[_free(cuts, len(one))] for one, cuts in zip(poses, jumped, strict=True)])
     mean: Array = np.linalg.eigh(q.T @ q)[1][:, -1]
     near = np.degrees(quaternion.angle_between(q, mean)) <= FAR_DEGREES

@@ -1,4 +1,4 @@
-"""Catalogues: what is known of recordings beyond their files, beside them or in the studio."""
+"""Catalogues: what is known of recordings beyond their files, from catalogue.yaml or the studio's own."""
 
 from __future__ import annotations
 
@@ -6,23 +6,34 @@ import fnmatch
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Any
 
-from appliance.studio.data.catalogue_file import read_catalogue_file
+from pydantic import Field, ValidationInfo, field_validator
+
+from appliance.show.section import Section, refusal
+from appliance.show.validation import validated
+from appliance.show.yaml_file import read_yaml
 
 CATALOGUES = Path(__file__).parent / "catalogues"
+ALWAYS = (0.0, 1e9)  # seconds
+Rate = Annotated[float, Field(ge=1, le=1000)]
+Unit = Annotated[float, Field(gt=0, le=10)]
+Second = Annotated[float, Field(ge=0)]
+SpanOfSeconds = Annotated[tuple[Second, Second], Field(strict=False)]
+Name = Annotated[str, Field(min_length=1)]
 Spans = tuple[tuple[float, float], ...]  # seconds from and to
 
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What is known of recordings beyond their files: true frame rates, takes, what is held out, and where
-    people know better than we what is a capture error.
+    """What is known of recordings beyond their files: true frame rates, takes, what is held out, and what
+    is or is not a capture error against all appearance.
     """
 
     true_fps: dict[str, float] = field(default_factory=dict)
     take: dict[str, str] = field(default_factory=dict)
     held_out: tuple[str, ...] = ()
-    acknowledgement: str = ""  # whom to thank, in every show made of them
+    acknowledgement: str = ""  # printed in every show made of them
     keep: dict[str, Spans] = field(default_factory=dict)
     mask: dict[str, Spans] = field(default_factory=dict)
     metres_per_unit: dict[str, float] = field(default_factory=dict)
@@ -31,7 +42,7 @@ class Catalogue:
         return _first(self.true_fps, name)
 
     def unit_of(self, name: str) -> float | None:
-        """What a recording's lengths are in, metres."""
+        """Metres in a unit of length of a recording."""
         return _first(self.metres_per_unit, name)
 
     def take_of(self, name: str) -> str:
@@ -41,16 +52,16 @@ class Catalogue:
         return any(fnmatch.fnmatch(name, pattern) for pattern in self.held_out)
 
     def kept(self, name: str) -> Spans:
-        """When a recording is sound whatever it looks like."""
+        """When a recording has no capture error, whatever it looks like."""
         return _spans(self.keep, name)
 
     def masked(self, name: str) -> Spans:
-        """When a recording is not to be learned from."""
+        """When a recording must not be learned from."""
         return _spans(self.mask, name)
 
 
 def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
-    """catalogue.yaml beside the recordings, else the studio's own where they know every name and size."""
+    """catalogue.yaml beside the recordings, else the studio's own if these list every name and size."""
     own = folder / "catalogue.yaml"
     if own.exists():
         return read_catalogue(own)
@@ -66,7 +77,7 @@ def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
 
 
 def read_catalogue(path: Path) -> Catalogue:
-    """Read a catalogue file. Raises ConfigError with the line of everything that is wrong in it."""
+    """Read a catalogue file. Raises ConfigError with the line of each error."""
     file = read_catalogue_file(path)
     return Catalogue(
         file.true_fps,
@@ -80,7 +91,7 @@ def read_catalogue(path: Path) -> Catalogue:
 
 
 def _joined(catalogues: Sequence[Catalogue]) -> Catalogue:
-    """What several know together; each acknowledgement once."""
+    """Several catalogues as one; each acknowledgement once."""
     rates: dict[str, float] = {}
     takes: dict[str, str] = {}
     for one in catalogues:
@@ -99,3 +110,60 @@ def _spans(by_pattern: Mapping[str, Spans], name: str) -> Spans:
     return tuple(
         span for pattern, spans in by_pattern.items() if fnmatch.fnmatch(name, pattern) for span in spans
     )
+
+
+class CatalogueFile(Section):
+    """catalogue.yaml. Every key is optional. Patterns are file names without '.bvh'."""
+
+    true_fps: dict[str, Rate] = Field(
+        default={}, description="Rates by pattern if headers are wrong: {salsa_*: 60}."
+    )
+    takes: dict[str, list[Name]] = Field(
+        default={}, description="Files that are one take: {duet-1: [anna_1, bert_1]}."
+    )
+    held_out: list[Name] = Field(default=[], description="Patterns of what to measure on: [anna_1].")
+    keep: dict[str, list[SpanOfSeconds]] = Field(
+        default={},
+        description="What is no capture error, by pattern: {anna_*: all, bert_1: [[12.5, 14]]}, in seconds.",
+    )
+    mask: dict[str, list[SpanOfSeconds]] = Field(
+        default={},
+        description="What must not be learned from, by pattern: {anna_1: [[0, 3.2]]}, in seconds.",
+    )
+    metres_per_unit: dict[str, Unit] = Field(
+        default={}, description="Metres in a unit of length, by pattern: {solo_*: 0.0254} for inches."
+    )
+    acknowledgement: str = Field(default="", description="Acknowledgement in every show made of them.")
+    bytes: dict[str, int] = Field(default={}, description="File sizes that identify recordings.")
+
+    @field_validator("keep", "mask", mode="before")
+    @classmethod
+    def _spans(cls, by_pattern: Any, info: ValidationInfo) -> Any:
+        if not isinstance(by_pattern, dict):
+            return by_pattern
+        words = "'all', or " if info.field_name == "keep" else ""
+        spans = {}
+        for pattern, several in by_pattern.items():
+            spans[pattern] = [ALWAYS] if several == "all" and words else several
+            if not _are_spans(spans[pattern]):
+                cure = f"Write {words}pairs of seconds, from and to: [[12.5, 14], [20, 21.5]]."
+                raise refusal(f"'{pattern}' does not say when.", cure, pattern)
+        return spans
+
+
+def _are_spans(spans: Any) -> bool:
+    """Whether these are pairs of numbers of which the second is greater."""
+    return isinstance(spans, list) and all(
+        isinstance(span, list | tuple)
+        and len(span) == 2
+        and all(isinstance(second, int | float) for second in span)
+        and span[0] < span[1]
+        for span in spans
+    )
+
+
+def read_catalogue_file(path: Path) -> CatalogueFile:
+    """Read catalogue.yaml; a key without a value counts as absent. Raises ConfigError with the lines."""
+    file = read_yaml(path)
+    file.values = {key: value for key, value in file.values.items() if value is not None}
+    return validated(CatalogueFile, file, {})

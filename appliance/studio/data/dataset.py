@@ -43,13 +43,13 @@ __all__ = [
 ]
 
 WINDOW = 8
-# Of a take alone: how much of its end is held out, how far from the rest, and of how long a one.
+# Of a single take: the share of its end that is held out, the gap before it, and the shortest such take.
 END_SHARE, END_LEAST_S, END_GAP_S, ALONE_LEAST_S = 0.15, 3.0, 1.0, 10.0
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """Takes with one skeleton; which joints move; which takes are kept apart."""
+    """Takes with one skeleton; which joints move; which takes are held out."""
 
     skeleton: Skeleton
     moving: tuple[int, ...]
@@ -66,12 +66,12 @@ class Dataset:
 
     @property
     def asymmetry(self) -> str:
-        """Why a mirror would show another body than this dancer's; '' where it shows this one."""
+        """Why the mirror image is not this dancer's body; '' if it is."""
         return asymmetry(self.skeleton, self.moving, self.still_pose())
 
     @property
     def mirrors(self) -> bool:
-        """Whether the mirror images of the dances can be learned from too."""
+        """Whether mirror images are training data too."""
         return not self.asymmetry
 
     def still_pose(self) -> NDArray[np.float64]:
@@ -84,7 +84,7 @@ def load_dataset(
     catalogue: Catalogue | None = None,
     progress: Callable[[Sequence[Path]], Sequence[Path]] = lambda files: files,
 ) -> Dataset:
-    """Read every BVH file of a folder. Raises DatasetError where skeletons differ or nothing is left."""
+    """Read every BVH file of a folder. Raises DatasetError if skeletons differ or nothing is left."""
     files = sorted(folder.glob("*.bvh"))
     if not files:
         raise DatasetError(f"{folder} has no .bvh files. Give the folder that holds your recordings.")
@@ -110,13 +110,13 @@ def load_dataset(
     if not any(take.sound.any() for take in training):
         raise DatasetError(
             "Every frame is masked as a capture error: nothing is left to train on. "
-            "Say what is none with --keep."
+            "Name sound files with --keep."
         )
     return Dataset(skeleton, moving, training, held_out)
 
 
 def _kept_apart(takes: Sequence[Take], catalogue: Catalogue) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
-    """What to learn from and what to measure on: whole takes, of one alone its end."""
+    """Training and held-out takes: whole takes, or the end of a single take."""
     held = {take.take for take in takes if catalogue.is_held_out(take.name)}
     names = sorted({take.take for take in takes})
     if not held and len(names) == 1:
@@ -129,7 +129,7 @@ def _kept_apart(takes: Sequence[Take], catalogue: Catalogue) -> tuple[tuple[Take
 
 
 def _ends_kept_apart(takes: Sequence[Take]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
-    """Of one take, which may be two dancers at once, the same last part of each; nothing of a short one."""
+    """The same last part of each recording of the only take; nothing of a short one."""
     count = min(len(take.recording) for take in takes)
     end = count - round(max(END_SHARE * count, END_LEAST_S * FPS))
     if count < ALONE_LEAST_S * FPS:

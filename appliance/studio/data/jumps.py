@@ -1,4 +1,4 @@
-"""Jumps: where a joint moves as no body does, judged by speed and by how suddenly its motion changes."""
+"""Jumps: motion that no body makes, recognised by its speed and by sudden changes."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.pose.skeleton import Skeleton
 
-SPAN_S = 1 / 30  # motions are compared over this time at any rate: an error of one frame shows as clearly
+SPAN_S = 1 / 30  # motions are compared over this time at any rate: a one-frame error counts alike
 # Two motions that follow each other and differ by more than this are a jump: what the dancer's own sharpest
 # 1 % allows, between two bounds. Measured in degrees: clean salsa and Indian dance reach 44 (a hand), martial
 # arts 65 (a shin in a kick); swapped markers begin at 34 (a hip), 43 (a neck), 57 (a foot).
@@ -26,8 +25,8 @@ Runs = list[tuple[int, int]]
 
 
 def bends(poses: Array, fps: float) -> NDArray[np.float32]:
-    """(N, J) of orientations (N, J, 4): by how many degrees the motion in the SPAN_S after each frame differs
-    from that before it."""
+    """(N, J): degrees by which the motion of orientations (N, J, 4) in the SPAN_S after each frame differs
+    from that in the SPAN_S before it."""
     span = _frames(SPAN_S, fps)
     if len(poses) <= span:
         return np.zeros(poses.shape[:2], dtype=np.float32)
@@ -37,10 +36,10 @@ def bends(poses: Array, fps: float) -> NDArray[np.float32]:
 
 
 def bend_limits(bent: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float64]]:
-    """For each take (J,): from how many degrees on a bend is a jump, judged by what the dancer does.
+    """For each take (J,): degrees above which a bend is a jump, derived from what the dancer does.
 
-    That is the sharpest 1 % of all takes, and up to twice as much where one take is sharp for a twentieth of
-    its time: a fight among waltzes is no error.
+    That is from the sharpest 1 % of all takes, and up to twice as much for a take that is sharp for a
+    twentieth of its time: a fight among waltzes is no error.
     """
     sharp = np.percentile(np.concatenate(bent), 99, axis=0)
     own = [np.clip(2 * np.percentile(take, 95, axis=0), sharp, 2 * sharp) for take in bent]
@@ -65,8 +64,8 @@ def jumps(recording: Recording, bent: NDArray[np.float32], limits: NDArray[np.fl
 
 
 def visible(recording: Recording, found: Mapping[int, Runs]) -> dict[int, Runs]:
-    """Jumps that the figure shows. A twist that one joint takes over from the next (solvers share it anew
-    between an arm and its hand) moves nothing: it is a matter of reckoning, not of capture.
+    """Jumps that are visible. A twist that a solver shifts from one joint to the next (from an arm to its
+    hand) moves nothing: it comes from the computation, not from the capture.
     """
     if not found:
         return {}
@@ -78,7 +77,7 @@ def visible(recording: Recording, found: Mapping[int, Runs]) -> dict[int, Runs]:
     least_m = SEEN_OF_HEIGHT * float(np.ptp(places[0], axis=0).max())
     shown: dict[int, Runs] = {}
     for joint, jumped in found.items():
-        below = _below(skeleton, joint)
+        below = skeleton.descendants(joint)
         ends = [one for one in below if one not in skeleton.parents]
         reach = places[:, below] - places[:, [joint]]
         moved = _bent(reach[span:] - reach[:-span], len(reach), span).max(axis=1) > least_m
@@ -88,30 +87,21 @@ def visible(recording: Recording, found: Mapping[int, Runs]) -> dict[int, Runs]:
 
 
 def runs(flags: NDArray[np.bool_]) -> Runs:
-    """First and last + 1 of each run of true ones."""
+    """First and last + 1 of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _bent(ways: Array, count: int, span: int) -> NDArray[np.float32]:
-    """(count, ...): how much the way (count - span, ..., 3) from each frame on differs from the way to it."""
+    """(count, ...): difference between the displacement (count - span, ..., 3) from and to each frame."""
     bent = np.zeros((count, *ways.shape[1:-1]), dtype=np.float32)
     if len(ways) > span:
         bent[span:-span] = np.linalg.norm(ways[span:] - ways[:-span], axis=-1)
     return bent
 
 
-def _below(skeleton: Skeleton, joint: int) -> list[int]:
-    """A joint and all that hangs from it."""
-    below = [joint]
-    for other, parent in enumerate(skeleton.parents):
-        if parent in below:
-            below.append(other)
-    return below
-
-
 def _mark(moving: NDArray[np.bool_], steps: Array, first: int, last: int) -> None:
-    """Mark the fast ones of steps first..last - 1, and those beside them that are as fast."""
+    """Mark the fast steps among first..last - 1, and adjacent ones that are as fast."""
     least = FAST * steps[first:last].max()
     moving[first:last] |= steps[first:last] >= least
     while first > 0 and moving[first] and steps[first - 1] >= least:
@@ -123,7 +113,7 @@ def _mark(moving: NDArray[np.bool_], steps: Array, first: int, last: int) -> Non
 
 
 def _too_fast(recording: Recording) -> NDArray[np.bool_]:
-    """(N - 1, J): steps that are part of a turn faster than any body's."""
+    """(N - 1, J): steps that are part of a turn faster than any body turns."""
     span, q = _frames(FASTEST_S, recording.fps), recording.poses
     too_fast = np.zeros((max(len(q) - 1, 0), q.shape[1]), dtype=bool)
     if len(q) > span:

@@ -1,4 +1,4 @@
-"""The mirror image of a dance: which joint is whose other side, and whether the skeleton has two sides."""
+"""The mirror image of a dance: which joints are counterparts, and whether the body is symmetric."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.bones import span_m
 
-UNEQUAL = 0.03  # of the body's span: bones may differ by so much from side to side (her head sits 5 mm off)
-OPPOSITE_DEGREES = 120.0  # a joint that usually is so far from its counterpart's image has other axes
+UNEQUAL = 0.03  # of the body's span: tolerance between the two sides (a dancer's head sits 5 mm off)
+OPPOSITE_DEGREES = 120.0  # a joint usually this far from its counterpart's image has other axes
 SIDEWAYS = (0, 2)  # left and right lie along x or along z; a mirror on the floor would be none
 
 _WORDS = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
 _OTHER = {**_WORDS, **{right: left for left, right in _WORDS.items()}}
-# Where a name says its side, the likeliest first: mixamorig:LeftArm, hand_left; L_Arm, arm.l.001; lShldr,
+# Where a name has its side, the likeliest first: mixamorig:LeftArm, hand_left; L_Arm, arm.l.001; lShldr,
 # LThumb, Bip_LHand; ArmL; lfoot.
 _PLACES = (
     r"left|right|Left|Right|LEFT|RIGHT",
@@ -39,15 +39,15 @@ def mirror_pairs(skeleton: Skeleton) -> NDArray[np.intp]:
 
 
 def asymmetry(skeleton: Skeleton, joints: Sequence[int], usual: Array | None = None) -> str:
-    """Why a mirror would show another body, in words; '' where it shows this one.
+    """Why the mirror image is another body, for people; '' if it is this one.
 
-    joints: those that are learned; usual (J, 4): their usual orientations, the root's without its heading.
+    joints: the learned ones; usual (J, 4): their usual orientations, the root's without its heading.
     """
     pairs = mirror_pairs(skeleton)
     names = skeleton.names
     if all(pairs[joint] == joint for joint in joints):
         return "no joint's name says which side it is on"
-    carrying = _with_those_above(skeleton, joints)
+    carrying = sorted({above for joint in joints for above in skeleton.ancestors(joint)})
     for joint in carrying:
         above, other = skeleton.parents[joint], skeleton.parents[pairs[joint]]
         if pairs[pairs[joint]] != joint or (above >= 0 and pairs[above] != other):
@@ -68,7 +68,7 @@ def asymmetry(skeleton: Skeleton, joints: Sequence[int], usual: Array | None = N
 
 
 def mirrored(recording: Recording) -> Recording:
-    """The dance as a mirror shows it: reflected through the plane between left and right, joints swapped."""
+    """The mirrored dance: reflected in the plane between left and right, joints swapped."""
     pairs = mirror_pairs(recording.skeleton)
     axis = _axis(recording.skeleton, pairs)
     poses = _reflected(recording.poses, pairs, axis)
@@ -76,7 +76,7 @@ def mirrored(recording: Recording) -> Recording:
 
 
 def _reflected(poses: Array, pairs: NDArray[np.intp], axis: int) -> Array:
-    """Orientations (..., J, 4) of the mirror image: what turns about the mirror's axis stays."""
+    """Orientations (..., J, 4) of the mirror image; turns about the mirror's normal stay."""
     image: Array = poses[..., pairs, :] * np.concatenate([[1.0], -_flip(axis)])
     return image
 
@@ -91,21 +91,13 @@ def _axis(skeleton: Skeleton, pairs: NDArray[np.intp]) -> int:
 
 
 def _unequal_m(skeleton: Skeleton, pairs: NDArray[np.intp], axis: int) -> Array:
-    """(J,): by how many metres each joint's offset differs from the image of its counterpart's."""
+    """(J,): metres between each joint's offset and the image of its counterpart's."""
     apart: Array = np.linalg.norm(skeleton.offsets[pairs] * _flip(axis) - skeleton.offsets, axis=-1)
     return apart
 
 
-def _with_those_above(skeleton: Skeleton, joints: Sequence[int]) -> list[int]:
-    found = set(joints)
-    for joint in joints:
-        while (joint := skeleton.parents[joint]) >= 0:
-            found.add(joint)
-    return sorted(found)
-
-
 def _others(name: str) -> Iterator[str]:
-    """What a joint's counterpart may be called."""
+    """Possible names of a joint's counterpart."""
     for place in _PLACES:
         other = re.sub(place, lambda found: _OTHER[found[0]], name)
         if other != name:

@@ -1,4 +1,4 @@
-"""Where a training's recordings lie and what is known of them: from the command line, or remembered."""
+"""A training's recordings and their catalogue: from the command line, or from a checkpoint."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from appliance.studio.data.catalogue import Catalogue, find_catalogue, read_catalogue
-from appliance.studio.data.catalogue_file import ALWAYS
+from appliance.studio.data.catalogue import ALWAYS, Catalogue, find_catalogue, read_catalogue
 from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.studio_error import StudioError
 
 
 @dataclass(frozen=True)
 class Sources:
-    """A folder of recordings and its catalogue; a checkpoint carries them along."""
+    """A folder of recordings and its catalogue; part of a checkpoint."""
 
     recordings: Path
     catalogue: Catalogue
@@ -37,7 +36,7 @@ def given(
     true_fps: Sequence[str] = (),
     keep: Sequence[str] = (),
 ) -> Sources:
-    """Sources from options; what is said by hand goes before what a catalogue knows."""
+    """Sources from options; options override the catalogue."""
     files = sorted(recordings.glob("*.bvh"))
     if not files:
         raise StudioError(f"{recordings} has no .bvh files. Give the folder that holds your recordings.")
@@ -48,20 +47,20 @@ def given(
     for pattern in (*known.keep, *known.mask):
         if not any(fnmatch.fnmatch(file.stem, pattern) for file in files):
             raise StudioError(
-                f"'{pattern}' is to be kept or masked, but no recording in {recordings} is called so. "
+                f"'{pattern}' is to be kept or masked, but no recording in {recordings} has that name. "
                 "Give the name of a file without .bvh, or a pattern such as 'solo_*'."
             )
     return Sources(recordings, replace(known, held_out=tuple(held_out)) if held_out else known)
 
 
 def remembered(state: dict[str, Any], recordings: Path | None, checkpoint: Path) -> Sources:
-    """Sources that a checkpoint was trained on; `recordings` where they have moved since."""
+    """Sources that a checkpoint was trained on; recordings: their folder, if they have moved since."""
     origin = state.get("origin") or {}
     if recordings is None and "recordings" not in origin:
-        raise StudioError(f"{checkpoint} does not say which recordings it learned from: give --recordings.")
+        raise StudioError(f"{checkpoint} does not name its training recordings. Give --recordings.")
     folder = recordings or Path(origin["recordings"])
     if not folder.is_dir():
-        raise StudioError(f"The recordings are no longer in {folder}: say where with --recordings.")
+        raise StudioError(f"The recordings are no longer in {folder}. Give their folder with --recordings.")
     if "catalogue" not in origin:
         return given(folder)
     known = origin["catalogue"]

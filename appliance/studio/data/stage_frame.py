@@ -12,7 +12,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.bones import span_m
 
-CENTIMETRE = 0.01  # what BVH files are in unless they say nonsense
+CENTIMETRE = 0.01  # unit of BVH files, unless no dancer has that size
 SMALLEST_M, LARGEST_M, USUAL_M = 1.2, 5.0, 2.3  # from a hand to a foot along the bones: child, giant, dancer
 UNITS = {"metres": 1.0, "decimetres": 0.1, "CMU's units": 0.0564, "inches": 0.0254, "millimetres": 0.001}
 STILL_DEGREES = 0.1
@@ -20,9 +20,9 @@ UPRIGHT = 0.6  # of the way from root to head lies along the vertical, in the me
 
 
 def in_stage_frame(recording: Recording, metres_per_unit: float | None = None) -> tuple[Recording, list[str]]:
-    """The recording as the studio wants it, and what had to be done, each as words for people.
+    """The recording in the stage's frame, and notes for people on what was changed.
 
-    recording: as read from a file in centimetres; metres_per_unit: what its lengths are in, where known.
+    recording: as read from a file in centimetres; metres_per_unit: unit of its lengths, if known.
     """
     notes = []
     if metres_per_unit is None:
@@ -45,7 +45,7 @@ def in_stage_frame(recording: Recording, metres_per_unit: float | None = None) -
 
 
 def _guessed_scale(skeleton: Skeleton) -> tuple[float, str]:
-    """By what to multiply lengths read as centimetres, and why in words; 1 where a dancer comes out."""
+    """Factor for lengths read as centimetres, and a note; 1 if the result is a dancer's size."""
     span = span_m(skeleton)
     if SMALLEST_M <= span <= LARGEST_M or not span:
         return 1.0, ""
@@ -71,7 +71,7 @@ def _scaled(recording: Recording, scale: float) -> Recording:
 
 
 def _hangs_from_nothing(recording: Recording) -> bool:
-    """Whether the root is no part of the body: it never turns, and one joint hangs from it that does."""
+    """Whether the root is not part of the body: it never turns, and its only child does."""
     q = recording.poses[:, :2]
     turned = np.degrees(quaternion.angle_between(q, q[:1])).max(axis=0)
     carried = [joint for joint, parent in enumerate(recording.skeleton.parents) if parent == 0]

@@ -1,4 +1,4 @@
-"""Takes: recordings at 50 poses a second in the stage's frame, with what is known and wrong in them."""
+"""Takes: recordings at 50 poses a second in the stage's frame, with their capture errors."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from appliance.studio.data.capture_errors import (
     without,
 )
 from appliance.studio.data.catalogue import Catalogue
+from appliance.studio.data.jumps import Runs, runs
 from appliance.studio.data.stage_frame import in_stage_frame
 
 FPS = 50.0
@@ -30,7 +31,7 @@ Pose = NDArray[np.floating[Any]]
 
 
 class DatasetError(ValueError):
-    """Recordings that cannot be trained on; says which and why."""
+    """Recordings that cannot be trained on: which, and why."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +41,10 @@ class Take:
     name: str
     take: str
     recording: Recording
-    sound: NDArray[np.bool_]  # (N,) frames that are no glitch
+    sound: NDArray[np.bool_]  # (N,) frames without a capture error
     header_fps: float
     true_fps: float
-    errors: tuple[CaptureError, ...] = ()  # why the others are
+    errors: tuple[CaptureError, ...] = ()  # why the others are masked
     notes: tuple[str, ...] = ()  # what had to be done to bring it into the stage's frame
     part_of: str = ""  # the recording of which it is an excerpt
     begins_s: float = 0.0  # there
@@ -52,6 +53,11 @@ class Take:
     def file(self) -> str:
         """The recording that it is, or is a part of."""
         return self.part_of or self.name
+
+    @property
+    def sound_runs(self) -> Runs:
+        """First and last + 1 frame of each stretch without a capture error."""
+        return runs(self.sound)
 
     def part(self, first: int, end: int) -> Take:
         """Frames first to end - 1 as a take of its own."""
@@ -75,7 +81,7 @@ class Take:
 def load_take(file: Path, catalogue: Catalogue, usual: Mapping[str, Pose] | None = None) -> Take:
     """One file at its true rate, T-pose dropped, capture errors marked, resampled to 50 Hz.
 
-    usual: by joint name the orientations (4,) in which the dancer usually is, where one file cannot tell.
+    usual: usual orientations (4,) by joint name, which a single file cannot tell.
     """
     take, recorded = read_take(file, catalogue)
     skeleton = recorded.skeleton
@@ -91,7 +97,7 @@ def read_take(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
     if leading_tpose_frames(recording):
         recording = recording.without_first(TPOSE_FRAMES)
     if not len(recording):
-        raise DatasetError(f"{file.name} has no pose besides its T-pose: take it away.")
+        raise DatasetError(f"{file.name} has no pose but its T-pose. Remove the file.")
     recording, notes = in_stage_frame(recording, catalogue.unit_of(file.stem))
     resampled = recording.resampled(FPS)
     sound = np.ones(len(resampled), dtype=bool)
@@ -100,7 +106,7 @@ def read_take(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
 
 
 def masked_take(take: Take, found: Sequence[CaptureError], catalogue: Catalogue) -> Take:
-    """The take without its errors, where people have not said that they are none, or named others."""
+    """The take with its errors masked, except those that the catalogue keeps, and with those that it adds."""
     told = [CaptureError("", start, end, MARKED) for start, end in catalogue.masked(take.name)]
     errors = (*without(found, catalogue.kept(take.name)), *told)
     return replace(take, sound=sound_frames(len(take.recording), FPS, errors), errors=errors)

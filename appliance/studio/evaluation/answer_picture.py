@@ -1,4 +1,4 @@
-"""answer.png: the phrase, the phrase with the hand's arm pasted on, and what the body makes of it."""
+"""answer.png: the phrase, the phrase with the hand's arm pasted on, and the dancer's answer."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ COLUMNS = 7
 
 
 def draw_answer(path: Path, measurement: Measurement, joint: str, iterations: Iterations) -> Path:
-    """Three strips under each other: one sees whether more than the held joint leaves the ghost behind it.
+    """Three strips, one below the other: do more joints than the held one differ from the ghost behind them?
 
-    The ghost is what would be there without the hand: the phrase behind the pasted arm, and behind the
-    answer the same dance without a hand, since many iterations change a phrase without any hand. The instants
-    are spread evenly over the whole dance, not chosen.
+    The ghost is the dance without the hand: the phrase behind the pasted arm, and behind the answer the same
+    iterations without a hand, since many iterations change a phrase by themselves. The instants are evenly
+    spaced over the whole dance, not chosen.
     """
     rehearsal, body = measurement.rehearsal, measurement.body
     danced, turns = rehearsal.held(*iterations, measurement.hand(joint))

@@ -1,4 +1,4 @@
-"""What codes windows of poses: a network file as it plays on stage, or a checkpoint as it trained."""
+"""Coders of pose windows: a network file as it runs on stage, or a checkpoint as it was trained."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from appliance.show.network import WINDOW
 from appliance.show.show import load_show
+from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.studio_error import StudioError
 
 if TYPE_CHECKING:
@@ -21,9 +22,9 @@ Poses = NDArray[np.float32]
 
 
 class Coder(Protocol):
-    """Iterates windows; knows its joints, their rest pose (M, 4), and how it came about.
+    """Iterates windows; has joint names, their rest pose (M, 4) and facts about the network.
 
-    batch: how many windows it takes at once; more are no use.
+    batch: the most windows worth coding at once.
     """
 
     joints: tuple[str, ...]
@@ -36,14 +37,9 @@ class Coder(Protocol):
         windows: Poses,
         coding_iterations: int,
         interaction_iterations: int = 0,
-        mask: NDArray[np.bool_] | None = None,
-        targets: Poses | None = None,
-        weights: NDArray[np.float32] | None = None,
+        hold: HeldJoints[NDArray[Any]] | None = None,
     ) -> tuple[Poses, Poses]:
-        """Windows (B, 8, M, 4) -> windows after so many iterations, latents (B, Z) of the last one.
-
-        mask (M,), targets (B, 8, M, 4), weights (M,): held joints, overwritten in so many iterations.
-        """
+        """Windows (B, 8, M, 4) -> windows after the last iteration, and its latents (B, Z)."""
 
 
 class OnnxCoder:
@@ -52,7 +48,7 @@ class OnnxCoder:
     batch = 1
 
     def __init__(self, path: Path) -> None:
-        """Raises StudioError where the file is no network of ours."""
+        """Raises StudioError if bunraku did not export the file."""
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
@@ -64,7 +60,7 @@ class OnnxCoder:
             facts = self._session.get_modelmeta().custom_metadata_map
             self.joints = tuple(facts["bunraku.joints"].split(","))
             self.rest = np.array(json.loads(facts["bunraku.rest"]), dtype=np.float32)
-        except Exception as error:  # onnxruntime has a class of its own for every way to be damaged
+        except Exception as error:  # onnxruntime raises another class for each kind of damage
             raise StudioError(
                 f"{path} is not a network that bunraku exported ({str(error).splitlines()[0][:150]}). "
                 "Give a show folder, a puppet.onnx or a checkpoint.pt."
@@ -75,44 +71,34 @@ class OnnxCoder:
             "precision": facts.get("bunraku.precision", "unknown"),
         }
         joints = len(self.joints)
-        self._free: dict[str, Any] = {
-            "mask": np.zeros(joints, dtype=bool),
-            "targets": np.tile(self.rest, (WINDOW, 1, 1)),
-            "weights": np.zeros(joints, dtype=np.float32),
-        }
+        self._free: HeldJoints[NDArray[Any]] = HeldJoints(
+            np.zeros(joints, dtype=bool),
+            np.tile(self.rest, (WINDOW, 1, 1)),
+            np.zeros(joints, dtype=np.float32),
+        )
 
     def iterate(
         self,
         windows: Poses,
         coding_iterations: int,
         interaction_iterations: int = 0,
-        mask: NDArray[np.bool_] | None = None,
-        targets: Poses | None = None,
-        weights: NDArray[np.float32] | None = None,
+        hold: HeldJoints[NDArray[Any]] | None = None,
     ) -> tuple[Poses, Poses]:
-        made = []
-        for number, window in enumerate(windows):
-            held: dict[str, Any] = {}
-            if mask is not None and targets is not None and weights is not None:
-                held = {"mask": mask, "targets": targets[number], "weights": weights}
-            made.append(self.run(window, coding_iterations, interaction_iterations, **held))
-        return np.stack([poses for poses, _ in made]), np.stack([latent for _, latent in made])
-
-    def run(
-        self, window: Poses, coding_iterations: int, interaction_iterations: int = 0, **held: Any
-    ) -> tuple[Poses, Poses]:
-        """One window (8, M, 4) -> poses and latent; held: mask (M,), targets (8, M, 4), weights (M,)."""
-        counts = {
+        feed = {
+            **(self._free if hold is None else hold)._asdict(),
             "coding_iterations": np.array(coding_iterations, dtype=np.int64),
             "interaction_iterations": np.array(interaction_iterations, dtype=np.int64),
         }
-        feed = {"window": window, **self._free, **held, **counts}
-        poses, latent = self._session.run(["poses", "latent"], feed)
-        return poses, latent
+        coded = []
+        for number, window in enumerate(windows):
+            if hold is not None:
+                feed["targets"] = hold.targets[number]
+            coded.append(self._session.run(["poses", "latent"], {**feed, "window": window}))
+        return np.stack([poses for poses, _ in coded]), np.stack([latent for _, latent in coded])
 
 
 class TorchCoder:
-    """A network as it trains or as a checkpoint keeps it: many windows at once."""
+    """A network in training or from a checkpoint: many windows at once."""
 
     batch = 512
 
@@ -125,20 +111,18 @@ class TorchCoder:
         windows: Poses,
         coding_iterations: int,
         interaction_iterations: int = 0,
-        mask: NDArray[np.bool_] | None = None,
-        targets: Poses | None = None,
-        weights: NDArray[np.float32] | None = None,
+        hold: HeldJoints[NDArray[Any]] | None = None,
     ) -> tuple[Poses, Poses]:
         import torch
 
-        device = self.autoencoder.rest.device
-        held = [
-            None if values is None else torch.from_numpy(values).to(device)
-            for values in (mask, targets, weights)
-        ]
+        def tensor(values: NDArray[Any]) -> torch.Tensor:
+            return torch.from_numpy(values).to(self.autoencoder.rest.device)
+
+        held = None if hold is None else HeldJoints(*map(tensor, hold))
         with torch.no_grad():
-            given = torch.from_numpy(windows).to(device)
-            poses, latents = self.autoencoder.iterate(given, coding_iterations, interaction_iterations, *held)
+            poses, latents = self.autoencoder.iterate(
+                tensor(windows), coding_iterations, interaction_iterations, held
+            )
         return poses.cpu().numpy(), latents.cpu().numpy()
 
 
@@ -148,7 +132,7 @@ def load_checkpoint(path: Path) -> tuple[TorchCoder, dict[str, Any]]:
 
     try:
         autoencoder, joints, state = load_autoencoder(path)
-    except Exception as error:  # torch has many for a file that is none of its own
+    except Exception as error:  # torch raises many classes for a file that it did not write
         raise StudioError(
             f"{path} is not a checkpoint of bunraku train ({str(error).splitlines()[0][:150]})."
         ) from error

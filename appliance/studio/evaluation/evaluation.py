@@ -1,4 +1,4 @@
-"""How well a network knows a dance: joint angles and positions after so many iterations, its latents."""
+"""How well a network reproduces a dance: joint angles and positions after K iterations, and its latents."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Evaluation:
     def as_json(self) -> dict[str, Any]:
         """Keys degrees.{1,2,5,10}.{mean,p95,max}, centimetres.{1,10}.{mean,max}, latent.{mean,std} and more.
 
-        latent.mean and latent.std are those of all values together; mean_of_each_size averages how far each
-        dimension's own mean is from 0, std_of_each the dimensions' own standard deviations.
+        latent.mean and latent.std are over all values together; mean_of_each_size is the average distance of
+        each dimension's mean from 0, std_of_each the average of the dimensions' standard deviations.
         """
         z = self.latents.astype(np.float64)
         return {
@@ -74,9 +74,9 @@ class Evaluation:
 def load_takes(
     files: Sequence[Path], coder: Coder, true_fps: float | None = None, all_frames: bool = False
 ) -> list[Take]:
-    """Recordings as training reads them: at their true rate, T-pose dropped, glitches masked, 50 Hz.
+    """Recordings as training reads them: at their true rate, T-pose dropped, capture errors masked, 50 Hz.
 
-    Without true_fps a catalogue that knows the file says its rate, else its header.
+    Without true_fps, the rate is that of a catalogue that lists the file, else of its header.
     """
     takes = []
     for file in files:
@@ -102,7 +102,7 @@ def evaluate(
     """Every hop-th sound window of the takes through the network.
 
     Positions are those of the network's joints, the root at its recorded place, in centimetres.
-    progress(parts, count) wraps the work. Raises StudioError where joints are missing or no window is left.
+    progress(parts, count) wraps the work. Raises StudioError if joints are missing or no window is left.
     """
     degrees: dict[int, list[Figures]] = {k: [] for k in iterations}
     centimetres: dict[int, list[Figures]] = {k: [] for k in POSITION_ITERATIONS if k in iterations}
@@ -121,7 +121,7 @@ def evaluate(
         for k in iterations:
             made, found = coder.iterate(windows, k)
             if not np.isfinite(made).all():
-                raise StudioError(f"{coder.facts['file']} gives numbers that are no poses: a damaged file.")
+                raise StudioError(f"{coder.facts['file']} outputs no poses: the file is damaged.")
             degrees[k].append(np.degrees(quaternion.angle_between(made, windows)).astype(np.float32))
             if k in centimetres:
                 centimetres[k].append(_distances(take, frames, whole, places, made))
@@ -139,7 +139,7 @@ def evaluate(
 
 
 def fitting_hop(coder: Coder, takes: Sequence[Take]) -> int:
-    """1 where coding every window takes less than PATIENCE_S; 2, 4 or 8 where a network is slow."""
+    """1 if coding every window takes less than PATIENCE_S; 2, 4 or 8 for a slow network."""
     take = max(takes, key=lambda take: len(window_starts(take)))
     first = window_starts(take)[: coder.batch]
     if not len(first):
@@ -158,7 +158,7 @@ def _parts(take: Take, hop: int, batch: int) -> list[NDArray[np.intp]]:
 
 
 def _places(take: Take, coder: Coder) -> list[int]:
-    """Where the network's joints stand in the recording's skeleton."""
+    """Indices of the network's joints in the recording's skeleton."""
     try:
         return [take.recording.skeleton.index(name) for name in coder.joints]
     except UnknownJointError as error:

@@ -37,12 +37,12 @@ def findings(dataset: Dataset) -> list[str]:
 
 
 def learned_windows(dataset: Dataset) -> int:
-    """How many sound windows there are to learn from, mirror images not counted."""
+    """The number of sound training windows, without mirror images."""
     return sum(len(window_starts(take)) for take in dataset.training)
 
 
 def require_windows(dataset: Dataset, least: int) -> None:
-    """Raises DatasetError where fewer windows are left to learn from than one step of training looks at."""
+    """Raises DatasetError if fewer training windows are left than one training step uses."""
     found = learned_windows(dataset)
     if found >= least:
         return

@@ -1,6 +1,8 @@
-"""A phrase danced as in play: the box's own hands and blending around a coder, a window every tick."""
+"""A phrase danced as on stage: the box's own hands and blending around a coder, a window every tick."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +13,16 @@ from appliance.dancer.puppeteers import TAKE_S, Puppeteer
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.data.dataset import FPS, WINDOW
 from appliance.studio.evaluation.coders import Coder, Poses
 
 TICK_S = 1 / FPS
-TAKING_TICKS = round((TAKE_S + 0.5) * FPS)  # before the dance begins: the hand then has its joint for good
+TAKING_TICKS = round((TAKE_S + 0.5) * FPS)  # before the dance: the hand has then fully taken its joint
 
 
 class FollowedOrientation(Puppeteer):
-    """Holds its joint at orientations (N, 4), one a tick from time 0; before and after, the outermost."""
+    """Holds its joint at orientations (N, 4), one each tick from time 0; clamped at both ends."""
 
     def __init__(self, joint: str, orientations: Array) -> None:
         super().__init__(joint)
@@ -32,10 +35,10 @@ class FollowedOrientation(Puppeteer):
 
 
 class Rehearsal:
-    """One phrase and one coder: dances with and without a hand, from the tick on that 8 windows overlap.
+    """One phrase and one coder: dances with and without a hand, from the tick at which 8 windows overlap.
 
-    windows (T + 7, 8, M, 4): what is coded, one a tick. phrase (T, M, 4): what is danced where no network is
-    in between; recording: the same ticks with all joints.
+    windows (T + 7, 8, M, 4): what is coded, one each tick. phrase (T, M, 4): the same ticks as recorded;
+    recording: with all joints.
     """
 
     def __init__(self, coder: Coder, recording: Recording) -> None:
@@ -49,7 +52,7 @@ class Rehearsal:
         self._free: dict[int, Poses] = {}
 
     def free(self, coding_iterations: int) -> Poses:
-        """(T, M, 4): the dance without a hand; each is danced once."""
+        """(T, M, 4): the dance without a hand; computed once for each count."""
         if coding_iterations not in self._free:
             self._free[coding_iterations] = self._danced(self.windows, coding_iterations)
         return self._free[coding_iterations]
@@ -59,7 +62,7 @@ class Rehearsal:
     ) -> tuple[Poses, Poses]:
         """The dance (T, M, 4) with a hand, and where the hand was (T, 4).
 
-        part: of the windows; the hand's time begins with its first one, the dance 7 ticks later.
+        part: which windows; the hand's time begins with the first of them, the dance 7 ticks later.
         """
         windows = self.windows[part]
         hands = Hands([hand], self.coder.joints)
@@ -69,13 +72,11 @@ class Rehearsal:
             hands.pull(now, windows[row])
             targets[row] = hands.targets
             shown[row] = hand.pull(now).orientation
-        danced = self._danced(
-            windows, coding_iterations, interaction_iterations, hands.mask, targets, hands.weights
-        )
-        return danced, shown[WINDOW - 1 :]
+        hold: HeldJoints[NDArray[Any]] = HeldJoints(hands.mask, targets, hands.weights)
+        return self._danced(windows, coding_iterations, interaction_iterations, hold), shown[WINDOW - 1 :]
 
     def whole(self, danced: Poses) -> Array:
-        """(T, J, 4): a dance with the joints that the network does not move, as the phrase has them."""
+        """(T, J, 4): a dance completed with the phrase's joints that the network does not move."""
         poses = self.recording.poses[: len(danced)].copy()
         poses[:, self.places] = danced
         return poses
@@ -85,24 +86,21 @@ class Rehearsal:
         windows: Poses,
         coding_iterations: int,
         interaction_iterations: int = 0,
-        mask: NDArray[np.bool_] | None = None,
-        targets: Poses | None = None,
-        weights: NDArray[np.float32] | None = None,
+        hold: HeldJoints[NDArray[Any]] | None = None,
     ) -> Poses:
-        """Every window coded: nothing feeds back, so all of them can be coded before they are blended."""
-        made = []
+        """Code all windows, then blend them: nothing feeds back from one to the next."""
+        coded = []
         for first in range(0, len(windows), self.coder.batch):
             part = slice(first, first + self.coder.batch)
-            aims = None if targets is None else targets[part]
-            poses, _ = self.coder.iterate(
-                windows[part], coding_iterations, interaction_iterations, mask, aims, weights
+            held = None if hold is None else hold._replace(targets=hold.targets[part])
+            coded.append(
+                self.coder.iterate(windows[part], coding_iterations, interaction_iterations, held)[0]
             )
-            made.append(poses)
-        return blended(np.concatenate(made))
+        return blended(np.concatenate(coded))
 
 
 def blended(windows: Poses) -> Poses:
-    """Windows (T + 7, 8, M, 4), one a tick, as the endless motion (T, M, 4) that the box makes of them."""
+    """Windows (T + 7, 8, M, 4), one each tick, blended into motion (T, M, 4) as the box does it."""
     blending = Blending(windows.shape[2], windows.shape[1])
     danced = np.empty((len(windows), *windows.shape[2:]), dtype=np.float32)
     for tick, window in enumerate(windows):

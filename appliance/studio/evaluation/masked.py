@@ -1,4 +1,4 @@
-"""What was masked in recordings as a capture error, in stretches, and a picture that lets people judge."""
+"""Stretches of recordings that were masked as capture errors, and a picture of the worst."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TOGETHER_S = 0.1
 
 @dataclass(frozen=True)
 class MaskedStretch:
-    """Errors of one take that touch each other."""
+    """Adjacent errors of one take."""
 
     take: Take
     errors: tuple[CaptureError, ...]
@@ -35,7 +35,7 @@ class MaskedStretch:
 
     @property
     def worst(self) -> CaptureError:
-        """The longest one, of several as long the one that is furthest off."""
+        """The longest error; among equals, the one that is furthest off."""
         return max(self.errors, key=lambda error: (round(error.end_s - error.start_s, 1), error.degrees))
 
     def sentence(self) -> str:
@@ -51,7 +51,7 @@ class MaskedStretch:
 
 
 def masked_stretches(takes: Sequence[Take]) -> list[MaskedStretch]:
-    """All of them, the longest first, those that last as long by how far they are off."""
+    """All stretches, the longest first; equally long ones by how far they are off."""
     found = []
     for take in takes:
         together: list[CaptureError] = []

@@ -1,4 +1,4 @@
-"""The figures of dances on one phrase with one other take's hands."""
+"""The figures of dances on one phrase with hands from one other take."""
 
 from __future__ import annotations
 
@@ -12,21 +12,20 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import WINDOW
-from appliance.studio.evaluation import motion_figures as motion
-from appliance.studio.evaluation.body_figures import BodyFigures
+from appliance.studio.evaluation import dance_figures as figures
 from appliance.studio.evaluation.coders import Coder, Poses
 from appliance.studio.evaluation.in_play import FollowedOrientation, Rehearsal
 from appliance.studio.evaluation.nearest import Floats, Reference, without_heading
 from appliance.studio.evaluation.onset import StepAnswer, answer_to_steps
 
 TICKS = 1200
-STEP = 5  # ticks from one search for the nearest pose to the next: the means stay the same to 0.1 degrees
+STEP = 5  # ticks between searches for the nearest pose: changes the means by less than 0.1 degrees
 Iterations = tuple[int, int]  # coding, interaction
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A phrase and the recording of another take whose joints are its hands; names for people."""
+    """A phrase, the recording of another take whose joints are the hands, and their names."""
 
     phrase: Recording
     hand: Recording
@@ -45,12 +44,12 @@ class Pair:
 
 @dataclass(frozen=True)
 class Figures:
-    """Of one joint at one K/J.
+    """Figures of one joint at one K/J.
 
     answer, fit, fit_own, fit_bare, held, plausibility_degrees, largest_step: degrees. plausibility, energy,
     roughness: ratios to the phrase's own. snap: the largest step against the largest one of the recordings.
-    found: share of ticks at which the dancer ever held the joint so; fit is of those. arm_in_trunk: share of
-    ticks. foot_skate: metres a second.
+    found: share of ticks whose hand orientation occurs in the recordings; fit is over those. arm_in_trunk:
+    share of ticks. foot_skate: metres a second.
     """
 
     answer: float
@@ -70,20 +69,20 @@ class Figures:
 
 
 class Measurement:
-    """One pair: the phrase's own figures, reckoned once, and those of every dance on it."""
+    """One pair: the phrase's own figures, computed once, and those of every dance on it."""
 
     def __init__(self, coder: Coder, pair: Pair, reference: Reference) -> None:
         ticks = min(len(pair.phrase), len(pair.hand), TICKS + WINDOW - 1)
         self.pair, self.reference, self.joints = pair, reference, coder.joints
         self.rehearsal = Rehearsal(coder, pair.phrase.excerpt(0, ticks / pair.phrase.fps))
-        self.body = BodyFigures(self.rehearsal.recording)
+        self.body = figures.BodyFigures(self.rehearsal.recording)
         self.phrase = without_heading(self.rehearsal.phrase)
         self.phrase_far = reference.nearest(self.phrase[::STEP])
         self._own_fit: dict[str, Floats] = {}
         self._bare_fit: dict[tuple[str, bytes], float] = {}
 
     def hand(self, joint: str) -> Puppeteer:
-        """The puppeteer that holds a joint as the other take did."""
+        """The puppeteer that holds a joint as the other take does."""
         return FollowedOrientation(joint, self.pair.orientations(joint, self._is_root(joint)))
 
     def steps(self, joint: str, iterations: Iterations) -> StepAnswer:
@@ -109,8 +108,8 @@ class Measurement:
             fit_own=_mean(self._fit_of_phrase(joint, others)[: len(far)]),
             fit_bare=self._fit_of_pasted(joint, others, hand_turns[rows]),
             plausibility=_ratio(far.mean(), own_far.mean()),
-            energy=_ratio(motion.energy(danced[:, others]), motion.energy(phrase[:, others])),
-            roughness=_ratio(motion.roughness(danced[:, others]), motion.roughness(phrase[:, others])),
+            energy=_ratio(figures.energy(danced[:, others]), figures.energy(phrase[:, others])),
+            roughness=_ratio(figures.roughness(danced[:, others]), figures.roughness(phrase[:, others])),
             held=float(np.degrees(quaternion.angle_between(danced[:, held], hand_turns)).mean()),
             plausibility_degrees=float(far.mean()),
             found=float(np.isfinite(fit).mean()),
@@ -118,9 +117,9 @@ class Measurement:
         )
 
     def answer(self, joint: str, danced: Poses, free: Poses) -> float:
-        """Degrees that the others are moved by a hand: a dance (T, M, 4) with it against one without."""
+        """How far a hand moves the others, degrees: a dance (T, M, 4) with it against one without."""
         others = self._others(joint)
-        apart = motion.degrees_apart(without_heading(danced)[:, others], without_heading(free)[:, others])
+        apart = figures.degrees_apart(without_heading(danced)[:, others], without_heading(free)[:, others])
         return float(apart.mean())
 
     def free(self, coding_iterations: int) -> dict[str, float]:
@@ -130,25 +129,25 @@ class Measurement:
         far = self.reference.nearest(danced[::STEP])
         return {
             "plausibility": _ratio(far.mean(), self.phrase_far.mean()),
-            "energy": _ratio(motion.energy(danced), motion.energy(self.phrase)),
-            "roughness": _ratio(motion.roughness(danced), motion.roughness(self.phrase)),
-            "deviation": float(motion.degrees_apart(danced, self.phrase).mean()),
+            "energy": _ratio(figures.energy(danced), figures.energy(self.phrase)),
+            "roughness": _ratio(figures.roughness(danced), figures.roughness(self.phrase)),
+            "deviation": float(figures.degrees_apart(danced, self.phrase).mean()),
             "plausibility_degrees": float(far.mean()),
             **self._of_body(shown),
         }
 
     def of_phrase(self) -> dict[str, float]:
-        """The phrase's own figures, what the others are compared with."""
+        """The phrase's own figures, with which the others are compared."""
         return {
             "plausibility_degrees": float(self.phrase_far.mean()),
-            "energy_degrees_a_tick": motion.energy(self.phrase),
-            "roughness_degrees_a_tick2": motion.roughness(self.phrase),
+            "energy_degrees_a_tick": figures.energy(self.phrase),
+            "roughness_degrees_a_tick2": figures.roughness(self.phrase),
             **self._of_body(self.rehearsal.phrase),
         }
 
     def _of_body(self, danced: Poses) -> dict[str, float]:
         """The largest step, arms in the trunk, feet that slide."""
-        step, whole = motion.largest_step(without_heading(danced)), self.rehearsal.whole(danced)
+        step, whole = figures.largest_step(without_heading(danced)), self.rehearsal.whole(danced)
         return {
             "largest_step": step,
             "snap": _ratio(step, self.reference.largest_step),
@@ -157,14 +156,14 @@ class Measurement:
         }
 
     def _fit_of_phrase(self, joint: str, others: list[int]) -> Floats:
-        """The phrase's others against what the dancer did with that joint as the phrase has it."""
+        """The phrase's others against recorded poses that hold the joint as the phrase does."""
         if joint not in self._own_fit:
             held, phrase = self.joints.index(joint), self.phrase[::STEP]
             self._own_fit[joint] = self.reference.nearest(phrase, others, held, phrase[:, held])
         return self._own_fit[joint]
 
     def _fit_of_pasted(self, joint: str, others: list[int], hand_turns: Floats) -> float:
-        """The phrase's others against what the dancer did with that joint as the hand has it."""
+        """The phrase's others against recorded poses that hold the joint as the hand does."""
         key = joint, hand_turns.tobytes()  # the same hand comes at several iterations
         if key not in self._bare_fit:
             held, phrase = self.joints.index(joint), self.phrase[::STEP][: len(hand_turns)]
@@ -180,11 +179,11 @@ class Measurement:
 
 
 def _mean(values: Floats) -> float:
-    """Of the ticks that have a value."""
+    """Mean of the finite values."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else float("nan")
 
 
 def _ratio(value: float | np.floating[Any], own: float | np.floating[Any]) -> float:
-    """Against the phrase's own; not a number where the phrase stands still."""
+    """Ratio to the phrase's own; NaN if the phrase stands still."""
     return float(value) / float(own) if own > 0 else float("nan")

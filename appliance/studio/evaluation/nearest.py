@@ -1,4 +1,4 @@
-"""The nearest pose that a dancer ever took: how far a dance is from the recordings."""
+"""The nearest recorded pose: how far a dance is from the recordings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from appliance.pose.quaternion import Array
 from appliance.studio.data.dataset import Take
 from appliance.studio.studio_error import StudioError
 
-HOLDS_DEGREES = 15.0  # a recorded joint so close to the hand's orientation is held as the hand holds it
+HOLDS_DEGREES = 15.0  # a recorded joint this close to the hand's orientation counts as held by it
 CANDIDATES = 128
 ROWS = 128  # ticks searched at once: their scores against 35,000 poses are 18 MB
 
@@ -20,12 +20,12 @@ Floats = NDArray[np.float32]
 
 
 class Reference:
-    """Poses (N, M, 4) that a dancer took, heading removed; the search for the nearest of them.
+    """The recorded poses (N, M, 4) of a dancer, heading removed, and the search for the nearest of them.
 
     Nearest is the smallest mean joint angle. One matrix product of rotation matrices ranks all poses by the
-    sum of sin^2(angle / 2); the mean angle of the CANDIDATES best is then computed. Where it was compared
-    with the search through all angles (120 ticks of salsa_29, 34,424 poses) each tick came out the same, at a
-    fortieth of the time.
+    sum of sin^2(angle / 2); the mean angle is then computed for the CANDIDATES best. Compared with the
+    exhaustive search (120 ticks of salsa_29, 34,424 poses), every tick gave the same result in a fortieth of
+    the time.
     """
 
     def __init__(self, poses: Array, largest_step: float = float("nan")) -> None:
@@ -102,7 +102,7 @@ def without_heading(poses: Array) -> Array:
 
 
 def _largest_step(take: Take, places: Sequence[int]) -> float:
-    """Degrees, between two sound poses that follow each other."""
+    """The largest joint angle between successive sound poses, degrees."""
     level = without_heading(take.recording.poses[:, places])
     steps = np.degrees(quaternion.angle_between(level[1:], level[:-1])).max(axis=-1)
     return float(steps[take.sound[1:] & take.sound[:-1]].max(initial=0.0))

@@ -1,4 +1,4 @@
-"""A step of the hand: how far the other joints go for it, and how long until half of that is out."""
+"""The step response: how far the other joints follow a step of the hand, and after how many ticks."""
 
 from __future__ import annotations
 
@@ -9,22 +9,24 @@ import numpy as np
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.data.dataset import WINDOW
+from appliance.studio.evaluation.dance_figures import degrees_apart
 from appliance.studio.evaluation.in_play import FollowedOrientation, Rehearsal
-from appliance.studio.evaluation.motion_figures import degrees_apart
 from appliance.studio.evaluation.nearest import without_heading
 
 STEPS = 8  # evenly over the phrase
 STEP_DEGREES = 60.0
-AFTER = 24  # ticks: all windows that saw the old orientation have passed after 15
+AFTER = 24  # ticks: after 15, all windows that saw the old orientation have passed
 CODED_WINDOWS = STEPS * 3 * (WINDOW + AFTER)  # what it costs
-LEAST_DEGREES = 1.0  # others that move less between the two orientations do not answer: nothing to time
+LEAST_DEGREES = 1.0  # if the others move less, they do not answer, and there is nothing to time
 
 
 @dataclass(frozen=True)
 class StepAnswer:
-    """To several steps of a hand by STEP_DEGREES. degrees: of the others, between the hand at the one and at
-    the other orientation (mean). onset_ticks: until half of that is out (median), 0 in the tick of the step,
-    None where nothing answers."""
+    """Response to several steps of a hand by STEP_DEGREES.
+
+    degrees: how far the others move from the hand's one orientation to the other (mean). onset_ticks: ticks
+    until half of that is reached (median), 0: in the tick of the step; None if nothing answers.
+    """
 
     degrees: float
     onset_ticks: float | None
@@ -35,8 +37,8 @@ def answer_to_steps(
 ) -> StepAnswer:
     """Steps from one of the hand's orientations (N, 4) to another, spread over the phrase.
 
-    The dance with the step is compared with those in which the hand stays at the one or at the other: half of
-    the answer is out when it is nearer to the other.
+    The dance with the step is compared with two in which the hand stays at one orientation: half of the
+    answer is out when it is nearer to the dance at the new one.
     """
     room = len(rehearsal.windows) - AFTER
     begins = np.linspace(0, room - WINDOW, STEPS).astype(int) if room >= WINDOW else np.zeros(0, dtype=int)

@@ -1,4 +1,4 @@
-"""The answer of a dancer that has just been trained, on its own takes, in about a minute: for its report."""
+"""The answer of a newly trained dancer, measured on its own takes in about a minute, for its report."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from appliance.studio.evaluation.coders import Coder
 from appliance.studio.evaluation.measurement import Iterations, Measurement, Pair
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.onset import CODED_WINDOWS
-from appliance.studio.evaluation.own_takes import own_takes
-from appliance.studio.evaluation.puppetry_words import verdict
+from appliance.studio.evaluation.pairs import own_takes
+from appliance.studio.evaluation.puppetry_report import verdict
 from appliance.studio.evaluation.usual_joints import usual_joints
 from appliance.studio.studio_error import StudioError
 
 PARTS = ("left upper arm", "left forearm", "head")
 ITERATIONS: tuple[Iterations, ...] = ((2, 1), (10, 9))
 FREE = (1, 10, 30)
-BUDGET_S = 30.0  # for coding; search, grounding and picture take about as long again
+BUDGET_S = 30.0  # for coding; search, grounding and picture take about as long
 MOST_TICKS, FEWEST_TICKS = 600, 150
 SIZES = ((2, 3), (1, 3), (1, 1))  # pairs and joints: fewer for a slow network
 
 
 def own_answer(coder: Coder, dataset: Dataset, picture: Path) -> dict[str, Any]:
-    """Figures as puppetry.measure has them, and verdict, measured_on; a picture.
+    """The figures of puppetry.measure, and verdict, measured_on; draws a picture.
 
-    It never fails: where nothing can be measured, not_measured says why, and there is no picture.
+    Never fails: if nothing can be measured, not_measured gives the reason, and there is no picture.
     """
     picture.unlink(missing_ok=True)
     try:
@@ -47,7 +47,7 @@ def own_answer(coder: Coder, dataset: Dataset, picture: Path) -> dict[str, Any]:
             )
     except StudioError as error:
         return {"not_measured": str(error)}
-    size = _fitting(coder, len(takes.pairs), len(joints))
+    size = fitting_size(coder, len(takes.pairs), len(joints))
     pairs = [_beginning(pair, size.ticks) for pair in takes.pairs[: size.pairs]]
     measurements = [Measurement(coder, pair, reference) for pair in pairs]
     found = puppetry.measure(measurements, joints[: size.joints], ITERATIONS, FREE, turning=False)
@@ -57,14 +57,14 @@ def own_answer(coder: Coder, dataset: Dataset, picture: Path) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class _Size:
+class Size:
     pairs: int
     joints: int
     ticks: int
 
 
-def _fitting(coder: Coder, pairs: int, joints: int) -> _Size:
-    """As much as the network codes within the budget."""
+def fitting_size(coder: Coder, pairs: int, joints: int) -> Size:
+    """The largest measurement that the network codes within the budget."""
     affordable = BUDGET_S / _seconds_a_pass(coder)
     ticks = FEWEST_TICKS
     for most_pairs, most_joints in SIZES:
@@ -74,7 +74,7 @@ def _fitting(coder: Coder, pairs: int, joints: int) -> _Size:
         ticks = int((affordable - steps) / dances)
         if ticks >= MOST_TICKS // 2:
             break
-    return _Size(*size, min(max(ticks, FEWEST_TICKS), MOST_TICKS))
+    return Size(*size, min(max(ticks, FEWEST_TICKS), MOST_TICKS))
 
 
 def _seconds_a_pass(coder: Coder) -> float:

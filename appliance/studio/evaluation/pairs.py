@@ -1,9 +1,10 @@
-"""Phrases and hands to measure an answer with: recordings of different takes; what is left as reference."""
+"""Phrases and hands to measure an answer with: recordings of different takes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset, Take
@@ -12,14 +13,15 @@ from appliance.studio.evaluation.pictures import longest_sound
 from appliance.studio.studio_error import StudioError
 
 LONGEST_S = (TICKS + WINDOW - 1) / FPS
+HALVES_S = 12.0  # a held-out take of this length is phrase and hand; a shorter one borrows the hand
 SHORTEST_S = 3.0  # a shorter stretch says nothing: an answer is a mean over many poses
 
 
 def pair_up(phrases: Sequence[Take], hands: Sequence[Take]) -> list[Pair]:
-    """As many pairs as there are phrases or hands, whichever are more; each hand is of another take.
+    """As many pairs as there are phrases or hands, whichever are more; each hand is from another take.
 
-    Of each recording the beginning of the longest stretch without a capture error is taken. Raises
-    StudioError where no hand is of another take, or everything is too short.
+    Each recording contributes the beginning of its longest stretch without a capture error. Raises
+    StudioError if no hand is from another take, or everything is too short.
     """
     pairs: dict[tuple[str, str], Pair] = {}
     for number in range(max(len(phrases), len(hands))):
@@ -45,7 +47,7 @@ def pair_up(phrases: Sequence[Take], hands: Sequence[Take]) -> list[Pair]:
 
 
 def apart_from(dataset: Dataset, takes: Sequence[Take]) -> tuple[Take, ...]:
-    """The training takes without those that are, or were danced together with, one of these takes."""
+    """The training takes except these takes and those that were danced together with them."""
     names = {take.name for take in takes}
     known = (*dataset.training, *dataset.held_out)
     given = {take.take for take in known if take.name in names} | {take.take for take in takes}
@@ -55,3 +57,72 @@ def apart_from(dataset: Dataset, takes: Sequence[Take]) -> tuple[Take, ...]:
 def _beginning(take: Take) -> Recording:
     """The first 1,200 ticks of the longest stretch without a capture error."""
     return longest_sound(take, math.inf).excerpt(0.0, LONGEST_S)
+
+
+@dataclass(frozen=True)
+class OwnTakes:
+    """Pairs of phrase and hand, the takes of the reference, and a description."""
+
+    pairs: list[Pair]
+    reference: Sequence[Take]
+    words: str
+
+
+def own_takes(dataset: Dataset) -> OwnTakes:
+    """What a training measures its own dancer on: held-out takes, else parts of one take.
+
+    Raises StudioError if the recordings are too few or too short.
+    """
+    apart = _longest_of_each(dataset.held_out)
+    if len(apart) > 1:
+        return OwnTakes(pair_up(apart, apart), dataset.training, "on takes that it never saw")
+    if apart:
+        return _on_one_apart(apart[0], dataset)
+    return _on_thirds(_longest_of_each(dataset.training)[0])
+
+
+def _on_one_apart(apart: Take, dataset: Dataset) -> OwnTakes:
+    """A held-out take as phrase; the hand is its other half, or a training take."""
+    training = _longest_of_each(dataset.training)
+    if apart.recording.seconds >= HALVES_S:
+        phrase, hand = _part(apart, 0, 2), _part(apart, 1, 2)
+        words = f"on two halves of {apart.name}, never seen"
+        return OwnTakes(pair_up([phrase], [hand]), dataset.training, words)
+    if len(training) == 1:
+        hand, rest = (_part(training[0], number, 2) for number in range(2))
+        words = f"on {apart.name}, never seen, with the hand of {hand.name}, which it learned"
+        return OwnTakes(pair_up([apart], [hand]), [rest], words)
+    words = f"on {apart.name}, never seen, with hands of {training[0].name}"
+    return OwnTakes(pair_up([apart], training[:1]), apart_from(dataset, training[:1]), words)
+
+
+def _on_thirds(take: Take) -> OwnTakes:
+    """A single take: its beginning as phrase, its end as hand, the middle as reference."""
+    if take.recording.seconds < 3 * SHORTEST_S:
+        raise StudioError(
+            f"{take.name} is {take.recording.seconds:.0f} s long, too short to be phrase, hand and "
+            "what the dancer did besides. Record more."
+        )
+    phrase, rest, hand = (_part(take, number, 3) for number in range(3))
+    words = f"on thirds of {take.name}, which it learned: the figures flatter it, keep a take apart"
+    return OwnTakes(pair_up([phrase], [hand]), [rest], words)
+
+
+def _longest_of_each(takes: Sequence[Take]) -> list[Take]:
+    """Of several recordings of a take the one with the most sound poses; the longest take first."""
+    best: dict[str, Take] = {}
+    for take in sorted(takes, key=lambda take: int(take.sound.sum()), reverse=True):
+        best.setdefault(take.take, take)
+    return list(best.values())
+
+
+def _part(take: Take, number: int, parts: int) -> Take:
+    """Part `number` of `parts` equal parts of a take, as a take of its own."""
+    first, last = (len(take.recording) * k // parts for k in (number, number + 1))
+    return replace(
+        take,
+        name=f"{take.name}, part {number + 1} of {parts}",
+        take=f"{take.take}, part {number + 1} of {parts}",
+        recording=take.recording.excerpt(first / FPS, last / FPS),
+        sound=take.sound[first:last],
+    )

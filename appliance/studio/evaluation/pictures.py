@@ -1,4 +1,4 @@
-"""Pictures while it trains: the losses as curves, and a dance beside what the network makes of it."""
+"""Pictures of a training: losses as curves, and a dance beside its reconstruction."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def draw_losses(path: Path, history: Sequence[dict[str, Any]]) -> Path:
 
 
 def draw_reconstruction(path: Path, coder: Coder, take: Take, title: str, iterations: int = 1) -> Path:
-    """A filmstrip of a take above what the network makes of it after so many iterations."""
+    """A filmstrip of a take above its reconstruction after `iterations` iterations."""
     excerpt = longest_sound(take, STRIP_S)
     made = reconstructed(coder, excerpt, iterations)
     return draw_filmstrip(
@@ -76,7 +76,7 @@ def draw_reconstruction(path: Path, coder: Coder, take: Take, title: str, iterat
 
 
 def reconstructed(coder: Coder, recording: Recording, iterations: int) -> NDArray[np.float64]:
-    """(N, J, 4): the recording in windows of 8 side by side through the network; a last rest is left out."""
+    """(N, J, 4): the recording coded in adjacent windows of 8; an incomplete last window is left out."""
     places = [recording.skeleton.index(name) for name in coder.joints]
     count = len(recording) // WINDOW * WINDOW
     windows = recording.poses[:count, places].astype(np.float32).reshape(-1, WINDOW, len(places), 4)
@@ -87,11 +87,8 @@ def reconstructed(coder: Coder, recording: Recording, iterations: int) -> NDArra
 
 
 def longest_sound(take: Take, most_s: float) -> Recording:
-    """The longest stretch of a take without a glitch, at most most_s long, cut from its middle."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], take.sound.astype(int), [0]])))
-    starts, ends = edges[::2], edges[1::2]
-    longest = int(np.argmax(ends - starts)) if len(starts) else 0
-    first, last = (int(starts[longest]), int(ends[longest])) if len(starts) else (0, len(take.sound))
+    """The middle of a take's longest stretch without a capture error, at most most_s long."""
+    first, last = max(take.sound_runs, key=lambda run: run[1] - run[0], default=(0, len(take.sound)))
     spare = max(0, last - first - round(min(most_s * FPS, len(take.sound)))) // 2
     return take.recording.excerpt((first + spare) / FPS, (last - spare) / FPS)
 
@@ -120,7 +117,7 @@ def dressed(axes: Any) -> Any:
 
 
 def save(figure: Any, path: Path) -> Path:
-    """Write a PNG whole or not at all: somebody may be looking at the old one."""
+    """Write a PNG atomically: a viewer may have the old one open."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".partial")
     with partial.open("wb") as stream:

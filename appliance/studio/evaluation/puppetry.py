@@ -1,11 +1,11 @@
-"""Does the hand move the body? Figures of a coder that dances as in play with one joint held.
+"""Does the hand move the body? Figures of a coder that dances as on stage with one joint held.
 
-A phrase that nobody trained on, and as hand one joint's own orientation over time from another take: true
+The phrase is a held-out take; the hand is the orientation of one joint over time in another take: true
 orientations of the same dancer, unrelated to the phrase. 'Others': the moving joints that are not held. All
-angles are mean joint angles in degrees, heading removed. What the dancer ever did is the reference: the sound
-poses of the training takes without their mirror images. With those, plausibility and fit_own of three takes
-kept apart come out 0 to 0.5 degrees lower, fit_bare 0.1 to 2.2 (most where few poses hold a joint so): a
-puppet would be told that it fits where only its mirror image ever did.
+angles are mean joint angles in degrees, heading removed. The reference is all that the dancer did: the sound
+poses of the training takes, without their mirror images. With mirror images, plausibility and fit_own of
+three held-out takes come out 0 to 0.5 degrees lower, fit_bare 0.1 to 2.2 (most where few poses hold a joint
+so): a puppet would seem to fit where only its mirror image did.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ IN_PLAY: Iterations = (10, 9)  # at which the onset and turning hands are measur
 FREE = (1, 10, 30, 100)
 TURNING_TICKS = 500  # two turns of the slow hand
 TURNING = tuple((axis, seconds) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1)) for seconds in (1.0, 5.0))
-LARGEST = ("largest_step", "snap")  # of several dances the largest counts, not the mean
+LARGEST = ("largest_step", "snap")  # of several dances the maximum counts, not the mean
 
 
 def measure(
@@ -37,8 +37,8 @@ def measure(
 ) -> dict[str, Any]:
     """Keys JOINT.K_J, JOINT.turning, free.K, phrase with figures below them, JOINT.onset_ticks, .step_answer.
 
-    Means over the pairs that are measured; turning hands on the first one only. advance(words) is called
-    before each dance, as often as `dances` says.
+    Means over the pairs; turning hands on the first pair only. advance(description) is called before each
+    dance, `dances` times in all.
     """
     in_play = usual_iterations(iterations)
     found: dict[str, Any] = {}
@@ -76,17 +76,17 @@ def measure(
 def dances(
     pairs: int, joints: int, iterations: Sequence[Iterations] = ITERATIONS, free: Sequence[int] = FREE
 ) -> int:
-    """How often measure advances."""
+    """How often `measure` calls advance."""
     return joints * (pairs * len(iterations) + 1 + len(TURNING)) + len(free)
 
 
 def usual_iterations(iterations: Sequence[Iterations]) -> Iterations:
-    """Those in play where they are among these, else the most."""
+    """IN_PLAY if it is among these, else the largest."""
     return IN_PLAY if IN_PLAY in iterations else max(iterations)
 
 
 def _means(rows: Sequence[dict[str, float]]) -> dict[str, float | None]:
-    """Of each figure over the rows; the largest of what is called so; None where no row has it."""
+    """Mean of each figure over the rows, or maximum of those in LARGEST; None if no row has it."""
     merged: dict[str, float | None] = {}
     for name in rows[0]:
         values = [row[name] for row in rows if math.isfinite(row[name])]

@@ -1,4 +1,4 @@
-"""What a show says about its own dancer: report.json."""
+"""report.json: the figures of a show's own dancer."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def joint_ranges(autoencoder: Autoencoder, training: np.ndarray[Any, np.dtype[np
 
 
 def random_dance(autoencoder: Autoencoder, ranges: Tensor, seed: int = 0) -> dict[str, float]:
-    """Poses decoded from the prior's noise: how many of their joint angles lie in the recordings' range."""
+    """Poses decoded from the prior: the share of joint angles within the recordings' range."""
     noise = torch.randn(
         RANDOM_LATENTS, autoencoder.shape.latent, generator=torch.Generator().manual_seed(seed)
     )

@@ -1,4 +1,4 @@
-"""report.png: what a dancer knows and does not know, on one page for the artist."""
+"""report.png: a dancer's errors, latents and quantization on one page for the artist."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""The joints that a hand is tried on, found by their usual names on any skeleton."""
+"""Body parts by their usual joint names, on any skeleton: the joints on which hands are tried."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-# The first name of a line that the network moves is taken; case and punctuation do not count. 'LeftShoulder'
+# The first name of a line that the network moves wins; case and punctuation do not count. 'LeftShoulder'
 # is the upper arm of some skeletons and the collar bone of others, which have a 'LeftArm' as well.
 USUAL_NAMES = {
     "left upper arm": "lshldr leftarm leftupperarm upperarml lhumerus leftshoulder lshoulder",
@@ -18,7 +18,7 @@ UPPER_ARMS = ("left upper arm", "right upper arm")
 
 
 def usual_joints(joints: Sequence[str]) -> dict[str, str]:
-    """What it is ('left upper arm') and its name here, of those that the network moves."""
+    """Body part ('left upper arm') to joint name, for those that the network moves."""
     folded = {_folded(name): name for name in reversed(joints)}
     found = {
         part: next((folded[name] for name in names.split() if name in folded), None)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
-from appliance.studio.evaluation import motion_figures as motion
+from appliance.studio.evaluation import dance_figures as motion
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.evaluation.nearest import Reference, without_heading
 from appliance.studio.experiments.families import NUDGE_DEGREES, TURNS_S, Trial

@@ -67,7 +67,7 @@ FIGURES = (
 
 
 @dataclass(frozen=True)
-class Wish:
+class ExperimentOptions:
     """What was asked for; None: what is usual."""
 
     show: Path
@@ -80,59 +80,63 @@ class Wish:
     pictures: bool = True
 
 
-def run(wish: Wish) -> None:
+def run(options: ExperimentOptions) -> None:
     """Dance, measure, draw and write; what was found goes to standard output as a table."""
     console = Console(stderr=True)
-    coders = _coders(wish)
+    coders = _coders(options)
     first = next(iter(coders.values()))
-    joint = _joint(wish.joint, first)
-    takes = _takes(wish, first)
+    joint = _joint(options.joint, first)
+    takes = _takes(options, first)
     excerpts = (
-        choose(takes, first.joints) if wish.excerpts is None else named(wish.excerpts, takes, first.joints)
+        choose(takes, first.joints)
+        if options.excerpts is None
+        else named(options.excerpts, takes, first.joints)
     )
     for one in excerpts:
         console.print(f"- {one.name}: {one.take} from {one.first / FPS:.1f} s; {one.why}.", highlight=False)
     skeleton = takes[0].recording.skeleton
-    trace = usual_trace(excerpts, skeleton.index(joint)) if wish.trace is None else read_trace(wish.trace)
-    wish.out.mkdir(parents=True, exist_ok=True)
+    trace = (
+        usual_trace(excerpts, skeleton.index(joint)) if options.trace is None else read_trace(options.trace)
+    )
+    options.out.mkdir(parents=True, exist_ok=True)
     found, pictures, work = {}, dict[str, list[Path]](), len(coders) * len(excerpts)
     drawing: list[Future[Path]] = []
     with (
         ProcessPoolExecutor(mp_context=get_context("spawn")) as pool,  # a strip takes seconds
         Progress(console=console, transient=True, disable=not console.is_terminal) as bar,
     ):
-        task = bar.add_task("dancing", total=work * (len(CONDITIONS) + len(FIGURES) * wish.pictures))
+        task = bar.add_task("dancing", total=work * (len(CONDITIONS) + len(FIGURES) * options.pictures))
 
         def advance(words: str) -> None:
             bar.update(task, advance=1, description=words)
 
         for name, coder in coders.items():
-            folder = wish.out / _file_name(name)
+            folder = options.out / _file_name(name)
             trials = [Trial(coder, one, joint, trace) for one in excerpts]
             for trial in trials:
                 trial.run(advance)
                 _write_dances(trial, folder / trial.excerpt.name)
-                wanted = _pictures(trial, folder / trial.excerpt.name, name) if wish.pictures else []
+                wanted = _pictures(trial, folder / trial.excerpt.name, name) if options.pictures else []
                 drawing += [pool.submit(draw_strips, *one) for one in wanted]
                 pictures[f"{name}: {trial.excerpt.name}, {trial.excerpt.why}"] = [one[0] for one in wanted]
             found[name] = claims(trials)
         for done in as_completed(drawing):
             done.result()
             advance("drawing")
-    (wish.out / "experiments.json").write_text(
+    (options.out / "experiments.json").write_text(
         json.dumps(_report(coders, excerpts, joint, found), indent=1) + "\n"
     )
     write_page(
-        wish.out / "experiments.html",
+        options.out / "experiments.html",
         "Experiments with a puppet",
-        _words(joint, wish, first),
+        _words(joint, options, first),
         excerpts,
         found,
         pictures,
     )
     _print_verdicts(Console(), found)
     console.print(
-        f"{wish.out / 'experiments.html'} shows all of it; BVH and strips lie beside it.", highlight=False
+        f"{options.out / 'experiments.html'} shows all of it; BVH and strips lie beside it.", highlight=False
     )
 
 
@@ -168,10 +172,10 @@ def read_trace(file: Path) -> Array:
     return quaternion.continuous(quaternion.slerp(turns[later - 1], turns[later], shares))
 
 
-def _coders(wish: Wish) -> dict[str, Coder]:
+def _coders(options: ExperimentOptions) -> dict[str, Coder]:
     """The show's network first; the others move the same joints."""
     found: dict[str, Coder] = {}
-    for path in (wish.show, *wish.networks):
+    for path in (options.show, *options.networks):
         coder = open_coder(path)
         name = f"{coder.facts['architecture']}, {coder.facts['precision']}"
         found[name if name not in found else f"{name}, {path.name}"] = coder
@@ -179,7 +183,7 @@ def _coders(wish: Wish) -> dict[str, Coder]:
     for name, coder in found.items():
         if coder.joints != joints:
             raise StudioError(
-                f"{name} moves other joints than {wish.show}: networks of one dancer can be compared."
+                f"{name} moves other joints than {options.show}: networks of one dancer can be compared."
             )
     return found
 
@@ -196,13 +200,13 @@ def _joint(wanted: str | None, coder: Coder) -> str:
     return joint
 
 
-def _takes(wish: Wish, coder: Coder) -> list[Take]:
+def _takes(options: ExperimentOptions, coder: Coder) -> list[Take]:
     """Where the excerpts come from: recordings, those kept apart from training, else the show's phrase."""
-    if wish.recordings is None:
-        return load_takes([load_show(wish.show).phrase], coder)
-    if wish.excerpts is not None:
-        return load_takes(sorted(wish.recordings.glob("*.bvh")), coder)
-    dataset = load_dataset(wish.recordings)
+    if options.recordings is None:
+        return load_takes([load_show(options.show).phrase], coder)
+    if options.excerpts is not None:
+        return load_takes(sorted(options.recordings.glob("*.bvh")), coder)
+    dataset = load_dataset(options.recordings)
     return list(dataset.held_out or dataset.training)
 
 
@@ -245,8 +249,8 @@ def _report(
     }
 
 
-def _words(joint: str, wish: Wish, coder: Coder) -> list[str]:
-    trace = "of the liveliest excerpt, there and back" if wish.trace is None else wish.trace.name
+def _words(joint: str, options: ExperimentOptions, coder: Coder) -> list[str]:
+    trace = "of the liveliest excerpt, there and back" if options.trace is None else options.trace.name
     return [
         "The experiments of 'Puppeteering an AI' (section 4). Five excerpts of 200 frames at 50 Hz are "
         f"danced with 1 to 10 coding iterations and no hand; then {joint} is kept at its recorded "

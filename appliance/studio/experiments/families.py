@@ -14,8 +14,8 @@ from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS
-from appliance.studio.evaluation.body_figures import BodyFigures
 from appliance.studio.evaluation.coders import Coder, Poses
+from appliance.studio.evaluation.dance_figures import BodyFigures
 from appliance.studio.evaluation.in_play import FollowedOrientation, Rehearsal
 from appliance.studio.evaluation.measurement import Iterations
 from appliance.studio.experiments.excerpts import LEAD, Excerpt

@@ -32,9 +32,9 @@ def encode(
         basis = graph.constant("curves", encoder.time.curves.numpy())
         amounts = _reshaped(graph, graph.op("MatMul", basis, steps), 1, shape.curves * shape.pose)
         return _dense_stack(graph, layers, encoder.stack, amounts, "encoder", out, bias)
-    if isinstance(encoder, networks._ConvEncoder):
+    if isinstance(encoder, networks.ConvEncoder):
         return _conv_encoder(graph, layers, encoder, shape, window, out)
-    if isinstance(encoder, networks._LstmEncoder):
+    if isinstance(encoder, networks.LstmEncoder):
         steps = _reshaped(graph, window, shape.window, 1, shape.pose)
         last = layers.lstm(graph, steps, encoder.lstm, "encoder.lstm", "last")
         inner = layers.elu(graph, layers.linear(graph, last, encoder.dense, "encoder.dense"))
@@ -86,15 +86,15 @@ def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent:
         amounts = _reshaped(graph, amounts, shape.curves, shape.pose)
         basis = graph.constant("curves_back", decoder.time.curves.numpy().T)
         flat = graph.op("MatMul", basis, amounts)
-    elif isinstance(decoder, networks._ConvDecoder):
+    elif isinstance(decoder, networks.ConvDecoder):
         flat = _conv_decoder(graph, layers, decoder, shape, latent)
-    elif isinstance(decoder, networks._LstmDecoder):
+    elif isinstance(decoder, networks.LstmDecoder):
         held = layers.elu(graph, layers.linear(graph, latent, decoder.dense, "decoder.dense"))
         steps = layers.lstm_of_repeated(graph, held, decoder.lstm, "decoder.lstm.0", shape.window)
         steps = layers.lstm(graph, steps, decoder.lstm, "decoder.lstm", "steps", first=1)
         rows = _reshaped(graph, steps, shape.window, shape.width)
         flat = layers.linear(graph, rows, decoder.last, "decoder.last")
-    elif isinstance(decoder, networks._AutoregressiveDecoder):
+    elif isinstance(decoder, networks.AutoregressiveDecoder):
         flat = _autoregressive_decoder(graph, layers, decoder, shape, latent)
     else:
         raise TypeError(f"No ONNX form is known for the decoder {type(decoder).__name__}.")
@@ -141,7 +141,7 @@ def _dense_stack(
 
 
 def _conv_encoder(
-    graph: Graph, layers: Layers, encoder: networks._ConvEncoder, shape: Shape, window: str, out: str
+    graph: Graph, layers: Layers, encoder: networks.ConvEncoder, shape: Shape, window: str, out: str
 ) -> str:
     rows = _reshaped(graph, window, shape.window, shape.pose)
     x = layers.elu(graph, EXACT.conv_as_matmul(graph, rows, encoder.first, "encoder.first", shape.window))
@@ -153,7 +153,7 @@ def _conv_encoder(
 
 
 def _conv_decoder(
-    graph: Graph, layers: Layers, decoder: networks._ConvDecoder, shape: Shape, latent: str
+    graph: Graph, layers: Layers, decoder: networks.ConvDecoder, shape: Shape, latent: str
 ) -> str:
     x = layers.elu(graph, layers.linear(graph, latent, decoder.first, "decoder.first"))
     rows = graph.op("Transpose", _reshaped(graph, x, shape.width, shape.window), perm=[1, 0])
@@ -163,7 +163,7 @@ def _conv_decoder(
 
 
 def _autoregressive_decoder(
-    graph: Graph, layers: Layers, decoder: networks._AutoregressiveDecoder, shape: Shape, latent: str
+    graph: Graph, layers: Layers, decoder: networks.AutoregressiveDecoder, shape: Shape, latent: str
 ) -> str:
     """The steps stand one after the other: a Loop inside the Loop would not prepack its weights."""
     state = graph.op("Tanh", layers.linear(graph, latent, decoder.state, "decoder.state"))

@@ -1,4 +1,4 @@
-"""The quantization gate: int8 ships only where nobody would see the difference to fp32."""
+"""The quantization gate: int8 ships only if its difference to fp32 cannot be seen."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.data.dataset import WINDOW, Take, window_starts
 from appliance.studio.evaluation.coders import Coder, Poses
 
-# Coding and interaction iterations; with a hand, each joint is held in its share of the windows.
+# Coding and interaction iterations; with a hand, each joint is held in an equal share of the windows.
 PASSES = {"1": (1, 0), "10": (10, 0), "10/9": (10, 9)}
 LIMITS_DEGREES = {"1": 0.25, "10": 1.5, "10/9": 1.5}  # mean between int8 and fp32 after them
 SAMPLE = 256  # windows, evenly spread over the takes
@@ -21,7 +22,7 @@ SAMPLE = 256  # windows, evenly spread over the takes
 
 @dataclass(frozen=True)
 class Verdict:
-    """Mean and largest difference of int8 to fp32 in degrees, by iterations, and what follows from it."""
+    """Mean and largest difference of int8 to fp32 in degrees, by iterations."""
 
     mean: dict[str, float]
     largest: dict[str, float]
@@ -61,20 +62,20 @@ def judge(fp32: Coder, int8: Coder, windows: Poses) -> Verdict:
 
 
 def _answers(coder: Coder, windows: Poses, coding: int, interaction: int) -> Poses:
-    """Windows (N, 8, M, 4) coded; in the interactive passes each holds one joint as another window has it."""
+    """Windows (N, 8, M, 4) coded; interactive passes hold one joint of each as in another window."""
     if not interaction:
         return coder.iterate(windows, coding)[0]
     made, joints = np.empty_like(windows), windows.shape[2]
     hands = np.roll(windows, len(windows) // 2, axis=0)
     for joint in range(min(joints, len(windows))):
         rows, mask = slice(joint, None, joints), np.arange(joints) == joint
-        held = mask, hands[rows], mask.astype(np.float32)
-        made[rows] = coder.iterate(windows[rows], coding, interaction, *held)[0]
+        hold = HeldJoints(mask, hands[rows], mask.astype(np.float32))
+        made[rows] = coder.iterate(windows[rows], coding, interaction, hold)[0]
     return made
 
 
 def sample_windows(takes: Sequence[Take], places: Sequence[int], count: int = SAMPLE) -> Poses:
-    """(N, 8, M, 4): windows of joints at `places`, spread evenly over the takes; all where there are few."""
+    """(N, 8, M, 4): windows of joints at `places`, spread evenly over the takes, `count` at most."""
     starts = [(take, start) for take in takes for start in window_starts(take)]
     chosen = np.linspace(0, len(starts) - 1, min(count, len(starts))).round().astype(int)
     poses: list[NDArray[np.float32]] = []
@@ -85,7 +86,7 @@ def sample_windows(takes: Sequence[Take], places: Sequence[int], count: int = SA
 
 
 def median_ms(coder: Coder, window: Poses, iterations: int = 10, runs: int = 40) -> float:
-    """Median cost of so many iterations on one window (8, M, 4), back to back, in milliseconds."""
+    """Median cost of coding one window (8, M, 4), in milliseconds."""
     costs = []
     for _ in range(runs + 5):
         began = time.perf_counter()

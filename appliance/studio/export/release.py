@@ -1,25 +1,28 @@
-"""From a checkpoint to a show: export, the gate, the report, and everything that a bundle needs."""
+"""From a checkpoint to a show: export, quantization gate, report, and everything else in a bundle."""
 
 from __future__ import annotations
 
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.studio.data.dataset import Catalogue, Dataset, Take, find_catalogue, load_take
+from appliance.studio.data.dataset import Dataset, Take, find_catalogue, load_take
+from appliance.studio.data.sources import Sources
 from appliance.studio.evaluation.coders import OnnxCoder, Poses, TorchCoder, load_checkpoint
 from appliance.studio.evaluation.evaluation import evaluate, fitting_hop
 from appliance.studio.evaluation.own_answer import own_answer
 from appliance.studio.evaluation.pictures import longest_sound
+from appliance.studio.evaluation.puppetry_report import print_answer
 from appliance.studio.evaluation.report import write_up
 from appliance.studio.evaluation.report_picture import draw_report
 from appliance.studio.export import packing
@@ -30,36 +33,30 @@ from appliance.studio.studio_error import StudioError
 EQUALITY = 1e-4  # in any component of any quaternion after 10 iterations
 EQUALITY_WINDOWS = 16
 PHRASE_S = 60.0
-SHORT_PHRASE_S = 20.0  # rather something longer that was learned
-HANGING_DEGREES = 80.0  # below the level: a hanging arm does not touch the hip
-FIRST_HANDS = (
-    "lshldr",
-    "leftshoulder",
-    "leftarm",
-    "leftupperarm",
-    "lforearm",
-    "leftforearm",
-    "lhand",
-    "lefthand",
-)
+SHORT_PHRASE_S = 20.0  # a held-out excerpt shorter than this gives way to a longer one from training
+HANGING_DEGREES = 80.0  # below horizontal: a hanging arm does not touch the hip
+FIRST_HANDS = "lshldr leftshoulder leftarm leftupperarm lforearm leftforearm lhand lefthand"
 
 
 @dataclass(frozen=True)
 class Request:
-    """What to make a show of. phrase: a BVH file, or None for the bundle's own or an excerpt of a take."""
+    """What to make a show of. name '': the folder's; phrase None: the bundle's own, or an excerpt."""
 
     checkpoint: Path
-    recordings: Path
+    source: Sources
     out: Path
-    name: str
+    name: str = ""
     phrase: Path | None = None
 
 
-def release(
-    request: Request, dataset: Dataset, catalogue: Catalogue, say: Callable[[str], None]
-) -> dict[str, Any]:
-    """Write the whole bundle and return its report. Raises StudioError where export and training differ."""
+def release(request: Request, dataset: Dataset, console: Console) -> dict[str, Any]:
+    """Write the whole bundle and return its report. Raises StudioError if export and training differ."""
+
+    def say(message: str) -> None:
+        console.print(message, highlight=False)
+
     coder, state = load_checkpoint(request.checkpoint)
+    name = request.name or request.out.resolve().name
     missing = [name for name in coder.joints if name not in dataset.skeleton.names]
     if missing:
         raise StudioError(
@@ -70,7 +67,7 @@ def release(
     judged_on = dataset.held_out or dataset.training
     request.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".export-", dir=request.out) as folder:
-        files = _export_both(coder, state, Path(folder))
+        files = _export_both(coder, state["settings"]["network"], Path(folder))
         coders = {precision: OnnxCoder(file) for precision, file in files.items()}
         windows = sample_windows(judged_on, places)
         difference = _difference(coder, coders["fp32"], windows)
@@ -84,44 +81,39 @@ def release(
     report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
     say("Measuring whether the body answers a hand.")
     report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png")
-    _write_texts(request, coder, dataset, catalogue, report, say)
-    shown = max(judged_on, key=lambda take: len(longest_sound(take, PHRASE_S)))
-    draw_report(request.out / "report.png", request.name, report, evaluation, coder, shown)
-    packing.seal(request.out)
-    return report
-
-
-def _write_texts(
-    request: Request,
-    coder: TorchCoder,
-    dataset: Dataset,
-    catalogue: Catalogue,
-    report: dict[str, Any],
-    say: Callable[[str], None],
-) -> None:
-    """Everything but network and picture: skeleton, phrase, show.yaml, report.json."""
     packing.write_skeleton(request.out, dataset.skeleton, dataset.still_pose())
-    phrase = _phrase(request, dataset, catalogue, say)
-    if phrase is not None:
+    if request.phrase is not None:
+        packing.write_phrase(request.out, _given_phrase(request.phrase, request.source, dataset))
+    elif not (request.out / "phrase.bvh").exists():
+        phrase, take = _excerpt(dataset)
         packing.write_phrase(request.out, phrase)
+        say(
+            f"phrase.bvh is {phrase.seconds:.0f} s of the recording {take}: the bundle contains a recording. "
+            "Give your own with --phrase, or replace the file and run bunraku export again."
+        )
     hand: dict[str, Any] = {"sensor": "left-wrist", "joint": first_hand(coder.joints)}
     hanging = hanging_orientation(dataset.skeleton, hand["joint"])
     if hanging is not None:
         hand["at_neutral"] = hanging
-    packing.write_show_yaml(request.out, request.name, [hand], catalogue.acknowledgement)
+    packing.write_show_yaml(request.out, name, [hand], request.source.catalogue.acknowledgement)
     (request.out / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    shown = _longest_sound_take(judged_on)
+    draw_report(request.out / "report.png", name, report, evaluation, coder, shown)
+    packing.seal(request.out)
+    print_answer(console, report["puppetry"])
+    return report
 
 
 def first_hand(joints: tuple[str, ...]) -> str:
-    """The joint that a new show gives to its sensor: the left upper arm where it is named so."""
+    """The joint that a new show assigns to its sensor: the left upper arm, if its name is known."""
     folded = {name.casefold().replace("_", ""): name for name in joints}
-    return next((folded[name] for name in FIRST_HANDS if name in folded), joints[-1])
+    return next((folded[name] for name in FIRST_HANDS.split() if name in folded), joints[-1])
 
 
 def hanging_orientation(skeleton: Skeleton, joint: str) -> list[float] | None:
     """Local orientation (w, x, y, z) of an arm that hangs while the dancer stands still.
 
-    None for a joint whose bone does not lie level in the rest pose: only arms of a T-pose are lowered.
+    None for a joint whose bone is not horizontal in the rest pose: only arms of a T-pose are lowered.
     """
     place = skeleton.index(joint)
     bones = [
@@ -135,16 +127,11 @@ def hanging_orientation(skeleton: Skeleton, joint: str) -> list[float] | None:
     return [round(float(part), 3) for part in down]
 
 
-def _export_both(coder: TorchCoder, state: dict[str, Any], folder: Path) -> dict[str, Path]:
+def _export_both(coder: TorchCoder, architecture: str, folder: Path) -> dict[str, Path]:
     files = {precision: folder / f"{precision}.onnx" for precision in ("fp32", "int8")}
     for precision, file in files.items():
-        export(
-            coder.autoencoder,
-            list(coder.joints),
-            file,
-            int8=precision == "int8",
-            architecture=state["settings"]["network"],
-        )
+        int8 = precision == "int8"
+        export(coder.autoencoder, list(coder.joints), file, int8=int8, architecture=architecture)
     return files
 
 
@@ -152,44 +139,40 @@ def _difference(coder: TorchCoder, exported: OnnxCoder, windows: Poses) -> float
     """Largest difference of a component after 10 iterations; raises StudioError above EQUALITY."""
     few = windows[np.linspace(0, len(windows) - 1, min(EQUALITY_WINDOWS, len(windows))).astype(int)]
     if not len(few):
-        raise StudioError("No window of 8 sound poses is in the recordings: nothing to check the export on.")
+        raise StudioError(
+            "The recordings have no window of 8 sound poses on which the export could be checked."
+        )
     trained, played = coder.iterate(few, 10)[0], exported.iterate(few, 10)[0]
     difference = float(np.abs(quaternion.aligned(played, trained) - trained).max())
     if not difference <= EQUALITY:
         raise StudioError(
             f"The exported network differs from the trained one by {difference:.1g} after 10 iterations "
-            f"(at most {EQUALITY:g} is let pass). No show was made. This is a fault of the export: report it."
+            f"(limit: {EQUALITY:g}). No show was written. This is a bug in the export: report it."
         )
     return difference
 
 
-def _phrase(
-    request: Request, dataset: Dataset, catalogue: Catalogue, say: Callable[[str], None]
-) -> Recording | None:
-    """The phrase to write; None where the bundle keeps its own."""
-    if request.phrase is not None:
-        beside = request.phrase.resolve().parent == request.recordings.resolve()
-        known = catalogue if beside else find_catalogue(request.phrase.parent, [request.phrase])
-        found = load_take(request.phrase, known).recording
-        if not found.skeleton.same_joints(dataset.skeleton):
-            raise StudioError(
-                f"{request.phrase} has another skeleton than the recordings. Give a phrase of theirs."
-            )
-        return found
-    if (request.out / "phrase.bvh").exists():
-        return None
-    longest = _longest(dataset.held_out or dataset.training)
-    phrase = longest_sound(longest, PHRASE_S)
-    if phrase.seconds < SHORT_PHRASE_S:
-        longest = _longest(dataset.takes)
-        phrase = longest_sound(longest, PHRASE_S)
-    say(
-        f"phrase.bvh is {phrase.seconds:.0f} s of the recording {longest.name}: the bundle contains a "
-        "recording. Give your own with --phrase, or replace the file and run bunraku export again."
-    )
+def _given_phrase(file: Path, source: Sources, dataset: Dataset) -> Recording:
+    """The phrase in a BVH file. Raises StudioError if its skeleton is not the recordings'."""
+    beside = file.resolve().parent == source.recordings.resolve()
+    phrase = load_take(file, source.catalogue if beside else find_catalogue(file.parent, [file])).recording
+    if not phrase.skeleton.same_joints(dataset.skeleton):
+        raise StudioError(
+            f"{file} does not have the skeleton of the recordings. Give a phrase with the same skeleton."
+        )
     return phrase
 
 
-def _longest(takes: Sequence[Take]) -> Take:
+def _excerpt(dataset: Dataset) -> tuple[Recording, str]:
+    """A phrase cut from a held-out take, or from any take if those are short; and the take's name."""
+    for takes in (dataset.held_out or dataset.training, dataset.takes):
+        take = _longest_sound_take(takes)
+        phrase = longest_sound(take, PHRASE_S)
+        if phrase.seconds >= SHORT_PHRASE_S:
+            break
+    return phrase, take.name
+
+
+def _longest_sound_take(takes: Sequence[Take]) -> Take:
     """The take with the longest stretch without a capture error."""
     return max(takes, key=lambda take: len(longest_sound(take, PHRASE_S)))

@@ -22,15 +22,15 @@ from appliance.studio.evaluation.coders import Poses
 from appliance.studio.export.packing import PHRASE_DIGITS
 from appliance.studio.granular import latent_paths
 from appliance.studio.granular.granular import cycle, decoded, encoded, fed_back, once
-from appliance.studio.improviser.footing import stand
+from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.phrase import verdict
 from appliance.studio.studio_error import StudioError
-from appliance.studio.train_command import reading
+from appliance.studio.train_command import reading_progress
 
 
 @dataclass(frozen=True)
-class Wish:
+class GranularOptions:
     """The command line of bunraku granular. one, other: 'TAKE' or 'TAKE@SECONDS'."""
 
     checkpoint: Path
@@ -49,66 +49,76 @@ class Wish:
     feedback: float | None = None
 
 
-def run(wish: Wish) -> None:
+def run(options: GranularOptions) -> None:
     """Walk, decode, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
-    autoencoder, joints, state = load_autoencoder(wish.checkpoint)
-    dataset = sources.remembered(state, wish.recordings, wish.checkpoint).load(reading(console))
+    autoencoder, joints, state = load_autoencoder(options.checkpoint)
+    dataset = sources.remembered(state, options.recordings, options.checkpoint).load(
+        reading_progress(console)
+    )
     if list(dataset.moving_names) != joints:
         raise StudioError(
-            f"{wish.checkpoint} moves {', '.join(joints)}, the recordings {', '.join(dataset.moving_names)}. "
-            "Give the recordings that it was trained on."
+            f"{options.checkpoint} moves {', '.join(joints)}; the recordings move "
+            f"{', '.join(dataset.moving_names)}. Give the recordings that it was trained on."
         )
-    if wish.hop > autoencoder.shape.window:
+    if options.hop > autoencoder.shape.window:
+        most = autoencoder.shape.window
         raise StudioError(
-            f"--hop {wish.hop} leaves gaps between windows of {autoencoder.shape.window} poses. Take at most "
-            "that."
+            f"--hop {options.hop} leaves gaps between windows of {most} poses. Take at most {most}."
         )
-    poses = _poses(wish, autoencoder, dataset)
-    phrase = stand(_whole(poses, dataset))
+    poses = _poses(options, autoencoder, dataset)
+    phrase = plant_feet(_whole(poses, dataset))
     natural = measure(phrase, Yardstick.of(dataset.training, dataset.moving))
-    wish.out.parent.mkdir(parents=True, exist_ok=True)
-    write_bvh(wish.out, phrase, digits=PHRASE_DIGITS)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    write_bvh(options.out, phrase, digits=PHRASE_DIGITS)
     told: dict[str, Any] = {
-        "wish": {
-            name: str(value) if isinstance(value, Path) else value for name, value in asdict(wish).items()
+        "options": {
+            name: str(value) if isinstance(value, Path) else value for name, value in asdict(options).items()
         },
         "naturalness": natural.as_json(),
     }
-    wish.out.with_suffix(".json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    title = f"{wish.out.stem}: {_words(wish)}"
-    picture = wish.out.with_suffix(".png")
+    options.out.with_suffix(".json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    title = f"{options.out.stem}: {_words(options)}"
+    picture = options.out.with_suffix(".png")
     draw_filmstrip(picture, phrase.skeleton, phrase.poses, phrase.roots, FPS, title=title, rows=2)
-    console.print(f"{wish.out}: {verdict(natural)}", highlight=False, soft_wrap=True)
+    console.print(f"{options.out}: {verdict(natural)}", highlight=False, soft_wrap=True)
 
 
-def _poses(wish: Wish, autoencoder: Autoencoder, dataset: Dataset) -> Poses:
+def _poses(options: GranularOptions, autoencoder: Autoencoder, dataset: Dataset) -> Poses:
     """(T, M, 4) of the moving joints."""
-    count, latent = max(2, round(wish.seconds * FPS / wish.hop)), autoencoder.shape.latent
-    if wish.feedback is not None:
-        return fed_back(autoencoder, _windows(wish, autoencoder, dataset, wish.one, 1), wish.feedback)
-    if wish.one is not None:
+    count, latent = max(2, round(options.seconds * FPS / options.hop)), autoencoder.shape.latent
+    if options.feedback is not None:
+        return fed_back(
+            autoencoder, _windows(options, autoencoder, dataset, options.one, 1), options.feedback
+        )
+    if options.one is not None:
         windows = [
-            _windows(wish, autoencoder, dataset, each, wish.hop)
-            for each in (wish.one, wish.other or wish.one)
+            _windows(options, autoencoder, dataset, each, options.hop)
+            for each in (options.one, options.other or options.one)
         ]
         shortest = min(map(len, windows))
         (one, facing), (other, _) = (encoded(autoencoder, each[:shortest]) for each in windows)
-        path = latent_paths.between(one, other, wish.mix if wish.other else 0.0, wish.offset, wish.seed)
-        return once(decoded(autoencoder, path, facing), wish.hop)
-    if wish.samples:
-        path = latent_paths.sampled(count, latent, wish.spread, wish.seed)
+        path = latent_paths.between(
+            one, other, options.mix if options.other else 0.0, options.offset, options.seed
+        )
+        return once(decoded(autoencoder, path, facing), options.hop)
+    if options.samples:
+        path = latent_paths.sampled(count, latent, options.spread, options.seed)
     else:
-        path = latent_paths.walked(count, latent, wish.spread, wish.speed * wish.seconds, wish.seed)
-    return cycle(decoded(autoencoder, path), wish.hop)
+        path = latent_paths.walked(
+            count, latent, options.spread, options.speed * options.seconds, options.seed
+        )
+    return cycle(decoded(autoencoder, path), options.hop)
 
 
-def _windows(wish: Wish, autoencoder: Autoencoder, dataset: Dataset, where: str | None, hop: int) -> Poses:
+def _windows(
+    options: GranularOptions, autoencoder: Autoencoder, dataset: Dataset, where: str | None, hop: int
+) -> Poses:
     """Windows (W, T, M, 4) of a take from a second on, `hop` ticks apart, as long as the phrase is to be."""
     take, first = _found(dataset, where)
     poses = quaternion.continuous(take.recording.poses[first:, dataset.moving]).astype(np.float32)
     length = autoencoder.shape.window
-    starts = np.arange(0, min(len(poses) - length + 1, round(wish.seconds * FPS)), hop)
+    starts = np.arange(0, min(len(poses) - length + 1, round(options.seconds * FPS)), hop)
     if len(starts) < 2:
         raise StudioError(
             f"{take.name} has no window of {length} poses from {first / FPS:.1f} s on. Begin earlier."
@@ -147,11 +157,11 @@ def _height(dataset: Dataset) -> float:
     return float(np.mean([take.recording.roots[:, 1].mean() for take in dataset.training]))
 
 
-def _words(wish: Wish) -> str:
-    if wish.feedback is not None:
-        return f"on its own motion, {wish.feedback:.0%} of the phrase mixed in"
-    if wish.one is not None:
-        mixed = f", {wish.mix:.0%} of {wish.other}" if wish.other else ""
-        return f"{wish.one}{mixed}, offset {wish.offset:g}"
-    kind = "samples" if wish.samples else f"a walk at {wish.speed:g} Hz"
-    return f"{kind}, spread {wish.spread:g}, seed {wish.seed}"
+def _words(options: GranularOptions) -> str:
+    if options.feedback is not None:
+        return f"on its own motion, {options.feedback:.0%} of the phrase mixed in"
+    if options.one is not None:
+        mixed = f", {options.mix:.0%} of {options.other}" if options.other else ""
+        return f"{options.one}{mixed}, offset {options.offset:g}"
+    kind = "samples" if options.samples else f"a walk at {options.speed:g} Hz"
+    return f"{kind}, spread {options.spread:g}, seed {options.seed}"

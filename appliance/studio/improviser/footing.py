@@ -1,4 +1,4 @@
-"""Footing: the legs and the root of a generated, endless phrase made to stand where a foot is planted."""
+"""Footing: adjusts legs and root of a generated, endless phrase so that planted feet stand still."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from appliance.pose.skeleton import Skeleton
 from appliance.studio.autoencoder import rotation
 
 LOW_M = 0.04  # a point of the sole higher than this is in the air
-SLOW_M_S = 0.35  # a point of that speed is half planted
-SMOOTH_FRAMES = 9  # of the changes to the legs: no change is quicker than a step
+SLOW_M_S = 0.35  # a point at this speed is half planted
+SMOOTH_FRAMES = 9  # smoothing of the changes to the legs: none is quicker than a step
 ROOT_SMOOTH_FRAMES = 15
 HEIGHT_SMOOTH_FRAMES = 7
 STILL = 1e-3  # a joint whose quaternion changes less in the whole phrase takes no part
@@ -27,7 +27,7 @@ STILL = 1e-3  # a joint whose quaternion changes less in the whole phrase takes 
 
 @dataclass(frozen=True)
 class _Scales:
-    """How much of each it takes to weigh one in the loss."""
+    """How much of each counts 1 in the loss."""
 
     slide_m_s: float = 0.06
     off_floor_m: float = 0.01
@@ -36,7 +36,7 @@ class _Scales:
     shift_m: float = 0.05
 
 
-def stand(phrase: Recording, iterations: int = 250) -> Recording:
+def plant_feet(phrase: Recording, iterations: int = 250) -> Recording:
     """A cyclic phrase with planted feet held and nothing below the floor (at height 0).
 
     First the root: its height from the lowest sole, its speed against the slide of what carries it; then legs
@@ -48,7 +48,7 @@ def stand(phrase: Recording, iterations: int = 250) -> Recording:
 
 
 def planted(points: Array, rest: Array, fps: float) -> Array:
-    """How much each point of the soles (N, S) carries, 0..1, by its height and its speed in a cycle.
+    """How firmly each point of the soles (N, S) is planted, 0..1, by its height and speed in a cycle.
 
     points (N, S, 3) metres; rest (S,): its height when planted.
     """
@@ -59,7 +59,7 @@ def planted(points: Array, rest: Array, fps: float) -> Array:
 
 
 def smoothed(values: Array, frames: int) -> Array:
-    """Hann-weighted mean over so many frames of a cycle, along the first axis."""
+    """Hann-weighted mean over `frames` frames of a cycle, along the first axis."""
     weights = np.hanning(frames + 2)[1:-1]
     weights /= weights.sum()
     shifts = range(-(frames // 2), frames - frames // 2)
@@ -79,7 +79,7 @@ def _grounded(phrase: Recording) -> Recording:
 
 
 def _carried(phrase: Recording) -> Recording:
-    """The root's way changed so that the points that carry slide less; it still ends where it began."""
+    """The root's path changed so that planted points slide less; it still ends where it began."""
     points = sole_positions(phrase.skeleton, phrase.poses, phrase.roots)
     rest = np.percentile(points[..., 1], PLANTED_PERCENTILE, axis=0)
     weight = planted(points, rest, phrase.fps)[..., None]
@@ -102,7 +102,7 @@ class _Legs(torch.nn.Module):
         moving = (np.abs(poses - still_pose).max(axis=(0, 2)) > STILL).nonzero()[0]
         joints = len(skeleton)
         points = [point for foot in soles_of(skeleton) for point in foot]
-        above = {joint for foot in skeleton.feet for joint in _way_up(skeleton, foot)}
+        above = {joint for foot in skeleton.feet for joint in skeleton.ancestors(foot)}
         self.turned = sorted({0} | (above & set(moving.tolist())))
         ends = [point - joints for point in points if point >= joints]
         longer = Skeleton(
@@ -127,14 +127,6 @@ class _Legs(torch.nn.Module):
         whole[:, self.rows] = pose
         positions: Tensor = self.body(whole)
         return positions[:, self.tips] + root[:, None]
-
-
-def _way_up(skeleton: Skeleton, joint: int) -> list[int]:
-    """A joint and those above it up to the root."""
-    way = [joint]
-    while skeleton.parents[way[-1]] >= 0:
-        way.append(skeleton.parents[way[-1]])
-    return way
 
 
 def _settled(phrase: Recording, iterations: int) -> Recording:

@@ -1,4 +1,4 @@
-"""From a pose autoencoder and recordings to an improviser, and from it to a phrase, as people see it."""
+"""`bunraku improvise`: trains an improviser on recordings and writes a phrase that it danced."""
 
 from __future__ import annotations
 
@@ -25,18 +25,17 @@ from appliance.studio.improviser.improviser_training import (
     ImproviserReport,
     ImproviserSettings,
     ImproviserTraining,
-    save_improviser,
 )
 from appliance.studio.improviser.moves import BEFORE, MOVE
 from appliance.studio.improviser.naturalness import Naturalness
-from appliance.studio.improviser.phrase import PhraseWish, make_phrase, verdict
+from appliance.studio.improviser.phrase import PhraseOptions, make_phrase, verdict
 from appliance.studio.improviser.steps import ROOT, Steps, steps_of_takes
 from appliance.studio.studio_error import StudioError
-from appliance.studio.train_command import reading
+from appliance.studio.train_command import reading_progress
 
 
 @dataclass(frozen=True)
-class Wish:
+class ImproviseOptions:
     """The command line of bunraku improvise."""
 
     checkpoint: Path
@@ -45,91 +44,101 @@ class Wish:
     minutes: float = 12.0
     steps: int = 0
     threads: int = 0
-    phrase: PhraseWish = field(default_factory=PhraseWish)
+    phrase: PhraseOptions = field(default_factory=PhraseOptions)
 
 
-def run(wish: Wish) -> bool:
-    """Train, improvise, write the phrase. False when it was stopped before its end; raises StudioError."""
+def run(options: ImproviseOptions) -> bool:
+    """Train, improvise, write the phrase. False if stopped before the end; raises StudioError."""
     console = Console(stderr=True)
-    if wish.threads:
-        torch.set_num_threads(wish.threads)
-    autoencoder, joints, state = load_autoencoder(wish.checkpoint)
-    dataset = sources.remembered(state, wish.recordings, wish.checkpoint).load(reading(console))
+    if options.threads:
+        torch.set_num_threads(options.threads)
+    autoencoder, joints, state = load_autoencoder(options.checkpoint)
+    dataset = sources.remembered(state, options.recordings, options.checkpoint).load(
+        reading_progress(console)
+    )
     if list(dataset.moving_names) != joints:
         raise StudioError(
-            f"{wish.checkpoint} moves {', '.join(joints)}, the recordings {', '.join(dataset.moving_names)}. "
-            "Improvise with the recordings that the checkpoint was trained on."
+            f"{options.checkpoint} moves {', '.join(joints)}; the recordings move "
+            f"{', '.join(dataset.moving_names)}. Give the recordings that the checkpoint was trained on."
         )
-    heard = steps_of_takes(autoencoder, dataset.training, dataset.moving, BEFORE + MOVE)
-    kept_apart = steps_of_takes(autoencoder, dataset.held_out, dataset.moving, BEFORE + MOVE)
-    training = _training(wish, autoencoder, heard, kept_apart, console)
-    if not _train(training, improviser_file(wish.out), console):
+    steps = steps_of_takes(autoencoder, dataset.training, dataset.moving, BEFORE + MOVE)
+    held_out = steps_of_takes(autoencoder, dataset.held_out, dataset.moving, BEFORE + MOVE)
+    training = _training(options, autoencoder, steps, held_out, console)
+    if not _train(training, improviser_file(options.out), console):
         return False
 
-    def say(words: str) -> None:
-        console.print(words, highlight=False, soft_wrap=True)
+    def say(message: str) -> None:
+        console.print(message, highlight=False, soft_wrap=True)
 
-    phrase, natural = make_phrase(autoencoder, training.averaged, dataset, heard, wish.phrase, say)
-    write(wish, phrase, natural, dataset, training)
-    say(f"{wish.out}: {verdict(natural)}")
+    phrase, natural = make_phrase(autoencoder, training.averaged, dataset, steps, options.phrase, say)
+    write_phrase(options, phrase, natural, dataset, training)
+    say(f"{options.out}: {verdict(natural)}")
     return True
 
 
 def improviser_file(out: Path) -> Path:
-    """Where the improviser of a phrase is kept."""
+    """Where the improviser of a phrase is stored."""
     return out.with_suffix(".improviser.pt")
 
 
-def write(
-    wish: Wish, phrase: Recording, natural: Naturalness, dataset: Dataset, training: ImproviserTraining
+def write_phrase(
+    options: ImproviseOptions,
+    phrase: Recording,
+    natural: Naturalness,
+    dataset: Dataset,
+    training: ImproviserTraining,
 ) -> None:
     """The phrase, its report (JSON) and a picture of it."""
-    wish.out.parent.mkdir(parents=True, exist_ok=True)
-    write_bvh(wish.out, phrase, digits=PHRASE_DIGITS)
-    told: dict[str, Any] = {
-        "phrase": asdict(wish.phrase),
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    write_bvh(options.out, phrase, digits=PHRASE_DIGITS)
+    report: dict[str, Any] = {
+        "phrase": asdict(options.phrase),
         "improviser": {"settings": asdict(training.settings), "steps": training.step},
         "learned_from": [take.name for take in dataset.training if take.sound.any()],
         "naturalness": natural.as_json(),
     }
-    wish.out.with_suffix(".json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    title = f"{wish.out.stem}: {phrase.seconds:.0f} s, seed {wish.phrase.seed}"
-    picture = wish.out.with_suffix(".png")
+    options.out.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    title = f"{options.out.stem}: {phrase.seconds:.0f} s, seed {options.phrase.seed}"
+    picture = options.out.with_suffix(".png")
     draw_filmstrip(picture, phrase.skeleton, phrase.poses, phrase.roots, phrase.fps, title=title, rows=3)
 
 
 def _training(
-    wish: Wish, autoencoder: Autoencoder, heard: list[Steps], kept_apart: list[Steps], console: Console
+    options: ImproviseOptions,
+    autoencoder: Autoencoder,
+    steps: list[Steps],
+    held_out: list[Steps],
+    console: Console,
 ) -> ImproviserTraining:
-    """A new training, or the one that stands beside the phrase where it is for the same autoencoder."""
-    settings = ImproviserSettings(seed=wish.phrase.seed, minutes=wish.minutes, steps=wish.steps)
+    """The training stored beside the phrase, if it is for the same autoencoder; else a new one."""
+    settings = ImproviserSettings(seed=options.phrase.seed, minutes=options.minutes, steps=options.steps)
     rows = BEFORE + MOVE * settings.moves
-    if not any(len(stretch) >= rows for stretch in heard):
+    if not any(len(stretch) >= rows for stretch in steps):
         raise StudioError(
-            f"No recording has {rows / 12.5:.0f} sound seconds in a row: too little to improvise from."
+            f"No recording has {rows / 12.5:.0f} s without a capture error: too little to improvise from."
         )
     training = ImproviserTraining(
-        [torch.tensor(stretch.features) for stretch in heard],
-        [torch.tensor(stretch.features) for stretch in kept_apart],
+        [torch.tensor(stretch.features) for stretch in steps],
+        [torch.tensor(stretch.features) for stretch in held_out],
         ROOT,
         settings,
     )
     training.origin = {"autoencoder": fingerprint(autoencoder)}
-    file = improviser_file(wish.out)
+    file = improviser_file(options.out)
     if file.exists():
         state = torch.load(file, map_location="cpu", weights_only=True)
         if state["origin"] == training.origin and state["shape"] == asdict(training.improviser.shape):
             training.restore(state)
-            # The phrase may have another seed than the one that the improviser learned with.
+            # The phrase may have another seed than the improviser's training.
             training.settings = replace(settings, seed=state["settings"]["seed"])
-            console.print(f"{file} goes on at {100 * training.fraction:.0f} %.", highlight=False)
+            console.print(f"{file} continues at {100 * training.fraction:.0f} %.", highlight=False)
             return training
-        console.print(f"{file} belongs to another autoencoder; a new one takes its place.", highlight=False)
+        console.print(f"{file} belongs to another autoencoder and is replaced.", highlight=False)
     return training
 
 
 def fingerprint(autoencoder: Autoencoder) -> str:
-    """Tells one autoencoder's weights from another's."""
+    """A hash of an autoencoder's weights."""
     digest = hashlib.sha256()
     for value in autoencoder.state_dict().values():
         digest.update(value.numpy().tobytes())
@@ -137,7 +146,7 @@ def fingerprint(autoencoder: Autoencoder) -> str:
 
 
 def _train(training: ImproviserTraining, file: Path, console: Console) -> bool:
-    """Until done or stopped (Ctrl-C, SIGTERM); the improviser's file is written either way."""
+    """Train until done or stopped (Ctrl-C, SIGTERM); the improviser's file is written either way."""
     if training.fraction >= 1.0:
         return True
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -150,14 +159,14 @@ def _train(training: ImproviserTraining, file: Path, console: Console) -> bool:
             return stop_asked()
 
         def report(line: ImproviserReport) -> None:
-            words = _words(line)
+            words = _history_line(line)
             progress.update(bar, completed=line.fraction, words=words)
             if not console.is_terminal:
                 console.print(f"{100 * line.fraction:5.1f} %  {words}", highlight=False, soft_wrap=True)
 
-        training.run(report, lambda: save_improviser(training, file), save_every_s=60.0, stop=stop)
+        training.run(report, lambda: training.save_checkpoint(file), save_every_s=60.0, stop=stop)
     if training.fraction < 1.0:
-        console.print("Stopped; nothing is lost. The same command goes on.")
+        console.print("Stopped; nothing is lost. The same command continues.")
     return training.fraction >= 1.0
 
 
@@ -167,7 +176,7 @@ def _progress(console: Console) -> Progress:
     return Progress(*columns, words, console=console, disable=not console.is_terminal)
 
 
-def _words(line: ImproviserReport) -> str:
+def _history_line(line: ImproviserReport) -> str:
     parts = ", ".join(f"{name} {value:.3g}" for name, value in line.parts.items())
     held = ", ".join(f"{name} {value:.3g}" for name, value in line.held_out.items())
     return f"step {line.step}  {parts}" + (f"; held-out takes: {held}" if held else "")

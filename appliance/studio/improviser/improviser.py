@@ -1,9 +1,9 @@
-"""The improviser: an LSTM with a mixture density head that dances on, move after move, and really samples.
+"""The improviser: an LSTM with a mixture density head that continues a dance, move after move, by sampling.
 
 The network of the 'mixture density' dance models (Pettee et al., 'Beyond Imitation'), one level up: it does
-not draw the next pose, whose every number would tremble on its own (17 % of the power above 8 Hz; dancers:
-1 %), but the code of the next move (moves.py). It always draws, with a seed and a temperature: the mixture's
-mean, which the published notebook puts in place of the drawn one, is the same dance every night.
+not sample the next pose, in which every number would tremble on its own (17 % of the power above 8 Hz;
+dancers: 1 %), but the code of the next move (moves.py). It always samples, with a seed and a temperature: the
+mixture's mean, which the published notebook uses instead, is the same dance every night.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from torch.nn import functional
 
 from appliance.studio.improviser.moves import BEFORE, MOVE, Moves, MovesShape, Scale
 
-NARROWEST = math.log(0.1)  # log scale; a narrower Gaussian learns takes by heart
+NARROWEST = math.log(0.1)  # log scale; a narrower Gaussian memorises takes
 WIDEST = math.log(2.0)
-FARTHEST = 6.0  # deviations of a number of a step: hardly a recorded step is so far from the mean
+FARTHEST = 6.0  # deviations of each number of a step: recorded steps are hardly ever further from the mean
 
 
 @dataclass
@@ -38,7 +38,7 @@ class Mixture:
         return -joined / x.shape[-1]
 
     def sample(self, temperature: float, generator: torch.Generator | None = None) -> Tensor:
-        """(B, D) drawn; temperature 1 as learned, 0 the middle of the likeliest Gaussian."""
+        """Samples (B, D); temperature 1: as learned, 0: the mean of the likeliest Gaussian."""
         uniform = torch.rand(self.logits.shape, generator=generator).clamp(1e-9, 1 - 1e-7)
         gumbel = -torch.log(-torch.log(uniform))
         rows = torch.arange(len(self.logits))
@@ -51,7 +51,7 @@ State = list[tuple[Tensor, Tensor]]
 
 
 class Choreographer(nn.Module):
-    """What was just danced and the code that it came from -> distribution of the next move's code."""
+    """Maps the last steps and the last move's code to the distribution of the next move's code."""
 
     def __init__(self, shape: MovesShape, width: int, layers: int, mixtures: int) -> None:
         super().__init__()
@@ -62,7 +62,7 @@ class Choreographer(nn.Module):
         self.head.weight.data *= 0.3
 
     def start(self, batch: int) -> State:
-        """Memory of a dancer who has not danced yet."""
+        """The memory before the first move."""
         empty = torch.zeros(batch, self.width)
         return [(empty, empty) for _ in self.cells]
 
@@ -83,7 +83,7 @@ class Choreographer(nn.Module):
 
 
 class Improviser(nn.Module):
-    """Scale, moves and choreographer: all that dances on."""
+    """Scale, moves and choreographer: all that continues a dance."""
 
     def __init__(self, shape: MovesShape, width: int, layers: int, mixtures: int) -> None:
         super().__init__()
@@ -93,14 +93,14 @@ class Improviser(nn.Module):
         self.choreographer = Choreographer(shape, width, layers, mixtures)
 
     @torch.no_grad()
-    def improvise(self, heard: Tensor, moves: int, temperature: float, seed: int) -> Tensor:
-        """Dance on from heard (B, T, features), 3 + 8 steps or more, by (B, 8 * moves, features)."""
+    def improvise(self, primer: Tensor, moves: int, temperature: float, seed: int) -> Tensor:
+        """Continue a primer (B, T, features), at least 3 + 8 steps, by (B, 8 * moves, features)."""
         generator = torch.Generator().manual_seed(seed)
-        x = self.scale.inside(heard)
+        x = self.scale.inside(primer)
         state = self.choreographer.start(len(x))
         known = (x.shape[1] - BEFORE) // MOVE
         if not known:
-            raise ValueError(f"{x.shape[1]} steps were heard; it takes {BEFORE + MOVE} to dance on from.")
+            raise ValueError(f"The primer has {x.shape[1]} steps; it takes {BEFORE + MOVE} to continue from.")
         for number in range(known):
             at = x.shape[1] - (known - number) * MOVE
             code, _ = self.moves.encode(x[:, at - BEFORE : at], x[:, at : at + MOVE])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,14 +11,14 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from appliance.studio.course import Course
 from appliance.studio.improviser.improviser import Improviser
-from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence, draw, move_loss
+from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence, move_loss, sample_code
+from appliance.studio.training_loop import TrainingLoop
 
 
 @dataclass(frozen=True)
 class ImproviserSettings:
-    """How to train. minutes bounds the wall time and paces the rest; steps does so where given."""
+    """How to train. minutes bounds the wall time and paces the learning rate, unless steps is given."""
 
     seed: int = 1
     minutes: float = 12.0
@@ -31,18 +30,18 @@ class ImproviserSettings:
     lstm_layers: int = 1
     mixtures: int = 6
     batch: int = 128
-    moves: int = 6  # in a row, 3.8 s: what the memory is trained over
+    moves: int = 6  # in a row, 3.8 s: the span over which the memory is trained
     learning_rate: float = 1.5e-3
     dropout: float = 0.2
-    closeness: float = 0.35  # deviation that a move may have from the recorded one, in a step's own
+    closeness: float = 0.35  # tolerated error of a move, in standard deviations of a step
     input_noise: float = 0.1
-    own: float = 0.9  # share of moves that go on from its own steps, at the end of the training
+    own: float = 0.9  # share of moves that continue the network's own steps, at the end of the training
     smoothing: float = 0.995
 
 
 @dataclass
 class ImproviserReport:
-    """What the loop tells while it runs."""
+    """A line of the training's history."""
 
     step: int
     seconds: float
@@ -51,8 +50,11 @@ class ImproviserReport:
     held_out: dict[str, float]
 
 
-class ImproviserTraining(Course[ImproviserReport]):
+class ImproviserTraining(TrainingLoop[ImproviserReport]):
     """State of a training: networks, averaged networks, optimiser, history."""
+
+    report_type = ImproviserReport
+    saved = ("improviser", "averaged", "optimizer")
 
     def __init__(
         self, training: Sequence[Tensor], held_out: Sequence[Tensor], ways: int, settings: ImproviserSettings
@@ -69,18 +71,16 @@ class ImproviserTraining(Course[ImproviserReport]):
         self.rows, self.starts = self._laid_out(training)
         self.held_rows, self.held_starts = self._laid_out(held_out)
         self.optimizer = torch.optim.Adam(self.improviser.parameters(), lr=settings.learning_rate, fused=True)
-        self.origin: dict[str, str] = {}  # which autoencoder's latents it dances in
 
-    def line(self, means: Mapping[str, float]) -> ImproviserReport:
-        """Mean losses since the last line, and those on takes kept apart."""
+    def report(self, means: Mapping[str, float]) -> ImproviserReport:
         return ImproviserReport(self.step, self.seconds, self.fraction, dict(means), self.held_out())
 
     def train_step(self) -> dict[str, Tensor]:
-        """One step on a batch of rows of moves, each move made out of recorded or of own steps before it."""
+        """One step on a batch of rows of moves, each continuing recorded or the network's own steps."""
         settings = self.settings
         for group in self.optimizer.param_groups:
-            cosine = 0.5 * (1 + math.cos(math.pi * self.fraction))
-            group["lr"] = settings.learning_rate * min(1.0, (self.step + 1) / 100) * max(cosine, 0.01)
+            warm = min(1.0, (self.step + 1) / 100)
+            group["lr"] = settings.learning_rate * warm * max(self._cosine(), 0.01)
         chosen = self.starts[torch.randint(len(self.starts), (settings.batch,))]
         truth = self.rows[chosen[:, None] + torch.arange(self._length)]
         own = settings.own * min(1.0, 1.5 * self.fraction)
@@ -93,13 +93,13 @@ class ImproviserTraining(Course[ImproviserReport]):
         torch.nn.utils.clip_grad_norm_(self.improviser.moves.parameters(), 1.0)
         torch.nn.utils.clip_grad_norm_(self.improviser.choreographer.parameters(), 1.0)
         self.optimizer.step()
-        self._average()
+        self._average_weights(self.averaged, self.improviser)
         self.step += 1
         return {name: part.detach() for name, part in parts.items()}
 
     @torch.no_grad()
     def held_out(self, sample: int = 64) -> dict[str, float]:
-        """The losses of the averaged networks on takes kept apart, recorded steps before each move."""
+        """The losses of the averaged networks on held-out takes, with recorded steps before each move."""
         if not len(self.held_starts):
             return {}
         picked = torch.linspace(0, len(self.held_starts) - 1, min(sample, len(self.held_starts))).long()
@@ -110,27 +110,12 @@ class ImproviserTraining(Course[ImproviserReport]):
         return {name: float(part) for name, part in parts.items()}
 
     def state(self) -> dict[str, Any]:
-        """Everything that a resumed training and the improvising need."""
+        """Everything that a resumed training and improvising need."""
         return {
+            **self._shared_state(),
             "settings": asdict(self.settings),
             "shape": asdict(self.improviser.shape),
-            "origin": self.origin,
-            "improviser": self.improviser.state_dict(),
-            "averaged": self.averaged.state_dict(),
-            "optimizer": self.optimizer.state_dict(),
-            "random": torch.get_rng_state(),
-            "step": self.step,
-            "seconds": self.seconds,
-            "history": [asdict(line) for line in self.history],
         }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on where a saved training stood."""
-        for name in ("improviser", "averaged", "optimizer"):
-            getattr(self, name).load_state_dict(state[name])
-        torch.set_rng_state(state["random"])
-        self.step, self.seconds = state["step"], state["seconds"]
-        self.history = [ImproviserReport(**line) for line in state["history"]]
 
     @property
     def _length(self) -> int:
@@ -141,8 +126,8 @@ class ImproviserTraining(Course[ImproviserReport]):
     ) -> dict[str, Tensor]:
         """Losses over rows (B, 3 + 8 * moves, inside).
 
-        own: share of moves that go on from the steps that the networks made (scheduled sampling). The code of
-        such a move is that which leads from there back to the recording, so that mending is learned too.
+        own: share of moves that continue the networks' own steps (scheduled sampling). The code of such a
+        move leads from there back to the recording, so that correcting is learned too.
         """
         moves, choreographer = improviser.moves, improviser.choreographer
         state = choreographer.start(len(truth))
@@ -156,7 +141,7 @@ class ImproviserTraining(Course[ImproviserReport]):
             before = before + noise * torch.rand(len(truth), 1, 1) * torch.randn_like(before)
             move = truth[:, at : at + MOVE]
             mean, log_variance = moves.encode(before, move)
-            code = draw(mean, log_variance)
+            code = sample_code(mean, log_variance)
             if mixture is not None:
                 sums["nats"] = sums["nats"] + mixture.negative_log_likelihood(code.detach()).mean()
             made = moves.decode(before, code)
@@ -166,7 +151,7 @@ class ImproviserTraining(Course[ImproviserReport]):
         return {name: value / (self.settings.moves - (name == "nats")) for name, value in sums.items()}
 
     def _laid_out(self, stretches: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
-        """All scaled steps after one another, and the rows at which a whole training row begins."""
+        """All scaled steps, concatenated, and the indices at which a whole training row begins."""
         starts, at = [], 0
         for stretch in stretches:
             starts.append(torch.arange(at, at + max(len(stretch) - self._length + 1, 0)))
@@ -174,18 +159,6 @@ class ImproviserTraining(Course[ImproviserReport]):
         if not starts:
             return torch.zeros(0, self.improviser.shape.inside), torch.zeros(0, dtype=torch.long)
         return self.improviser.scale.inside(torch.cat(list(stretches))), torch.cat(starts)
-
-    @torch.no_grad()
-    def _average(self) -> None:
-        keep = min(self.settings.smoothing, (self.step + 1) / (self.step + 10))
-        torch._foreach_lerp_(list(self.averaged.parameters()), list(self.improviser.parameters()), 1 - keep)
-
-
-def save_improviser(training: ImproviserTraining, path: Path) -> None:
-    """Write the whole state; the old file stays until the new one is complete."""
-    partial = path.with_suffix(".partial")
-    torch.save(training.state(), partial)
-    partial.replace(path)
 
 
 def load_improviser(path: Path) -> tuple[Improviser, dict[str, Any]]:

@@ -1,8 +1,8 @@
-"""Moves: two thirds of a second of dance at once, out of what was danced before and a code of what to do.
+"""Moves: two thirds of a second of dance at once, from the steps before it and a code.
 
 A conditional variational autoencoder in the manner of 'Character Controllers Using Motion VAEs' (Ling et al.
-2020), over moves of 8 steps: whatever code is drawn, what comes out is one smooth move that goes on from the
-steps before it. The code of the recordings' moves is what the improviser's mixtures are learned from.
+2020), over moves of 8 steps: any sampled code gives one smooth move that continues the steps before it. The
+improviser's mixtures learn the distribution of the codes of recorded moves.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from torch import Tensor, nn
 
 MOVE = 8  # steps of a move, 0.64 s
 BEFORE = 3  # steps before it that the networks see
-PLACE_WEIGHT = 3.0  # of the root's way in the loss, against a latent's direction of the same variance
+PLACE_WEIGHT = 3.0  # of the root's displacement in the loss, to a latent direction of the same variance
 
 
 @dataclass(frozen=True)
 class MovesShape:
-    """latent: size of the autoencoder's latent; kept: directions of it that are danced in; ways: numbers of
-    the root's way; code: size of a move's code; width and depth of the dense networks.
+    """latent: size of the autoencoder's latent; kept: how many of its principal directions are used; ways:
+    numbers of the root's displacement; code: size of a move's code; width and depth of the dense networks.
     """
 
     latent: int
@@ -40,7 +40,7 @@ class MovesShape:
 
 
 class Scale(nn.Module):
-    """Steps to and from principal directions of the latents and the root's way, mean 0 and deviation 1."""
+    """Maps steps to and from principal directions of latents and the root's displacement, standardised."""
 
     def __init__(self, shape: MovesShape) -> None:
         super().__init__()
@@ -87,7 +87,7 @@ class Scale(nn.Module):
 
 
 class _Dense(nn.Module):
-    """Residual dense layers; the code enters each of them, so that none forgets it."""
+    """Residual dense layers; each receives the code, so that none forgets it."""
 
     def __init__(self, size_in: int, code: int, size_out: int, width: int, depth: int) -> None:
         super().__init__()
@@ -126,13 +126,13 @@ class Moves(nn.Module):
         return mean, log_variance.clamp(-8.0, 2.0)
 
     def decode(self, before: Tensor, code: Tensor) -> Tensor:
-        """The move (B, 8, inside) that goes on from before."""
+        """The move (B, 8, inside) that continues `before`."""
         flat: Tensor = self.decoder(before.flatten(1), code)
         return before[:, -1:] + flat.reshape(-1, MOVE, self.shape.inside)
 
 
-def draw(mean: Tensor, log_variance: Tensor) -> Tensor:
-    """A code from its distribution."""
+def sample_code(mean: Tensor, log_variance: Tensor) -> Tensor:
+    """A sample of the code's distribution."""
     return mean + torch.exp(0.5 * log_variance) * torch.randn_like(mean)
 
 

@@ -7,13 +7,14 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from appliance.dancer.grounding import measure_standing, survey
+from appliance.dancer.grounding import survey
 from appliance.dancer.loop import is_closed, turns_about_y, yaws
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, Take
 from appliance.studio.improviser.pace import Pace, mean_pace, mean_speed, pace
+from appliance.studio.standing import measure_standing
 
 EVERY_S = 0.2  # of poses that are compared with each other
 SECOND_S = 1.0  # length of the stretches that are searched for in the recordings
@@ -24,7 +25,7 @@ class Likeness:
     """How a motion's poses lie among the recorded ones; distances are root mean squares over joints."""
 
     breadth: float  # spread of its poses about their mean, over that of the recordings
-    coverage: float  # share of recorded poses that it comes as near to as another take does
+    coverage: float  # share of recorded poses to which it comes as near as another take does
     strangeness: float  # distance of its poses from the nearest recorded ones, over that of another take's
     strangeness_p99: float
     nearest_second_cm: float  # from each of its seconds to the nearest recorded one: 0 would be a copy
@@ -44,7 +45,7 @@ class Seam:
 
 @dataclass(frozen=True)
 class Naturalness:
-    """Measures of a phrase, and beside them, where they mean little alone, those of the recordings."""
+    """Measures of a phrase, with those of the recordings where they mean little alone."""
 
     seconds: float
     pace: Pace
@@ -65,7 +66,7 @@ class Naturalness:
 
 @dataclass(frozen=True)
 class Yardstick:
-    """What the recordings are like, which phrases are held against.
+    """Measures of the recordings, with which phrases are compared.
 
     pace: their own, glitches left out; shapes (K, M * 3): figures of theirs, centimetres; near (K,): how far
     each is from the nearest one of another take; seconds: stretches of a second; shape_speed: of whole
@@ -83,7 +84,7 @@ class Yardstick:
 
     @staticmethod
     def of(takes: Sequence[Take], moving: Sequence[int]) -> Yardstick:
-        """Learn what the takes are like."""
+        """Measure the takes."""
         parts = [part for take in takes for part in sound_parts(take)]
         names = [take.take for take in takes for _ in sound_parts(take)]
         usual_speed = mean_speed(parts, moving)
@@ -142,11 +143,8 @@ def measure(phrase: Recording, yardstick: Yardstick) -> Naturalness:
 
 def sound_parts(take: Take, shortest_s: float = 2.0) -> list[Recording]:
     """The stretches of a take without a glitch."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], take.sound, [False]]).astype(int)))
-    fps = take.recording.fps
-    return [
-        take.recording.excerpt(a / fps, b / fps) for a, b in edges.reshape(-1, 2) if b - a >= shortest_s * fps
-    ]
+    recording, fps = take.recording, take.recording.fps
+    return [recording.excerpt(a / fps, b / fps) for a, b in take.sound_runs if b - a >= shortest_s * fps]
 
 
 def figure_shapes(recording: Recording, moving: Sequence[int]) -> Array:
@@ -175,7 +173,7 @@ def _likeness(phrase: Array, yardstick: Yardstick) -> Likeness:
 
 
 def _to_others(parts: Sequence[Array], names: Sequence[str], every: int = 1) -> Array:
-    """Distance of every so many rows to the nearest row of a part with another name; inf where none is."""
+    """Distance of every `every`-th row to the nearest row of a part with another name, or inf."""
     owners = np.concatenate([[name] * len(part) for name, part in zip(names, parts, strict=True)])
     rows = np.concatenate(parts)
     other = owners[::every, None] != owners[None]

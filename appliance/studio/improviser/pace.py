@@ -1,4 +1,4 @@
-"""Pace: how fast, how smoothly and how restlessly a motion goes."""
+"""Pace: speed, smoothness, trembling and stillness of a motion."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.studio.data.jumps import runs
 
-SLOW_SHARE = 0.25  # of the recordings' mean pace: below it for a while, the dancer has frozen
+SLOW_SHARE = 0.25  # of the recordings' mean pace: a slower dancer is still
 TREMBLING_HZ = 8.0  # hardly any of a dancer's motion is faster than this
 SMOOTHING_S = 0.5
 
@@ -31,7 +31,7 @@ class Pace:
 
 
 def pace(recording: Recording, moving: Sequence[int], usual_speed: float, cyclic: bool = False) -> Pace:
-    """How the recording moves; usual_speed: mean joint speed, degrees a second, that stillness is held by.
+    """How the recording moves; usual_speed: mean joint speed, degrees a second, the measure of stillness.
 
     cyclic: the last frame leads into the first.
     """
@@ -45,6 +45,7 @@ def pace(recording: Recording, moving: Sequence[int], usual_speed: float, cyclic
     fast = np.fft.rfftfreq(len(turning), 1 / fps) > TREMBLING_HZ
     width = max(1, min(round(SMOOTHING_S * fps), len(turning)))
     smooth = np.convolve(speeds.mean(axis=1), np.ones(width) / width, mode="valid")
+    still = runs(smooth < SLOW_SHARE * usual_speed)
     return Pace(
         speed=float(speeds.mean()),
         speed_p99=float(np.percentile(speeds, 99)),
@@ -52,7 +53,7 @@ def pace(recording: Recording, moving: Sequence[int], usual_speed: float, cyclic
         jerk_p99=float(np.percentile(jerk, 99)),
         trembling=float(power[fast].sum() / power.sum()),
         root_jerk_p99=float(np.percentile(root_jerk, 99)),
-        longest_still_s=_longest_run(smooth < SLOW_SHARE * usual_speed) / fps,
+        longest_still_s=max((end - first for first, end in still), default=0) / fps,
     )
 
 
@@ -66,7 +67,7 @@ def joint_turning(recording: Recording, moving: Sequence[int], cyclic: bool = Fa
 
 
 def mean_pace(paces: Sequence[Pace], weights: Sequence[int]) -> Pace:
-    """Weighted means; the longest stillness is the longest of all."""
+    """Weighted means; of the stillness, the maximum."""
     rows = {name: [asdict(one)[name] for one in paces] for name in asdict(paces[0])}
     means = {name: float(np.average(values, weights=weights)) for name, values in rows.items()}
     return Pace(**{**means, "longest_still_s": max(rows["longest_still_s"])})
@@ -77,8 +78,3 @@ def mean_speed(parts: Sequence[Recording], moving: Sequence[int]) -> float:
     return float(
         np.concatenate([np.linalg.norm(joint_turning(p, moving), axis=-1).mean(1) for p in parts]).mean()
     )
-
-
-def _longest_run(flags: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int))).reshape(-1, 2)
-    return int((edges[:, 1] - edges[:, 0]).max()) if len(edges) else 0

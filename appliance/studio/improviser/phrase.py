@@ -1,4 +1,4 @@
-"""The phrase: the best minute and a half of many that the improviser danced, made endless."""
+"""The phrase: the best stretch of several improvised dances, made endless."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import FPS, Dataset
-from appliance.studio.improviser.footing import smoothed, stand
+from appliance.studio.improviser.footing import plant_feet, smoothed
 from appliance.studio.improviser.improviser import Improviser
 from appliance.studio.improviser.moves import MOVE
 from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
@@ -22,16 +22,16 @@ from appliance.studio.improviser.steps import HOP, Steps, danced_again, motion_o
 from appliance.studio.improviser.stretches import best_stretches
 from appliance.studio.studio_error import StudioError
 
-SEAM_S = 0.8  # the end turns into the start over so long
-STAGE_M = 3.6  # the root's path stays within so wide and so deep; arms and steps need the rest of 4 m
-STROLL_FRAMES = 401  # what is slower than this is where on the stage, not how, the dancer steps
-HEARD = 35  # steps of a recording that the improviser hears before it dances: 2.8 s
+SEAM_S = 0.8  # length of the crossfade from the end to the start
+STAGE_M = 3.6  # width and depth of the root's path; arms and steps need the rest of 4 m
+STROLL_FRAMES = 401  # slower motion than this is the way over the stage, not steps
+PRIMER = 35  # steps of a recording that the improviser continues: 2.8 s
 STEPS_S = FPS / HOP
 
 
 @dataclass(frozen=True)
-class PhraseWish:
-    """What is wanted of a phrase."""
+class PhraseOptions:
+    """How to make a phrase."""
 
     seconds: float = 90.0
     seed: int = 1
@@ -39,34 +39,34 @@ class PhraseWish:
     dances: int = 16
     minutes: float = 4.0  # of each dance
     finalists: int = 4
-    settling: int = 250  # iterations of the feet's settling
+    settling: int = 250  # iterations of gradient descent that plant the feet
 
 
 def make_phrase(
     autoencoder: Autoencoder,
     improviser: Improviser,
     dataset: Dataset,
-    heard: Sequence[Steps],
-    wish: PhraseWish,
+    recorded: Sequence[Steps],
+    options: PhraseOptions,
     say: Callable[[str], None] = lambda words: None,
 ) -> tuple[Recording, Naturalness]:
     """Improvise several dances, take the stretches that close best, make them endless, keep the best.
 
-    heard: stretches of recordings, of which each dance goes on from one.
+    recorded: stretches of the recordings; each dance continues one of them.
     """
     moving, still = dataset.moving, dataset.still_pose()
     dances = [
-        _motion(autoencoder, dance, dataset, still) for dance in improvise(improviser, heard, wish, say)
+        _motion(autoencoder, dance, dataset, still) for dance in improvise(improviser, recorded, options, say)
     ]
     yardstick = Yardstick.of(dataset.training, moving)
-    stretches = best_stretches(dances, yardstick, wish.seconds, STAGE_M, SEAM_S, wish.finalists)
+    stretches = best_stretches(dances, yardstick, options.seconds, STAGE_M, SEAM_S, options.finalists)
     if not stretches:
-        raise StudioError("No dance is long enough for the phrase: ask for longer ones by --dance-minutes.")
+        raise StudioError("No dance is long enough for the phrase. Ask for longer ones with --dance-minutes.")
     best: tuple[float, Recording, Naturalness] | None = None
     for number, stretch in enumerate(stretches, 1):
         closed = closed_loop(dances[stretch.dance], stretch.first, stretch.last)
         again = replace(closed, poses=danced_again(autoencoder, closed.poses, moving, cyclic=True))
-        phrase = on_stage(stand(on_stage(again), wish.settling))
+        phrase = on_stage(plant_feet(on_stage(again), options.settling))
         natural = measure(phrase, yardstick)
         say(f"candidate {number} of {len(stretches)}: {verdict(natural)}")
         faults = faultiness(natural) + stretch.cost
@@ -77,18 +77,18 @@ def make_phrase(
 
 
 def improvise(
-    improviser: Improviser, heard: Sequence[Steps], wish: PhraseWish, say: Callable[[str], None]
+    improviser: Improviser, recorded: Sequence[Steps], options: PhraseOptions, say: Callable[[str], None]
 ) -> list[Steps]:
-    """The dances, each from another recorded start."""
-    chance = np.random.default_rng(wish.seed)
-    long = [stretch for stretch in heard if len(stretch) >= HEARD]
+    """Dances, each of which continues another recorded stretch."""
+    chance = np.random.default_rng(options.seed)
+    long = [stretch for stretch in recorded if len(stretch) >= PRIMER]
     starts = []
-    for number in chance.choice(len(long), wish.dances, replace=len(long) < wish.dances):
-        first = int(chance.integers(len(long[number]) - HEARD + 1))
-        starts.append(torch.tensor(long[number].features[first : first + HEARD]))
-    moves = int(np.ceil(wish.minutes * 60 * STEPS_S / MOVE))
-    say(f"improvising {wish.dances} dances of {wish.minutes:g} minutes")
-    danced = improviser.improvise(torch.stack(starts), moves, wish.temperature, wish.seed)
+    for number in chance.choice(len(long), options.dances, replace=len(long) < options.dances):
+        first = int(chance.integers(len(long[number]) - PRIMER + 1))
+        starts.append(torch.tensor(long[number].features[first : first + PRIMER]))
+    moves = int(np.ceil(options.minutes * 60 * STEPS_S / MOVE))
+    say(f"improvising {options.dances} dances of {options.minutes:g} minutes")
+    danced = improviser.improvise(torch.stack(starts), moves, options.temperature, options.seed)
     return [Steps.of_features(dance.numpy()) for dance in danced]
 
 
@@ -98,11 +98,11 @@ def _motion(autoencoder: Autoencoder, steps: Steps, dataset: Dataset, still: Arr
 
 
 def closed_loop(dance: Recording, first: int, last: int) -> Recording:
-    """Frames first..last - 1 as a cycle: what follows the last one turns into the first ones.
+    """Frames first..last - 1 as a cycle: the frames after the last are crossfaded into the first ones.
 
-    What differs between the two ends is crossfaded in what the dancer does (pose without heading, turning and
-    way of each frame), so that neither place nor heading matters; the way and the turning that are then
-    missing from a whole cycle are spread over all of it.
+    Crossfaded are the pose without heading, and the turning and displacement of each frame, so that neither
+    place nor heading matters. The displacement and turning that then miss from a whole cycle are spread over
+    all of it.
     """
     count, fade = last - first, round(SEAM_S * FPS)
     heading = np.unwrap(yaws(quaternion.heading(dance.poses[:, 0])))
@@ -133,7 +133,7 @@ def closed_loop(dance: Recording, first: int, last: int) -> Recording:
 
 
 def on_stage(phrase: Recording) -> Recording:
-    """The path in the middle of the stage, its slow part narrowed to fit; steps stay as they are."""
+    """The path centred on the stage, its slow part shrunk to fit; steps stay as they are."""
     roots = phrase.roots.copy()
     ground = roots[:, [0, 2]]
     stroll = smoothed(ground, min(STROLL_FRAMES, len(ground) // 2 * 2 - 1))
@@ -150,7 +150,7 @@ def on_stage(phrase: Recording) -> Recording:
 
 
 def faultiness(natural: Naturalness) -> float:
-    """One number for choosing between candidates: 0 is as the recordings are."""
+    """One number to choose between candidates: 0 is like the recordings."""
     pace, recorded = natural.pace, natural.recorded_pace
     return float(
         2 * abs(np.log(natural.liveliness))

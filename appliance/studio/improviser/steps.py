@@ -1,4 +1,4 @@
-"""A dance as steps of 80 ms: each a latent of the pose autoencoder and the root's way, and back to motion."""
+"""A dance as steps of 80 ms: a pose latent and the root's displacement each; and back to motion."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from appliance.studio.data.mirror import asymmetry, mirrored
 
 HOP = 4  # frames from one step to the next: 12.5 steps a second, half a window, so that two windows overlap
 MIDDLE = WINDOW // 2  # the frame of a window whose heading and place count as the window's own
-ROOT = 4  # numbers beside the latent: way x, way z, turn, height
-FLOOR_FRAMES = 150  # the floor of a recording drifts by centimetres within seconds; this is its memory
+ROOT = 4  # numbers besides the latent: displacement x and z, turn, height
+FLOOR_FRAMES = 150  # the floor of a recording drifts by centimetres within seconds: its window
 FLOOR_PERCENTILE = 30.0
 
 
@@ -52,15 +52,14 @@ class Steps:
 def steps_of_takes(
     autoencoder: Autoencoder, takes: Sequence[Take], moving: Sequence[int], shortest: int
 ) -> list[Steps]:
-    """Every sound stretch of the takes and its mirror image, at each of the 4 frames that it can begin with.
-    A body that is not its own mirror image is not mirrored.
+    """Every sound stretch of the takes and its mirror image, starting at each of its first 4 frames.
 
-    shortest: stretches of fewer steps are left out.
+    A body that is not its own mirror image is not mirrored. shortest: stretches of fewer steps are omitted.
     """
     found = []
     two_sided = bool(takes) and not asymmetry(takes[0].recording.skeleton, moving)
     for take in takes:
-        for start, end in _stretches(take.sound):
+        for start, end in take.sound_runs:
             excerpt = take.recording.excerpt(start / FPS, end / FPS)
             for recording in (excerpt, mirrored(excerpt)) if two_sided else (excerpt,):
                 for first in range(HOP):
@@ -176,9 +175,3 @@ def smooth_curve(knots: Array, between: int) -> Array:
     curve = (2 * t3 - 3 * t2 + 1) * a + (t3 - 2 * t2 + t) * da + (3 * t2 - 2 * t3) * b + (t3 - t2) * db
     points: Array = curve.reshape(-1, knots.shape[1])
     return points
-
-
-def _stretches(sound: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last + 1 frame of each run of sound frames."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], sound, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -1,4 +1,4 @@
-"""Stretches: of several dances the parts whose end meets their start, with few other faults."""
+"""Stretches: the parts of several dances whose end is closest to their start, with few other faults."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from appliance.studio.improviser.naturalness import Yardstick, distances, figure
 EVERY = 4  # frames; ends are looked for at each of these
 STARTS_EVERY = 2  # of them
 SHORTEST, LONGEST = 0.9, 1.1  # of the wanted length
-PACE_S = 0.1  # a joint's speed counts in likeness as the way that it makes in this time
-APART_S = 5.0  # two finalists of one dance begin so far from each other
-ENDS_EACH = 2  # stretches that are looked at for each start
+PACE_S = 0.1  # a joint's speed counts in distances as its displacement in this time
+APART_S = 5.0  # finalists from one dance begin at least this far apart
+ENDS_EACH = 2  # ends that are considered for each start
 GAP, PACE, OVER_M, DRIFT_M = 2.0, 1.0, 0.2, 0.05  # weights of the faults; strangeness weighs 1
 
 
@@ -38,7 +38,7 @@ def best_stretches(
     seam_s: float,
     finalists: int,
 ) -> list[Stretch]:
-    """The best few, best first, of about so many seconds, each followed by seam_s more of its dance."""
+    """The best stretches, best first, of about `seconds`, each followed by seam_s more of its dance."""
     found = [
         stretch
         for number, dance in enumerate(dances)
@@ -85,7 +85,7 @@ def _stretches(
 
 
 def _room(path: Array, stage_m: float) -> float:
-    """What it costs that a path (N, 2), closed, needs more room than the stage has, or misses its start."""
+    """Cost of a closed path (N, 2) that needs more room than the stage has, or misses its start."""
     miss = path[-1] - path[0]
     closed = path - np.linspace(0, 1, len(path))[:, None] * miss
     over = np.maximum(np.ptp(closed, axis=0) - stage_m, 0).sum()

@@ -75,7 +75,7 @@ def test_a_node_that_goes_and_comes_back() -> None:
         now += 0.025
     assert not wire.is_open
     assert wire.trouble == (
-        "Art-Net 127.0.0.1, universe 1: nobody listens on that port. "
+        "Art-Net 127.0.0.1, universe 1: no program listens on that port. "
         "Its lights do not follow; the show goes on. "
         "Check the node's power, its network cable, and its address in the box file."
     )

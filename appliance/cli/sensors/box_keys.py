@@ -1,4 +1,4 @@
-"""Which box and which key file a command about sensors means, and the box told of a change to it."""
+"""The box and the key file that a command about sensors means, and how the box learns of a change."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ _WHICH_BOX = "Is it running here? Its box file (--box) tells the control port, i
 
 
 @dataclass(frozen=True)
-class Venue:
-    """Which box and which key file are meant."""
+class BoxKeys:
+    """A box and its key file."""
 
     box: BoxConfig
     keys: Path
@@ -41,8 +41,8 @@ class Venue:
         return ControlClient.of(self.box)
 
 
-def venue(box_file: Path | None, keys: Path | None) -> Venue:
-    """By the box file, the key file alone, or what lies in this folder. Raises StageError, ConfigError."""
+def box_keys_of(box_file: Path | None, keys: Path | None) -> BoxKeys:
+    """From the box file, the key file alone, or the files in this folder. Raises StageError, ConfigError."""
     if box_file is not None and keys is not None:
         raise StageError("Give --box or --keys, not both: a box file names its key file.")
     box = load_box(box_file if keys is not None else box_here(box_file))
@@ -51,7 +51,7 @@ def venue(box_file: Path | None, keys: Path | None) -> Venue:
             f"{box.path} names no key file, so no sensor is let in. "
             "Write `keys: sensors.keys` under sensors in it."
         )
-    return Venue(box, box.sensors.keys or keys or DEFAULT_KEYS)
+    return BoxKeys(box, box.sensors.keys or keys or DEFAULT_KEYS)
 
 
 def people_console() -> Console:
@@ -60,53 +60,53 @@ def people_console() -> Console:
     return console if console.is_terminal else Console(highlight=False, width=_PIPE_WIDTH)
 
 
-def send_command(place: Venue, address: str, name: str | None) -> None:
-    """Have the running box do this for the sensor of that name, or for all, and print its answer.
+def send_command(box_keys: BoxKeys, address: str, name: str | None) -> None:
+    """Send a command for the sensor of that name, or for all, to the running box and print the answer.
 
     Raises StageError when it is not done.
     """
     try:
-        answer = place.running.ask(address, *([name] if name else []))
+        answer = box_keys.running.ask(address, *([name] if name else []))
     except NoBoxError as error:
-        raise StageError(f"{error} {_WHICH_BOX}" if place.running.has_port else str(error)) from None
+        raise StageError(f"{error} {_WHICH_BOX}" if box_keys.running.has_port else str(error)) from None
     if not answer.done:
         raise StageError(answer.words)
     print(answer.words)
 
 
-def edit_keys(place: Venue, change_it: Callable[[KeyEditing], None], words: str) -> int:
-    """Change the key file and have the running box take it. The exit status."""
-    with clear_errors(place.keys):
-        if not place.keys.exists():
+def edit_keys(box_keys: BoxKeys, change_it: Callable[[KeyEditing], None], words: str) -> int:
+    """Change the key file and have the running box read it. Returns the exit status."""
+    with clear_errors(box_keys.keys):
+        if not box_keys.keys.exists():
             raise FileNotFoundError
-        with editing(place.keys) as change:
+        with editing(box_keys.keys) as change:
             change_it(change)
             change.commit()
     print(words)
-    return reload_and_say(place)
+    return reload_and_say(box_keys)
 
 
-def reload_and_say(place: Venue) -> int:
-    """Have the running box take the key file, and say whether it did. The exit status."""
-    is_well, words = reload_keys(place)
+def reload_and_say(box_keys: BoxKeys) -> int:
+    """Have the running box read the key file, and report whether it did. Returns the exit status."""
+    is_well, words = reload_keys(box_keys)
     print(words)
     return 0 if is_well else NOT_TAKEN
 
 
-def reload_keys(place: Venue) -> tuple[bool, str]:
+def reload_keys(box_keys: BoxKeys) -> tuple[bool, str]:
     """Have the running box read the key file again: whether it is as it should be, and a sentence.
 
-    Where a stage lives, silence is no answer: show control may be on its way back, and is asked again.
+    If a stage runs, silence is no answer: show control may be restarting, and is asked again.
     """
     until = time.monotonic() + _RESTART_S
     while True:
         try:
-            return _ask_to_reload(place)
+            return _ask_to_reload(box_keys)
         except NoBoxError as error:
-            if not place.running.has_port:
-                words = "The box has no control port to be told by: the change counts when it starts again."
+            if not box_keys.running.has_port:
+                words = "The box has no control port: the change counts when it starts again."
                 return True, words
-            if running_stage(place.box) is None:
+            if running_stage(box_keys.box) is None:
                 return True, f"{error} The change counts when it starts."
         if time.monotonic() >= until:
             return (
@@ -116,23 +116,23 @@ def reload_keys(place: Venue) -> tuple[bool, str]:
         time.sleep(_AGAIN_S)
 
 
-def _ask_to_reload(place: Venue) -> tuple[bool, str]:
+def _ask_to_reload(box_keys: BoxKeys) -> tuple[bool, str]:
     """What `reload_keys` gives when a box answers; raises NoBoxError when none does."""
-    roll = place.running.roll()
-    if roll.key_file is not None and roll.key_file.resolve() != place.keys.resolve():
+    roll = box_keys.running.roll()
+    if roll.key_file is not None and roll.key_file.resolve() != box_keys.keys.resolve():
         return False, f"{other_file(roll.key_file)} and knows nothing of this change. {THAT_BOX}"
-    answer = place.running.ask("/sensors/reload")
+    answer = box_keys.running.ask("/sensors/reload")
     return answer.done, f"The running box {'took it' if answer.done else 'did not take it'}. {answer.words}"
 
 
 def other_file(key_file: Path) -> str:
-    """Half a sentence."""
+    """The first half of a sentence."""
     return f"The running box reads another key file ({key_file})"
 
 
 @contextmanager
 def clear_errors(path: Path) -> Iterator[None]:
-    """Raise StageError, one clear line, for what goes wrong with a key file."""
+    """Turn errors about a key file into StageError, one clear line."""
     try:
         yield
     except KeyFileError as error:

@@ -1,4 +1,4 @@
-"""The answer of a dancer in a table and in sentences."""
+"""The measured answer of a dancer as a table and sentences."""
 
 from __future__ import annotations
 
@@ -13,17 +13,8 @@ from appliance.studio.evaluation.usual_joints import UPPER_ARMS, usual_joints
 ANSWERS, ANSWERS_A_LITTLE = 8.0, 4.0  # degrees
 LIVELY = (0.7, 1.3)  # energy
 PLAUSIBLE = 1.1  # the phrase has 1; release 0.1.0, the arm more or less pasted on, 1.1 to 1.25
-COLUMNS = (
-    "held",
-    "K/J",
-    "answer",
-    "fit",
-    "own / foreign",
-    "plausibility",
-    "energy",
-    "roughness",
-    "off the hand",
-)
+COLUMNS = ["held", "K/J", "answer", "fit", "own / foreign"]
+COLUMNS += ["plausibility", "energy", "roughness", "off the hand"]
 ENOUGH_MINUTES = 8.0  # the default show's dancer answers with what it learned in 11
 
 
@@ -55,7 +46,7 @@ def verdict(found: dict[str, Any], minutes: float) -> str:
 
 
 def print_answer(console: Console, found: dict[str, Any]) -> None:
-    """Table and sentences; why there are none where nothing was measured."""
+    """Print table and sentences, or why nothing was measured."""
     if "not_measured" in found:
         words = f"Whether this dancer answers a hand could not be measured: {found['not_measured']}"
         console.print(words, highlight=False)
@@ -87,16 +78,16 @@ def table(found: dict[str, Any]) -> Table:
 
 
 def sentences(found: dict[str, Any]) -> list[str]:
-    """What the figures mean, a sentence a joint.
+    """What the figures mean, one sentence for each joint.
 
-    Noise moves the others as well as an answer does, and a pose without life fits everything a little: so
-    fit, plausibility and energy are asked as well.
+    Noise moves the others as an answer does, and a lifeless pose fits everything a little: therefore fit,
+    plausibility and energy count too.
     """
     return [_sentence(joint, *strongest(found[joint])) for joint in joints_of(found)]
 
 
 def asides(found: dict[str, Any]) -> list[str]:
-    """What else a body does: when it answers, whether it snaps, goes through itself, slides."""
+    """Onset of the answer, snaps, arms in the trunk, sliding feet."""
     joints, phrase = joints_of(found), found["phrase"]
     onsets = [found[joint]["onset_ticks"] for joint in joints]
     known = [ticks for ticks in onsets if ticks is not None]
@@ -136,7 +127,7 @@ def iterations_of(figures: dict[str, Any]) -> dict[str, Any]:
 
 
 def strongest(figures: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-    """The row at 10/9 or, where that was not asked for, at the most iterations; and which it is."""
+    """K/J and row at 10/9 or, if that was not measured, at the most iterations."""
     rows = iterations_of(figures)
     key = "10_9" if "10_9" in rows else max(rows, key=lambda key: [int(part) for part in key.split("_")])
     return key.replace("_", "/"), rows[key]
@@ -152,15 +143,15 @@ def _sentence(joint: str, iterations: str, row: dict[str, Any]) -> str:
 
 
 def degree(row: dict[str, Any]) -> int:
-    """0, 1 or 2: it hardly answers, a little, or answers."""
+    """0: it hardly answers, 1: a little, 2: it answers."""
     return int(row["answer"] >= ANSWERS_A_LITTLE) + int(row["answer"] >= ANSWERS)
 
 
 def reservations(row: dict[str, Any]) -> list[str]:
     """What is wrong with an answer: its poses are not the dancer's, or it has another energy.
 
-    A network that had been trained for a minute moved the others by 8.7 degrees at an energy of 1.05, with a
-    fit below that of the bare phrase: it is its plausibility (1.22) that told it from a dancer.
+    A network trained for one minute moved the others by 8.7 degrees at an energy of 1.05, with a fit below
+    that of the bare phrase: only its plausibility (1.22) distinguished it from a dancer.
     """
     found = []
     plausibility = row["plausibility"]

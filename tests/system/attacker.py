@@ -1,4 +1,4 @@
-"""Someone on the venue's network who hears everything, has no key, and tries what can be tried."""
+"""An attacker on the venue's network: receives everything, has no key, and tries everything."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ HOST = "127.0.0.1"
 MOST_REMEMBERED = 4000
 
 
-class Stranger:
-    """Replays, reflects, forges, cuts and damages; to the box and to the wearables, from its own address."""
+class Attacker:
+    """Replays, reflects, forges, truncates and damages packets to box and wearables, from its own socket."""
 
     def __init__(self, box: tuple[str, int], wearables: list[tuple[str, int]], seed: int) -> None:
         self.counts: Counter[str] = Counter()
         self._box = box
         self._wearables = wearables
-        self._chance = random.Random(f"stranger {seed}")
+        self._chance = random.Random(f"attacker {seed}")
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind((HOST, 0))
         self._socket.setblocking(False)
@@ -28,12 +28,12 @@ class Stranger:
         self._tagger = wire.Tagger(self._chance.randbytes(wire.KEY_BYTES))
 
     def overhear(self, data: bytes) -> None:
-        """A packet on the air; the newest are kept, and the oldest of the evening too."""
+        """Record a packet on the air; the newest are kept, and the oldest of the evening."""
         is_answer = wire.LAYOUTS[data[3]].direction == "box to sensor"
         self._remember(self._answers if is_answer else self._heard, data)
 
     def act(self, times: int) -> None:
-        """So many tries. What the box answers to a replayed hello is used too."""
+        """Attack this many times. The box's answers to replayed hellos are used too."""
         while (answer := self._receive()) is not None:
             self._remember(self._answers, answer)
         for _ in range(times):
@@ -58,7 +58,7 @@ class Stranger:
             self._send("reflect", self._box, self._answers[-1])
 
     def _forge(self) -> None:
-        """The newest reading again, a little later and turned round, under its old tag."""
+        """The newest reading again, with a later sequence and another orientation, under its old tag."""
         data = bytearray(self._heard[-1])
         sequence = int.from_bytes(data[16:20], "little") + self._chance.randrange(1, 50)
         data[16:20] = (sequence & 0xFFFFFFFF).to_bytes(4, "little")
@@ -75,7 +75,7 @@ class Stranger:
         self._send("damage", self._box, bytes(data))
 
     def _wrong_key(self) -> None:
-        """Well made packets of every kind, for the present session, with a key of the stranger's own."""
+        """Valid packets of every kind, for the present session, signed with the attacker's own key."""
         _, _, _, device, boot, session, sequence = wire.HEAD.unpack_from(self._heard[-1])
         head = device, boot, session, sequence + 1
         turned = (0.0, 0.0, 0.0, 1.0)

@@ -1,30 +1,59 @@
-"""Whether a body stays a body: upper arms deep in the trunk, and feet that slide while they carry."""
+"""Figures of a dance: energy, roughness and steps of its motion; arms in the trunk, sliding feet."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.dancer.grounding import Floor, Grounding, GroundingError, measure_standing, survey
+from appliance.dancer.grounding import Floor, Grounding, GroundingError, survey
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.evaluation.usual_joints import UPPER_ARMS, usual_joints
+from appliance.studio.standing import measure_standing
 
+ROUGHNESS_PERCENTILE = 99.0
 TRUNK_RADIUS = 0.5  # of the distance between the shoulders: 11 cm for the CMU dancers
 DEEP = 0.3  # of that radius below the surface: 3.5 cm
 ALONG_ARM = (0.5, 0.75, 1.0)  # of the upper arm: its inner half begins in the trunk
 
 
+def degrees_apart(a: Array, b: Array) -> Array:
+    """(T,): mean joint angle between poses (T, M, 4)."""
+    apart: Array = np.degrees(quaternion.angle_between(a, b)).mean(axis=-1)
+    return apart
+
+
+def energy(poses: Array) -> float:
+    """Mean joint speed of poses (T, M, 4), degrees a tick."""
+    return float(_steps(poses).mean())
+
+
+def largest_step(poses: Array) -> float:
+    """The largest angle of any joint from one tick to the next, degrees."""
+    return float(_steps(poses).max())
+
+
+def roughness(poses: Array) -> float:
+    """99th percentile of the angular acceleration over ticks and joints, degrees a tick squared.
+
+    A joint's angular velocity is the axis of its step times the angle, in the parent's frame.
+    """
+    turns = quaternion.multiply(poses[1:], quaternion.inverse(poses[:-1]))
+    axes, angles = quaternion.to_axis_angle(turns)
+    velocities = axes * np.degrees(angles)[..., None]
+    accelerations = np.linalg.norm(np.diff(velocities, axis=0), axis=-1)
+    return float(np.percentile(accelerations, ROUGHNESS_PERCENTILE))
+
+
 class BodyFigures:
-    """The figures of dances on one phrase, whose floor it knows; not a number where the skeleton's names do
-    not say what its arms, neck and feet are.
+    """The figures of dances on one phrase and its floor; NaN if joint names do not identify the body parts.
 
     The trunk is a tube along the spine from hip to neck, its radius half the distance between the shoulders.
     An upper arm is deep in it where the axis of its outer half is more than 0.3 radii below the surface.
     Release 0.1.0 on salsa_29 with hands of salsa_24 on lShldr at 10/9: 6 to 11 % of the ticks; the phrase
-    2 %. Foot skate is the horizontal speed of the lowest point of the soles, grounded as in play: 0.14 and
+    2 %. Foot skate is the horizontal speed of the lowest point of the soles, grounded as on stage: 0.14 and
     0.06 m/s there; 0.07 and 0.02 on the default show's own phrase.
     """
 
@@ -52,7 +81,7 @@ class BodyFigures:
         return float(deep.mean())
 
     def foot_skate(self, poses: Array) -> float:
-        """Metres a second that the foot that carries slides in poses (T, J, 4) on the phrase's path."""
+        """Sliding speed of the supporting foot, m/s, in poses (T, J, 4) on the phrase's path."""
         if self._floor is None or len(poses) < 2:
             return float("nan")
         lifts = self._floor.lifts[: len(poses)]
@@ -60,13 +89,13 @@ class BodyFigures:
         return standing.slide_cm_s / 100
 
     def grounded(self, poses: Array) -> Array:
-        """Roots (T, 3) in metres of poses (T, J, 4) on the phrase's path, set on the floor as in play."""
+        """Roots (T, 3) in metres of poses (T, J, 4) on the phrase's path, grounded as on stage."""
         path = self._recording.roots[: len(poses)].astype(np.float32)
         if self._floor is None:
             return path
         grounding, roots = Grounding(self._skeleton, self._floor), np.empty_like(path)
         for tick, pose in enumerate(poses.astype(np.float32)):
-            grounding.stand(pose, path[tick], float(self._floor.lifts[tick]))
+            grounding.ground_pose(pose, path[tick], float(self._floor.lifts[tick]))
             roots[tick] = grounding.root
         return roots
 
@@ -111,3 +140,9 @@ def _distance(points: Array, starts: Array, ends: Array) -> Array:
     share = np.clip((away * bones).sum(axis=-1) / lengths, 0.0, 1.0)
     distance: Array = np.linalg.norm(away - share[:, None] * bones, axis=-1)
     return distance
+
+
+def _steps(poses: Array) -> Array:
+    """(T - 1, M): angle of each joint from tick to tick, degrees."""
+    steps: Array = np.degrees(quaternion.angle_between(poses[1:], poses[:-1]))
+    return steps

@@ -1,4 +1,4 @@
-"""The pictures of each look for the documentation: `python -m appliance.projector.gallery [folder]`."""
+"""docs/pictures/look*.png, by `python -m tools.look_pictures [folder]`: what each look looks like."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
-import appliance.show
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.projector.context import offscreen
 from appliance.projector.picture.renderer import Renderer
-from appliance.projector.still import FINER, Image, drawn, moment_of, shrunk
+from appliance.projector.still import FINER, Image, draw_still, moment_of, shrink
+from appliance.show.bundle import default_show_path
 from appliance.show.look import STYLES, CameraConfig, LookConfig
 
 SIZE = 864, 486
 UPRIGHT, TOGETHER_S = (320, 400), 49.6  # of the four looks beside each other
-SHOW = Path(appliance.show.__file__).parent / "default_show"
+SHOW = default_show_path()
 CHALK = LookConfig(
     name="chalk", style="ink", figure="#f0e9da", light="#5b5550", accent="#d2452b", background="#000000"
 )
@@ -33,8 +33,8 @@ PICTURES = {  # what each picture is called: the look, and the moment of the phr
 }
 
 
-def gallery(folder: Path) -> list[Path]:
-    """Draw all pictures into a folder; returns them."""
+def draw_looks(folder: Path) -> list[Path]:
+    """Draw all pictures into a folder and return their paths."""
     from PIL import Image as Files  # of the extra `pictures`, which the show itself runs without
 
     recording = read_bvh(SHOW / "phrase.bvh")
@@ -45,7 +45,7 @@ def gallery(folder: Path) -> list[Path]:
             ctx, size, recording.skeleton, {name: look for name, (look, _) in PICTURES.items()}
         )
         for name, (_, time_s) in PICTURES.items():
-            image = shrunk(drawn(ctx, renderer, moment_of(recording, time_s), name, size))
+            image = shrink(draw_still(ctx, renderer, moment_of(recording, time_s), name, size))
             paths.append(folder / f"look-{name}.png")
             Files.fromarray(image).save(paths[-1], optimize=True)
         renderer.release()
@@ -62,11 +62,11 @@ def _side_by_side(ctx: moderngl.Context, recording: Recording) -> Image:
     }
     renderer = Renderer(ctx, size, recording.skeleton, looks)
     moment = moment_of(recording, TOGETHER_S)
-    pictures = [shrunk(drawn(ctx, renderer, moment, style, size)) for style in looks]
+    pictures = [shrink(draw_still(ctx, renderer, moment, style, size)) for style in looks]
     renderer.release()
     return np.hstack(pictures)
 
 
 if __name__ == "__main__":
-    for path in gallery(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures")):
+    for path in draw_looks(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures")):
         print(f"{path} ({path.stat().st_size // 1000} kB)")

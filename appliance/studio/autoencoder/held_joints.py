@@ -1,0 +1,20 @@
+"""Which joints are held, where, and how firmly: what the interactive passes of the iteration overwrite."""
+
+from __future__ import annotations
+
+from typing import Generic, NamedTuple, TypeVar
+
+Values = TypeVar("Values")  # torch tensors or numpy arrays
+
+
+class HeldJoints(NamedTuple, Generic[Values]):
+    """Of M joints in windows of T poses.
+
+    mask (M,): which are held; targets (B, T, M, 4): one orientation for each pose of each window; weights
+    (M,), 0 to 1: how firmly. For all windows alike: targets (T, M, 4); a different hold for each: weights
+    (B, M).
+    """
+
+    mask: Values
+    targets: Values
+    weights: Values

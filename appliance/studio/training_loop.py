@@ -1,0 +1,128 @@
+"""The training loop of both networks: progress, averaged weights, reports, checkpoints, stop and resume."""
+
+from __future__ import annotations
+
+import math
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
+
+import torch
+from torch import Tensor, nn
+
+
+class Duration(Protocol):
+    """How to train: for `steps` steps if that is not 0, else for minutes of wall time.
+
+    smoothing: of the averaged weights, 0 to 1.
+    """
+
+    @property
+    def steps(self) -> int: ...
+
+    @property
+    def minutes(self) -> float: ...
+
+    @property
+    def smoothing(self) -> float: ...
+
+
+Report = TypeVar("Report")
+
+
+class TrainingLoop(ABC, Generic[Report]):
+    """Counts steps and seconds over all runs; a kind of training defines what a step and a report are."""
+
+    report_type: type[Report]
+    saved: ClassVar[tuple[str, ...]]  # networks and optimisers in a checkpoint
+
+    def __init__(self, duration: Duration) -> None:
+        self._duration = duration
+        self.step, self.seconds = 0, 0.0
+        self.history: list[Report] = []
+        self.origin: dict[str, Any] = {}  # what the training data came from
+
+    @abstractmethod
+    def train_step(self) -> dict[str, Tensor]:
+        """One optimiser step; returns the losses by name."""
+
+    @abstractmethod
+    def report(self, means: Mapping[str, float]) -> Report:
+        """A line of history: the mean losses since the previous one, and the error on held-out takes."""
+
+    @abstractmethod
+    def state(self) -> dict[str, Any]:
+        """The checkpoint: everything that a resumed training needs."""
+
+    @property
+    def fraction(self) -> float:
+        """How much of the training is done, 0..1."""
+        if self._duration.steps:
+            return min(self.step / self._duration.steps, 1.0)
+        return min(self.seconds / (self._duration.minutes * 60), 1.0)
+
+    def run(
+        self,
+        report: Callable[[Report], None],
+        save: Callable[[], None],
+        report_every_s: float = 15.0,
+        save_every_s: float = 120.0,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Train until done or stop() returns True; reports and saves at intervals of wall time."""
+        sums: dict[str, float] = {}
+        counted = 0
+        began, offset = time.monotonic(), self.seconds
+        last_report = last_save = began
+        while self.fraction < 1.0 and not stop():
+            for name, value in self.train_step().items():
+                sums[name] = sums.get(name, 0.0) + float(value)
+            counted += 1
+            now = time.monotonic()
+            self.seconds = offset + now - began
+            if now - last_report >= report_every_s or self.fraction >= 1.0:
+                line = self.report({name: value / counted for name, value in sums.items()})
+                self.history.append(line)
+                report(line)
+                sums, counted, last_report = {}, 0, now
+            if now - last_save >= save_every_s:
+                save()
+                last_save = now
+        save()
+
+    def save_checkpoint(self, path: Path) -> None:
+        """Write the whole state; the old file stays until the new one is complete."""
+        partial = path.with_suffix(".partial")
+        torch.save(self.state(), partial)
+        partial.replace(path)
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a checkpoint."""
+        for name in self.saved:
+            getattr(self, name).load_state_dict(state[name])
+        torch.set_rng_state(state["random"].cpu())
+        self.step, self.seconds = state["step"], state["seconds"]
+        self.history = [self.report_type(**line) for line in state["history"]]
+
+    def _shared_state(self) -> dict[str, Any]:
+        return {
+            **{name: getattr(self, name).state_dict() for name in self.saved},
+            "random": torch.get_rng_state(),
+            "origin": self.origin,
+            "step": self.step,
+            "seconds": self.seconds,
+            "history": [asdict(line) for line in self.history],  # type: ignore[call-overload]
+        }
+
+    def _cosine(self) -> float:
+        """Share of the learning rate, from 1 at the start to 0 at the end."""
+        return 0.5 * (1 + math.cos(math.pi * self.fraction))
+
+    @torch.no_grad()
+    def _average_weights(self, averaged: nn.Module, network: nn.Module) -> None:
+        """Move the averaged weights towards the network's; call before `step` is counted."""
+        keep = min(self._duration.smoothing, (self.step + 1) / (self.step + 10))
+        torch._foreach_lerp_(list(averaged.parameters()), list(network.parameters()), 1 - keep)
