@@ -48,6 +48,9 @@ def train(
     out: Annotated[Path, typer.Option(help="Folder for the show.")],
     recordings: Recordings = None,
     network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.conditional,
+    window: Annotated[
+        int, typer.Option(min=4, max=128, help="Poses of a window: 8 for a show, others for granular.")
+    ] = 8,
     minutes: Annotated[float | None, typer.Option(min=0.01, help="Training time.", show_default="45")] = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Training steps, instead of --minutes.")] = None,
     seed: Annotated[int, typer.Option(help="The same seed and number of steps give the same network.")] = 1,
@@ -82,6 +85,7 @@ def train(
                 out=out,
                 recordings=recordings,
                 network=network.value,
+                window=window,
                 minutes=minutes,
                 steps=steps,
                 seed=seed,

@@ -143,3 +143,19 @@ def test_what_cannot_be_is_said(
     assert done.exit_code == 2
     assert words in done.output
     assert not (tmp_path / "p.bvh").exists()
+
+
+def test_long_windows_are_trained_danced_and_no_show(recordings: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "long"
+    sizes = ("--network", "mlp", "--window", 32, "--width", 32, "--latent", 8, "--steps", 20)
+    done = bunraku("train", "--recordings", recordings, "--out", folder, "--threads", 1, *sizes)
+    assert done.exit_code == 0, done.output
+    assert "bunraku granular" in done.output and not (folder / "puppet.onnx").exists()
+    checkpoint, out = folder / "checkpoint.pt", tmp_path / "phrase.bvh"
+    done = bunraku("granular", checkpoint, "--out", out, "--seconds", 3, "--hop", 16)
+    assert done.exit_code == 0, done.output
+    assert len(read_bvh(out)) in range(140, 161)
+    for refused in (("export", checkpoint, "--out", tmp_path / "show"), ("evaluate", checkpoint, out)):
+        done = bunraku(*refused)
+        assert done.exit_code == 2
+        assert "windows of 32 poses, and the box dances windows of 8" in " ".join(done.output.split())

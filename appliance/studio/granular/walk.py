@@ -15,10 +15,9 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.autoencoder.training import load_autoencoder
 from appliance.studio.data import sources
 from appliance.studio.data.dataset import FPS, Dataset, Take
-from appliance.studio.evaluation.coders import Poses
+from appliance.studio.evaluation.coders import Poses, load_checkpoint
 from appliance.studio.export.packing import PHRASE_DIGITS
 from appliance.studio.granular import latent_paths
 from appliance.studio.granular.granular import cycle, decoded, encoded, fed_back, once
@@ -52,7 +51,8 @@ class GranularOptions:
 def run(options: GranularOptions) -> None:
     """Walk, decode, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
-    autoencoder, joints, state = load_autoencoder(options.checkpoint)
+    coder, state = load_checkpoint(options.checkpoint)
+    autoencoder, joints = coder.autoencoder, list(coder.joints)
     dataset = sources.remembered(state, options.recordings, options.checkpoint).load(
         reading_progress(console)
     )
