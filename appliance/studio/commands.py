@@ -1,57 +1,20 @@
-"""`bunraku train`, `evaluate`, `export` and `improvise`: from a dancer's recordings to a show.
+"""The studio's commands, from a dancer's recordings to a show; those with a module of their own join last.
 
 Only this module loads with the command line; what needs torch is imported by the command that runs.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-REFUSED, INTERRUPTED = 2, 130  # exit statuses
+from appliance.studio import experiment_command, granular_command
+from appliance.studio.clear_errors import INTERRUPTED, clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-
-
-@contextmanager
-def clear_errors(command: str) -> Iterator[None]:
-    """Turn an error that the artist can fix into one message and exit status 2."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] not in ("torch", "onnx", "matplotlib"):
-            raise
-        _refuse(
-            f"bunraku {command} needs {error.name}, which is not installed here. The box dances without it. "
-            "Install the studio with: pip install 'bunraku[studio]'"
-        )
-    except (ValueError, RuntimeError, OSError) as error:
-        if not _is_for_people(error):
-            raise
-        _refuse(str(error))
-
-
-def _is_for_people(error: Exception) -> bool:
-    from appliance.pictures.filmstrip import MissingPicturesError
-    from appliance.pose.bvh import BvhError
-    from appliance.show.config_error import ConfigError
-    from appliance.studio.data.dataset import DatasetError
-    from appliance.studio.studio_error import StudioError
-
-    return isinstance(
-        error, BvhError | ConfigError | DatasetError | MissingPicturesError | StudioError | OSError
-    )
-
-
-def _refuse(message: str) -> None:
-    print(f"bunraku: {message}", file=sys.stderr)
-    raise typer.Exit(REFUSED)
 
 
 class NetworkName(StrEnum):
@@ -85,6 +48,9 @@ def train(
     out: Annotated[Path, typer.Option(help="Folder for the show.")],
     recordings: Recordings = None,
     network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.conditional,
+    window: Annotated[
+        int, typer.Option(min=4, max=128, help="Poses of a window: 8 for a show, others for granular.")
+    ] = 8,
     minutes: Annotated[float | None, typer.Option(min=0.01, help="Training time.", show_default="45")] = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Training steps, instead of --minutes.")] = None,
     seed: Annotated[int, typer.Option(help="The same seed and number of steps give the same network.")] = 1,
@@ -119,6 +85,7 @@ def train(
                 out=out,
                 recordings=recordings,
                 network=network.value,
+                window=window,
                 minutes=minutes,
                 steps=steps,
                 seed=seed,
@@ -243,3 +210,7 @@ def improvise(
         )
     if not done:
         raise typer.Exit(INTERRUPTED)
+
+
+app.add_typer(experiment_command.app)
+app.add_typer(granular_command.app)

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from appliance.studio.data import sources
-from appliance.studio.evaluation.coders import load_checkpoint
+from appliance.studio.evaluation.coders import load_puppet
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
 from appliance.studio.train_command import reading_progress
@@ -21,7 +21,7 @@ def run(checkpoint: Path, out: Path, recordings: Path | None, phrase: Path | Non
         checkpoint = checkpoint / "checkpoint.pt"
     if not checkpoint.exists():
         raise StudioError(f"{checkpoint} does not exist. Give the checkpoint.pt of a training.")
-    source = sources.remembered(load_checkpoint(checkpoint)[1], recordings, checkpoint)
+    source = sources.remembered(load_puppet(checkpoint)[1], recordings, checkpoint)
     dataset = source.load(reading_progress(console))
     report = release(Request(checkpoint, source, out, name or "", phrase), dataset, console)
     console.print(

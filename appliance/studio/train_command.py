@@ -16,6 +16,7 @@ from appliance.studio.autoencoder.architectures import DEFAULT
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.autoencoder.training_run import TrainingRun, parameters
 from appliance.studio.data import sources
+from appliance.studio.data.dataset import WINDOW
 from appliance.studio.data.sources import Sources
 from appliance.studio.evaluation.coders import load_checkpoint
 from appliance.studio.evaluation.findings import MASKED_PICTURE, findings, require_windows
@@ -31,6 +32,7 @@ class TrainOptions:
     out: Path
     recordings: Path | None = None
     network: str = DEFAULT
+    window: int = WINDOW
     minutes: float | None = None
     steps: int | None = None
     seed: int = 1
@@ -64,7 +66,7 @@ def run(options: TrainOptions) -> bool:
         console.print(f"- {line}", highlight=False)
     if any(take.errors for take in dataset.takes):
         draw_masked(options.out / MASKED_PICTURE, dataset.takes)
-    require_windows(dataset, settings.batch)
+    require_windows(dataset, settings.batch, settings.window)
     training = Training(dataset, settings, device)
     training.origin = source.as_state()
     if state is not None:
@@ -79,6 +81,12 @@ def run(options: TrainOptions) -> bool:
             soft_wrap=True,
         )
         return False
+    if settings.window != WINDOW:
+        console.print(
+            f"{checkpoint} dances by itself: bunraku granular {shlex.quote(str(checkpoint))} --out "
+            f"phrase.bvh. It is no show: the box dances windows of {WINDOW} poses."
+        )
+        return True
     release(Request(checkpoint, source, options.out, options.name or "", options.phrase), dataset, console)
     console.print(
         f"{options.out} is a show. Dance it: bunraku play --show {shlex.quote(str(options.out))} --emulate"
@@ -121,6 +129,7 @@ def _settings_and_source(
         raise StudioError("Give the folder of the recordings: --recordings FOLDER.")
     settings = Settings(
         network=options.network,
+        window=options.window,
         latent=options.latent,
         width=options.width,
         depth=options.depth,
@@ -150,6 +159,6 @@ def _plan(training: Training, device: str) -> str:
     where = "the GPU" if device == "cuda" else f"the CPU ({torch.get_num_threads()} threads)"
     count = parameters(training.autoencoder.network)
     return (
-        f"{settings.network}, latent {shape.latent}, width {shape.width}: {count / 1e6:.2f} million "
-        f"parameters; {bound} on {where}{done}."
+        f"{settings.network}, windows of {shape.window} poses, latent {shape.latent}, width {shape.width}: "
+        f"{count / 1e6:.2f} million parameters; {bound} on {where}{done}."
     )

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from appliance.pose import quaternion
+from appliance.pose.anatomy import Anatomy
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.body.anatomy import Anatomy
 
 CROWDED_SHARE = 0.3  # of a limb's points that lie in another part of the body
 CLEARANCE = 0.01  # of the height, between the surfaces of two limbs

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from appliance.pose.anatomy import LONG_BONE, Anatomy
 from appliance.pose.quaternion import Array
-from appliance.projector.body.anatomy import LONG_BONE, Anatomy
 from appliance.projector.body.extremities import foot, hand, head
 from appliance.projector.body.volumes import Group, Slab
 

@@ -32,6 +32,7 @@ class Settings:
     """How to train. minutes bounds the wall time and paces the learning rate, unless steps is given."""
 
     network: str = DEFAULT
+    window: int = WINDOW  # poses; the box dances windows of 8, longer ones are for bunraku granular
     latent: int = 0
     width: int = 0
     depth: int = 0
@@ -88,11 +89,12 @@ class Training(TrainingLoop[Report]):
         rest = torch.tensor(still[list(dataset.moving)])
         network, shape = build(
             settings.network,
-            WINDOW,
+            settings.window,
             len(dataset.moving),
             latent=settings.latent,
             width=settings.width,
             depth=settings.depth,
+            curves=settings.window // 2,
         )
         self.autoencoder = Autoencoder(network, shape, rest).to(self.device)
         network.start_at(rest.float().flatten().to(self.device))
@@ -102,8 +104,12 @@ class Training(TrainingLoop[Report]):
             self.device
         )
         mirror = settings.mirror and dataset.mirrors
-        self.train_windows = self._heading_free(windows(dataset.training, dataset.moving, mirror))
-        self.held_windows = torch.tensor(windows(dataset.held_out, dataset.moving)).to(self.device)
+        self.train_windows = self._heading_free(
+            windows(dataset.training, dataset.moving, mirror, settings.window)
+        )
+        self.held_windows = torch.tensor(
+            windows(dataset.held_out, dataset.moving, window=settings.window)
+        ).to(self.device)
         self.optimizer = torch.optim.Adam(
             self.autoencoder.parameters(), lr=settings.learning_rate, fused=True
         )

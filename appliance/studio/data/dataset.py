@@ -147,21 +147,23 @@ def mean_pose(takes: Sequence[Take]) -> NDArray[np.float64]:
     return quaternion.normalize(mean).astype(np.float64)
 
 
-def window_starts(take: Take, hop: int = 1) -> NDArray[np.intp]:
+def window_starts(take: Take, hop: int = 1, window: int = WINDOW) -> NDArray[np.intp]:
     """First frames of every hop-th of a take's windows in which each pose is sound."""
-    if len(take.sound) < WINDOW:
+    if len(take.sound) < window:
         return np.zeros(0, dtype=np.intp)
-    whole = np.lib.stride_tricks.sliding_window_view(take.sound, WINDOW).all(axis=-1)
+    whole = np.lib.stride_tricks.sliding_window_view(take.sound, window).all(axis=-1)
     return np.flatnonzero(whole)[::hop]
 
 
-def windows(takes: Sequence[Take], moving: Sequence[int], mirror: bool = False) -> NDArray[np.float32]:
-    """Every sound window of the takes, (N, 8, M, 4) float32, and after them their mirror images."""
+def windows(
+    takes: Sequence[Take], moving: Sequence[int], mirror: bool = False, window: int = WINDOW
+) -> NDArray[np.float32]:
+    """Every sound window of the takes, (N, window, M, 4) float32, and after them their mirror images."""
     found = []
     for take in takes:
         recordings = [take.recording, mirrored(take.recording)] if mirror else [take.recording]
-        starts = window_starts(take)
+        starts = window_starts(take, window=window)
         for recording in recordings:
             poses = recording.poses[:, moving].astype(np.float32)
-            found.append(poses[starts[:, None] + np.arange(WINDOW)])
-    return np.concatenate(found) if found else np.zeros((0, WINDOW, len(moving), 4), dtype=np.float32)
+            found.append(poses[starts[:, None] + np.arange(window)])
+    return np.concatenate(found) if found else np.zeros((0, window, len(moving), 4), dtype=np.float32)

@@ -28,6 +28,7 @@ class Coder(Protocol):
     """
 
     joints: tuple[str, ...]
+    window: int
     rest: Poses
     facts: dict[str, str]
     batch: int
@@ -46,6 +47,7 @@ class OnnxCoder:
     """A puppet's network file run as the box runs it: one window at a time, one thread."""
 
     batch = 1
+    window = WINDOW
 
     def __init__(self, path: Path) -> None:
         """Raises StudioError if bunraku did not export the file."""
@@ -104,6 +106,7 @@ class TorchCoder:
 
     def __init__(self, autoencoder: Autoencoder, joints: Sequence[str], facts: dict[str, str]) -> None:
         self.autoencoder, self.joints, self.facts = autoencoder, tuple(joints), facts
+        self.window = autoencoder.shape.window
         self.rest = autoencoder.rest.cpu().numpy()
 
     def iterate(
@@ -141,12 +144,23 @@ def load_checkpoint(path: Path) -> tuple[TorchCoder, dict[str, Any]]:
     return TorchCoder(autoencoder, joints, facts), state
 
 
+def load_puppet(path: Path) -> tuple[TorchCoder, dict[str, Any]]:
+    """The same for a network that the box can dance. Raises StudioError."""
+    coder, state = load_checkpoint(path)
+    if coder.window != WINDOW:
+        raise StudioError(
+            f"{path} has windows of {coder.window} poses, and the box dances windows of {WINDOW}. It dances "
+            "by itself with bunraku granular; for a show train one without --window."
+        )
+    return coder, state
+
+
 def open_coder(path: Path) -> Coder:
     """A show folder, an .onnx file, a checkpoint.pt, or a folder that is still training."""
     if path.is_dir():
         if not (path / "show.yaml").exists() and (path / "checkpoint.pt").exists():
-            return load_checkpoint(path / "checkpoint.pt")[0]
+            return load_puppet(path / "checkpoint.pt")[0]
         return OnnxCoder(load_show(path).network)
     if not path.exists():
         raise StudioError(f"{path} does not exist. Give a show folder, a puppet.onnx or a checkpoint.pt.")
-    return load_checkpoint(path)[0] if path.suffix == ".pt" else OnnxCoder(path)
+    return load_puppet(path)[0] if path.suffix == ".pt" else OnnxCoder(path)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from appliance.studio.data.dataset import FPS, Dataset, DatasetError, Take, window_starts
+from appliance.studio.data.dataset import FPS, WINDOW, Dataset, DatasetError, Take, window_starts
 
 MASKED_PICTURE = "pictures/masked.png"
 FEW_S = 120.0  # of sound dance to learn from
@@ -36,22 +36,22 @@ def findings(dataset: Dataset) -> list[str]:
     ]
 
 
-def learned_windows(dataset: Dataset) -> int:
+def learned_windows(dataset: Dataset, window: int = WINDOW) -> int:
     """The number of sound training windows, without mirror images."""
-    return sum(len(window_starts(take)) for take in dataset.training)
+    return sum(len(window_starts(take, window=window)) for take in dataset.training)
 
 
-def require_windows(dataset: Dataset, least: int) -> None:
+def require_windows(dataset: Dataset, least: int, window: int = WINDOW) -> None:
     """Raises DatasetError if fewer training windows are left than one training step uses."""
-    found = learned_windows(dataset)
+    found = learned_windows(dataset, window)
     if found >= least:
         return
     masked = sum(int(np.count_nonzero(~take.sound)) for take in dataset.training) / FPS
     why = f" {masked:.1f} s are masked as capture errors ({MASKED_PICTURE})." if masked else ""
     raise DatasetError(
-        f"Only {_count(found, 'window')} of 8 sound poses (about {found / FPS:.1f} s) to learn from: too few "
-        f"to learn anything. At least {least} are needed (about {least / FPS:.0f} s in a row), some minutes "
-        f"are better.{why} Bring more or longer recordings."
+        f"Only {_count(found, 'window')} of {window} sound poses (about {found / FPS:.1f} s) to learn from: "
+        f"too few to learn anything. At least {least} are needed (about {least / FPS:.0f} s in a row), some "
+        f"minutes are better.{why} Bring more or longer recordings."
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from appliance.pictures.filmstrip import draw_filmstrip
 from appliance.pose.recording import Recording
-from appliance.studio.data.dataset import FPS, WINDOW, Take
+from appliance.studio.data.dataset import FPS, Take
 from appliance.studio.evaluation.coders import Coder
 
 BACKDROP, PANEL, INK, FAINT = "#0f1015", "#191a21", "#efe6d8", "#9a948c"
@@ -76,10 +76,10 @@ def draw_reconstruction(path: Path, coder: Coder, take: Take, title: str, iterat
 
 
 def reconstructed(coder: Coder, recording: Recording, iterations: int) -> NDArray[np.float64]:
-    """(N, J, 4): the recording coded in adjacent windows of 8; an incomplete last window is left out."""
+    """(N, J, 4): the recording coded in adjacent windows; an incomplete last window is left out."""
     places = [recording.skeleton.index(name) for name in coder.joints]
-    count = len(recording) // WINDOW * WINDOW
-    windows = recording.poses[:count, places].astype(np.float32).reshape(-1, WINDOW, len(places), 4)
+    count = len(recording) // coder.window * coder.window
+    windows = recording.poses[:count, places].astype(np.float32).reshape(-1, coder.window, len(places), 4)
     made, _ = coder.iterate(windows, iterations)
     whole = np.array(recording.poses[:count], dtype=np.float64)
     whole[:, places] = made.reshape(count, len(places), 4)

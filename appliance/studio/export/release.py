@@ -18,7 +18,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import Dataset, Take, find_catalogue, load_take
 from appliance.studio.data.sources import Sources
-from appliance.studio.evaluation.coders import OnnxCoder, Poses, TorchCoder, load_checkpoint
+from appliance.studio.evaluation.coders import OnnxCoder, Poses, TorchCoder, load_puppet
 from appliance.studio.evaluation.evaluation import evaluate, fitting_hop
 from appliance.studio.evaluation.own_answer import own_answer
 from appliance.studio.evaluation.pictures import longest_sound
@@ -55,7 +55,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     def say(message: str) -> None:
         console.print(message, highlight=False)
 
-    coder, state = load_checkpoint(request.checkpoint)
+    coder, state = load_puppet(request.checkpoint)
     name = request.name or request.out.resolve().name
     missing = [name for name in coder.joints if name not in dataset.skeleton.names]
     if missing:

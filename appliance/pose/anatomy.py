@@ -1,4 +1,4 @@
-"""What a skeleton's joints are to a sculptor: trunk, limbs, hands, feet, head, and where its front is."""
+"""What the joints of a skeleton of any kind are: trunk, limbs, hands, feet, head, and where the front is."""
 
 from __future__ import annotations
 

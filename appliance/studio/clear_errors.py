@@ -1,0 +1,46 @@
+"""An error that the artist can fix is one message and exit status 2, for every command of the studio."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import typer
+
+REFUSED, INTERRUPTED = 2, 130  # exit statuses
+
+
+@contextmanager
+def clear_errors(command: str) -> Iterator[None]:
+    """Turn an error that the artist can fix into one message and exit status 2."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] not in ("torch", "onnx", "matplotlib"):
+            raise
+        _refuse(
+            f"bunraku {command} needs {error.name}, which is not installed here. The box dances without it. "
+            "Install the studio with: pip install 'bunraku[studio]'"
+        )
+    except (ValueError, RuntimeError, OSError) as error:
+        if not _is_for_people(error):
+            raise
+        _refuse(str(error))
+
+
+def _is_for_people(error: Exception) -> bool:
+    from appliance.pictures.filmstrip import MissingPicturesError
+    from appliance.pose.bvh import BvhError
+    from appliance.show.config_error import ConfigError
+    from appliance.studio.data.dataset import DatasetError
+    from appliance.studio.studio_error import StudioError
+
+    return isinstance(
+        error, BvhError | ConfigError | DatasetError | MissingPicturesError | StudioError | OSError
+    )
+
+
+def _refuse(message: str) -> None:
+    print(f"bunraku: {message}", file=sys.stderr)
+    raise typer.Exit(REFUSED)

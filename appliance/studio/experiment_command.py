@@ -1,0 +1,68 @@
+"""`bunraku experiment`: the experiments of 'Puppeteering an AI'. Its app joins the studio's commands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from appliance.studio.clear_errors import clear_errors
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+
+@app.command()
+def experiment(
+    out: Annotated[Path, typer.Option(help="Folder for the page, the strips, the BVH and the figures.")],
+    show: Annotated[
+        Path | None,
+        typer.Option(help="Show whose network dances; left out: the show that comes with the box."),
+    ] = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder that the excerpts come from, takes kept apart first; left out: the show's phrase."
+        ),
+    ] = None,
+    excerpts: Annotated[
+        Path | None, typer.Option(help="YAML that names them: `still: {take: salsa_09, start: 12.5}`.")
+    ] = None,
+    network: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Another network of the same dancer beside it (checkpoint.pt, puppet.onnx); repeatable."
+        ),
+    ] = None,
+    joint: Annotated[
+        str | None, typer.Option(help="What the hand holds; left out: the left upper arm.")
+    ] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of a worn sensor: seconds, w, x, y, z; left out: how the liveliest excerpt moves it."
+        ),
+    ] = None,
+    pictures: Annotated[bool, typer.Option(help="Draw the filmstrips, most of the time it takes.")] = True,
+) -> None:
+    """Dance the experiments of 'Puppeteering an AI' and hold what comes out against the paper's claims.
+
+    Five excerpts of 200 frames, chosen by measure; coding iterations 1 to 10; one joint kept, turned, led by
+    a sensor and held still. Out come a page that opens without a network, filmstrips, BVH, experiments.json.
+    """
+    with clear_errors("experiment"):
+        from appliance.show.bundle import default_show_path
+        from appliance.studio.experiments.experiment import ExperimentOptions, run
+
+        run(
+            ExperimentOptions(
+                show=show or default_show_path(),
+                out=out,
+                recordings=recordings,
+                excerpts=excerpts,
+                networks=tuple(network or ()),
+                joint=joint,
+                trace=trace,
+                pictures=pictures,
+            )
+        )

@@ -1,0 +1,287 @@
+"""`bunraku experiment`: all families on five excerpts, with strips, recordings, figures and a page."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from appliance.pictures.filmstrip import Strip, draw_strips
+from appliance.pose import quaternion
+from appliance.pose.bvh import write_bvh
+from appliance.pose.quaternion import Array
+from appliance.show.show import load_show
+from appliance.studio.data.dataset import FPS, Take, load_dataset
+from appliance.studio.evaluation.coders import Coder, open_coder
+from appliance.studio.evaluation.evaluation import load_takes
+from appliance.studio.evaluation.usual_joints import usual_joints
+from appliance.studio.experiments.claims import Claim, claims
+from appliance.studio.experiments.excerpts import Excerpt, choose, named
+from appliance.studio.experiments.families import (
+    AS_IN_THE_PAPER,
+    CONDITIONS,
+    FIXED_DEGREES,
+    TURNS_S,
+    WITH_SENSOR,
+    Condition,
+    Trial,
+    as_recording,
+    usual_trace,
+)
+from appliance.studio.experiments.page import write_page
+from appliance.studio.studio_error import StudioError
+
+COLUMNS = 8
+FIGURES = (
+    ("coding iterations alone", "once", tuple(Condition("coding", (count, 0)) for count in (1, 2, 5, 10))),
+    (
+        "the joint kept where the recording has it",
+        "once",
+        tuple(Condition("kept", each) for each in AS_IN_THE_PAPER),
+    ),
+    *(
+        (
+            f"the joint turning, {seconds:g} s a turn",
+            "looped",
+            tuple(Condition("turning", each, f"{seconds:g}s") for each in AS_IN_THE_PAPER),
+        )
+        for seconds in TURNS_S
+    ),
+    ("the joint led by a sensor", "looped", tuple(Condition("sensor", each) for each in WITH_SENSOR)),
+    (
+        "the joint held still",
+        "looped",
+        tuple(Condition("fixed", (10, 9), f"{degrees}deg") for degrees in FIXED_DEGREES),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class ExperimentOptions:
+    """What was asked for; None: what is usual."""
+
+    show: Path
+    out: Path
+    recordings: Path | None = None
+    excerpts: Path | None = None
+    networks: tuple[Path, ...] = ()
+    joint: str | None = None
+    trace: Path | None = None
+    pictures: bool = True
+
+
+def run(options: ExperimentOptions) -> None:
+    """Dance, measure, draw and write; what was found goes to standard output as a table."""
+    console = Console(stderr=True)
+    coders = _coders(options)
+    first = next(iter(coders.values()))
+    joint = _joint(options.joint, first)
+    takes = _takes(options, first)
+    excerpts = (
+        choose(takes, first.joints)
+        if options.excerpts is None
+        else named(options.excerpts, takes, first.joints)
+    )
+    for one in excerpts:
+        console.print(f"- {one.name}: {one.take} from {one.first / FPS:.1f} s; {one.why}.", highlight=False)
+    skeleton = takes[0].recording.skeleton
+    trace = (
+        usual_trace(excerpts, skeleton.index(joint)) if options.trace is None else read_trace(options.trace)
+    )
+    options.out.mkdir(parents=True, exist_ok=True)
+    found, pictures, work = {}, dict[str, list[Path]](), len(coders) * len(excerpts)
+    drawing: list[Future[Path]] = []
+    with (
+        ProcessPoolExecutor(mp_context=get_context("spawn")) as pool,  # a strip takes seconds
+        Progress(console=console, transient=True, disable=not console.is_terminal) as bar,
+    ):
+        task = bar.add_task("dancing", total=work * (len(CONDITIONS) + len(FIGURES) * options.pictures))
+
+        def advance(words: str) -> None:
+            bar.update(task, advance=1, description=words)
+
+        for name, coder in coders.items():
+            folder = options.out / _file_name(name)
+            trials = [Trial(coder, one, joint, trace) for one in excerpts]
+            for trial in trials:
+                trial.run(advance)
+                _write_dances(trial, folder / trial.excerpt.name)
+                wanted = _pictures(trial, folder / trial.excerpt.name, name) if options.pictures else []
+                drawing += [pool.submit(draw_strips, *one) for one in wanted]
+                pictures[f"{name}: {trial.excerpt.name}, {trial.excerpt.why}"] = [one[0] for one in wanted]
+            found[name] = claims(trials)
+        for done in as_completed(drawing):
+            done.result()
+            advance("drawing")
+    (options.out / "experiments.json").write_text(
+        json.dumps(_report(coders, excerpts, joint, found), indent=1) + "\n"
+    )
+    write_page(
+        options.out / "experiments.html",
+        "Experiments with a puppet",
+        _words(joint, options, first),
+        excerpts,
+        found,
+        pictures,
+    )
+    _print_verdicts(Console(), found)
+    console.print(
+        f"{options.out / 'experiments.html'} shows all of it; BVH and strips lie beside it.", highlight=False
+    )
+
+
+def read_trace(file: Path) -> Array:
+    """A sensor's trace, (N, 4) at 50 Hz: CSV rows of seconds, w, x, y, z; local to the joint's parent.
+
+    Raises StudioError with the line.
+    """
+    rows: list[list[float]] = []
+    with file.open(newline="") as lines:
+        for number, row in enumerate(csv.reader(lines), 1):
+            if number == 1 and row and not _is_number(row[0]):
+                continue
+            try:
+                values = [float(cell) for cell in row]
+            except ValueError:
+                values = []
+            if len(values) != 5 or not np.isfinite(values).all() or not any(values[1:]):
+                raise StudioError(f"{file}, line {number}: a row has seconds and a quaternion: 0.02,1,0,0,0.")
+            if rows and values[0] <= rows[-1][0]:
+                raise StudioError(
+                    f"{file}, line {number}: {values[0]} s comes after {rows[-1][0]} s. Sort by time."
+                )
+            rows.append(values)
+    if len(rows) < 2:
+        raise StudioError(f"{file} has no trace: rows of seconds, w, x, y, z are needed.")
+    table = np.array(rows)
+    turns = quaternion.continuous(quaternion.normalize(table[:, 1:]))
+    times = np.arange(table[0, 0], table[-1, 0], 1 / FPS)
+    later = np.clip(np.searchsorted(table[:, 0], times, side="right"), 1, len(table) - 1)
+    spans = table[later, 0] - table[later - 1, 0]
+    shares = (times - table[later - 1, 0]) / spans
+    return quaternion.continuous(quaternion.slerp(turns[later - 1], turns[later], shares))
+
+
+def _coders(options: ExperimentOptions) -> dict[str, Coder]:
+    """The show's network first; the others move the same joints."""
+    found: dict[str, Coder] = {}
+    for path in (options.show, *options.networks):
+        coder = open_coder(path)
+        name = f"{coder.facts['architecture']}, {coder.facts['precision']}"
+        found[name if name not in found else f"{name}, {path.name}"] = coder
+    joints = next(iter(found.values())).joints
+    for name, coder in found.items():
+        if coder.joints != joints:
+            raise StudioError(
+                f"{name} moves other joints than {options.show}: networks of one dancer can be compared."
+            )
+    return found
+
+
+def _joint(wanted: str | None, coder: Coder) -> str:
+    joint = wanted or usual_joints(coder.joints).get("left upper arm")
+    if joint not in coder.joints:
+        words = (
+            f"'{wanted}' is not moved by the network"
+            if wanted
+            else "There is no left shoulder by a usual name"
+        )
+        raise StudioError(f"{words}. Say what to hold with --joint: {', '.join(coder.joints)}.")
+    return joint
+
+
+def _takes(options: ExperimentOptions, coder: Coder) -> list[Take]:
+    """Where the excerpts come from: recordings, those kept apart from training, else the show's phrase."""
+    if options.recordings is None:
+        return load_takes([load_show(options.show).phrase], coder)
+    if options.excerpts is not None:
+        return load_takes(sorted(options.recordings.glob("*.bvh")), coder)
+    dataset = load_dataset(options.recordings)
+    return list(dataset.held_out or dataset.training)
+
+
+def _write_dances(trial: Trial, folder: Path) -> None:
+    """BVH of the excerpt and of every dance on it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_bvh(folder / "excerpt.bvh", as_recording(trial.once, trial.once.phrase))
+    for condition, dance in trial.dances.items():
+        write_bvh(folder / f"{condition.name}.bvh", trial.whole(dance))
+
+
+def _pictures(trial: Trial, folder: Path, network: str) -> list[tuple[Any, ...]]:
+    """What draw_strips needs for each of the FIGURES: the recording, and the conditions under it."""
+    skeleton = trial.excerpt.recording.skeleton
+    held, wanted = [skeleton.index(trial.joint)], []
+    for number, (words, base, conditions) in enumerate(FIGURES, 1):
+        rehearsal = trial.once if base == "once" else trial.looped
+        recorded = as_recording(rehearsal, rehearsal.phrase)
+        strips = [Strip(recorded.poses, recorded.roots, "recorded")]
+        for condition in conditions:
+            danced = trial.whole(trial.dances[condition])
+            strips.append(Strip(danced.poses, danced.roots, condition.label))
+        path = folder / f"{number}_{conditions[0].family}.png"
+        title = f"{trial.excerpt.name}: {words} ({network})"
+        marked = [] if conditions[0].family == "coding" else held
+        wanted.append((path, skeleton, strips, FPS, marked, title, COLUMNS))
+    return wanted
+
+
+def _report(
+    coders: Mapping[str, Coder], excerpts: Sequence[Excerpt], joint: str, found: Mapping[str, Sequence[Claim]]
+) -> dict[str, object]:
+    return {
+        "joint": joint,
+        "excerpts": {one.name: one.as_json() for one in excerpts},
+        "networks": {
+            name: {"facts": coders[name].facts, "claims": {one.letter: one.as_json() for one in found[name]}}
+            for name in coders
+        },
+    }
+
+
+def _words(joint: str, options: ExperimentOptions, coder: Coder) -> list[str]:
+    trace = "of the liveliest excerpt, there and back" if options.trace is None else options.trace.name
+    return [
+        "The experiments of 'Puppeteering an AI' (section 4). Five excerpts of 200 frames at 50 Hz are "
+        f"danced with 1 to 10 coding iterations and no hand; then {joint} is kept at its recorded "
+        "orientation pose by pose, turned about an axis at one and at five seconds a turn, led by a sensor's "
+        "trace, and held still. K/J are coding and interaction iterations.",
+        f"Windows of 8 poses, one a tick, blended as on the box. The sensor's trace: {trace}.",
+    ]
+
+
+def _print_verdicts(console: Console, found: Mapping[str, Sequence[Claim]]) -> None:
+    table = Table(title="The paper's claims")
+    table.add_column("claim")
+    for name in found:
+        table.add_column(name)
+    for rows in zip(*found.values(), strict=True):
+        held = [f"{sum(one.holds.values())} of {len(one.holds)}" for one in rows]
+        words = [
+            f"{'holds' if one.holds_on_the_whole else 'does not hold'} ({of})"
+            for one, of in zip(rows, held, strict=True)
+        ]
+        table.add_row(f"({rows[0].letter}) {rows[0].words}", *words)
+    console.print(table)
+
+
+def _file_name(name: str) -> str:
+    return "".join(letter if letter.isalnum() else "_" for letter in name).strip("_")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,100 @@
+"""The report of the experiments: an HTML page that opens without a network, its pictures inside."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from appliance.studio.experiments.claims import Claim
+from appliance.studio.experiments.excerpts import Excerpt
+
+_STYLE = """
+body { background: #0f1015; color: #efe6d8; font: 16px/1.5 system-ui, sans-serif;
+       margin: 2rem auto; max-width: 76rem; padding: 0 1.5rem }
+h1, h2, h3 { font-weight: 500 } h1 { font-size: 1.7rem } h2 { margin-top: 3rem }
+table { border-collapse: collapse; margin: 1rem 0; width: 100% }
+th, td { border-bottom: 1px solid #34353d; padding: .35rem .6rem; text-align: right; vertical-align: top }
+th:first-child, td:first-child { text-align: left } th { color: #9a948c; font-weight: 400 }
+.yes { color: #8fc98f } .no { color: #f5462a } .words { color: #9a948c }
+img { width: 100%; margin: .5rem 0 1.5rem }
+"""
+
+
+def write_page(
+    path: Path,
+    title: str,
+    words: Sequence[str],
+    excerpts: Sequence[Excerpt],
+    networks: Mapping[str, Sequence[Claim]],
+    pictures: Mapping[str, Sequence[Path]],
+) -> None:
+    """words: paragraphs below the title; networks: name and claims; pictures: heading and PNG files."""
+    parts = [f"<h1>{html.escape(title)}</h1>", *(f"<p>{html.escape(one)}</p>" for one in words)]
+    parts += ["<h2>The excerpts</h2>", _excerpts(excerpts), "<h2>The paper's claims</h2>", _summary(networks)]
+    for name, claims in networks.items():
+        parts += [f"<h3>{html.escape(name)}</h3>", *(_claim(one) for one in claims)]
+    for heading, files in pictures.items():
+        parts += [f"<h2>{html.escape(heading)}</h2>", *map(_picture, files)] if files else []
+    path.write_text(
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
+        f"<style>{_STYLE}</style></head>\n<body>\n" + "\n".join(parts) + "\n</body></html>\n"
+    )
+
+
+def _excerpts(excerpts: Sequence[Excerpt]) -> str:
+    names = ("whole", "torso", "arms", "legs")
+    rows = [["excerpt", "take", "seconds", *(f"{name}, degrees/s" for name in names), "coordination"]]
+    for one in excerpts:
+        seconds = one.as_json()["seconds"]
+        assert isinstance(seconds, list), "two of them"
+        speeds = [f"{getattr(one.measures, name):.0f}" for name in names]
+        place = f"{seconds[0]:.1f} to {seconds[1]:.1f}"
+        rows.append([f"{one.name}: {one.why}", one.take, place, *speeds, f"{one.measures.coordination:.2f}"])
+    return _table(rows)
+
+
+def _summary(networks: Mapping[str, Sequence[Claim]]) -> str:
+    first = next(iter(networks.values()))
+    rows = [["claim", *networks]]
+    for number, claim in enumerate(first):
+        verdicts = (claims[number].holds_on_the_whole for claims in networks.values())
+        rows.append(
+            [
+                f"({claim.letter}) {claim.words}",
+                *("holds" if holds else "does not hold" for holds in verdicts),
+            ]
+        )
+    return _table(rows)
+
+
+def _claim(claim: Claim) -> str:
+    columns = list(next(iter(claim.figures.values()), {}))
+    rows = [["excerpt", *(column.replace("_", " ") for column in columns), ""]]
+    for name, figures in claim.figures.items():
+        verdict = {True: "holds", False: "does not hold", None: ""}[claim.holds.get(name)]
+        rows.append([name, *(f"{figures[column]:.2f}" for column in columns), verdict])
+    words, measure = html.escape(claim.words), html.escape(claim.measure)
+    return f"<p>({claim.letter}) {words}<br><span class=words>{measure}</span></p>{_table(rows)}"
+
+
+def _table(rows: Sequence[Sequence[str]]) -> str:
+    head, *body = rows
+    lines = ["<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
+    colours = {"holds": " class=yes", "does not hold": " class=no"}
+    for row in body:
+        cells = "".join(f"<td{colours.get(cell, '')}>{html.escape(cell)}</td>" for cell in row)
+        lines.append(f"<tr>{cells}</tr>")
+    return f"<table>{''.join(lines)}</table>"
+
+
+def _picture(file: Path) -> str:
+    """As JPEG: a tenth of the size, and thirty of them are on the page."""
+    from PIL import Image
+
+    packed = io.BytesIO()
+    Image.open(file).convert("RGB").save(packed, "JPEG", quality=88)
+    data = base64.b64encode(packed.getvalue()).decode()
+    return f'<img alt="{html.escape(file.stem)}" src="data:image/jpeg;base64,{data}">'

@@ -1,0 +1,76 @@
+"""`bunraku granular`: motion without a recording. Its app joins the studio's commands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from appliance.studio.clear_errors import clear_errors
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+
+@app.command()
+def granular(
+    checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a training.")],
+    out: Annotated[Path, typer.Option(help="The phrase, a BVH file; its figures and picture lie beside it.")],
+    recordings: Annotated[
+        Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="How long the phrase is.")] = 30.0,
+    seed: Annotated[int, typer.Option(help="Another seed, another dance.")] = 1,
+    spread: Annotated[
+        float, typer.Option(min=0.0, max=5.0, help="How far from the usual: 1 as in the prior; 0: one pose.")
+    ] = 1.2,
+    speed: Annotated[
+        float,
+        typer.Option(min=0.01, max=25.0, help="Of a walk: how often a second the dance changes, at most."),
+    ] = 1.0,
+    hop: Annotated[int, typer.Option(min=1, help="Ticks of 20 ms from one window to the next.")] = 1,
+    samples: Annotated[
+        bool, typer.Option("--samples", help="Every window drawn for itself, instead of a walk.")
+    ] = False,
+    one: Annotated[
+        str | None, typer.Option("--from", help="A take, TAKE or TAKE@SECONDS: its path instead of a walk.")
+    ] = None,
+    other: Annotated[str | None, typer.Option("--to", help="Another one, mixed into it.")] = None,
+    mix: Annotated[float, typer.Option(min=0.0, max=1.0, help="How much of --to (encodingmix).")] = 0.5,
+    offset: Annotated[
+        float,
+        typer.Option(min=-5.0, max=5.0, help="Moves the path, in standard deviations (encodingoffset)."),
+    ] = 0.0,
+    feedback: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0, max=1.0, help="The network on its own motion, with this share of --from mixed in."
+        ),
+    ] = None,
+) -> None:
+    """Make an endless phrase out of a dancer's latents alone: Granular Dance.
+
+    A walk through the prior (or samples, with --samples), the path between two takes, or the network fed with
+    what it danced before. The phrase plays in a show as any other.
+    """
+    with clear_errors("granular"):
+        from appliance.studio.granular.walk import GranularOptions, run
+
+        run(
+            GranularOptions(
+                checkpoint=checkpoint,
+                out=out,
+                recordings=recordings,
+                seconds=seconds,
+                seed=seed,
+                spread=spread,
+                speed=speed,
+                hop=hop,
+                samples=samples,
+                one=one,
+                other=other,
+                mix=mix,
+                offset=offset,
+                feedback=feedback,
+            )
+        )

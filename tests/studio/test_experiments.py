@@ -1,0 +1,296 @@
+"""The first paper's experiments: excerpts by measure, claims that a copy and a pausing dancer tell apart."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from appliance.pose import quaternion
+from appliance.pose.bvh import read_bvh, write_bvh
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+from appliance.show.bundle import default_show_path
+from appliance.show.config_error import ConfigError
+from appliance.studio.autoencoder.held_joints import HeldJoints
+from appliance.studio.data.dataset import FPS, WINDOW, Take
+from appliance.studio.evaluation.coders import Poses
+from appliance.studio.experiments.claims import claims, pauses
+from appliance.studio.experiments.excerpts import FRAMES, Excerpt, choose, measured, named, regions_of
+from appliance.studio.experiments.experiment import read_trace
+from appliance.studio.experiments.families import CONDITIONS, Condition, Trial, usual_trace
+from appliance.studio.experiments.page import write_page
+from appliance.studio.studio_error import StudioError
+
+SECONDS = 12.0
+ARMS = ("rShldr", "lShldr", "rForeArm", "lForeArm")
+LEGS = ("rThigh", "lThigh", "rShin", "lShin")
+TORSO = ("abdomen", "chest")
+JOINTS = ("hip", *TORSO, "head", *ARMS, *LEGS)
+JOINT = "lShldr"
+
+
+@pytest.fixture(scope="module")
+def skeleton() -> Skeleton:
+    return read_bvh(default_show_path() / "skeleton.bvh").skeleton
+
+
+def take(skeleton: Skeleton, name: str, **swings: tuple[tuple[str, ...], float, float]) -> Take:
+    """A body at rest whose joints swing: what it is called = (joints, degrees, cycles a second)."""
+    count = round(SECONDS * FPS)
+    time = np.arange(count) / FPS
+    poses = np.tile(quaternion.IDENTITY.astype(float), (count, len(skeleton), 1))
+    for joints, degrees, hertz in swings.values():
+        angles = np.radians(degrees) * np.sin(2 * np.pi * hertz * time)
+        for joint in joints:
+            poses[:, skeleton.index(joint)] = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), angles)
+    roots = np.tile([0.0, 1.0, 0.0], (count, 1))
+    recording = Recording(skeleton, poses, roots, FPS)
+    return Take(name, name, recording, np.ones(count, dtype=bool), FPS, FPS)
+
+
+@pytest.fixture(scope="module")
+def takes(skeleton: Skeleton) -> list[Take]:
+    """Each of them is one of the five kinds from end to end."""
+    return [
+        take(skeleton, "nothing", all=(JOINTS, 0.5, 0.2)),
+        take(skeleton, "bending", torso=(TORSO, 30, 0.3), arms=(ARMS, 1, 0.3), legs=(LEGS, 1, 0.3)),
+        take(skeleton, "apart", arms=(ARMS, 30, 0.35), legs=(LEGS, 30, 0.87)),
+        take(skeleton, "in_step", arms=(ARMS, 30, 0.5), legs=(LEGS, 30, 0.5)),
+        take(skeleton, "everything", all=(JOINTS, 40, 0.6), arms=(ARMS, 40, 0.75)),
+    ]
+
+
+def test_each_kind_of_excerpt_is_found_where_it_is(takes: list[Take]) -> None:
+    found = {one.name: one.take for one in choose(takes, JOINTS)}
+    assert found == {
+        "still": "nothing",
+        "torso": "bending",
+        "uncoordinated": "apart",
+        "coordinated": "in_step",
+        "partly": "everything",
+    }
+
+
+def test_an_excerpt_has_its_frames_and_what_the_windows_need_around_them(takes: list[Take]) -> None:
+    for one in choose(takes, JOINTS):
+        assert len(one.recording) == FRAMES + 2 * (WINDOW - 1)
+        whole = next(take for take in takes if take.name == one.take).recording
+        np.testing.assert_array_equal(one.recording.poses[WINDOW - 1], whole.poses[one.first])
+
+
+def test_coordination_knows_step_from_chance(skeleton: Skeleton, takes: list[Take]) -> None:
+    regions = regions_of(skeleton, JOINTS)
+    places = [skeleton.index(name) for name in JOINTS]
+    in_step, apart = (
+        measured(take.recording.poses[:FRAMES, places], regions).coordination for take in (takes[3], takes[2])
+    )
+    assert in_step > 0.99 and apart < 0.5
+
+
+def test_regions_are_told_by_shape(skeleton: Skeleton) -> None:
+    found = regions_of(skeleton, JOINTS)
+    assert {JOINTS[place] for place in found.arms} == set(ARMS)
+    assert {JOINTS[place] for place in found.legs} == set(LEGS)
+    assert {"abdomen", "chest"} <= {JOINTS[place] for place in found.torso}
+
+
+def test_too_little_for_five_is_said(skeleton: Skeleton) -> None:
+    with pytest.raises(StudioError, match="too short for five excerpts of 4 s: 2 fit"):
+        choose([take(skeleton, "short", all=(JOINTS, 3, 1.0))], JOINTS)
+
+
+def test_a_skeleton_without_limbs_is_said(skeleton: Skeleton) -> None:
+    with pytest.raises(StudioError, match="--excerpts"):
+        regions_of(skeleton, ("hip", "head"))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a: {take: nothing}\n", "'a' does not say where it is"),
+        ("a: {take: nothing, start: soon}\n", "'a' does not say where it is"),
+        ("a: {take: elsewhere, start: 1}\n", "There is no take 'elsewhere'"),
+        ("b: {take: nothing, start: 1}\na: {take: nothing, start: 9}\n", "excerpts.yaml:2: nothing ends"),
+        ("a: {take: nothing, start: -1}\n", "'a' does not say where it is"),
+        ("{}\n", "names no excerpt"),
+    ],
+)
+def test_a_wrong_excerpts_file_is_told_with_its_line(
+    takes: list[Take], tmp_path: Path, text: str, words: str
+) -> None:
+    file = tmp_path / "excerpts.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError) as refused:
+        named(file, takes, JOINTS)
+    assert words in str(refused.value)
+
+
+def test_named_excerpts_are_taken(takes: list[Take], tmp_path: Path) -> None:
+    file = tmp_path / "excerpts.yaml"
+    file.write_text("mine: {take: apart, start: 2.5}\n")
+    (found,) = named(file, takes, JOINTS)
+    assert (found.name, found.take, found.first) == ("mine", "apart", 125)
+
+
+def test_pauses_and_jumps_are_counted() -> None:
+    turns = np.repeat([0.0, 10.0, 20.0, 30.0], 10)  # four pauses of ten ticks, each left by one step
+    poses = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.radians(turns))[:, None]
+    share, jump = pauses(poses, mean_speed=30.0 / 39)
+    assert share == pytest.approx(36 / 39)
+    assert jump == 1
+    smooth = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.radians(np.linspace(0, 30, 40)))[
+        :, None
+    ]
+    share, jump = pauses(smooth, mean_speed=30.0 / 39)
+    assert share == 0 and np.isnan(jump)
+
+
+class Pretender:
+    """A coder that only overwrites what is held, and with `pausing` rounds every angle to steps."""
+
+    batch = 512
+
+    def __init__(self, pausing: bool = False) -> None:
+        self.joints, self.facts, self.pausing = (
+            JOINTS,
+            {"architecture": "pretender", "precision": "none"},
+            pausing,
+        )
+        self.rest = np.tile(quaternion.IDENTITY, (len(JOINTS), 1))
+
+    def iterate(
+        self,
+        windows: Poses,
+        coding_iterations: int,
+        interaction_iterations: int = 0,
+        held: HeldJoints[np.ndarray] | None = None,
+    ) -> tuple[Poses, Poses]:
+        made = windows.copy()
+        if self.pausing and coding_iterations > 1:
+            made[..., 1] = np.round(made[..., 1] * 8) / 8
+            made = quaternion.normalize(made).astype(np.float32)
+        if held is not None and interaction_iterations == coding_iterations:
+            made[:, :, held.mask] = held.targets[:, :, held.mask]
+        return made, np.zeros((len(windows), 2), dtype=np.float32)
+
+
+def trials(takes: list[Take], coder: Pretender) -> list[Trial]:
+    excerpts = choose(takes, JOINTS)
+    trace = usual_trace(excerpts, takes[0].recording.skeleton.index(JOINT))
+    found = [
+        Trial(coder, one, JOINT, trace) for one in excerpts if one.name in ("still", "coordinated", "torso")
+    ]
+    for trial in found:
+        trial.run()
+    return found
+
+
+def test_a_copy_is_faithful_and_shows_the_hand_and_does_nothing_else(takes: list[Take]) -> None:
+    verdicts = {one.letter: one.holds_on_the_whole for one in claims(trials(takes, Pretender()))}
+    assert verdicts == {"a": True, "b": True, "c": False, "d": True, "e": False, "f": False, "g": False}
+
+
+def test_a_dancer_that_pauses_on_poses_is_intermittent(takes: list[Take]) -> None:
+    by_letter = {one.letter: one for one in claims(trials(takes, Pretender(pausing=True)))}
+    assert by_letter["c"].holds_on_the_whole
+    assert by_letter["c"].figures["coordinated"]["pauses_10"] > 0.3
+
+
+def test_every_family_is_danced_as_long_as_its_hand_needs(takes: list[Take]) -> None:
+    trial = trials(takes, Pretender())[0]
+    assert set(trial.dances) == set(CONDITIONS)
+    assert len(trial.dances[Condition("kept", (10, 10))].poses) == FRAMES
+    slow = trial.dances[Condition("turning", (10, 10), "5s")]
+    assert slow.hand is not None and len(slow.poses) == 750
+    first = quaternion.angle_between(slow.hand[0], slow.hand[250])
+    assert np.degrees(first) < 1.0, "five seconds are one turn"
+    kept = trial.dances[Condition("kept", (1, 1))].poses
+    np.testing.assert_allclose(np.abs((kept * trial.once.phrase).sum(-1)), 1.0, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("seconds,w,x,y,z\n0,1,0,0\n", "line 2: a row has seconds and a quaternion"),
+        ("0,1,0,0,0\n0.02,0,0,0,0\n", "line 2"),
+        ("0,1,0,0,0\n0.02,nan,0,0,0\n", "line 2"),
+        ("0.02,1,0,0,0\n0.01,1,0,0,0\n", "line 2: 0.01 s comes after 0.02 s"),
+        ("", "has no trace"),
+    ],
+)
+def test_a_wrong_trace_is_told_with_its_line(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "trace.csv"
+    file.write_text(text)
+    with pytest.raises(StudioError, match=words):
+        read_trace(file)
+
+
+def test_a_trace_is_read_at_the_ticks(tmp_path: Path) -> None:
+    file = tmp_path / "trace.csv"
+    times = np.arange(0, 2, 0.01)
+    half = np.radians(45 * times)
+    rows = [f"{t},{np.cos(h)},{np.sin(h)},0,0" for t, h in zip(times, half, strict=True)]
+    file.write_text("seconds,w,x,y,z\n" + "\n".join(rows) + "\n")
+    found: Array = read_trace(file)
+    assert len(found) == 100
+    np.testing.assert_allclose(2 * np.degrees(np.arccos(found[:, 0])), 90 * np.arange(100) / FPS, atol=0.05)
+
+
+def test_the_command_writes_page_strips_recordings_and_figures(tmp_path: Path, long_run: bool) -> None:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    phrase = read_bvh(default_show_path() / "phrase.bvh")
+    write_bvh(folder / "solo.bvh", phrase.excerpt(0, 12))
+    (tmp_path / "excerpts.yaml").write_text("mine: {take: solo, start: 2}\n")
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "appliance.cli.app", "experiment", "--out", str(tmp_path / "out")),
+            *("--recordings", str(folder), "--excerpts", str(tmp_path / "excerpts.yaml")),
+            "--pictures" if long_run else "--no-pictures",
+        ],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "(a) One pass reproduces the recording faithfully." in " ".join(
+        done.stdout.replace("│", " ").split()
+    )
+    report = json.loads((tmp_path / "out/experiments.json").read_text())
+    assert report["excerpts"]["mine"]["take"] == "solo"
+    (network,) = report["networks"].values()
+    assert set(network["claims"]) == set("abcdefg")
+    page = (tmp_path / "out/experiments.html").read_text()
+    assert "http" not in page, "it opens without a network"
+    assert page.count("data:image/jpeg;base64,") == (6 if long_run else 0)
+    danced = sorted((tmp_path / "out").glob("*/mine/*.bvh"))
+    assert len(danced) == len(CONDITIONS) + 1
+    assert len(read_bvh(next(path for path in danced if path.name == "turning_5s_10_10.bvh"))) == 750
+
+
+def test_the_page_has_its_pictures_inside(takes: list[Take], tmp_path: Path) -> None:
+    trial = trials(takes, Pretender())[0]
+    strip = tmp_path / "strip.png"
+    Image.new("RGB", (64, 32), "red").save(strip)
+    page = tmp_path / "page.html"
+    write_page(
+        page, "A <title>", ["Words."], [trial.excerpt], {"a network": claims([trial])}, {"Strips": [strip]}
+    )
+    text = page.read_text()
+    assert "A &lt;title&gt;" in text and "does not hold" in text
+    _, data = text.split("data:image/jpeg;base64,")
+    shown = Image.open(io.BytesIO(base64.b64decode(data.split('"')[0])))
+    assert shown.size == (64, 32)
+
+
+def test_an_excerpt_reports_its_measures(takes: list[Take]) -> None:
+    one: Excerpt = choose(takes, JOINTS)[0]
+    assert one.as_json()["seconds"] == [round(one.first / FPS, 2), round((one.first + FRAMES) / FPS, 2)]
