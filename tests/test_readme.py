@@ -21,7 +21,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (
     "README.md",
-    *(f"docs/{page}.md" for page in ("choreographer", "dancer", "lights", "technician", "touring")),
+    *(f"docs/{page}.md" for page in ("choreographer", "dancer", "exchange", "lights", "technician", "touring")),
 )
 WATCHDOG_S = 900.0  # for one block: the slowest one takes a minute on a free machine
 RECURSIVE = re.compile(r"^make (test|bench|lock|clean)\b")  # these would run this test again
