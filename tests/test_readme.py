@@ -19,10 +19,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = (
-    "README.md",
-    *(f"docs/{page}.md" for page in ("choreographer", "dancer", "exchange", "lights", "technician", "touring")),
-)
+PAGES_OF_USERS = ("choreographer", "dancer", "exchange", "lights", "technician", "touring")
+PAGES = ("README.md", *(f"docs/{page}.md" for page in PAGES_OF_USERS))
 WATCHDOG_S = 900.0  # for one block: the slowest one takes a minute on a free machine
 RECURSIVE = re.compile(r"^make (test|bench|lock|clean)\b")  # these would run this test again
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from appliance.studio import experiment_command, granular_command
+from appliance.studio import experiment_command, granular_command, path_command, vary_command
 from appliance.studio.clear_errors import INTERRUPTED, clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -26,6 +26,16 @@ class NetworkName(StrEnum):
     lstm = "lstm"
     lstm_autoregressive = "lstm-autoregressive"
     lstm256 = "lstm256"
+    lstm384 = "lstm384"
+    dense64 = "dense64"
+
+
+class ModelName(StrEnum):
+    """What to train, by its name in models.MODELS."""
+
+    puppet = "puppet"
+    pose = "pose"
+    sequence = "sequence"
 
 
 class Device(StrEnum):
@@ -47,11 +57,26 @@ Phrase = Annotated[
 def train(
     out: Annotated[Path, typer.Option(help="Folder for the show.")],
     recordings: Recordings = None,
-    network: Annotated[NetworkName, typer.Option(help="Architecture.")] = NetworkName.conditional,
+    model: Annotated[
+        ModelName,
+        typer.Option(help="puppet: a show. pose: for path and map. sequence: for vary."),
+    ] = ModelName.puppet,
+    network: Annotated[
+        NetworkName | None,
+        typer.Option(
+            help="Architecture. As published: lstm (puppet), dense64 (pose), lstm384 (sequence).",
+            show_default="conditional, for other models mlp",
+        ),
+    ] = None,
     window: Annotated[
-        int, typer.Option(min=4, max=128, help="Poses of a window: 8 for a show, others for granular.")
-    ] = 8,
-    minutes: Annotated[float | None, typer.Option(min=0.01, help="Training time.", show_default="45")] = None,
+        int,
+        typer.Option(
+            min=0, max=128, help="Poses of a window, for granular.", show_default="8, of sequences 128"
+        ),
+    ] = 0,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.01, help="Training time.", show_default="45, of poses 15")
+    ] = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Training steps, instead of --minutes.")] = None,
     seed: Annotated[int, typer.Option(help="The same seed and number of steps give the same network.")] = 1,
     latent: Annotated[int, typer.Option(min=0, help="Size of the latent. 0: as the network has it.")] = 0,
@@ -76,7 +101,10 @@ def train(
     phrase: Phrase = None,
     name: Annotated[str | None, typer.Option(help="Name of the show. Default: the folder's name.")] = None,
 ) -> None:
-    """Train a dancer on recordings and write a show that can be played to --out."""
+    """Train a dancer on recordings and write a show that can be played to --out.
+
+    With --model pose or sequence: the autoencoders of 'Beyond Imitation', a checkpoint for the studio.
+    """
     with clear_errors("train"):
         from appliance.studio import train_command
 
@@ -84,7 +112,8 @@ def train(
             train_command.TrainOptions(
                 out=out,
                 recordings=recordings,
-                network=network.value,
+                model=model.value,
+                network=network.value if network else None,
                 window=window,
                 minutes=minutes,
                 steps=steps,
@@ -214,3 +243,5 @@ def improvise(
 
 app.add_typer(experiment_command.app)
 app.add_typer(granular_command.app)
+app.add_typer(vary_command.app)
+app.add_typer(path_command.app)

@@ -11,7 +11,7 @@ from appliance.studio.data import sources
 from appliance.studio.evaluation.coders import load_puppet
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
-from appliance.studio.train_command import reading_progress
+from appliance.studio.trained_on import reading_progress
 
 
 def run(checkpoint: Path, out: Path, recordings: Path | None, phrase: Path | None, name: str | None) -> None:

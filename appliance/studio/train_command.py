@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import torch
 from rich.console import Console
-from rich.progress import track
 
-from appliance.studio.autoencoder.architectures import DEFAULT
+from appliance.studio.autoencoder.models import MODELS, settings_for
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.autoencoder.training_run import TrainingRun, parameters
 from appliance.studio.data import sources
@@ -23,6 +21,8 @@ from appliance.studio.evaluation.findings import MASKED_PICTURE, findings, requi
 from appliance.studio.evaluation.masked import draw_masked
 from appliance.studio.export.release import Request, release
 from appliance.studio.studio_error import StudioError
+from appliance.studio.trained_on import reading_progress
+from appliance.studio.variations.sweep import report
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,9 @@ class TrainOptions:
 
     out: Path
     recordings: Path | None = None
-    network: str = DEFAULT
-    window: int = WINDOW
+    model: str = "puppet"
+    network: str | None = None
+    window: int = 0
     minutes: float | None = None
     steps: int | None = None
     seed: int = 1
@@ -81,6 +82,11 @@ def run(options: TrainOptions) -> bool:
             soft_wrap=True,
         )
         return False
+    if settings.model != "puppet":
+        if settings.model == "sequence":
+            report(training.averaged, dataset, options.out, console)
+        console.print(f"{checkpoint} is ready. What it is for: {MODELS[settings.model].use}.")
+        return True
     if settings.window != WINDOW:
         console.print(
             f"{checkpoint} dances by itself: bunraku granular {shlex.quote(str(checkpoint))} --out "
@@ -102,15 +108,6 @@ def choose_device(wanted: str) -> str:
     return "cuda" if available and wanted != "cpu" else "cpu"
 
 
-def reading_progress(console: Console) -> Any:
-    """Wraps the reading of recordings in a progress bar."""
-
-    def progress(files: Sequence[Path]) -> Any:
-        return track(files, "reading", console=console, transient=True, disable=not console.is_terminal)
-
-    return progress
-
-
 def _settings_and_source(
     options: TrainOptions, checkpoint: Path
 ) -> tuple[Settings, Sources, dict[str, Any] | None]:
@@ -127,8 +124,9 @@ def _settings_and_source(
         )
     if options.recordings is None:
         raise StudioError("Give the folder of the recordings: --recordings FOLDER.")
-    settings = Settings(
-        network=options.network,
+    settings = settings_for(
+        options.model,
+        options.network,
         window=options.window,
         latent=options.latent,
         width=options.width,

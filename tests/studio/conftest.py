@@ -11,6 +11,8 @@ from typer.testing import CliRunner, Result
 
 from appliance.studio.commands import app
 from appliance.studio.evaluation import answer_picture, own_answer
+from appliance.studio.pose_space import path
+from appliance.studio.variations import sweep, vary
 from tests.studio.tiny import write_recordings
 
 
@@ -27,10 +29,13 @@ def _seeded_torch() -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def _small_answers() -> Iterator[None]:
-    """The answer of a trained dancer is measured on 3 s, and drawn with two figures a strip."""
+    """What training ends with is measured on little, and strips have two figures."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(answer_picture, "COLUMNS", 2)
         patch.setattr(own_answer, "MOST_TICKS", 150)
+        for module in (sweep, vary, path):
+            patch.setattr(module, "COLUMNS", 2)
+        patch.setattr(sweep, "WINDOWS", 3)
         yield
 
 

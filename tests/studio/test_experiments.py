@@ -22,9 +22,10 @@ from appliance.show.bundle import default_show_path
 from appliance.show.config_error import ConfigError
 from appliance.studio.autoencoder.held_joints import HeldJoints
 from appliance.studio.data.dataset import FPS, WINDOW, Take
+from appliance.studio.data.regions import regions_of
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.experiments.claims import claims, pauses
-from appliance.studio.experiments.excerpts import FRAMES, Excerpt, choose, measured, named, regions_of
+from appliance.studio.experiments.excerpts import FRAMES, Excerpt, choose, measured, named
 from appliance.studio.experiments.experiment import read_trace
 from appliance.studio.experiments.families import CONDITIONS, Condition, Trial, usual_trace
 from appliance.studio.experiments.page import write_page

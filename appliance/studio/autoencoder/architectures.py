@@ -5,21 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from appliance.studio.autoencoder.conditional import Conditional
-from appliance.studio.autoencoder.networks import Conv, Lstm, LstmAutoregressive, Mlp, Network, Shape
+from appliance.studio.autoencoder.networks import Conv, Dense, Lstm, LstmAutoregressive, Mlp, Network, Shape
 
 DEFAULT = "conditional"
 NETWORKS: dict[str, tuple[Callable[[Shape], Network], dict[str, int]]] = {
     DEFAULT: (Conditional, {"latent": 64, "width": 384, "depth": 1}),
     "mlp": (Mlp, {"latent": 64, "width": 384, "depth": 1}),
     "conv": (Conv, {"latent": 64, "width": 160}),
-    "lstm": (Lstm, {"latent": 32, "width": 512}),
-    "lstm-autoregressive": (LstmAutoregressive, {"latent": 32, "width": 512}),
-    "lstm256": (Lstm, {"latent": 64, "width": 256}),
+    "lstm": (Lstm, {"latent": 32, "width": 512, "depth": 2}),
+    "lstm-autoregressive": (LstmAutoregressive, {"latent": 32, "width": 512, "depth": 2}),
+    "lstm256": (Lstm, {"latent": 64, "width": 256, "depth": 2}),
+    "lstm384": (Lstm, {"latent": 256, "width": 384, "depth": 3}),
+    "dense64": (Dense, {"latent": 32, "width": 64, "depth": 2}),
 }
+MOST_CURVES = 32  # of 128 poses: all that is slower than 6 Hz
 
 
-def build(name: str, window: int, joints: int, **sizes: int) -> tuple[Network, Shape]:
+def build(
+    name: str, window: int, joints: int, variational: bool = False, **sizes: int
+) -> tuple[Network, Shape]:
     """A network by name; sizes that are not 0 (latent, width, depth) override its own."""
     make, defaults = NETWORKS[name]
-    shape = Shape(window, joints, **{**defaults, **{k: v for k, v in sizes.items() if v}})
+    curves = max(1, min(window // 2, MOST_CURVES))
+    given = {**defaults, "curves": curves, **{k: v for k, v in sizes.items() if v}}
+    shape = Shape(window, joints, variational=variational, **given)
     return make(shape), shape

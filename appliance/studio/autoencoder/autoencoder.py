@@ -41,8 +41,13 @@ class Autoencoder(nn.Module):
         return torch.cat([root[:, :, None], windows[:, :, 1:]], dim=2)
 
     def encode(self, windows: Tensor) -> Tensor:
-        """Heading-free windows -> latents (B, Z)."""
-        return self.network.encode(windows.flatten(1))
+        """Heading-free windows -> latents (B, Z); of a variational network their means."""
+        return self.network.encode(windows.flatten(1))[:, : self.shape.latent]
+
+    def encode_gaussian(self, windows: Tensor) -> tuple[Tensor, Tensor]:
+        """Heading-free windows -> means and log variances (B, Z) of a variational network."""
+        mean, log_variance = self.network.encode(windows.flatten(1)).chunk(2, dim=-1)
+        return mean, log_variance.clamp(-12.0, 4.0)
 
     def encode_held(self, windows: Tensor, start: Tensor, goal: Tensor, held: Tensor) -> Tensor:
         """Latents (B, Z) of heading-free windows, overwritten by goal (B, T, M, 4) as held (B, M) says.

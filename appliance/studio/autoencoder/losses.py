@@ -23,7 +23,9 @@ class LossWeights:
     pace: float = 1.0
     unit_norm: float = 0.1
     position: float = 1.0
-    prior: float = 0.003
+    squared: float = 0.0  # of quaternions' components: the published loss of 'Beyond Imitation'
+    prior: float = 0.003  # of the adversarial prior; 0: none
+    divergence: float = 0.001  # of a variational network's latents from the prior
     advance: float = 1.0
     energy: float = 8.0
     first: float = 0.5  # of rotations after the first pass of several
@@ -33,17 +35,19 @@ class LossWeights:
 def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:
     """Losses of raw decoded quaternions (B, T, M, 4) against heading-free windows of the same shape.
 
-    rotation: see rotation_loss; pace: the same for steps between poses; unit_norm: squared; position: mean
-    distance in metres.
+    rotation: see rotation_loss; pace: the same for steps between poses, 0 for a window of one; unit_norm:
+    squared; position: mean distance in metres; squared: of the components, summed over a joint.
     """
     made = rotation.normalize(raw)
     norms = raw.square().sum(-1)
     moments = torch.randint(raw.shape[1], (POSITION_POSES,), device=raw.device)
     here, there = body(torch.cat([made[:, moments], windows[:, moments]])).chunk(2)
     distance = (here - there).square().sum(-1)
+    steps = (made[:, 1:] - made[:, :-1]) - (windows[:, 1:] - windows[:, :-1])
     return {
         "rotation": rotation_loss(raw, windows),
-        "pace": 2 * _length((made[:, 1:] - made[:, :-1]) - (windows[:, 1:] - windows[:, :-1])),
+        "pace": 2 * _length(steps) if steps.numel() else raw.new_zeros(()),
+        "squared": (raw - windows).square().sum(-1).mean(),
         "unit_norm": (norms - 1).square().mean(),
         "position": (distance + 1e-8).sqrt().mean(),
     }
@@ -63,6 +67,16 @@ def advance_losses(raw: Tensor, windows: Tensor) -> dict[str, Tensor]:
     sizes, sizes_wanted = _sizes(change).mean((0, 1)), _sizes(wanted).mean((0, 1))
     energy = 2 * (sizes - ENERGY * sizes_wanted).abs().mean()
     return {"advance": 2 * _length(change - wanted), "energy": energy}
+
+
+def divergence(mean: Tensor, log_variance: Tensor) -> Tensor:
+    """Nats by which Gaussians (B, Z) differ from a standard one, mean of a batch."""
+    return 0.5 * (mean.square() + log_variance.exp() - 1 - log_variance).sum(-1).mean()
+
+
+def sampled(mean: Tensor, log_variance: Tensor) -> Tensor:
+    """A sample of each Gaussian (B, Z)."""
+    return mean + torch.exp(0.5 * log_variance) * torch.randn_like(mean)
 
 
 def prior_loss(critic: PriorCritic, latents: Tensor) -> Tensor:

@@ -14,7 +14,10 @@ from torch import Tensor, nn
 
 @dataclass(frozen=True)
 class Shape:
-    """What a network is built for: window poses, moving joints, latent size, width of its layers."""
+    """What a network is built for: window poses, moving joints, latent size, width and depth of its layers.
+
+    variational: whether the encoder gives a Gaussian, means and log variances, instead of a point.
+    """
 
     window: int
     joints: int
@@ -22,6 +25,7 @@ class Shape:
     width: int
     depth: int = 1
     curves: int = 4  # cosines in time that the mlp sees, of the 8 that the window's poses could have
+    variational: bool = False
 
     @property
     def pose(self) -> int:
@@ -30,6 +34,11 @@ class Shape:
     @property
     def flat(self) -> int:
         return self.window * self.pose
+
+    @property
+    def coded(self) -> int:
+        """Numbers that the encoder gives."""
+        return 2 * self.latent if self.variational else self.latent
 
 
 class Network(nn.Module):
@@ -95,7 +104,7 @@ class MlpEncoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.time = TimeBasis(shape)
-        self.stack = _dense_stack(shape.curves * shape.pose, shape.width, shape.depth, shape.latent)
+        self.stack = _dense_stack(shape.curves * shape.pose, shape.width, shape.depth, shape.coded)
 
     def forward(self, window: Tensor) -> Tensor:
         latent: Tensor = self.stack(self.time.project(window))
@@ -157,7 +166,7 @@ class ConvEncoder(nn.Module):
         self.window, self.pose = shape.window, shape.pose
         self.first = nn.Conv1d(shape.pose, shape.width, 3, padding=1)
         self.second = nn.Conv1d(shape.width, shape.width, 3, padding=1)
-        self.last = nn.Linear(shape.width * shape.window, shape.latent)
+        self.last = nn.Linear(shape.width * shape.window, shape.coded)
 
     def forward(self, window: Tensor) -> Tensor:
         x = window.view(-1, self.window, self.pose).transpose(1, 2)
@@ -197,8 +206,8 @@ class LstmEncoder(nn.Module):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.window, self.pose = shape.window, shape.pose
-        self.lstm = nn.LSTM(shape.pose, shape.width, num_layers=2, batch_first=True)
-        self.dense, self.last = nn.Linear(shape.width, shape.width), nn.Linear(shape.width, shape.latent)
+        self.lstm = nn.LSTM(shape.pose, shape.width, num_layers=shape.depth, batch_first=True)
+        self.dense, self.last = nn.Linear(shape.width, shape.width), nn.Linear(shape.width, shape.coded)
 
     def forward(self, window: Tensor) -> Tensor:
         steps, _ = self.lstm(window.view(-1, self.window, self.pose))
@@ -211,7 +220,7 @@ class LstmDecoder(nn.Module):
         super().__init__()
         self.window = shape.window
         self.dense = nn.Linear(shape.latent, shape.width)
-        self.lstm = nn.LSTM(shape.width, shape.width, num_layers=2, batch_first=True)
+        self.lstm = nn.LSTM(shape.width, shape.width, num_layers=shape.depth, batch_first=True)
         self.last = nn.Linear(shape.width, shape.pose)
 
     def forward(self, latent: Tensor) -> Tensor:
@@ -225,7 +234,7 @@ class LstmDecoder(nn.Module):
 
 
 class Lstm(Network):
-    """The paper's network (Granular Dance, 'Puppeteering an AI'): 2 x 512 LSTM each way.
+    """The papers' network: LSTM each way, 2 x 512 in 'Puppeteering an AI', 3 x 384 in 'Beyond Imitation'.
 
     Two departures, both needed for what the paper describes: the latent is linear (a ReLU latent cannot
     follow a Gaussian of mean zero), and the dense layers are ELU as in the paper's critic.
@@ -266,3 +275,33 @@ class LstmAutoregressive(Network):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.encoder, self.decoder = LstmEncoder(shape), AutoregressiveDecoder(shape)
+
+
+class DenseDecoder(nn.Sequential):
+    """Dense layers that begin with the rest pose."""
+
+    def start_at(self, rest: Tensor) -> None:
+        last = self[-1]
+        assert isinstance(last, nn.Linear)
+        _start_at(last, rest.repeat(last.out_features // len(rest)))
+
+
+class Dense(Network):
+    """The pose autoencoder of 'Beyond Imitation': 2 x 64 LeakyReLU each way."""
+
+    encoder: nn.Sequential
+    decoder: DenseDecoder
+
+    def __init__(self, shape: Shape) -> None:
+        super().__init__()
+        inward, outward = (
+            [nn.Linear(size, shape.width), nn.LeakyReLU()]
+            + [
+                layer
+                for _ in range(shape.depth - 1)
+                for layer in (nn.Linear(shape.width, shape.width), nn.LeakyReLU())
+            ]
+            for size in (shape.flat, shape.latent)
+        )
+        self.encoder = nn.Sequential(*inward, nn.Linear(shape.width, shape.coded))
+        self.decoder = DenseDecoder(*outward, nn.Linear(shape.width, shape.flat))

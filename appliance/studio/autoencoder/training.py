@@ -31,8 +31,10 @@ SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below
 class Settings:
     """How to train. minutes bounds the wall time and paces the learning rate, unless steps is given."""
 
+    model: str = "puppet"  # see models.py
     network: str = DEFAULT
-    window: int = WINDOW  # poses; the box dances windows of 8, longer ones are for bunraku granular
+    window: int = WINDOW  # poses; the box dances windows of 8, others are for the studio
+    variational: bool = False
     latent: int = 0
     width: int = 0
     depth: int = 0
@@ -49,6 +51,11 @@ class Settings:
     critic_every: int = 2  # steps; the prior moves slowly
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
     answers: AnswerSettings = field(default_factory=AnswerSettings)
+
+    @property
+    def hop(self) -> int:
+        """Frames between two training windows: neighbours of long ones differ little."""
+        return max(1, self.window // 16)
 
     @staticmethod
     def from_state(saved: Mapping[str, Any]) -> Settings:
@@ -91,10 +98,10 @@ class Training(TrainingLoop[Report]):
             settings.network,
             settings.window,
             len(dataset.moving),
+            settings.variational,
             latent=settings.latent,
             width=settings.width,
             depth=settings.depth,
-            curves=settings.window // 2,
         )
         self.autoencoder = Autoencoder(network, shape, rest).to(self.device)
         network.start_at(rest.float().flatten().to(self.device))
@@ -105,10 +112,10 @@ class Training(TrainingLoop[Report]):
         )
         mirror = settings.mirror and dataset.mirrors
         self.train_windows = self._heading_free(
-            windows(dataset.training, dataset.moving, mirror, settings.window)
+            windows(dataset.training, dataset.moving, mirror, settings.window, settings.hop)
         )
         self.held_windows = torch.tensor(
-            windows(dataset.held_out, dataset.moving, window=settings.window)
+            windows(dataset.held_out, dataset.moving, window=settings.window, hop=settings.hop)
         ).to(self.device)
         self.optimizer = torch.optim.Adam(
             self.autoencoder.parameters(), lr=settings.learning_rate, fused=True
@@ -143,24 +150,28 @@ class Training(TrainingLoop[Report]):
             latents.append(coded)
             self.lessons.follow(lesson, rotation.normalize(raw.detach()))
         coded = torch.cat(latents)
-        if self.step % settings.critic_every == 0:
-            self._critic_loss = self._train_critic(coded)
-        prior = losses.prior_loss(self.critic, coded)
+        if settings.weights.prior:
+            if self.step % settings.critic_every == 0:
+                self._critic_loss = self._train_critic(coded)
+            prior = losses.prior_loss(self.critic, coded)
+            total = total + settings.weights.prior * prior
+            reported |= {"prior": prior, "critic": self._critic_loss}
         self.optimizer.zero_grad(set_to_none=True)
-        (total + settings.weights.prior * prior).backward()  # type: ignore[no-untyped-call]
+        total.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.autoencoder.parameters(), 1.0)
         self.optimizer.step()
         self._average_weights(self.averaged, self.autoencoder)
         self.step += 1
         with torch.no_grad():
             spread = {"latent_mean": coded.mean(0).abs().mean(), "latent_std": coded.std(0).mean()}
-        reported |= {"prior": prior, "critic": self._critic_loss, **spread}
+        reported |= spread
         return {name: part.detach() for name, part in reported.items()}
 
     def _code(self, lesson: Lesson) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
         """Run a lesson's passes: raw windows (B, T, M, 4) and latents (B, Z) of the last, and the losses.
 
-        The decoder sees noisy latents; those that are returned, for the critic, have no noise.
+        The decoder sees noisy latents, or samples of a variational network's; those that are returned, for
+        the critic, have no noise.
         """
         windows, hands, parts = lesson.windows, lesson.hands, {}
         for taken in range(lesson.passes - 1 if hands is not None else 0):
@@ -170,8 +181,14 @@ class Training(TrainingLoop[Report]):
             if taken == 0:
                 parts["first"] = losses.rotation_loss(raw, hands.first)
             windows = rotation.normalize(raw)
-        coded = self.autoencoder.encode(windows)
-        raw = self.autoencoder.decode_raw(coded + self.settings.latent_noise * torch.randn_like(coded))
+        if self.settings.variational:
+            coded, log_variance = self.autoencoder.encode_gaussian(windows)
+            parts["divergence"] = losses.divergence(coded, log_variance)
+            seen = losses.sampled(coded, log_variance)
+        else:
+            coded = self.autoencoder.encode(windows)
+            seen = coded + self.settings.latent_noise * torch.randn_like(coded)
+        raw = self.autoencoder.decode_raw(seen)
         parts.update(losses.reconstruction_losses(raw, lesson.answer, self.body))
         if hands is not None:
             parts.update(losses.advance_losses(raw, lesson.answer))
@@ -252,18 +269,10 @@ def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]
     rest is removed here exactly, without a change to any window.
     """
     state = torch.load(path, map_location="cpu", weights_only=True)
-    shape = state["shape"]
-    network, built = build(
-        state["settings"]["network"],
-        shape["window"],
-        shape["joints"],
-        latent=shape["latent"],
-        width=shape["width"],
-        depth=shape["depth"],
-        curves=shape["curves"],
-    )
-    autoencoder = Autoencoder(network, built, torch.zeros(shape["joints"], 4))
+    shape = dict(state["shape"])
+    network, built = build(state["settings"]["network"], shape.pop("window"), shape.pop("joints"), **shape)
+    autoencoder = Autoencoder(network, built, torch.zeros(built.joints, 4))
     autoencoder.load_state_dict(state["averaged"])
-    if isinstance(network, Mlp):
+    if isinstance(network, Mlp) and not built.variational:
         network.standardise(*state["latent_moments"])
     return autoencoder.requires_grad_(False).eval(), state["joints"], state

@@ -156,13 +156,13 @@ def window_starts(take: Take, hop: int = 1, window: int = WINDOW) -> NDArray[np.
 
 
 def windows(
-    takes: Sequence[Take], moving: Sequence[int], mirror: bool = False, window: int = WINDOW
+    takes: Sequence[Take], moving: Sequence[int], mirror: bool = False, window: int = WINDOW, hop: int = 1
 ) -> NDArray[np.float32]:
-    """Every sound window of the takes, (N, window, M, 4) float32, and after them their mirror images."""
+    """Every hop-th sound window of the takes, (N, window, M, 4) float32, then their mirror images."""
     found = []
     for take in takes:
         recordings = [take.recording, mirrored(take.recording)] if mirror else [take.recording]
-        starts = window_starts(take, window=window)
+        starts = window_starts(take, hop, window)
         for recording in recordings:
             poses = recording.poses[:, moving].astype(np.float32)
             found.append(poses[starts[:, None] + np.arange(window)])

@@ -146,7 +146,12 @@ def load_checkpoint(path: Path) -> tuple[TorchCoder, dict[str, Any]]:
 
 def load_puppet(path: Path) -> tuple[TorchCoder, dict[str, Any]]:
     """The same for a network that the box can dance. Raises StudioError."""
+    from appliance.studio.autoencoder.models import MODELS
+
     coder, state = load_checkpoint(path)
+    model = state["settings"].get("model", "puppet")
+    if model != "puppet":
+        raise StudioError(f"{path} is a {model} model, for {MODELS[model].use}; a show needs a puppet.")
     if coder.window != WINDOW:
         raise StudioError(
             f"{path} has windows of {coder.window} poses, and the box dances windows of {WINDOW}. It dances "

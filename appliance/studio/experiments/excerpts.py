@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from appliance.pose import quaternion
-from appliance.pose.anatomy import Anatomy
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.pose.skeleton import Skeleton
 from appliance.show.config_error import ConfigError
 from appliance.show.yaml_file import read_yaml
 from appliance.studio.data.dataset import FPS, WINDOW, Take
+from appliance.studio.data.regions import Regions, regions_of
 from appliance.studio.evaluation.nearest import without_heading
 from appliance.studio.studio_error import StudioError
 
@@ -30,15 +29,6 @@ FRAMES = 200  # 4 s
 STEP = 25  # frames from one candidate to the next
 SMOOTHED, LAG = 5, 12  # ticks
 LEAD = WINDOW - 1  # frames around an excerpt: the first and last windows reach that far
-
-
-@dataclass(frozen=True)
-class Regions:
-    """Places of the joints of each region among the joints that the network moves."""
-
-    torso: list[int]
-    arms: list[int]
-    legs: list[int]
 
 
 @dataclass(frozen=True)
@@ -85,33 +75,6 @@ WHY = {
     "coordinated": "arms and legs move most in step",
     "partly": "the whole body moves, coordinated in part",
 }
-
-
-def regions_of(skeleton: Skeleton, joints: Sequence[str]) -> Regions:
-    """Torso, arms and legs among the joints that move, found by the skeleton's shape.
-
-    Raises StudioError where it has no pair of limbs above and below.
-    """
-    anatomy = Anatomy(skeleton)
-    arms, legs = set[int](), set[int]()
-    for _, first in anatomy.limbs():
-        limb = [first, *anatomy.below(first)]
-        goes_down = (
-            anatomy.positions[limb, 1].min() < anatomy.positions[anatomy.trunk[0], 1] - 0.2 * anatomy.height
-        )
-        (legs if goes_down else arms).update(limb)
-    places = {name: place for place, name in enumerate(joints)}
-
-    def among(chosen: set[int] | list[int]) -> list[int]:
-        return sorted(places[skeleton.names[joint]] for joint in chosen if skeleton.names[joint] in places)
-
-    found = Regions(among(anatomy.trunk), among(arms), among(legs))
-    if not (found.torso and found.arms and found.legs):
-        raise StudioError(
-            "The excerpts are chosen by how torso, arms and legs move, and this skeleton has no such limbs. "
-            "Name the excerpts yourself with --excerpts."
-        )
-    return found
 
 
 def measured(poses: Array, regions: Regions) -> Measures:

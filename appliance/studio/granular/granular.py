@@ -41,6 +41,20 @@ def once(windows: Poses, hop: int) -> Poses:
     return _blended(windows, hop, len(windows) * hop)
 
 
+def to_the_end(windows: Poses, hop: int) -> Poses:
+    """The same to the end of the last window: (W - 1) * hop + T poses."""
+    count, length, joints, _ = windows.shape
+    blending, danced = (
+        Blending(joints, length, hop),
+        np.empty(((count - 1) * hop + length, joints, 4), np.float32),
+    )
+    for tick in range(len(danced)):
+        if tick % hop == 0 and tick // hop < count:
+            blending.add(windows[tick // hop])
+        danced[tick] = blending.take()
+    return danced
+
+
 def cycle(windows: Poses, hop: int) -> Poses:
     """Windows (W, T, M, 4), `hop` ticks apart, as a cycle of W * hop poses.
 

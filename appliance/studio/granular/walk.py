@@ -15,7 +15,6 @@ from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.data import sources
 from appliance.studio.data.dataset import FPS, Dataset, Take
 from appliance.studio.evaluation.coders import Poses, load_checkpoint
 from appliance.studio.export.packing import PHRASE_DIGITS
@@ -25,7 +24,7 @@ from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.phrase import verdict
 from appliance.studio.studio_error import StudioError
-from appliance.studio.train_command import reading_progress
+from appliance.studio.trained_on import trained_on
 
 
 @dataclass(frozen=True)
@@ -52,15 +51,8 @@ def run(options: GranularOptions) -> None:
     """Walk, decode, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
     coder, state = load_checkpoint(options.checkpoint)
-    autoencoder, joints = coder.autoencoder, list(coder.joints)
-    dataset = sources.remembered(state, options.recordings, options.checkpoint).load(
-        reading_progress(console)
-    )
-    if list(dataset.moving_names) != joints:
-        raise StudioError(
-            f"{options.checkpoint} moves {', '.join(joints)}; the recordings move "
-            f"{', '.join(dataset.moving_names)}. Give the recordings that it was trained on."
-        )
+    autoencoder = coder.autoencoder
+    dataset = trained_on(options.checkpoint, coder.joints, state, options.recordings, console)
     if options.hop > autoencoder.shape.window:
         most = autoencoder.shape.window
         raise StudioError(

@@ -18,7 +18,6 @@ from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.training import load_autoencoder
 from appliance.studio.autoencoder.training_run import stop_signals
-from appliance.studio.data import sources
 from appliance.studio.data.dataset import Dataset
 from appliance.studio.export.packing import PHRASE_DIGITS
 from appliance.studio.improviser.improviser_training import (
@@ -31,7 +30,7 @@ from appliance.studio.improviser.naturalness import Naturalness
 from appliance.studio.improviser.phrase import PhraseOptions, make_phrase, verdict
 from appliance.studio.improviser.steps import ROOT, Steps, steps_of_takes
 from appliance.studio.studio_error import StudioError
-from appliance.studio.train_command import reading_progress
+from appliance.studio.trained_on import trained_on
 
 
 @dataclass(frozen=True)
@@ -53,14 +52,7 @@ def run(options: ImproviseOptions) -> bool:
     if options.threads:
         torch.set_num_threads(options.threads)
     autoencoder, joints, state = load_autoencoder(options.checkpoint)
-    dataset = sources.remembered(state, options.recordings, options.checkpoint).load(
-        reading_progress(console)
-    )
-    if list(dataset.moving_names) != joints:
-        raise StudioError(
-            f"{options.checkpoint} moves {', '.join(joints)}; the recordings move "
-            f"{', '.join(dataset.moving_names)}. Give the recordings that the checkpoint was trained on."
-        )
+    dataset = trained_on(options.checkpoint, joints, state, options.recordings, console)
     steps = steps_of_takes(autoencoder, dataset.training, dataset.moving, BEFORE + MOVE)
     held_out = steps_of_takes(autoencoder, dataset.held_out, dataset.moving, BEFORE + MOVE)
     training = _training(options, autoencoder, steps, held_out, console)

@@ -11,8 +11,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from appliance.studio.autoencoder.losses import divergence, sampled
 from appliance.studio.improviser.improviser import Improviser
-from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence, move_loss, sample_code
+from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, move_loss
 from appliance.studio.training_loop import TrainingLoop
 
 
@@ -141,7 +142,7 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
             before = before + noise * torch.rand(len(truth), 1, 1) * torch.randn_like(before)
             move = truth[:, at : at + MOVE]
             mean, log_variance = moves.encode(before, move)
-            code = sample_code(mean, log_variance)
+            code = sampled(mean, log_variance)
             if mixture is not None:
                 sums["nats"] = sums["nats"] + mixture.negative_log_likelihood(code.detach()).mean()
             made = moves.decode(before, code)

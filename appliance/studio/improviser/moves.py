@@ -131,16 +131,6 @@ class Moves(nn.Module):
         return before[:, -1:] + flat.reshape(-1, MOVE, self.shape.inside)
 
 
-def sample_code(mean: Tensor, log_variance: Tensor) -> Tensor:
-    """A sample of the code's distribution."""
-    return mean + torch.exp(0.5 * log_variance) * torch.randn_like(mean)
-
-
-def divergence(mean: Tensor, log_variance: Tensor) -> Tensor:
-    """Nats by which codes differ from a standard Gaussian, mean of a batch."""
-    return 0.5 * (mean.square() + log_variance.exp() - 1 - log_variance).sum(-1).mean()
-
-
 def move_loss(made: Tensor, move: Tensor, before: Tensor, importance: Tensor) -> Tensor:
     """Weighted squared error of the steps and of their pace, a number of a step."""
 

@@ -1,0 +1,94 @@
+"""What `bunraku train` trains: each model in a compact form, the default, and as the papers published it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from appliance.studio.autoencoder.architectures import DEFAULT
+from appliance.studio.autoencoder.losses import LossWeights
+from appliance.studio.autoencoder.training import Settings
+from appliance.studio.data.dataset import WINDOW
+from appliance.studio.studio_error import StudioError
+
+SQUARED_ALONE = LossWeights(
+    rotation=0.0, pace=0.0, unit_norm=0.0, position=0.0, prior=0.0, squared=1.0, divergence=1e-4
+)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A kind of autoencoder: its window in poses, and settings by network, the default first.
+
+    use: what its checkpoint is good for, for people; shortest, longest: windows that may be asked for.
+    """
+
+    window: int
+    networks: dict[str, dict[str, Any]]
+    use: str
+    shortest: int = 4
+    longest: int = 128
+
+
+PUPPETS: tuple[str, ...] = (DEFAULT, "mlp", "conv", "lstm", "lstm-autoregressive", "lstm256")
+MODELS = {
+    "puppet": Model(WINDOW, {name: {} for name in PUPPETS}, "bunraku play"),
+    "pose": Model(
+        1,
+        {
+            "mlp": {
+                "weights": LossWeights(prior=0.0),
+                "variational": True,
+                "latent": 32,
+                "width": 256,
+                "depth": 2,
+                "minutes": 15.0,
+            },
+            # Section 'Pose autoencoder' of 'Beyond Imitation'
+            "dense64": {
+                "weights": SQUARED_ALONE,
+                "latent_noise": 0.0,
+                "learning_rate": 1e-4,
+                "batch": 128,
+                "minutes": 15.0,
+            },
+        },
+        "bunraku path, bunraku map",
+        shortest=1,
+        longest=1,
+    ),
+    "sequence": Model(
+        128,
+        {
+            "mlp": {
+                "weights": LossWeights(prior=0.0, divergence=3e-4),
+                "variational": True,
+                "batch": 64,
+                "latent": 128,
+                "width": 512,
+                "depth": 3,
+                "minutes": 45.0,
+            },
+            # Section 'Sequence VAE' of 'Beyond Imitation'
+            "lstm384": {"weights": SQUARED_ALONE, "variational": True, "minutes": 45.0, "batch": 128},
+        },
+        "bunraku vary",
+        shortest=16,
+    ),
+}
+
+
+def settings_for(model: str, network: str | None = None, seed: int = 1, **sizes: int) -> Settings:
+    """Settings of a model and network; sizes that are not 0 override its own. Raises StudioError."""
+    kind = MODELS[model]
+    network = network or next(iter(kind.networks))
+    if network not in kind.networks:
+        raise StudioError(
+            f"--model {model} has the networks {', '.join(kind.networks)}, not {network}. Choose one of them."
+        )
+    window = sizes.get("window") or kind.window
+    if not kind.shortest <= window <= kind.longest:
+        fits = f"{kind.shortest} to {kind.longest} poses" if kind.longest > 1 else "one pose: omit it"
+        raise StudioError(f"--window {window} is not for --model {model}, which takes {fits}.")
+    chosen = {"window": window, **kind.networks[network], **{k: v for k, v in sizes.items() if v}}
+    return Settings(model=model, network=network, seed=seed, **chosen)

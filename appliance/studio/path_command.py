@@ -1,0 +1,72 @@
+"""`bunraku path` and `bunraku map`: the space of a dancer's poses. The app joins the studio's commands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from appliance.studio.clear_errors import clear_errors
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+Model = Annotated[Path, typer.Option(help="checkpoint.pt of bunraku train --model pose.")]
+Moved = Annotated[
+    Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
+]
+
+
+@app.command()
+def path(
+    model: Model,
+    out: Annotated[Path, typer.Option(help="The dance, a BVH file; its figures and picture lie beside it.")],
+    phrase: Annotated[
+        Path | None, typer.Argument(help="BVH of the phrase that wobbles.", show_default=False)
+    ] = None,
+    wobble: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            metavar="AMPLITUDE FREQUENCY",
+            help="Sinusoids on the phrase's path: standard deviations (0.3 is a lot), Hz.",
+        ),
+    ] = None,
+    draw: Annotated[
+        Path | None, typer.Option(help="A line over the map becomes the dance: map.svg drawn on, or a CSV.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Phases of the wobble.")] = 1,
+    start: Annotated[float, typer.Option(min=0.0, help="Second of the phrase to begin at.")] = 0.0,
+    seconds: Annotated[float, typer.Option(min=0.5, max=600.0, help="How long the dance is.")] = 10.0,
+    recordings: Moved = None,
+) -> None:
+    """Make a dance of a path through the space of a dancer's poses ('Beyond Imitation').
+
+    A phrase's own path with a wobble, or a line that you draw over the map that bunraku map writes.
+    """
+    if (wobble is None) == (draw is None) or (phrase is None) != (wobble is None):
+        raise typer.BadParameter("Give a PHRASE with --wobble AMPLITUDE FREQUENCY, or --draw FILE.")
+    if wobble is not None and not (0 <= wobble[0] <= 5 and 0 < wobble[1] <= 10):
+        raise typer.BadParameter("--wobble takes an amplitude of 0 to 5 and a frequency up to 10 Hz.")
+    with clear_errors("path"):
+        from appliance.studio.pose_space.path import PathOptions, run
+
+        run(PathOptions(model, out, phrase, recordings, wobble, draw, seed, start, seconds))
+
+
+@app.command(name="map")
+def map_(
+    files: Annotated[list[Path], typer.Argument(help="BVH recordings to lay over the map.")],
+    model: Model,
+    out: Annotated[Path, typer.Option(help="Folder for the page, the pictures and the sheet to draw on.")],
+    seconds: Annotated[float, typer.Option(min=1.0, help="How much of each recording.")] = 60.0,
+    recordings: Moved = None,
+) -> None:
+    """Draw the space of a dancer's poses as a map, with recordings as paths over it.
+
+    PCA, the pose autoencoder and, where umap-learn is installed, UMAP side by side; a page to turn in a
+    browser, without a network; with two recordings of the same phrase their distance over time.
+    """
+    with clear_errors("map"):
+        from appliance.studio.pose_space.pose_map import MapOptions, run
+
+        run(MapOptions(model, out, tuple(files), recordings, seconds))

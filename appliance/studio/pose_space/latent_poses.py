@@ -1,0 +1,92 @@
+"""A phrase as a path of pose latents, and any path as poses: the pose autoencoder, one pose at a time.
+
+A latent knows no heading and no place: both are taken out of the phrase and put back ('Beyond Imitation',
+Figure 2: with them, the paths of a phrase would not be continuous).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from appliance.pose.quaternion import Array
+from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.evaluation.coders import Poses
+from appliance.studio.granular.granular import decoded, encoded
+from appliance.studio.granular.latent_paths import Latents
+
+
+def latents_of(autoencoder: Autoencoder, poses: Array) -> tuple[Latents, Array]:
+    """Poses (T, M, 4) -> latents (T, Z) and headings (T, 4)."""
+    return encoded(autoencoder, poses.astype(np.float32)[:, None])
+
+
+def poses_of(autoencoder: Autoencoder, latents: Latents, facing: Array | None = None) -> Poses:
+    """Latents (T, Z) -> poses (T, M, 4); facing (T, 4), left out: ahead."""
+    made: Poses = decoded(autoencoder, latents, facing)[:, 0]
+    return made
+
+
+def wobbled(latents: Latents, amplitude: float, frequency: float, seed: int, fps: float = 50.0) -> Latents:
+    """The path with a sinusoid on each number of the latent.
+
+    amplitude: in standard deviations of the prior, of each number; frequency in Hz; the phases are the
+    seed's.
+    """
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, latents.shape[1])
+    angles = 2 * np.pi * frequency * np.arange(len(latents))[:, None] / fps + phases
+    moved: Latents = (latents + amplitude * np.sin(angles)).astype(np.float32)
+    return moved
+
+
+@dataclass(frozen=True)
+class PoseMap:
+    """Directions (D, Z) of the latents in which the dancer's poses differ most, and their middle (Z,).
+
+    spread (D,): standard deviation along each; a point of the map is in latent units from the middle.
+    """
+
+    middle: Array
+    directions: Array
+    spread: Array
+
+    @staticmethod
+    def of(latents: Latents, dimensions: int) -> PoseMap:
+        """Principal components; a latent of no more numbers than that is only turned."""
+        values = latents.astype(np.float64)
+        middle = values.mean(axis=0)
+        _, sizes, directions = np.linalg.svd(values - middle, full_matrices=False)
+        count = min(dimensions, len(directions))
+        signs = np.sign(directions[np.arange(count), np.abs(directions[:count]).argmax(axis=1)])
+        return PoseMap(
+            middle, signs[:, None] * directions[:count], sizes[:count] / np.sqrt(max(len(values), 1))
+        )
+
+    def points(self, latents: Latents) -> Array:
+        """(T, Z) -> (T, D)."""
+        found: Array = (latents - self.middle) @ self.directions.T
+        return found
+
+    def latents(self, points: Array) -> Latents:
+        """(T, D) -> (T, Z): the pose that is usual there."""
+        back: Latents = (self.middle + points @ self.directions[: points.shape[1]]).astype(np.float32)
+        return back
+
+
+def even_path(points: Array, ticks: int) -> Array:
+    """A drawn line (N, D) -> (ticks, D): at an even speed, its corners rounded over 0.2 s."""
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    at = np.linspace(0.0, lengths[-1], ticks)
+    walked = np.stack([np.interp(at, lengths, column) for column in points.T], axis=1)
+    weights = np.hanning(11 + 2)[1:-1]
+    padded = np.pad(walked, ((5, 5), (0, 0)), mode="edge")
+    smooth = [np.convolve(column, weights / weights.sum(), "valid") for column in padded.T]
+    return np.stack(smooth, axis=1)
+
+
+def distance_over_time(one: Array, other: Array) -> Array:
+    """(T,): how far apart two paths of points (T, D) are at each tick."""
+    count = min(len(one), len(other))
+    apart: Array = np.linalg.norm(one[:count] - other[:count], axis=1)
+    return apart

@@ -1,0 +1,125 @@
+"""The map's pictures: methods side by side, the map with figures and paths, two paths' distance over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from appliance.pose.quaternion import Array
+from appliance.studio.pose_space.projections import Projection
+
+SLATE, INK, FAINT = "#23262b", "#efe6d8", "#6b6660"
+COLOURS = ("#e2583e", "#4fb3bf", "#e8b04b", "#9b7fd1", "#7fbf6a", "#d97fa8")
+
+
+def draw_projections(path: Path, names: Sequence[str], found: Sequence[Projection]) -> None:
+    """A panel for each method, a colour for each recording."""
+    figure, panels = _panels(len(found), 4.2, 4.2)
+    for axes, projection in zip(panels, found, strict=True):
+        for number, points in enumerate(projection.points):
+            axes.plot(*points[:, :2].T, color=COLOURS[number % len(COLOURS)], linewidth=0.6, alpha=0.9)
+        step, longest = projection.continuity
+        axes.set_title(f"{projection.name}\nstep {step:.1f} %, longest x{longest:.0f}", color=INK, fontsize=9)
+        axes.set_xticks([])
+        axes.set_yticks([])
+    _name(panels[0], names)
+    _save(figure, path)
+
+
+def draw_map(
+    path: Path,
+    known: Array,
+    paths: Mapping[str, Array],
+    figures: Sequence[tuple[Array, Array, Sequence[tuple[int, int]]]],
+    nobody: float,
+) -> tuple[float, float, float, float]:
+    """All recorded poses as a cloud, figures that are usual at a place, recordings as lines.
+
+    Faint figures: nobody has been there: farther than `nobody` of the map's spread from all recorded poses.
+    Returns the frame: left, right, bottom, top in the map's units; the picture fills it.
+    """
+    places = np.array([place for place, _, _ in figures])
+    low, high = places.min(axis=0), places.max(axis=0)
+    margin = 0.5 * float(np.max(high - low)) / max(1.0, np.sqrt(len(figures)))
+    left, bottom = (low - margin).tolist()
+    right, top = (high + margin).tolist()
+    pyplot = _pyplot()
+    width = 12.0
+    figure = pyplot.figure(figsize=(width, width * (top - bottom) / (right - left)), facecolor=SLATE)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
+    axes.scatter(*known[:: max(1, len(known) // 8000), :2].T, s=2.0, color=FAINT, linewidths=0)
+    spread = float(known[:, :2].std(axis=0).max())
+    size = 0.8 * _spacing(places)
+    for place, joints, bones in figures:
+        away = float(np.linalg.norm(known[:, :2] - place, axis=1).min())
+        colour, strength = (INK, 0.95) if away <= nobody * spread else (FAINT, 0.8)
+        scale = size / max(float(np.ptp(joints[:, 1])), 1.6)
+        for joint, parent in bones:
+            ends = place + scale * joints[[joint, parent]][:, :2]
+            axes.plot(*ends.T, color=colour, alpha=strength, linewidth=1.3, solid_capstyle="round", zorder=3)
+    for number, points in enumerate(paths.values()):
+        colour = COLOURS[number % len(COLOURS)]
+        axes.plot(*points[:, :2].T, color=colour, linewidth=0.9, alpha=0.6, zorder=2)
+    _name(axes, list(paths))
+    _save(figure, path)
+    return left, right, bottom, top
+
+
+def draw_distance(path: Path, apart: Array, one: str, other: str, fps: float) -> None:
+    """How far apart two recordings are on the map, over time."""
+    figure, (axes,) = _panels(1, 10.0, 3.0)
+    axes.plot(np.arange(len(apart)) / fps, apart, color=COLOURS[0], linewidth=1.0)
+    axes.set_title(f"{one} and {other}: distance on the map over time (s)", color=INK, fontsize=10)
+    axes.set_ylim(bottom=0)
+    _save(figure, path)
+
+
+def _spacing(places: Array) -> float:
+    """Distance between neighbours of a grid."""
+    columns = np.unique(np.round(places[:, 0], 6))
+    return float(np.diff(columns).min()) if len(columns) > 1 else 1.0
+
+
+def _panels(count: int, width: float, height: float) -> tuple[Any, list[Any]]:
+    figure, axes = _pyplot().subplots(
+        1, count, figsize=(width * count, height), facecolor=SLATE, squeeze=False, layout="constrained"
+    )
+    for one in axes[0]:
+        one.set_facecolor(SLATE)
+        one.tick_params(colors=INK, labelsize=8)
+        for edge in one.spines.values():
+            edge.set_color(FAINT)
+    return figure, list(axes[0])
+
+
+def _name(axes: Any, names: Sequence[str]) -> None:
+    for number, name in enumerate(names[:12]):
+        axes.text(
+            0.012,
+            0.985 - 0.035 * number,
+            name,
+            color=COLOURS[number % len(COLOURS)],
+            fontsize=9,
+            transform=axes.transAxes,
+            va="top",
+        )
+
+
+def _pyplot() -> Any:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    return pyplot
+
+
+def _save(figure: Any, path: Path) -> None:
+    figure.savefig(path, dpi=110, facecolor=figure.get_facecolor())
+    _pyplot().close(figure)

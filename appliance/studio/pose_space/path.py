@@ -1,0 +1,89 @@
+"""`bunraku path`: a phrase whose path through the poses wobbles, or a drawn path that becomes a dance."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from appliance.pictures.filmstrip import Strip, draw_strips
+from appliance.pose.bvh import write_bvh
+from appliance.studio.data.dataset import FPS
+from appliance.studio.evaluation.dance_figures import degrees_apart, energy
+from appliance.studio.evaluation.nearest import reference_of, without_heading
+from appliance.studio.export.packing import PHRASE_DIGITS
+from appliance.studio.pose_space.drawing import read_line
+from appliance.studio.pose_space.latent_poses import even_path, latents_of, poses_of, wobbled
+from appliance.studio.pose_space.pose_model import map_of, open_pose_model
+from appliance.studio.standing_dance import excerpt_of, standing
+
+COLUMNS = 8  # of the strip
+
+
+@dataclass(frozen=True)
+class PathOptions:
+    """The command line of bunraku path. wobble: amplitude and Hz; draw: a line over the map, SVG or CSV."""
+
+    model: Path
+    out: Path
+    phrase: Path | None = None
+    recordings: Path | None = None
+    wobble: tuple[float, float] | None = None
+    draw: Path | None = None
+    seed: int = 1
+    start: float = 0.0
+    seconds: float = 10.0
+
+
+def run(options: PathOptions) -> None:
+    """Walk, decode, stand, measure, write; raises StudioError."""
+    console = Console(stderr=True)
+    coder, dataset = open_pose_model(options.model, options.recordings, console)
+    autoencoder, moving = coder.autoencoder, list(dataset.moving)
+    given = None
+    if options.phrase is not None:
+        given = excerpt_of(options.phrase, options.start, options.seconds, coder, dataset.skeleton)
+    if given is not None and options.wobble is not None:
+        latents, facing = latents_of(autoencoder, given.poses[:, moving])
+        poses = poses_of(autoencoder, wobbled(latents, *options.wobble, options.seed), facing)
+    else:
+        assert options.draw is not None, "the command asks for a phrase with a wobble, or a drawing"
+        line = even_path(read_line(options.draw), round(options.seconds * FPS))
+        poses = poses_of(autoencoder, map_of(autoencoder, dataset).latents(line))
+    whole = standing(poses, given, dataset)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    write_bvh(options.out, whole, digits=PHRASE_DIGITS)
+    figures = {
+        "nearest_recorded_pose_degrees": float(
+            reference_of(dataset.training, dataset.moving_names).nearest(poses).mean()
+        ),
+        "degrees_a_second": FPS * energy(without_heading(poses)),
+    }
+    strips = [Strip(whole.poses, whole.roots, _words(options))]
+    if given is not None:
+        own = given.poses[: len(poses), moving]
+        figures["degrees_from_the_phrase"] = float(
+            degrees_apart(without_heading(own), without_heading(poses)).mean()
+        )
+        strips.insert(0, Strip(given.poses, given.roots, "phrase"))
+        strips[1] = Strip(whole.poses, whole.roots, _words(options), behind=strips[0])
+    draw_strips(
+        options.out.with_suffix(".png"), dataset.skeleton, strips, FPS, (), options.out.stem, columns=COLUMNS
+    )
+    told = {key: str(value) if isinstance(value, Path) else value for key, value in asdict(options).items()}
+    report = json.dumps({"options": told, "figures": figures}, indent=1)
+    options.out.with_suffix(".json").write_text(report + "\n", encoding="utf-8")
+    said = ", ".join(f"{name.replace('_', ' ')} {value:.1f}" for name, value in figures.items())
+    console.print(
+        f"{options.out}: {np.round(len(poses) / FPS, 1)} s, {said}.", highlight=False, soft_wrap=True
+    )
+
+
+def _words(options: PathOptions) -> str:
+    if options.wobble is not None:
+        return f"wobbling by {options.wobble[0]:g} sigma at {options.wobble[1]:g} Hz"
+    assert options.draw is not None
+    return f"along {options.draw.name}"

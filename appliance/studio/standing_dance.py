@@ -1,0 +1,59 @@
+"""A generated dance on its feet, and the excerpt of a recording that it was made of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+from appliance.studio.data.dataset import FPS, Dataset
+from appliance.studio.evaluation.coders import Coder, Poses
+from appliance.studio.evaluation.evaluation import load_takes
+from appliance.studio.improviser.footing import plant_feet
+from appliance.studio.improviser.steps import floor_under
+from appliance.studio.studio_error import StudioError
+
+
+def excerpt_of(file: Path, start_s: float, seconds: float, coder: Coder, skeleton: Skeleton) -> Recording:
+    """A part of a BVH file at 50 Hz, its floor at height 0. Raises StudioError for another skeleton, or where
+    it is too short.
+    """
+    (take,) = load_takes([file], coder)
+    recording = take.recording
+    if not recording.skeleton.same_joints(skeleton):
+        raise StudioError(f"{file} has another skeleton than the recordings that the model was trained on.")
+    if start_s >= recording.seconds:
+        raise StudioError(f"{file} is {recording.seconds:.1f} s long: --start {start_s:g} is not in it.")
+    excerpt = recording.excerpt(start_s, min(start_s + seconds, recording.seconds))
+    roots = excerpt.roots.copy()
+    roots[:, 1] -= floor_under(excerpt)
+    return replace(excerpt, roots=roots)
+
+
+def standing(poses: Poses, given: Recording | None, dataset: Dataset) -> Recording:
+    """Poses (T, M, 4) of the moving joints with all joints, on the path of a recording or on the spot.
+
+    The feet are planted in a cycle: danced there and back, a dance is one.
+    """
+    count = len(poses)
+    whole: Array
+    roots: Array
+    if given is None:
+        whole = np.tile(dataset.still_pose(), (count, 1, 1))
+        height = float(np.mean([take.recording.roots[:, 1].mean() for take in dataset.training]))
+        roots = np.tile([0.0, height, 0.0], (count, 1))
+    else:
+        whole, roots = given.poses[:count].copy(), given.roots[:count]
+    whole[:, list(dataset.moving)] = poses
+    there_and_back = Recording(
+        dataset.skeleton,
+        quaternion.continuous(np.concatenate([whole, whole[::-1]])),
+        np.concatenate([roots, roots[::-1]]),
+        FPS,
+    )
+    return plant_feet(there_and_back).excerpt(0.0, count / FPS)

@@ -1,0 +1,40 @@
+"""The recordings that a checkpoint was trained on, read again with a progress bar."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import track
+
+from appliance.studio.data import sources
+from appliance.studio.data.dataset import Dataset
+from appliance.studio.studio_error import StudioError
+
+
+def trained_on(
+    checkpoint: Path,
+    joints: Sequence[str],
+    state: dict[str, Any],
+    recordings: Path | None,
+    console: Console,
+) -> Dataset:
+    """recordings: their folder, if they have moved. Raises StudioError where other joints move in them."""
+    dataset = sources.remembered(state, recordings, checkpoint).load(reading_progress(console))
+    if list(dataset.moving_names) != list(joints):
+        raise StudioError(
+            f"{checkpoint} moves {', '.join(joints)}; the recordings move "
+            f"{', '.join(dataset.moving_names)}. Give the recordings that the checkpoint was trained on."
+        )
+    return dataset
+
+
+def reading_progress(console: Console) -> Any:
+    """Wraps the reading of recordings in a progress bar."""
+
+    def progress(files: Sequence[Path]) -> Any:
+        return track(files, "reading", console=console, transient=True, disable=not console.is_terminal)
+
+    return progress

@@ -1,0 +1,1 @@
+"""Variations of a phrase by the sequence autoencoder of 'Beyond Imitation'."""

@@ -1,0 +1,76 @@
+"""Variations: a phrase's latents moved, mixed with another's, or sampled, and decoded into motion.
+
+A phrase longer than the model's window is covered by overlapping windows, all moved by the same noise, and
+blended by Hann weights and SLERP as on the box.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.evaluation.coders import Poses
+from appliance.studio.granular import latent_paths
+from appliance.studio.granular.granular import decoded, encoded, to_the_end
+from appliance.studio.granular.latent_paths import Latents
+from appliance.studio.studio_error import StudioError
+
+OVERLAP = 4  # windows that know a pose
+
+
+@dataclass(frozen=True)
+class EncodedPhrase:
+    """A phrase as latents (W, Z) and headings (W, 4) of its windows; ticks: poses that they cover."""
+
+    latents: Latents
+    facing: Array
+    ticks: int
+
+
+def encode_phrase(autoencoder: Autoencoder, poses: Array) -> EncodedPhrase:
+    """Poses (T, M, 4) of the moving joints at 50 Hz. Raises StudioError for fewer than a window has."""
+    length = autoencoder.shape.window
+    if len(poses) < length:
+        raise StudioError(
+            f"The phrase has {len(poses)} poses; the model sees {length} at once ({length / 50:.2f} s). "
+            "Give a longer one, or begin earlier."
+        )
+    hop = hop_of(autoencoder)
+    starts = np.arange(0, len(poses) - length + 1, hop)
+    whole = quaternion.continuous(poses).astype(np.float32)
+    latents, facing = encoded(autoencoder, whole[starts[:, None] + np.arange(length)])
+    return EncodedPhrase(latents, facing, int(starts[-1]) + length)
+
+
+def varied(autoencoder: Autoencoder, phrase: EncodedPhrase, sigma: float, seed: int) -> Poses:
+    """The phrase moved by noise of `sigma` standard deviations of the prior; 0: as the model knows it."""
+    noise = np.random.default_rng(seed).standard_normal(phrase.latents.shape[1])
+    return _danced(autoencoder, phrase, phrase.latents + np.asarray(sigma * noise, dtype=np.float32))
+
+
+def mixed(
+    autoencoder: Autoencoder, phrase: EncodedPhrase, other: EncodedPhrase, share: float, seed: int
+) -> Poses:
+    """The phrase with a share of another one, as long as the shorter of them."""
+    count = min(len(phrase.latents), len(other.latents))
+    path = latent_paths.between(phrase.latents[:count], other.latents[:count], share, 0.0, seed)
+    return _danced(autoencoder, phrase, path)
+
+
+def sampled(autoencoder: Autoencoder, spread: float, seed: int) -> Poses:
+    """One window out of the prior, facing ahead."""
+    made: Poses = decoded(autoencoder, latent_paths.sampled(1, autoencoder.shape.latent, spread, seed))[0]
+    return made
+
+
+def hop_of(autoencoder: Autoencoder) -> int:
+    """Ticks from one window to the next."""
+    return max(1, autoencoder.shape.window // OVERLAP)
+
+
+def _danced(autoencoder: Autoencoder, phrase: EncodedPhrase, path: Latents) -> Poses:
+    return to_the_end(decoded(autoencoder, path, phrase.facing[: len(path)]), hop_of(autoencoder))

@@ -1,0 +1,186 @@
+"""`bunraku vary`: variations of a phrase as BVH, with their figures, and the phrase above them in a strip."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from appliance.pictures.filmstrip import Strip, draw_strips
+from appliance.pose.bvh import write_bvh
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.studio.data.dataset import FPS, Dataset
+from appliance.studio.data.regions import regions_of
+from appliance.studio.evaluation.coders import Poses, TorchCoder, load_checkpoint
+from appliance.studio.evaluation.dance_figures import energy
+from appliance.studio.evaluation.nearest import Reference, reference_of
+from appliance.studio.export.packing import PHRASE_DIGITS
+from appliance.studio.standing_dance import excerpt_of, standing
+from appliance.studio.studio_error import StudioError
+from appliance.studio.trained_on import trained_on
+from appliance.studio.variations import variations
+from appliance.studio.variations.timing import difference
+
+COLUMNS = 8  # of the strip
+
+
+@dataclass(frozen=True)
+class VaryOptions:
+    """The command line of bunraku vary. phrase: a BVH file; None: samples from the prior alone."""
+
+    model: Path
+    out: Path
+    phrase: Path | None = None
+    recordings: Path | None = None
+    sigma: float = 0.5
+    count: int = 8
+    seed: int = 1
+    start: float = 0.0
+    seconds: float = 10.0
+    mix: Path | None = None
+    share: float = 0.5
+    regions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Of a variation: degrees from the phrase, after time warping, the share of timing, from the nearest
+    recorded pose; energy of the phrase's. Of a sample only what needs no phrase.
+    """
+
+    nearest: float
+    degrees: float | None = None
+    warped: float | None = None
+    timing: float | None = None
+    energy: float | None = None
+
+
+def run(options: VaryOptions) -> None:
+    """Vary, stand, measure, write; raises StudioError."""
+    console = Console(stderr=True)
+    coder, dataset = _model(options, console)
+    reference = reference_of(dataset.training, dataset.moving_names)
+    given = (
+        None
+        if options.phrase is None
+        else excerpt_of(options.phrase, options.start, options.seconds, coder, dataset.skeleton)
+    )
+    danced = _dances(options, coder, dataset, given)
+    options.out.mkdir(parents=True, exist_ok=True)
+    figures, strips = {}, []
+    if given is not None:
+        write_bvh(options.out / "phrase.bvh", given, digits=PHRASE_DIGITS)
+        moving = given.poses[:, list(dataset.moving)]
+        figures["phrase"] = measured(moving, None, reference)
+        strips.append(Strip(given.poses, given.roots, "phrase"))
+    working = track(
+        danced.items(), "standing", console=console, transient=True, disable=not console.is_terminal
+    )
+    for name, poses in working:
+        whole = standing(poses, given, dataset)
+        write_bvh(options.out / f"{name}.bvh", whole, digits=PHRASE_DIGITS)
+        figures[name] = measured(
+            poses, None if given is None else given.poses[:, list(dataset.moving)], reference
+        )
+        strips.append(Strip(whole.poses, whole.roots, name, behind=strips[0] if given is not None else None))
+    title = _words(options)
+    draw_strips(options.out / "variations.png", dataset.skeleton, strips, FPS, (), title, columns=COLUMNS)
+    told: dict[str, Any] = {
+        "options": {
+            key: str(value) if isinstance(value, Path) else value for key, value in asdict(options).items()
+        },
+        "figures": {name: asdict(one) for name, one in figures.items()},
+    }
+    (options.out / "variations.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    Console().print(_table(figures, title))
+    console.print(f"{options.out}: BVH of each, variations.png and variations.json.", highlight=False)
+
+
+def measured(poses: Array, phrase: Array | None, reference: Reference) -> Figures:
+    """Figures of poses (T, M, 4) beside a phrase's."""
+    nearest = float(reference.nearest(poses).mean())
+    if phrase is None:
+        return Figures(nearest)
+    off = difference(phrase, poses)
+    pace = energy(phrase[: len(poses)])
+    return Figures(
+        nearest, off.degrees, off.warped, off.timing, energy(poses) / pace if pace > 1e-9 else None
+    )
+
+
+def _model(options: VaryOptions, console: Console) -> tuple[TorchCoder, Dataset]:
+    coder, state = load_checkpoint(options.model)
+    if not coder.autoencoder.shape.variational:
+        raise StudioError(
+            f"{options.model} is no sequence model. Train one with: bunraku train --model sequence."
+        )
+    dataset = trained_on(options.model, coder.joints, state, options.recordings, console)
+    return coder, dataset
+
+
+def _dances(
+    options: VaryOptions, coder: TorchCoder, dataset: Dataset, given: Recording | None
+) -> dict[str, Poses]:
+    """(T, M, 4) of the moving joints by name."""
+    autoencoder, seeds = coder.autoencoder, range(options.seed, options.seed + options.count)
+    if given is None:
+        return {f"sample_{seed}": variations.sampled(autoencoder, options.sigma, seed) for seed in seeds}
+    moving = list(dataset.moving)
+    own = given.poses[:, moving].astype(np.float32)
+    phrase = variations.encode_phrase(autoencoder, own)
+    if options.mix is not None:
+        other = excerpt_of(options.mix, options.start, options.seconds, coder, dataset.skeleton).poses[
+            :, moving
+        ]
+        made = {
+            "mixed": variations.mixed(
+                autoencoder, phrase, variations.encode_phrase(autoencoder, other), options.share, 1
+            )
+        }
+    else:
+        made = {
+            f"variation_{seed}": variations.varied(autoencoder, phrase, options.sigma, seed) for seed in seeds
+        }
+    if not options.regions:
+        return made
+    regions = regions_of(dataset.skeleton, dataset.moving_names)
+    changed = sorted(place for name in options.regions for place in getattr(regions, name))
+    return {name: _only(poses, own, changed) for name, poses in made.items()}
+
+
+def _only(poses: Poses, own: Poses, changed: list[int]) -> Poses:
+    """The phrase, with the changed joints of a variation."""
+    whole = own[: len(poses)].copy()
+    whole[:, changed] = poses[:, changed]
+    return whole
+
+
+def _words(options: VaryOptions) -> str:
+    where = f", {' and '.join(options.regions)} alone" if options.regions else ""
+    if options.phrase is None:
+        return f"samples from the prior, spread {options.sigma:g}"
+    if options.mix is not None:
+        return f"{options.phrase.stem} with {options.share:.0%} of {options.mix.stem}{where}"
+    return f"{options.phrase.stem}, varied by {options.sigma:g} sigma{where}"
+
+
+def _table(figures: dict[str, Figures], title: str) -> Table:
+    table = Table(title=title)
+    for name in ("", "degrees from the phrase", "of that timing", "nearest recorded pose", "energy"):
+        table.add_column(name, justify="right" if name else "left")
+    for name, one in figures.items():
+        cells = (
+            "" if one.degrees is None else f"{one.degrees:.1f}",
+            "" if one.timing is None else f"{one.timing:.0%}",
+            f"{one.nearest:.1f}",
+            "" if one.energy is None else f"{one.energy:.2f}",
+        )
+        table.add_row(name.replace("_", " "), *cells)
+    return table

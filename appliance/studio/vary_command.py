@@ -1,0 +1,78 @@
+"""`bunraku vary`: variations of a phrase. Its app joins the studio's commands."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from appliance.studio.clear_errors import clear_errors
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+
+class Region(StrEnum):
+    """Parts of the body that may change by themselves."""
+
+    arms = "arms"
+    legs = "legs"
+    torso = "torso"
+
+
+@app.command()
+def vary(
+    model: Annotated[Path, typer.Option(help="checkpoint.pt of bunraku train --model sequence.")],
+    out: Annotated[Path, typer.Option(help="Folder for the variations, their strip and their figures.")],
+    phrase: Annotated[
+        Path | None, typer.Argument(help="BVH of the phrase; left out with --free.", show_default=False)
+    ] = None,
+    sigma: Annotated[
+        float,
+        typer.Option(min=0.0, max=10.0, help="How far: 0.5 subtle, 1 to 2 inventive, beyond 3 it may break."),
+    ] = 0.5,
+    count: Annotated[int, typer.Option(min=1, max=64, help="How many variations.")] = 8,
+    seed: Annotated[int, typer.Option(help="Of the first variation; each has the next one.")] = 1,
+    start: Annotated[float, typer.Option(min=0.0, help="Second of the phrase to begin at.")] = 0.0,
+    seconds: Annotated[float, typer.Option(min=0.5, max=120.0, help="How much of it to vary.")] = 10.0,
+    mix: Annotated[
+        Path | None, typer.Option(help="BVH of another phrase to mix in, instead of noise.")
+    ] = None,
+    share: Annotated[float, typer.Option(min=0.0, max=1.0, help="How much of --mix.")] = 0.5,
+    region: Annotated[
+        list[Region] | None, typer.Option(help="The part of the body that changes; repeatable.")
+    ] = None,
+    free: Annotated[bool, typer.Option("--free", help="Samples from the prior, without a phrase.")] = False,
+    recordings: Annotated[
+        Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
+    ] = None,
+) -> None:
+    """Make variations of a phrase: other timing and expression, or something new with an element kept.
+
+    The phrase becomes a point of a model that knows what this dancer does in two and a half seconds; noise
+    moves the point ('Beyond Imitation'). Each variation is a BVH file that plays in a show.
+    """
+    if (phrase is None) != free:
+        raise typer.BadParameter("Give a PHRASE, or --free for samples without one.")
+    if free and (mix is not None or region):
+        raise typer.BadParameter("--mix and --region need a PHRASE.")
+    with clear_errors("vary"):
+        from appliance.studio.variations.vary import VaryOptions, run
+
+        run(
+            VaryOptions(
+                model=model,
+                out=out,
+                phrase=phrase,
+                recordings=recordings,
+                sigma=sigma,
+                count=count,
+                seed=seed,
+                start=start,
+                seconds=seconds,
+                mix=mix,
+                share=share,
+                regions=tuple(one.value for one in region or ()),
+            )
+        )

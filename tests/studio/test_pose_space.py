@@ -1,0 +1,163 @@
+"""The space of poses: a wobble, a line over the map that becomes a dance, and the map itself."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.pose import quaternion
+from appliance.pose.bvh import read_bvh
+from appliance.studio.evaluation.coders import load_checkpoint
+from appliance.studio.pose_space.drawing import read_line
+from appliance.studio.pose_space.latent_poses import PoseMap, even_path, latents_of, poses_of, wobbled
+from appliance.studio.studio_error import StudioError
+from tests.studio.conftest import bunraku
+from tests.studio.tiny import moving, swaying
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> Path:
+    """The checkpoint of a pose model after 300 steps."""
+    out = tmp_path_factory.mktemp("pose")
+    options = ["--steps", 300, "--width", 48, "--latent", 6, "--threads", 1]
+    result = bunraku("train", "--model", "pose", "--recordings", recordings, "--out", out, *options)
+    assert result.exit_code == 0, result.output
+    return out / "checkpoint.pt"
+
+
+def test_a_phrase_comes_back_from_its_path_with_its_heading(model: Path) -> None:
+    autoencoder = load_checkpoint(model)[0].autoencoder
+    phrase = swaying(4.0, 0).poses[:, list(moving())]
+    turn = quaternion.from_axis_angle([0.0, 1.0, 0.0], 2.0)
+    turned = phrase.copy()
+    turned[:, 0] = quaternion.multiply(np.broadcast_to(turn, phrase[:, 0].shape), phrase[:, 0])
+    for poses in (phrase, turned):
+        made = poses_of(autoencoder, *latents_of(autoencoder, poses))
+        assert np.degrees(quaternion.angle_between(made, poses)).mean() < 8
+    np.testing.assert_allclose(
+        latents_of(autoencoder, turned)[0], latents_of(autoencoder, phrase)[0], atol=1e-4
+    )
+
+
+def test_a_wobble_has_its_amplitude_and_its_frequency() -> None:
+    still = np.zeros((500, 4), np.float32)
+    path = wobbled(still, 0.3, 1.5, seed=2)
+    assert np.abs(path).max() == pytest.approx(0.3, abs=0.01)
+    for column in path.T:
+        assert np.abs(np.fft.rfft(column)).argmax() == 15  # cycles in ten seconds
+    assert np.abs(path - wobbled(still, 0.3, 1.5, seed=3)).max() > 0.1
+    np.testing.assert_array_equal(wobbled(still, 0.0, 1.5, 1), still)
+
+
+def test_the_map_leads_there_and_back() -> None:
+    chance = np.random.default_rng(1)
+    latents = (chance.standard_normal((300, 5)) * (3, 2, 0.5, 0.1, 0.1) + 1).astype(np.float32)
+    pose_map = PoseMap.of(latents, 2)
+    points = chance.standard_normal((20, 2))
+    np.testing.assert_allclose(pose_map.points(pose_map.latents(points)), points, atol=1e-5)
+    np.testing.assert_allclose(pose_map.points(latents).std(axis=0), pose_map.spread[:2], rtol=1e-5)
+    assert pose_map.spread[0] > pose_map.spread[1]
+
+
+def test_a_drawn_line_is_walked_at_an_even_speed() -> None:
+    path = even_path(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.0]]), 400)
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    assert path.shape == (400, 2) and steps[20:-20].max() < 1.2 * np.median(steps)
+    np.testing.assert_allclose(path[[0, -1]], [[0, 0], [1, 3]], atol=0.05)
+
+
+def test_lines_are_read_from_csv_and_svg(tmp_path: Path) -> None:
+    table = tmp_path / "line.csv"
+    table.write_text("x,y\n0.5, 1\n# a corner\n-2;0.25\n")
+    np.testing.assert_allclose(read_line(table), [[0.5, 1], [-2, 0.25]])
+    drawing = tmp_path / "line.svg"
+    drawing.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="400" height="200" viewBox="-200 -100 400 200">'
+        '<path d="M 0 0 L 1 1"/>'
+        '<g transform="translate(100,0)"><path d="M -50,20 L 50,20 L 50,-80"/></g></svg>'
+    )
+    line = read_line(drawing)
+    np.testing.assert_allclose(line[[0, -1]], [[0.5, -0.2], [1.5, 0.8]], atol=1e-3)
+    assert np.abs(line - [1.5, -0.2]).sum(axis=1).min() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.csv", "0,0\nhere,there\n", ":2: 'here,there' is no point"),
+        ("a.csv", "1,1\n1,1\n", "no line with a length"),
+        ("a.csv", "0,nan\n1,1", "finite"),
+        ("a.svg", "<svg", "cannot be read as SVG|holds no line"),
+        ("a.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>', "holds no line"),
+    ],
+)
+def test_what_is_no_line_is_named(tmp_path: Path, name: str, text: str, words: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(StudioError, match=words):
+        read_line(tmp_path / name)
+
+
+def test_path_makes_a_wobbling_phrase(model: Path, recordings: Path, tmp_path: Path) -> None:
+    out = tmp_path / "wobble.bvh"
+    options = ["--model", model, "--out", out, "--wobble", 0.5, 1.0, "--seconds", 2]
+    result = bunraku("path", recordings / "sway_0.bvh", *options)
+    assert result.exit_code == 0, result.output
+    assert len(read_bvh(out)) == 100 and out.with_suffix(".png").exists()
+    figures = json.loads(out.with_suffix(".json").read_text())["figures"]
+    assert figures["degrees_from_the_phrase"] > 1
+
+
+def test_a_line_on_the_map_becomes_a_dance(model: Path, recordings: Path, tmp_path: Path) -> None:
+    files = [recordings / f"sway_{number}.bvh" for number in (0, 1)]
+    result = bunraku("map", *files, "--model", model, "--out", tmp_path / "map")
+    assert result.exit_code == 0, result.output
+    for name in ("map.png", "projections.png", "distance.png", "map.html", "map.svg", "map.json"):
+        assert (tmp_path / "map" / name).stat().st_size > 100, name
+    report = json.loads((tmp_path / "map" / "map.json").read_text())
+    assert set(report["projections"]) >= {"PCA, heading kept", "PCA, heading removed", "pose autoencoder"}
+    assert report["apart"]["largest"] >= report["apart"]["mean"] > 0
+    sheet = (tmp_path / "map" / "map.svg").read_text()
+    left, top, width, height = (float(x) for x in re.search(r'viewBox="([^"]+)"', sheet)[1].split())
+    drawn = f'<path d="M {left + width / 3} {top + height / 2} l {width / 3} 0"/></svg>'
+    (tmp_path / "drawn.svg").write_text(sheet.replace("</svg>", drawn))
+    line = read_line(tmp_path / "drawn.svg")
+    np.testing.assert_allclose(np.ptp(line, axis=0), [width / 300, 0], atol=1e-3)
+    out = tmp_path / "drawn.bvh"
+    result = bunraku("path", "--draw", tmp_path / "drawn.svg", "--model", model, "--out", out, "--seconds", 3)
+    assert result.exit_code == 0, result.output
+    assert len(read_bvh(out)) == 150
+
+
+def test_the_page_of_the_map_needs_no_network(model: Path, recordings: Path, tmp_path: Path) -> None:
+    bunraku("map", recordings / "sway_0.bvh", "--model", model, "--out", tmp_path)
+    page = (tmp_path / "map.html").read_text()
+    assert not re.search(r"https?://|src=|@import", page)
+    data = json.loads(re.search(r"const data = (\{.*\});\n", page)[1])
+    assert data["dances"][0]["name"] == "sway_0" and len(data["dances"][0]["path"]) == 100
+    assert len(data["dances"][0]["figures"][0]) == 3 * 20
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["{rec}/sway_0.bvh"], 2, "--wobble"),
+        (["{rec}/sway_0.bvh", "--wobble", "0.5", "50"], 2, "10 Hz"),
+        (["--draw", "{rec}/none.svg"], 2, "does not exist"),
+    ],
+)
+def test_what_makes_no_path_is_named(
+    arguments: list[str], code: int, words: str, model: Path, recordings: Path, tmp_path: Path
+) -> None:
+    given = [each.format(rec=recordings) for each in arguments]
+    result = bunraku("path", *given, "--model", model, "--out", tmp_path / "x.bvh")
+    assert result.exit_code == code and words in " ".join(result.stderr.split()), result.output
+
+
+def test_a_puppet_is_no_pose_model(trained: tuple[Path, object], recordings: Path, tmp_path: Path) -> None:
+    checkpoint = trained[0] / "checkpoint.pt"
+    result = bunraku("map", recordings / "sway_0.bvh", "--model", checkpoint, "--out", tmp_path)
+    assert result.exit_code == 2 and "is no pose model" in " ".join(result.stderr.split())
