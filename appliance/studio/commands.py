@@ -213,6 +213,12 @@ def improvise(
     temperature: Annotated[
         float, typer.Option(min=0.05, max=2.0, help="1: as free as the training; less: closer to habits.")
     ] = 1.2,
+    prompt: Annotated[
+        Path | None, typer.Option(help="BVH to continue, for --seconds, instead of an endless phrase.")
+    ] = None,
+    prompt_end: Annotated[
+        float | None, typer.Option("--from", min=1.0, help="Second of the prompt to continue from.")
+    ] = None,
     dances: Annotated[int, typer.Option(min=1, help="How many dances to choose the phrase from.")] = 16,
     dance_minutes: Annotated[float, typer.Option(min=0.05, help="Length of each dance.")] = 4.0,
     threads: Annotated[int, typer.Option(min=0, help="CPU cores to use. 0: all.")] = 0,
@@ -235,6 +241,8 @@ def improvise(
                 steps=steps,
                 threads=threads,
                 phrase=PhraseOptions(seconds, seed, temperature, dances, dance_minutes),
+                prompt=prompt,
+                prompt_end=prompt_end,
             )
         )
     if not done:

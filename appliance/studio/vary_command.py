@@ -29,9 +29,14 @@ def vary(
         Path | None, typer.Argument(help="BVH of the phrase; left out with --free.", show_default=False)
     ] = None,
     sigma: Annotated[
-        float,
-        typer.Option(min=0.0, max=10.0, help="How far: 0.5 subtle, 1 to 2 inventive, beyond 3 it may break."),
-    ] = 0.5,
+        float | None,
+        typer.Option(
+            min=0.0,
+            max=10.0,
+            help="How far: 0.5 subtle, 1 to 2 inventive, beyond 3 it may break.",
+            show_default="0.5, with --free 1",
+        ),
+    ] = None,
     count: Annotated[int, typer.Option(min=1, max=64, help="How many variations.")] = 8,
     seed: Annotated[int, typer.Option(help="Of the first variation; each has the next one.")] = 1,
     start: Annotated[float, typer.Option(min=0.0, help="Second of the phrase to begin at.")] = 0.0,
@@ -44,6 +49,10 @@ def vary(
         list[Region] | None, typer.Option(help="The part of the body that changes; repeatable.")
     ] = None,
     free: Annotated[bool, typer.Option("--free", help="Samples from the prior, without a phrase.")] = False,
+    on_map: Annotated[
+        Path | None,
+        typer.Option(help="checkpoint.pt of a pose model: draws the variations as paths over its map."),
+    ] = None,
     recordings: Annotated[
         Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
     ] = None,
@@ -66,7 +75,7 @@ def vary(
                 out=out,
                 phrase=phrase,
                 recordings=recordings,
-                sigma=sigma,
+                sigma=(1.0 if free else 0.5) if sigma is None else sigma,
                 count=count,
                 seed=seed,
                 start=start,
@@ -74,5 +83,6 @@ def vary(
                 mix=mix,
                 share=share,
                 regions=tuple(one.value for one in region or ()),
+                on_map=on_map,
             )
         )

@@ -9,7 +9,9 @@ import pytest
 import torch
 from typer.testing import CliRunner, Result
 
+from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.commands import app
+from appliance.studio.data.dataset import load_dataset
 from appliance.studio.evaluation import answer_picture, own_answer
 from appliance.studio.pose_space import path
 from appliance.studio.variations import sweep, vary
@@ -48,6 +50,24 @@ def bunraku(*arguments: object) -> Result:
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three takes of four seconds."""
     return write_recordings(tmp_path_factory.mktemp("recordings") / "dancer")
+
+
+@pytest.fixture(scope="session")
+def puppet_checkpoint(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> Path:
+    """checkpoint.pt of a puppet that has hardly begun."""
+    path = tmp_path_factory.mktemp("puppet") / "checkpoint.pt"
+    Training(load_dataset(recordings), Settings(network="mlp", width=16, latent=8)).save_checkpoint(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def pose_checkpoint(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> Path:
+    """checkpoint.pt of a pose model after 300 steps."""
+    out = tmp_path_factory.mktemp("pose")
+    options = ["--steps", 300, "--width", 48, "--latent", 6, "--threads", 1]
+    result = bunraku("train", "--model", "pose", "--recordings", recordings, "--out", out, *options)
+    assert result.exit_code == 0, result.output
+    return out / "checkpoint.pt"
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,7 @@ import torch
 from appliance.dancer.loop import turns_about_y
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
+from appliance.studio.autoencoder.losses import divergence
 from appliance.studio.data.dataset import Take
 from appliance.studio.improviser import steps
 from appliance.studio.improviser.improviser import FARTHEST, Improviser, Mixture
@@ -20,7 +21,7 @@ from appliance.studio.improviser.improviser_training import (
     ImproviserTraining,
     load_improviser,
 )
-from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, divergence
+from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape
 from tests.studio.tiny import moving, swaying, untrained
 
 TINY = ImproviserSettings(

@@ -14,7 +14,7 @@ from appliance.dancer.grounding import survey
 from appliance.dancer.loop import is_closed, turns_about_y, yaws
 from appliance.dancer.motion_source import Playback
 from appliance.pose import quaternion
-from appliance.pose.bvh import read_bvh
+from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.dataset import Take, load_dataset
@@ -218,6 +218,44 @@ def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
     assert run(options)
     assert "continues at 100 %" in capsys.readouterr().err
     assert out.read_bytes() == bytes_before
+
+
+def test_a_prompt_is_continued_where_it_ends_without_a_seam(
+    checkpoint: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("appliance.studio.improviser.improvisation.draw_filmstrip", lambda *_, **__: None)
+    write_bvh(tmp_path / "prompt.bvh", strolling(8.0))
+    written = read_bvh(tmp_path / "prompt.bvh")
+    options = ["--recordings", checkpoint[1], "--steps", 2, "--threads", 1, "--seconds", 4, "--from", 6]
+    out = tmp_path / "on.bvh"
+    result = bunraku("improvise", checkpoint[0], "--prompt", tmp_path / "prompt.bvh", "--out", out, *options)
+    assert result.exit_code == 0, result.output
+    dance, told = read_bvh(out), json.loads(out.with_suffix(".json").read_text())
+    join = round(told["joined_s"] * 50)
+    assert 5.0 < told["joined_s"] <= 6.0 and len(dance) == pytest.approx(join + 200, abs=2)
+    kept = join - 20
+    np.testing.assert_allclose(
+        np.degrees(quaternion.angle_between(dance.poses[:kept], written.poses[:kept])).max(), 0, atol=0.2
+    )
+    ground = dance.roots[:, [0, 2]]
+    steps = np.linalg.norm(np.diff(ground, axis=0), axis=1)
+    assert steps[join - 25 : join + 25].max() < 0.03, "nobody is carried off where the prompt ends"
+    assert told["seam_degrees"] < 20 and "prompt ends at" in " ".join(result.stderr.split())
+
+
+def test_a_prompt_that_is_too_short_is_named(checkpoint: tuple[Path, Path], tmp_path: Path) -> None:
+    write_bvh(tmp_path / "prompt.bvh", swaying(3.0))
+    options = ["--recordings", checkpoint[1], "--steps", 2, "--threads", 1, "--from", 1]
+    result = bunraku(
+        "improvise",
+        checkpoint[0],
+        "--prompt",
+        tmp_path / "prompt.bvh",
+        "--out",
+        tmp_path / "on.bvh",
+        *options,
+    )
+    assert result.exit_code == 2 and "continues from 1." in " ".join(result.stderr.split()), result.output
 
 
 def test_the_command_hands_its_options_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -20,13 +20,8 @@ from tests.studio.tiny import moving, swaying
 
 
 @pytest.fixture(scope="module")
-def model(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> Path:
-    """The checkpoint of a pose model after 300 steps."""
-    out = tmp_path_factory.mktemp("pose")
-    options = ["--steps", 300, "--width", 48, "--latent", 6, "--threads", 1]
-    result = bunraku("train", "--model", "pose", "--recordings", recordings, "--out", out, *options)
-    assert result.exit_code == 0, result.output
-    return out / "checkpoint.pt"
+def model(pose_checkpoint: Path) -> Path:
+    return pose_checkpoint
 
 
 def test_a_phrase_comes_back_from_its_path_with_its_heading(model: Path) -> None:
@@ -55,12 +50,15 @@ def test_a_wobble_has_its_amplitude_and_its_frequency() -> None:
 
 def test_the_map_leads_there_and_back() -> None:
     chance = np.random.default_rng(1)
-    latents = (chance.standard_normal((300, 5)) * (3, 2, 0.5, 0.1, 0.1) + 1).astype(np.float32)
-    pose_map = PoseMap.of(latents, 2)
+    latents = chance.standard_normal((3000, 5)).astype(np.float32)
+    effect = chance.standard_normal((5, 30)) * np.array([[1.0], [9.0], [0.5], [4.0], [0.1]])
+    pose_map = PoseMap.of(latents, latents @ effect, 2)
     points = chance.standard_normal((20, 2))
     np.testing.assert_allclose(pose_map.points(pose_map.latents(points)), points, atol=1e-5)
-    np.testing.assert_allclose(pose_map.points(latents).std(axis=0), pose_map.spread[:2], rtol=1e-5)
-    assert pose_map.spread[0] > pose_map.spread[1]
+    assert pose_map.directions[0, 1] > 0.98 and pose_map.directions[1, 3] > 0.9, "what moves the body most"
+    assert 0.9 < pose_map.explained < 1
+    own = PoseMap.of(latents * (1, 5, 1, 2, 1), latents * (1, 5, 1, 2, 1), 2)
+    assert own.directions[0, 1] > 0.99 and own.explained == pytest.approx(29 / 32, abs=0.03)
 
 
 def test_a_drawn_line_is_walked_at_an_even_speed() -> None:
@@ -157,7 +155,6 @@ def test_what_makes_no_path_is_named(
     assert result.exit_code == code and words in " ".join(result.stderr.split()), result.output
 
 
-def test_a_puppet_is_no_pose_model(trained: tuple[Path, object], recordings: Path, tmp_path: Path) -> None:
-    checkpoint = trained[0] / "checkpoint.pt"
-    result = bunraku("map", recordings / "sway_0.bvh", "--model", checkpoint, "--out", tmp_path)
+def test_a_puppet_is_no_pose_model(puppet_checkpoint: Path, recordings: Path, tmp_path: Path) -> None:
+    result = bunraku("map", recordings / "sway_0.bvh", "--model", puppet_checkpoint, "--out", tmp_path)
     assert result.exit_code == 2 and "is no pose model" in " ".join(result.stderr.split())

@@ -122,22 +122,23 @@ def test_vary_writes_each_variation_its_figures_and_a_strip(
 
 
 def test_samples_of_the_prior_need_no_phrase_and_two_phrases_mix(
-    model: Path, recordings: Path, tmp_path: Path
+    model: Path, pose_checkpoint: Path, recordings: Path, tmp_path: Path
 ) -> None:
     checkpoint = model / "checkpoint.pt"
     result = bunraku("vary", "--free", "--model", checkpoint, "--out", tmp_path / "free", "--count", 2)
     assert result.exit_code == 0, result.output
     assert len(read_bvh(tmp_path / "free" / "sample_2.bvh")) == WINDOW
     other = recordings / "sway_1.bvh"
-    out = ["--model", checkpoint, "--out", tmp_path / "mix"]
+    out = ["--model", checkpoint, "--out", tmp_path / "mix", "--on-map", pose_checkpoint]
     result = bunraku("vary", recordings / "sway_0.bvh", "--mix", other, "--share", 0.3, *out)
     assert result.exit_code == 0 and (tmp_path / "mix" / "mixed.bvh").exists(), result.output
+    assert (tmp_path / "mix" / "map.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["{rec}/sway_0.bvh", "--model", "{trained}/checkpoint.pt"], "is no sequence model"),
+        (["{rec}/sway_0.bvh", "--model", "{puppet}"], "is no sequence model"),
         (["{rec}/sway_0.bvh", "--model", "{rec}/sway_0.bvh"], "is not a checkpoint"),
         (["{rec}/none.bvh", "--model", "{model}/checkpoint.pt"], "does not exist"),
         (["{rec}/sway_0.bvh", "--model", "{model}/checkpoint.pt", "--start", "9"], "is not in it"),
@@ -152,10 +153,10 @@ def test_what_cannot_be_varied_is_named(
     words: str,
     model: Path,
     recordings: Path,
-    trained: tuple[Path, object],
+    puppet_checkpoint: Path,
     tmp_path: Path,
 ) -> None:
-    places = {"rec": recordings, "model": model, "trained": trained[0]}
+    places = {"rec": recordings, "model": model, "puppet": puppet_checkpoint}
     result = bunraku("vary", *(each.format(**places) for each in arguments), "--out", tmp_path)
     assert result.exit_code == 2 and words in " ".join(result.stderr.split()), result.output
 

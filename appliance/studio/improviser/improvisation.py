@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,11 @@ from appliance.pictures.filmstrip import draw_filmstrip
 from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.autoencoder.training import load_autoencoder
 from appliance.studio.autoencoder.training_run import stop_signals
 from appliance.studio.data.dataset import Dataset
+from appliance.studio.evaluation.coders import TorchCoder, load_puppet
 from appliance.studio.export.packing import PHRASE_DIGITS
+from appliance.studio.improviser.improviser import Improviser
 from appliance.studio.improviser.improviser_training import (
     ImproviserReport,
     ImproviserSettings,
@@ -28,7 +30,9 @@ from appliance.studio.improviser.improviser_training import (
 from appliance.studio.improviser.moves import BEFORE, MOVE
 from appliance.studio.improviser.naturalness import Naturalness
 from appliance.studio.improviser.phrase import PhraseOptions, make_phrase, verdict
+from appliance.studio.improviser.prompt import continued
 from appliance.studio.improviser.steps import ROOT, Steps, steps_of_takes
+from appliance.studio.standing_dance import excerpt_of
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
 
@@ -44,6 +48,8 @@ class ImproviseOptions:
     steps: int = 0
     threads: int = 0
     phrase: PhraseOptions = field(default_factory=PhraseOptions)
+    prompt: Path | None = None
+    prompt_end: float | None = None  # seconds of the prompt; None: all of it
 
 
 def run(options: ImproviseOptions) -> bool:
@@ -51,8 +57,9 @@ def run(options: ImproviseOptions) -> bool:
     console = Console(stderr=True)
     if options.threads:
         torch.set_num_threads(options.threads)
-    autoencoder, joints, state = load_autoencoder(options.checkpoint)
-    dataset = trained_on(options.checkpoint, joints, state, options.recordings, console)
+    coder, state = load_puppet(options.checkpoint)
+    autoencoder = coder.autoencoder
+    dataset = trained_on(options.checkpoint, coder.joints, state, options.recordings, console)
     steps = steps_of_takes(autoencoder, dataset.training, dataset.moving, BEFORE + MOVE)
     held_out = steps_of_takes(autoencoder, dataset.held_out, dataset.moving, BEFORE + MOVE)
     training = _training(options, autoencoder, steps, held_out, console)
@@ -62,10 +69,37 @@ def run(options: ImproviseOptions) -> bool:
     def say(message: str) -> None:
         console.print(message, highlight=False, soft_wrap=True)
 
+    if options.prompt is not None:
+        continue_prompt(options, coder, training.averaged, dataset, say)
+        return True
     phrase, natural = make_phrase(autoencoder, training.averaged, dataset, steps, options.phrase, say)
     write_phrase(options, phrase, natural, dataset, training)
     say(f"{options.out}: {verdict(natural)}")
     return True
+
+
+def continue_prompt(
+    options: ImproviseOptions,
+    coder: TorchCoder,
+    improviser: Improviser,
+    dataset: Dataset,
+    say: Callable[[str], None],
+) -> None:
+    """The prompt and what the improviser dances after it, with a report and a picture."""
+    assert options.prompt is not None
+    end = 1e9 if options.prompt_end is None else options.prompt_end
+    prompt = excerpt_of(options.prompt, 0.0, end, coder, dataset.skeleton)
+    asked = options.phrase
+    made = continued(
+        coder.autoencoder, improviser, dataset, prompt, asked.seconds, asked.temperature, asked.seed
+    )
+    words = f"the prompt ends at {made.joined_s:.1f} s"
+    figures = {"joined_s": made.joined_s, "seam_degrees": made.seam, "usual_degrees": made.usual}
+    _write(options.out, made.dance, f"{options.out.stem}: {words}", {**asdict(asked), **figures})
+    say(
+        f"{options.out}: {made.dance.seconds:.1f} s; {words}. The largest step of a joint around there is "
+        f"{made.seam:.1f} degrees, {made.usual:.1f} are usual in the prompt."
+    )
 
 
 def improviser_file(out: Path) -> Path:
@@ -81,18 +115,22 @@ def write_phrase(
     training: ImproviserTraining,
 ) -> None:
     """The phrase, its report (JSON) and a picture of it."""
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    write_bvh(options.out, phrase, digits=PHRASE_DIGITS)
     report: dict[str, Any] = {
         "phrase": asdict(options.phrase),
         "improviser": {"settings": asdict(training.settings), "steps": training.step},
         "learned_from": [take.name for take in dataset.training if take.sound.any()],
         "naturalness": natural.as_json(),
     }
-    options.out.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     title = f"{options.out.stem}: {phrase.seconds:.0f} s, seed {options.phrase.seed}"
-    picture = options.out.with_suffix(".png")
-    draw_filmstrip(picture, phrase.skeleton, phrase.poses, phrase.roots, phrase.fps, title=title, rows=3)
+    _write(options.out, phrase, title, report)
+
+
+def _write(out: Path, dance: Recording, title: str, report: Mapping[str, Any]) -> None:
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_bvh(out, dance, digits=PHRASE_DIGITS)
+    out.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    picture = out.with_suffix(".png")
+    draw_filmstrip(picture, dance.skeleton, dance.poses, dance.roots, dance.fps, title=title, rows=3)
 
 
 def _training(

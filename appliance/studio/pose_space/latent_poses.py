@@ -42,26 +42,32 @@ def wobbled(latents: Latents, amplitude: float, frequency: float, seed: int, fps
 
 @dataclass(frozen=True)
 class PoseMap:
-    """Directions (D, Z) of the latents in which the dancer's poses differ most, and their middle (Z,).
+    """Orthogonal directions (D, Z) of the latents along which the body differs most, and their middle (Z,).
 
-    spread (D,): standard deviation along each; a point of the map is in latent units from the middle.
+    A point of the map is in latent units from the middle. explained: share of the figures' variance along
+    these directions.
     """
 
     middle: Array
     directions: Array
-    spread: Array
+    explained: float
 
     @staticmethod
-    def of(latents: Latents, dimensions: int) -> PoseMap:
-        """Principal components; a latent of no more numbers than that is only turned."""
-        values = latents.astype(np.float64)
-        middle = values.mean(axis=0)
-        _, sizes, directions = np.linalg.svd(values - middle, full_matrices=False)
-        count = min(dimensions, len(directions))
-        signs = np.sign(directions[np.arange(count), np.abs(directions[:count]).argmax(axis=1)])
-        return PoseMap(
-            middle, signs[:, None] * directions[:count], sizes[:count] / np.sqrt(max(len(values), 1))
-        )
+    def of(latents: Latents, figures: Array, dimensions: int) -> PoseMap:
+        """latents (N, Z) of figures (N, P): where all numbers of a latent vary alike, as the prior wants them
+        to, only the figures say which directions matter. Given as their own figures: principal components.
+        """
+        values, shapes = (each - each.mean(axis=0) for each in (latents.astype(np.float64), figures))
+        effect = np.linalg.lstsq(values, shapes, rcond=None)[0]
+        directions = np.linalg.svd(effect * values.std(axis=0)[:, None], full_matrices=False)[0].T[
+            :dimensions
+        ]
+        signs = np.sign(directions[np.arange(len(directions)), np.abs(directions).argmax(axis=1)])
+        directions = signs[:, None] * directions
+        seen = values @ directions.T
+        left = shapes - seen @ np.linalg.lstsq(seen, shapes, rcond=None)[0]
+        explained = 1 - float(left.var(axis=0).sum() / max(float(shapes.var(axis=0).sum()), 1e-12))
+        return PoseMap(latents.astype(np.float64).mean(axis=0), directions, explained)
 
     def points(self, latents: Latents) -> Array:
         """(T, Z) -> (T, D)."""

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import Dataset
 from appliance.studio.evaluation.coders import TorchCoder, load_checkpoint
 from appliance.studio.granular.latent_paths import Latents
+from appliance.studio.improviser.naturalness import figure_shapes
 from appliance.studio.pose_space.latent_poses import PoseMap, latents_of
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
@@ -27,11 +29,13 @@ def open_pose_model(
 
 
 def map_of(autoencoder: Autoencoder, dataset: Dataset, dimensions: int = 2) -> PoseMap:
-    """The directions in which the training poses differ most."""
-    return PoseMap.of(training_latents(autoencoder, dataset), dimensions)
+    """The directions along which the training poses differ most."""
+    return PoseMap.of(*training_poses(autoencoder, dataset), dimensions)
 
 
-def training_latents(autoencoder: Autoencoder, dataset: Dataset) -> Latents:
-    """(N, Z) of all sound training poses."""
-    poses = [take.recording.poses[take.sound][:, list(dataset.moving)] for take in dataset.training]
-    return latents_of(autoencoder, np.concatenate(poses))[0]
+def training_poses(autoencoder: Autoencoder, dataset: Dataset) -> tuple[Latents, Array]:
+    """Latents (N, Z) and figures (N, M * 3) in centimetres of all sound training poses."""
+    takes = [(take.recording, take.sound) for take in dataset.training]
+    poses = [recording.poses[sound][:, list(dataset.moving)] for recording, sound in takes]
+    figures = [figure_shapes(recording, dataset.moving)[sound] for recording, sound in takes]
+    return latents_of(autoencoder, np.concatenate(poses))[0], np.concatenate(figures)

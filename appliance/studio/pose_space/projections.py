@@ -61,7 +61,8 @@ def _shapes_with_heading(recording: Recording, moving: Sequence[int]) -> Array:
 
 
 def _principal(shapes: Sequence[Array]) -> tuple[Array, ...]:
-    found = PoseMap.of(np.concatenate(shapes).astype(np.float32), 2)
+    whole = np.concatenate(shapes).astype(np.float32)
+    found = PoseMap.of(whole, whole, 2)
     return tuple(found.points(one.astype(np.float32)) for one in shapes)
 
 

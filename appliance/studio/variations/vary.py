@@ -22,6 +22,8 @@ from appliance.studio.evaluation.coders import Poses, TorchCoder, load_checkpoin
 from appliance.studio.evaluation.dance_figures import energy
 from appliance.studio.evaluation.nearest import Reference, reference_of
 from appliance.studio.export.packing import PHRASE_DIGITS
+from appliance.studio.pose_space.ground import Ground
+from appliance.studio.pose_space.pose_model import open_pose_model
 from appliance.studio.standing_dance import excerpt_of, standing
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
@@ -47,6 +49,7 @@ class VaryOptions:
     mix: Path | None = None
     share: float = 0.5
     regions: tuple[str, ...] = ()
+    on_map: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,8 @@ def run(options: VaryOptions) -> None:
             poses, None if given is None else given.poses[:, list(dataset.moving)], reference
         )
         strips.append(Strip(whole.poses, whole.roots, name, behind=strips[0] if given is not None else None))
+    if options.on_map is not None:
+        _draw_on_map(options, given, danced, console)
     title = _words(options)
     draw_strips(options.out / "variations.png", dataset.skeleton, strips, FPS, (), title, columns=COLUMNS)
     told: dict[str, Any] = {
@@ -113,6 +118,19 @@ def measured(poses: Array, phrase: Array | None, reference: Reference) -> Figure
     return Figures(
         nearest, off.degrees, off.warped, off.timing, energy(poses) / pace if pace > 1e-9 else None
     )
+
+
+def _draw_on_map(
+    options: VaryOptions, given: Recording | None, danced: dict[str, Poses], console: Console
+) -> None:
+    """The link of both models: the phrase and its variations as a bundle of paths over the map of poses."""
+    assert options.on_map is not None
+    coder, dataset = open_pose_model(options.on_map, options.recordings, console)
+    ground, paths = Ground.of(coder.autoencoder, dataset), {}
+    if given is not None:
+        paths["phrase"] = ground.path(given.poses[:, list(dataset.moving)])
+    paths |= {name: ground.path(poses) for name, poses in danced.items()}
+    ground.draw(options.out / "map.png", paths)
 
 
 def _model(options: VaryOptions, console: Console) -> tuple[TorchCoder, Dataset]:

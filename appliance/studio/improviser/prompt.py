@@ -1,0 +1,123 @@
+"""A prompt continued: the improviser goes on where a recording ends, or at a second of it, without a seam."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+
+from appliance.dancer.loop import Placement, smooth, turns_about_y, yaws
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.data.dataset import FPS, WINDOW, Dataset
+from appliance.studio.improviser.improviser import Improviser
+from appliance.studio.improviser.moves import BEFORE, MOVE
+from appliance.studio.improviser.phrase import PRIMER, STEPS_S
+from appliance.studio.improviser.steps import HOP, Steps, danced_again, motion_of, steps_of
+from appliance.studio.standing_dance import standing
+from appliance.studio.studio_error import StudioError
+
+KNOWN = 5  # of the prompt's steps that are decoded again, for the motion that is faded over
+AROUND_S = 0.3  # on either side of the join, where a seam would show
+
+
+@dataclass(frozen=True)
+class Continuation:
+    """dance: the prompt and what follows; joined_s: where that begins; seam: the largest step of a joint from
+    tick to tick around there; usual: the 99th percentile of the prompt's largest steps; both in degrees.
+    """
+
+    dance: Recording
+    joined_s: float
+    seam: float
+    usual: float
+
+
+def continued(
+    autoencoder: Autoencoder,
+    improviser: Improviser,
+    dataset: Dataset,
+    prompt: Recording,
+    seconds: float,
+    temperature: float,
+    seed: int,
+) -> Continuation:
+    """prompt: at 50 Hz, its floor at height 0. Raises StudioError where it is too short."""
+    moving = list(dataset.moving)
+    steps = steps_of(autoencoder, prompt, moving)
+    if len(steps) < BEFORE + MOVE:
+        least = HOP * (BEFORE + MOVE + 1) + WINDOW
+        raise StudioError(
+            f"The prompt has {len(prompt) / FPS:.1f} s; the improviser continues from {least / FPS:.1f} s or "
+            "more. Give a longer one, or a later --from."
+        )
+    primer = torch.tensor(steps.features[-PRIMER:])[None]
+    moves = math.ceil(seconds * STEPS_S / MOVE)
+    danced = improviser.improvise(primer, moves, temperature, seed)[0].numpy()
+    together = Steps.of_features(np.concatenate([steps.features[-KNOWN:], danced]))
+    poses, roots = motion_of(autoencoder, together, prompt.poses[-1], moving)
+    poses = danced_again(autoencoder, poses, moving)
+    first = HOP * (len(steps) - KNOWN + 1) + WINDOW // 2  # frame of the prompt that the motion begins with
+    fade = (KNOWN - 1) * HOP
+    made = _placed(Recording(prompt.skeleton, poses, roots, FPS), prompt, first)
+    count = min(first + len(made), first + fade + round(seconds * FPS))
+    whole = _joined(prompt, made, first, fade, count)
+    planted = standing(whole.poses[:, moving].astype(np.float32), whole, dataset)
+    dance = _joined(whole, _placed(_from(planted, first), whole, first), first, fade, count)
+    return Continuation(dance, (first + fade) / FPS, *_seam(dance, prompt, first, fade, moving))
+
+
+def _placed(made: Recording, prompt: Recording, first: int) -> Recording:
+    """Turned and moved to where the prompt stands at that frame."""
+    old, new = (
+        (roots[0], roots[2], float(yaws(quaternion.heading(pose[0]))))
+        for roots, pose in ((made.roots[0], made.poses[0]), (prompt.roots[first], prompt.poses[first]))
+    )
+    placement = Placement.bringing(old, new)
+    poses, roots = made.poses.copy(), made.roots.copy()
+    turn = np.broadcast_to(turns_about_y(np.array(placement.yaw)), poses[:, 0].shape)
+    poses[:, 0] = quaternion.multiply(turn, poses[:, 0])
+    roots[:, 0], roots[:, 2] = placement.point(roots[:, 0].copy(), roots[:, 2].copy())
+    return replace(made, poses=poses, roots=roots)
+
+
+def _joined(before: Recording, made: Recording, first: int, fade: int, count: int) -> Recording:
+    """`before` up to a frame, then faded over into what was made from that frame on."""
+    share = smooth((np.arange(fade) + 0.5) / fade)
+    over = slice(first, first + fade)
+    poses = np.concatenate(
+        [
+            before.poses[:first],
+            quaternion.slerp(before.poses[over], made.poses[:fade], share[:, None]),
+            made.poses[fade : count - first],
+        ]
+    )
+    roots = np.concatenate(
+        [
+            before.roots[:first],
+            before.roots[over] + share[:, None] * (made.roots[:fade] - before.roots[over]),
+            made.roots[fade : count - first],
+        ]
+    )
+    return Recording(before.skeleton, quaternion.continuous(poses), roots, FPS)
+
+
+def _from(recording: Recording, first: int) -> Recording:
+    return replace(recording, poses=recording.poses[first:], roots=recording.roots[first:])
+
+
+def _seam(
+    dance: Recording, prompt: Recording, first: int, fade: int, moving: list[int]
+) -> tuple[float, float]:
+    def largest(poses: Array) -> Array:
+        turns = quaternion.angle_between(poses[1:, moving], poses[:-1, moving])
+        steps: Array = np.degrees(turns).max(axis=1)
+        return steps
+
+    around = round(AROUND_S * FPS)
+    seam = largest(dance.poses[max(0, first - around) : first + fade + around])
+    return float(seam.max()), float(np.percentile(largest(prompt.poses), 99))

@@ -1,0 +1,56 @@
+"""The ground of a dancer's map: all recorded poses, and the figures that are usual at each place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from appliance.pose.quaternion import Array
+from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.data.dataset import Dataset
+from appliance.studio.pose_space import map_pictures
+from appliance.studio.pose_space.latent_poses import PoseMap, latents_of, poses_of
+from appliance.studio.pose_space.pose_model import training_poses
+
+GRID = 9  # figures along the map's wider side
+NOBODY = 0.35  # of the map's spread: farther from all recorded poses nobody has been
+
+
+@dataclass(frozen=True)
+class Ground:
+    """pose_map: of a model, in three dimensions; known (N, 3): its points of the training poses."""
+
+    autoencoder: Autoencoder
+    dataset: Dataset
+    pose_map: PoseMap
+    known: Array
+
+    @staticmethod
+    def of(autoencoder: Autoencoder, dataset: Dataset) -> Ground:
+        latents, figures = training_poses(autoencoder, dataset)
+        pose_map = PoseMap.of(latents, figures, 3)
+        return Ground(autoencoder, dataset, pose_map, pose_map.points(latents))
+
+    def path(self, poses: Array) -> Array:
+        """Points (T, D) of poses (T, M, 4)."""
+        return self.pose_map.points(latents_of(self.autoencoder, poses)[0])
+
+    def draw(self, file: Path, paths: Mapping[str, Array]) -> tuple[float, float, float, float]:
+        """Paths over the map's first two directions; returns its left, right, bottom and top."""
+        return map_pictures.draw_map(file, self.known, paths, self._figures(), NOBODY)
+
+    def _figures(self) -> list[tuple[Array, Array, Sequence[tuple[int, int]]]]:
+        """On a grid: place (2,), the figure that is usual there (J, 3) in metres, its bones."""
+        skeleton = self.dataset.skeleton
+        low, high = np.percentile(self.known[:, :2], [1, 99], axis=0)
+        step = float((high - low).max()) / (GRID - 1)
+        columns, rows = (np.arange(a, b + step / 2, step) for a, b in zip(low, high, strict=True))
+        places = np.array([(x, y) for y in rows for x in columns])
+        whole = np.tile(self.dataset.still_pose(), (len(places), 1, 1))
+        whole[:, list(self.dataset.moving)] = poses_of(self.autoencoder, self.pose_map.latents(places))
+        positions, _ = skeleton.forward_kinematics(whole, np.zeros((len(places), 3)))
+        bones = [(joint, parent) for joint, parent in enumerate(skeleton.parents) if parent >= 0]
+        return [(place, figure, bones) for place, figure in zip(places, positions, strict=True)]
