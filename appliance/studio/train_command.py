@@ -84,7 +84,7 @@ def run(options: TrainOptions) -> bool:
         return False
     if settings.model != "puppet":
         if settings.model == "sequence":
-            report(training.averaged, dataset, options.out, console)
+            report(load_checkpoint(checkpoint)[0].autoencoder, dataset, options.out, console)
         console.print(f"{checkpoint} is ready. What it is for: {MODELS[settings.model].use}.")
         return True
     if settings.window != WINDOW:

@@ -75,7 +75,7 @@ def test_the_more_noise_the_further_from_the_phrase(model: Path) -> None:
     assert (np.diff(distances) > 0).all(), distances
     again = [variations.varied(coder.autoencoder, phrase, 1.0, seed) for seed in (1, 1, 2)]
     np.testing.assert_array_equal(again[0], again[1])
-    assert difference(again[0], again[2]).degrees > 0.1
+    assert difference(again[0], again[2]).degrees > 0.5 * difference(own, again[0]).degrees > 0
 
 
 def test_a_mixture_goes_from_one_phrase_to_the_other(model: Path) -> None:
@@ -103,7 +103,7 @@ def test_vary_writes_each_variation_its_figures_and_a_strip(
     model: Path, recordings: Path, tmp_path: Path
 ) -> None:
     options = ["--model", model / "checkpoint.pt", "--out", tmp_path, "--count", 2, "--seconds", 2.5]
-    result = bunraku("vary", recordings / "sway_0.bvh", *options, "--sigma", 1, "--region", "arms")
+    result = bunraku("vary", recordings / "sway_0.bvh", *options, "--sigma", 10, "--region", "arms")
     assert result.exit_code == 0, result.output
     phrase, first, second = (
         read_bvh(tmp_path / f"{name}.bvh") for name in ("phrase", "variation_1", "variation_2")
@@ -111,7 +111,7 @@ def test_vary_writes_each_variation_its_figures_and_a_strip(
     count = len(first)
     arm, belly = (phrase.skeleton.index(name) for name in ("lShldr", "abdomen"))
     assert np.degrees(quaternion.angle_between(first.poses[:, arm], phrase.poses[:count, arm])).max() > 1
-    assert np.degrees(quaternion.angle_between(first.poses[:, arm], second.poses[:, arm])).max() > 0.5
+    assert np.degrees(quaternion.angle_between(first.poses[:, arm], second.poses[:, arm])).max() > 0.05
     np.testing.assert_allclose(
         quaternion.angle_between(first.poses[:, belly], phrase.poses[:count, belly]), 0, atol=2e-3
     )

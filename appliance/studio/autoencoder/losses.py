@@ -25,6 +25,7 @@ class LossWeights:
     position: float = 1.0
     squared: float = 0.0  # of quaternions' components: the published loss of 'Beyond Imitation'
     prior: float = 0.003  # of the adversarial prior; 0: none
+    speed: float = 0.0  # how much each joint moves within windows, as a mean over the batch
     divergence: float = 0.001  # of a variational network's latents from the prior
     advance: float = 1.0
     energy: float = 8.0
@@ -35,18 +36,21 @@ class LossWeights:
 def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:
     """Losses of raw decoded quaternions (B, T, M, 4) against heading-free windows of the same shape.
 
-    rotation: see rotation_loss; pace: the same for steps between poses, 0 for a window of one; unit_norm:
-    squared; position: mean distance in metres; squared: of the components, summed over a joint.
+    rotation: see rotation_loss; pace: the same for steps between poses, 0 for a window of one; speed: of the
+    size of those steps, see advance_losses; unit_norm: squared; position: mean distance in metres; squared:
+    of the components, summed over a joint.
     """
     made = rotation.normalize(raw)
     norms = raw.square().sum(-1)
     moments = torch.randint(raw.shape[1], (POSITION_POSES,), device=raw.device)
     here, there = body(torch.cat([made[:, moments], windows[:, moments]])).chunk(2)
     distance = (here - there).square().sum(-1)
-    steps = (made[:, 1:] - made[:, :-1]) - (windows[:, 1:] - windows[:, :-1])
+    steps, wanted = (each[:, 1:] - each[:, :-1] for each in (made, windows))
+    zero = raw.new_zeros(())
     return {
         "rotation": rotation_loss(raw, windows),
-        "pace": 2 * _length(steps) if steps.numel() else raw.new_zeros(()),
+        "pace": 2 * _length(steps - wanted) if steps.numel() else zero,
+        "speed": _mean_size_loss(steps, wanted) if steps.numel() else zero,
         "squared": (raw - windows).square().sum(-1).mean(),
         "unit_norm": (norms - 1).square().mean(),
         "position": (distance + 1e-8).sqrt().mean(),
@@ -64,9 +68,7 @@ def advance_losses(raw: Tensor, windows: Tensor) -> dict[str, Tensor]:
     """
     (made, later), (given, given_later) = rotation.normalize(raw).chunk(2), windows.chunk(2)
     change, wanted = later - made, given_later - given
-    sizes, sizes_wanted = _sizes(change).mean((0, 1)), _sizes(wanted).mean((0, 1))
-    energy = 2 * (sizes - ENERGY * sizes_wanted).abs().mean()
-    return {"advance": 2 * _length(change - wanted), "energy": energy}
+    return {"advance": 2 * _length(change - wanted), "energy": _mean_size_loss(change, wanted, ENERGY)}
 
 
 def divergence(mean: Tensor, log_variance: Tensor) -> Tensor:
@@ -104,6 +106,12 @@ def critic_loss(critic: PriorCritic, latents: Tensor, noise: Tensor, steepness: 
 def rotation_loss(raw: Tensor, windows: Tensor) -> Tensor:
     """Mean joint angle error in radians (the chord, twice: exact to 1 % below 25 degrees)."""
     return 2 * _length(rotation.normalize(raw) - windows)
+
+
+def _mean_size_loss(changes: Tensor, wanted: Tensor, share: float = 1.0) -> Tensor:
+    """In radians: how far each joint's mean change is from a share of the wanted one's."""
+    sizes, sizes_wanted = (_sizes(each).mean((0, 1)) for each in (changes, wanted))
+    return 2 * (sizes - share * sizes_wanted).abs().mean()
 
 
 def _length(differences: Tensor) -> Tensor:

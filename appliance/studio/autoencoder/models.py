@@ -61,7 +61,7 @@ MODELS = {
         128,
         {
             "mlp": {
-                "weights": LossWeights(prior=0.0, divergence=3e-4),
+                "weights": LossWeights(prior=0.0, divergence=1e-4, speed=8.0),
                 "variational": True,
                 "batch": 64,
                 "latent": 128,

@@ -154,8 +154,10 @@ class Mlp(Network):
         """Map latents of this mean and deviation (Z,) to the prior's 0 and 1; windows stay the same."""
         last, first = self.encoder.stack[-1], self.decoder.stack[0]
         assert isinstance(last, nn.Linear) and isinstance(first, nn.Linear)
-        last.weight /= deviation[:, None]
-        last.bias.sub_(mean).div_(deviation)
+        size = len(mean)
+        last.weight[:size] /= deviation[:, None]
+        last.bias[:size] = (last.bias[:size] - mean) / deviation
+        last.bias[size:] -= 2 * deviation.log()[: len(last.bias) - size]  # of a variational network
         first.bias.add_(first.weight @ mean)
         first.weight *= deviation
 

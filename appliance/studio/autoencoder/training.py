@@ -273,6 +273,6 @@ def load_autoencoder(path: Path) -> tuple[Autoencoder, list[str], dict[str, Any]
     network, built = build(state["settings"]["network"], shape.pop("window"), shape.pop("joints"), **shape)
     autoencoder = Autoencoder(network, built, torch.zeros(built.joints, 4))
     autoencoder.load_state_dict(state["averaged"])
-    if isinstance(network, Mlp) and not built.variational:
+    if isinstance(network, Mlp):
         network.standardise(*state["latent_moments"])
     return autoencoder.requires_grad_(False).eval(), state["joints"], state
