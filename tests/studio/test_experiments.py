@@ -111,7 +111,7 @@ def test_too_little_for_five_is_said(skeleton: Skeleton) -> None:
 
 def test_a_skeleton_without_limbs_is_said(skeleton: Skeleton) -> None:
     with pytest.raises(StudioError, match="--excerpts"):
-        regions_of(skeleton, ("hip", "head"))
+        regions_of(skeleton, ("hip", "head"), "Name them with --excerpts.")
 
 
 @pytest.mark.parametrize(

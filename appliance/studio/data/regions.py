@@ -19,10 +19,10 @@ class Regions:
     legs: list[int]
 
 
-def regions_of(skeleton: Skeleton, joints: Sequence[str]) -> Regions:
+def regions_of(skeleton: Skeleton, joints: Sequence[str], cure: str = "") -> Regions:
     """Torso, arms and legs among the joints that move, found by the skeleton's shape.
 
-    Raises StudioError where it has no pair of limbs above and below.
+    Raises StudioError where it has no pair of limbs above and below; cure: what then to do.
     """
     anatomy = Anatomy(skeleton)
     arms, legs = set[int](), set[int]()
@@ -39,5 +39,7 @@ def regions_of(skeleton: Skeleton, joints: Sequence[str]) -> Regions:
 
     found = Regions(among(anatomy.trunk), among(arms), among(legs))
     if not (found.torso and found.arms and found.legs):
-        raise StudioError("This skeleton has no arms and legs that can be told apart from a torso.")
+        raise StudioError(
+            f"This skeleton has no arms and legs that can be told apart from a torso. {cure}".strip()
+        )
     return found

@@ -95,7 +95,7 @@ def choose(takes: Sequence[Take], joints: Sequence[str]) -> list[Excerpt]:
     if not takes:
         raise StudioError("There is no recording to choose excerpts from.")
     skeleton = takes[0].recording.skeleton
-    regions = regions_of(skeleton, joints)
+    regions = regions_of(skeleton, joints, _NAME_THEM)
     places = [skeleton.index(name) for name in joints]
     candidates = [one for take in takes for one in _candidates(take, places, regions)]
     chosen: list[Excerpt] = []
@@ -143,7 +143,13 @@ def named(file: Path, takes: Sequence[Take], joints: Sequence[str]) -> list[Exce
         places = [skeleton.index(joint) for joint in joints]
         poses = without_heading(take.recording.poses[first : first + FRAMES, places])
         found.append(
-            _excerpt(name, "named in a file", take, first, measured(poses, regions_of(skeleton, joints)))
+            _excerpt(
+                name,
+                "named in a file",
+                take,
+                first,
+                measured(poses, regions_of(skeleton, joints, _NAME_THEM)),
+            )
         )
     if problems or not found:
         raise ConfigError(problems or [entries.problem((), "It names no excerpt.", _EXAMPLE)])
@@ -151,6 +157,7 @@ def named(file: Path, takes: Sequence[Take], joints: Sequence[str]) -> list[Exce
 
 
 _Candidate = tuple[Take, int, Measures]
+_NAME_THEM = "Name the excerpts yourself with --excerpts."
 _EXAMPLE = "Write a take and its start in seconds: still: {take: salsa_09, start: 12.5}."
 
 

@@ -168,7 +168,7 @@ def _dances(
         }
     if not options.regions:
         return made
-    regions = regions_of(dataset.skeleton, dataset.moving_names)
+    regions = regions_of(dataset.skeleton, dataset.moving_names, "Omit --region.")
     changed = sorted(place for name in options.regions for place in getattr(regions, name))
     return {name: _only(poses, own, changed) for name, poses in made.items()}
 
