@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.commands import app
 from appliance.studio.data.dataset import load_dataset
-from appliance.studio.evaluation import answer_picture, own_answer
+from appliance.studio.evaluation import answer_picture, own_answer, pictures
 from appliance.studio.pose_space import path
 from appliance.studio.variations import sweep, vary
 from tests.studio.tiny import write_recordings
@@ -35,7 +35,7 @@ def _small_answers() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(answer_picture, "COLUMNS", 2)
         patch.setattr(own_answer, "MOST_TICKS", 150)
-        for module in (sweep, vary, path):
+        for module in (pictures, sweep, vary, path):
             patch.setattr(module, "COLUMNS", 2)
         patch.setattr(sweep, "WINDOWS", 3)
         yield
@@ -72,7 +72,7 @@ def pose_checkpoint(tmp_path_factory: pytest.TempPathFactory, recordings: Path) 
 
 @pytest.fixture(scope="session")
 def trained(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> tuple[Path, Result]:
-    """A show after 150 steps of a tiny mlp, and what the command said."""
+    """A show after 60 steps of a tiny mlp, and what the command said."""
     show = tmp_path_factory.mktemp("trained") / "evening"
-    options = ["--steps", 150, "--width", 48, "--latent", 16, "--threads", 1, "--device", "cpu"]
+    options = ["--steps", 60, "--width", 48, "--latent", 16, "--threads", 1, "--device", "cpu"]
     return show, bunraku("train", "--recordings", recordings, "--out", show, *options)

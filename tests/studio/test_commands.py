@@ -46,7 +46,7 @@ def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:
         "17 of 20 joints move",
         "Still everywhere, kept as they stand",
         "Kept apart to measure on, by take: sway_2",
-        "150 steps on the CPU (1 threads)",
+        "60 steps on the CPU (1 threads)",
         "degrees on held-out takes",
         "computes what was trained",
         "the bundle contains a recording",
@@ -68,7 +68,7 @@ def test_training_ends_with_whether_the_dancer_answers(trained: Trained) -> None
 def test_training_leaves_its_history_and_pictures(trained: Trained) -> None:
     show, _ = trained
     told = json.loads((show / "training.json").read_text())
-    assert told["settings"]["width"] == 48 and told["history"][-1]["step"] == 150
+    assert told["settings"]["width"] == 48 and told["history"][-1]["step"] == 60
     assert told["history"][-1]["held_out_degrees"] > 0
     for picture in (show / "pictures" / "losses.png", show / "report.png", show / "answer.png"):
         assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 10_000
@@ -80,7 +80,7 @@ def test_the_report_holds_what_the_stage_and_the_artist_need(trained: Trained) -
     report = json.loads((trained[0] / "report.json").read_text())
     assert report["network"]["ships"] in ("fp32", "int8")
     assert report["evaluated_on"] == ["sway_2"]
-    assert report["training"]["steps"] == 150
+    assert report["training"]["steps"] == 60
     assert report["equality_with_pytorch"]["largest_difference"] <= 1e-4
     assert len(report["joint_range_degrees"]) == 17
     assert all(0 < degrees <= 180 for degrees in report["joint_range_degrees"].values())

@@ -79,7 +79,7 @@ def test_the_seed_alone_decides(dancer: Dataset, tmp_path: Path) -> None:
     assert same(weights[0], weights[1]) and not same(weights[0], weights[2])
 
 
-@pytest.mark.parametrize(("network", "steps"), [("mlp", 250), ("conditional", 500)])
+@pytest.mark.parametrize(("network", "steps"), [("mlp", 200), ("conditional", 300)])
 def test_training_reduces_the_error(dancer: Dataset, tmp_path: Path, network: str, steps: int) -> None:
     training = Training(dancer, replace(TINY, network=network, steps=steps, width=64))
     training.held_windows = training.train_windows  # the tiny takes have nothing in common to generalise
@@ -87,7 +87,7 @@ def test_training_reduces_the_error(dancer: Dataset, tmp_path: Path, network: st
     run(training, tmp_path / "checkpoint.pt")
     after = training.held_out_degrees()
     assert before is not None and after is not None
-    assert after < 0.7 * before
+    assert after < 0.8 * before
     last = training.history[-1]
     assert last.fraction == 1.0 and last.step == steps and last.held_out_degrees == after
     assert set(last.losses) >= {"rotation", "pace", "unit_norm", "position", "prior", "critic"}
