@@ -16,9 +16,10 @@ import torch
 from appliance.dancer.puppet import Puppet
 from appliance.pose.bvh import read_bvh
 from appliance.show.bundle import default_show_path
-from appliance.studio.autoencoder.architectures import NETWORKS, build
+from appliance.studio.autoencoder.architectures import build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.held_joints import HeldJoints
+from appliance.studio.autoencoder.models import PUPPETS
 from appliance.studio.export.export import export
 from tests.studio.tiny import moving, skeleton, swaying
 
@@ -89,7 +90,7 @@ def test_pytorch_eager(measured: Callable[..., Any], one_thread: None, onednn: b
 
 
 @pytest.mark.parametrize("precision", ["fp32", "int8"])
-@pytest.mark.parametrize("network", sorted(NETWORKS))
+@pytest.mark.parametrize("network", sorted(PUPPETS))
 def test_exported(
     measured: Callable[..., Any], exported: Callable[[str, str], Path], network: str, precision: str
 ) -> None:

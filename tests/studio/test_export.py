@@ -12,8 +12,8 @@ import torch
 from onnx import numpy_helper
 
 from appliance.pose import quaternion
-from appliance.studio.autoencoder.architectures import NETWORKS
 from appliance.studio.autoencoder.held_joints import HeldJoints
+from appliance.studio.autoencoder.models import PUPPETS
 from appliance.studio.evaluation.coders import OnnxCoder
 from appliance.studio.export.export import export
 from tests.studio.test_autoencoder import some_windows
@@ -22,7 +22,7 @@ from tests.studio.tiny import moving, skeleton, untrained
 NAMES = [skeleton().names[j] for j in moving()]
 
 
-@pytest.fixture(scope="module", params=sorted(NETWORKS))
+@pytest.fixture(scope="module", params=sorted(PUPPETS))
 def network(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 

@@ -154,7 +154,7 @@ def test_a_recording_measured_by_itself_is_as_natural_as_can_be() -> None:
     assert natural.liveliness == pytest.approx(natural.pace.speed / natural.recorded_pace.speed)
     assert natural.likeness.strangeness < 1e-3 and natural.likeness.nearest_second_cm < 1.0
     assert natural.likeness.coverage >= 1 / 3
-    assert natural.seam.closed  # three seconds of sway, three times
+    assert natural.seam is not None and natural.seam.closed  # three seconds of sway, three times
     json.dumps(natural.as_json())
 
 

@@ -28,7 +28,7 @@ from appliance.studio.improviser.improviser_training import (
     ImproviserTraining,
 )
 from appliance.studio.improviser.moves import BEFORE, MOVE
-from appliance.studio.improviser.naturalness import Naturalness
+from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
 from appliance.studio.improviser.phrase import PhraseOptions, make_phrase, verdict
 from appliance.studio.improviser.prompt import continued
 from appliance.studio.improviser.steps import ROOT, Steps, steps_of_takes
@@ -95,10 +95,12 @@ def continue_prompt(
     )
     words = f"the prompt ends at {made.joined_s:.1f} s"
     figures = {"joined_s": made.joined_s, "seam_degrees": made.seam, "usual_degrees": made.usual}
-    _write(options.out, made.dance, f"{options.out.stem}: {words}", {**asdict(asked), **figures})
+    natural = measure(made.dance, Yardstick.of(dataset.training, dataset.moving), endless=False)
+    report = {"phrase": asdict(asked), **figures, "naturalness": natural.as_json()}
+    _write(options.out, made.dance, f"{options.out.stem}: {words}", report)
     say(
         f"{options.out}: {made.dance.seconds:.1f} s; {words}. The largest step of a joint around there is "
-        f"{made.seam:.1f} degrees, {made.usual:.1f} are usual in the prompt."
+        f"{made.seam:.1f} degrees, {made.usual:.1f} are usual in the prompt. {verdict(natural)}"
     )
 
 

@@ -58,7 +58,7 @@ class Naturalness:
     penetration_cm: float
     worst_penetration_cm: float
     stage_m: tuple[float, float]  # how wide and how deep the root's path is
-    seam: Seam
+    seam: Seam | None  # of an endless phrase
 
     def as_json(self) -> dict[str, object]:
         return asdict(self)
@@ -119,9 +119,9 @@ class Yardstick:
         return strange
 
 
-def measure(phrase: Recording, yardstick: Yardstick) -> Naturalness:
-    """Measure an endless phrase at 50 Hz against the recordings that its networks learned from."""
-    own = pace(phrase, yardstick.moving, yardstick.pace.speed, cyclic=True)
+def measure(phrase: Recording, yardstick: Yardstick, endless: bool = True) -> Naturalness:
+    """Measure a phrase at 50 Hz against the recordings that its networks learned from."""
+    own = pace(phrase, yardstick.moving, yardstick.pace.speed, cyclic=endless)
     floor = survey(phrase)
     standing = measure_standing(phrase.skeleton, phrase.poses, phrase.roots, floor, floor.lifts, phrase.fps)
     wide, deep = np.ptp(phrase.roots[:, [0, 2]], axis=0).tolist()
@@ -137,7 +137,7 @@ def measure(phrase: Recording, yardstick: Yardstick) -> Naturalness:
         penetration_cm=standing.penetration_cm,
         worst_penetration_cm=standing.worst_penetration_cm,
         stage_m=(wide, deep),
-        seam=_seam(phrase),
+        seam=_seam(phrase) if endless else None,
     )
 
 
@@ -160,14 +160,15 @@ def _likeness(phrase: Array, yardstick: Yardstick) -> Likeness:
     few = phrase[:: round(EVERY_S * FPS)]
     covered = distances(few, yardstick.shapes).min(axis=0) <= np.maximum(yardstick.near, yardstick.usual_cm)
     strange = yardstick.strangeness(few)
-    seconds = distances(_seconds(phrase, round(SECOND_S * FPS) // 2), yardstick.seconds).min(axis=1)
+    whole_seconds = _seconds(phrase, round(SECOND_S * FPS) // 2)
+    seconds = distances(whole_seconds, yardstick.seconds).min(axis=1)
     spread, usual_spread = (np.sqrt(shapes.var(axis=0).sum()) for shapes in (phrase, yardstick.shapes))
     return Likeness(
         breadth=float(spread / usual_spread),
         coverage=float(covered.mean()),
         strangeness=float(strange.mean()),
         strangeness_p99=float(np.percentile(strange, 99)),
-        nearest_second_cm=float(seconds.mean()),
+        nearest_second_cm=float(seconds.mean()) if len(seconds) else float("nan"),
         recorded_nearest_second_cm=yardstick.nearest_second_cm,
     )
 

@@ -166,6 +166,7 @@ def faultiness(natural: Naturalness) -> float:
 def verdict(natural: Naturalness) -> str:
     """The measures in one line for people."""
     pace, recorded, likeness, seam = natural.pace, natural.recorded_pace, natural.likeness, natural.seam
+    joined = "" if seam is None else f", seam {seam.degrees:.1f} of {seam.around_degrees:.1f} degrees"
     wide, deep = natural.stage_m
     return (
         f"{natural.seconds:.1f} s, liveliness {natural.liveliness:.2f}, breadth {likeness.breadth:.2f}, "
@@ -173,6 +174,5 @@ def verdict(natural: Naturalness) -> str:
         f"strangeness {likeness.strangeness:.2f}, jerk x{pace.jerk_p99 / recorded.jerk_p99:.2f}, "
         f"above 8 Hz {100 * pace.trembling:.2f} % (recorded {100 * recorded.trembling:.2f} %), "
         f"longest still {pace.longest_still_s:.1f} s, slide {natural.slide_cm_s:.0f} cm/s "
-        f"(recorded {natural.recorded_slide_cm_s:.0f}), path {wide:.1f} x {deep:.1f} m, "
-        f"seam {seam.degrees:.1f} of {seam.around_degrees:.1f} degrees"
+        f"(recorded {natural.recorded_slide_cm_s:.0f}), path {wide:.1f} x {deep:.1f} m{joined}"
     )

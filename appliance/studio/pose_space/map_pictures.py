@@ -108,6 +108,8 @@ def _name(axes: Any, names: Sequence[str]) -> None:
             fontsize=9,
             transform=axes.transAxes,
             va="top",
+            bbox={"facecolor": SLATE, "edgecolor": "none", "pad": 2},
+            zorder=4,
         )
 
 

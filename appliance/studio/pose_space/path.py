@@ -6,7 +6,6 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 
 from appliance.pictures.filmstrip import Strip, draw_strips
@@ -15,6 +14,8 @@ from appliance.studio.data.dataset import FPS
 from appliance.studio.evaluation.dance_figures import degrees_apart, energy
 from appliance.studio.evaluation.nearest import reference_of, without_heading
 from appliance.studio.export.packing import PHRASE_DIGITS
+from appliance.studio.improviser.naturalness import Yardstick, measure
+from appliance.studio.improviser.phrase import verdict
 from appliance.studio.pose_space.drawing import read_line
 from appliance.studio.pose_space.latent_poses import even_path, latents_of, poses_of, wobbled
 from appliance.studio.pose_space.pose_model import map_of, open_pose_model
@@ -74,12 +75,11 @@ def run(options: PathOptions) -> None:
         options.out.with_suffix(".png"), dataset.skeleton, strips, FPS, (), options.out.stem, columns=COLUMNS
     )
     told = {key: str(value) if isinstance(value, Path) else value for key, value in asdict(options).items()}
-    report = json.dumps({"options": told, "figures": figures}, indent=1)
-    options.out.with_suffix(".json").write_text(report + "\n", encoding="utf-8")
+    natural = measure(whole, Yardstick.of(dataset.training, dataset.moving), endless=False)
+    report = {"options": told, "figures": figures, "naturalness": natural.as_json()}
+    options.out.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     said = ", ".join(f"{name.replace('_', ' ')} {value:.1f}" for name, value in figures.items())
-    console.print(
-        f"{options.out}: {np.round(len(poses) / FPS, 1)} s, {said}.", highlight=False, soft_wrap=True
-    )
+    console.print(f"{options.out}: {said}; {verdict(natural)}", highlight=False, soft_wrap=True)
 
 
 def _words(options: PathOptions) -> str:

@@ -22,6 +22,7 @@ from appliance.studio.evaluation.coders import Poses, TorchCoder, load_checkpoin
 from appliance.studio.evaluation.dance_figures import energy
 from appliance.studio.evaluation.nearest import Reference, reference_of
 from appliance.studio.export.packing import PHRASE_DIGITS
+from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.pose_space.pose_model import open_pose_model
 from appliance.studio.standing_dance import excerpt_of, standing
@@ -77,7 +78,8 @@ def run(options: VaryOptions) -> None:
     )
     danced = _dances(options, coder, dataset, given)
     options.out.mkdir(parents=True, exist_ok=True)
-    figures, strips = {}, []
+    yardstick = Yardstick.of(dataset.training, dataset.moving)
+    figures, strips, natural = {}, [], {}
     if given is not None:
         write_bvh(options.out / "phrase.bvh", given, digits=PHRASE_DIGITS)
         moving = given.poses[:, list(dataset.moving)]
@@ -92,6 +94,7 @@ def run(options: VaryOptions) -> None:
         figures[name] = measured(
             poses, None if given is None else given.poses[:, list(dataset.moving)], reference
         )
+        natural[name] = measure(whole, yardstick, endless=False)
         strips.append(Strip(whole.poses, whole.roots, name, behind=strips[0] if given is not None else None))
     if options.on_map is not None:
         _draw_on_map(options, given, danced, console)
@@ -102,9 +105,10 @@ def run(options: VaryOptions) -> None:
             key: str(value) if isinstance(value, Path) else value for key, value in asdict(options).items()
         },
         "figures": {name: asdict(one) for name, one in figures.items()},
+        "naturalness": {name: one.as_json() for name, one in natural.items()},
     }
     (options.out / "variations.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    Console().print(_table(figures, title))
+    Console().print(_table(figures, natural, title))
     console.print(f"{options.out}: BVH of each, variations.png and variations.json.", highlight=False)
 
 
@@ -189,16 +193,31 @@ def _words(options: VaryOptions) -> str:
     return f"{options.phrase.stem}, varied by {options.sigma:g} sigma{where}"
 
 
-def _table(figures: dict[str, Figures], title: str) -> Table:
+def _table(figures: dict[str, Figures], natural: dict[str, Naturalness], title: str) -> Table:
     table = Table(title=title)
-    for name in ("", "degrees from the phrase", "of that timing", "nearest recorded pose", "energy"):
+    for name in ("", "from the phrase", "of that timing", "from recorded", "energy", "above 8 Hz", "slide"):
         table.add_column(name, justify="right" if name else "left")
     for name, one in figures.items():
-        cells = (
-            "" if one.degrees is None else f"{one.degrees:.1f}",
+        table.add_row(
+            name.replace("_", " "),
+            "" if one.degrees is None else f"{one.degrees:.1f}°",
             "" if one.timing is None else f"{one.timing:.0%}",
-            f"{one.nearest:.1f}",
+            f"{one.nearest:.1f}°",
             "" if one.energy is None else f"{one.energy:.2f}",
+            *_motion(natural.get(name)),
         )
-        table.add_row(name.replace("_", " "), *cells)
+    if natural:
+        any_of_them = next(iter(natural.values()))
+        table.add_row("recordings", "", "", "", "", *_usual(any_of_them))
     return table
+
+
+def _motion(natural: Naturalness | None) -> tuple[str, str]:
+    """Trembling and sliding feet, for people."""
+    if natural is None:
+        return "", ""
+    return f"{natural.pace.trembling:.1%}", f"{natural.slide_cm_s:.0f} cm/s"
+
+
+def _usual(natural: Naturalness) -> tuple[str, str]:
+    return f"{natural.recorded_pace.trembling:.1%}", f"{natural.recorded_slide_cm_s:.0f} cm/s"
