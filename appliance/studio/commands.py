@@ -81,7 +81,9 @@ def train(
     seed: Annotated[int, typer.Option(help="The same seed and number of steps give the same network.")] = 1,
     latent: Annotated[int, typer.Option(min=0, help="Size of the latent. 0: as the network has it.")] = 0,
     width: Annotated[int, typer.Option(min=0, help="Width of the layers. 0: as the network has it.")] = 0,
-    depth: Annotated[int, typer.Option(min=0, help="Blocks of conditional and mlp, layers of an lstm. 0: its own.")] = 0,
+    depth: Annotated[
+        int, typer.Option(min=0, help="Blocks of conditional and mlp, layers of an lstm. 0: its own.")
+    ] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the training in --out.")] = False,
     threads: Annotated[int, typer.Option(min=0, help="CPU cores to use. 0: all.")] = 0,
     device: Annotated[Device, typer.Option(help="auto: the GPU, if there is one.")] = Device.auto,

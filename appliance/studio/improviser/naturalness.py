@@ -205,7 +205,7 @@ def _seconds(shapes: Array, stride: int) -> Array:
     length = round(SECOND_S * FPS)
     starts = np.arange(0, len(shapes) - length + 1, stride)
     moments = np.linspace(0, length - 1, 10).round().astype(int)
-    seconds: Array = shapes[starts[:, None] + moments].reshape(len(starts), -1)
+    seconds: Array = shapes[starts[:, None] + moments].reshape(len(starts), len(moments) * shapes.shape[1])
     return seconds
 
 
