@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from appliance.studio.autoencoder.conditional import Conditional
-from appliance.studio.autoencoder.networks import Conv, Dense, Lstm, LstmAutoregressive, Mlp, Network, Shape
+from appliance.studio.autoencoder.dense import Dense
+from appliance.studio.autoencoder.networks import Conv, Lstm, LstmAutoregressive, Mlp, Network, Shape
 
 DEFAULT = "conditional"
 NETWORKS: dict[str, tuple[Callable[[Shape], Network], dict[str, int]]] = {

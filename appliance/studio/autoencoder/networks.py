@@ -123,7 +123,7 @@ class MlpDecoder(nn.Module):
     def start_at(self, rest: Tensor) -> None:
         """Make the rest pose (M * 4), held still, the first output."""
         still = self.time.project(rest.repeat(self.time.shape.window)[None])[0]
-        _start_at(self.stack[-1], still)
+        start_layer_at(self.stack[-1], still)
 
 
 def _dense_stack(size_in: int, width: int, depth: int, size_out: int) -> nn.Sequential:
@@ -133,7 +133,8 @@ def _dense_stack(size_in: int, width: int, depth: int, size_out: int) -> nn.Sequ
     )
 
 
-def _start_at(layer: nn.Module, rest: Tensor) -> None:
+def start_layer_at(layer: nn.Module, rest: Tensor) -> None:
+    """Make `rest`, one number for each output of a linear layer, what the layer first gives."""
     assert isinstance(layer, nn.Linear | nn.Conv1d) and layer.bias is not None
     layer.bias.data.copy_(rest)
     layer.weight.data *= 0.1
@@ -193,7 +194,7 @@ class ConvDecoder(nn.Module):
         return window.flatten(1)
 
     def start_at(self, rest: Tensor) -> None:
-        _start_at(self.last, rest)
+        start_layer_at(self.last, rest)
 
 
 class Conv(Network):
@@ -232,7 +233,7 @@ class LstmDecoder(nn.Module):
         return window.flatten(1)
 
     def start_at(self, rest: Tensor) -> None:
-        _start_at(self.last, rest)
+        start_layer_at(self.last, rest)
 
 
 class Lstm(Network):
@@ -268,7 +269,7 @@ class AutoregressiveDecoder(nn.Module):
         return torch.cat(poses, dim=-1)
 
     def start_at(self, rest: Tensor) -> None:
-        _start_at(self.last, rest)
+        start_layer_at(self.last, rest)
 
 
 class LstmAutoregressive(Network):
@@ -277,33 +278,3 @@ class LstmAutoregressive(Network):
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.encoder, self.decoder = LstmEncoder(shape), AutoregressiveDecoder(shape)
-
-
-class DenseDecoder(nn.Sequential):
-    """Dense layers that begin with the rest pose."""
-
-    def start_at(self, rest: Tensor) -> None:
-        last = self[-1]
-        assert isinstance(last, nn.Linear)
-        _start_at(last, rest.repeat(last.out_features // len(rest)))
-
-
-class Dense(Network):
-    """The pose autoencoder of 'Beyond Imitation': 2 x 64 LeakyReLU each way."""
-
-    encoder: nn.Sequential
-    decoder: DenseDecoder
-
-    def __init__(self, shape: Shape) -> None:
-        super().__init__()
-        inward, outward = (
-            [nn.Linear(size, shape.width), nn.LeakyReLU()]
-            + [
-                layer
-                for _ in range(shape.depth - 1)
-                for layer in (nn.Linear(shape.width, shape.width), nn.LeakyReLU())
-            ]
-            for size in (shape.flat, shape.latent)
-        )
-        self.encoder = nn.Sequential(*inward, nn.Linear(shape.width, shape.coded))
-        self.decoder = DenseDecoder(*outward, nn.Linear(shape.width, shape.flat))
