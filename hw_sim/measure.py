@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +14,7 @@ import yaml
 from appliance.sensor.keys import create_keys
 from hw_sim.emulated_sensor import REBOOT_S
 from hw_sim.figures import FREE_SETTLING_S, Evidence, figures_of, table, verdict
-from hw_sim.peers import ProbeError, Setting
+from hw_sim.peers import ProbeError, Setting, scratch_folder
 from hw_sim.probe import Course, run, run_restarts
 
 REFUSED, FAILED = 2, 1
@@ -52,8 +51,8 @@ def measure(
     1.
     """
     try:
-        with tempfile.TemporaryDirectory(prefix="bunraku-measure-") as scratch:
-            setting = _setting(show, box, Path(scratch), firmware)
+        with scratch_folder("bunraku-measure-") as scratch:
+            setting = _setting(show, box, scratch, firmware)
             print(f"Measuring {seconds:g} s in phase with the sensor ...", flush=True)
             locked = run(setting, locked_course(seconds))
             free_s = max(6.0, seconds / 3.0)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import contextlib
 import os
 import random
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -120,6 +122,19 @@ def stop(stage: subprocess.Popen[bytes], words: Path) -> None:
         raise ProbeError("The box does not end after SIGTERM.") from None
     if status != 0:
         raise ProbeError(f"The box ended with status {status}:\n{words.read_text().strip()}")
+
+
+@contextlib.contextmanager
+def scratch_folder(prefix: str) -> Iterator[Path]:
+    """A temporary folder. The companions of a killed box write their last into it while it is removed."""
+    folder = Path(tempfile.mkdtemp(prefix=prefix))
+    try:
+        yield folder
+    finally:
+        until = time.monotonic() + ENDS_WITHIN_S
+        while folder.exists() and time.monotonic() < until:
+            shutil.rmtree(folder, ignore_errors=True)
+            time.sleep(0.02)
 
 
 @contextlib.contextmanager

@@ -2,19 +2,42 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
+from hw_sim.peers import scratch_folder
 from tests.bundles import write_show
 
 
 def measure(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "hw_sim", "measure", *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_a_folder_that_somebody_still_writes_into_is_removed() -> None:
+    with scratch_folder("bunraku-scratch-") as folder:
+        (folder / "runtime").mkdir()
+        until = time.monotonic() + 0.5
+
+        def write() -> None:
+            number = 0
+            while time.monotonic() < until:
+                with contextlib.suppress(FileNotFoundError):
+                    (folder / "runtime" / f"{number}").touch()
+                    (folder / f"{number}").touch()
+                number += 1
+
+        writer = threading.Thread(target=write)
+        writer.start()
+    assert not folder.exists()
+    writer.join()
 
 
 @pytest.mark.realtime
