@@ -155,11 +155,11 @@ def test_the_figure_of_moving_joints_is_the_whole_figure() -> None:
 
 
 def test_a_perfect_reconstruction_costs_nothing() -> None:
-    windows = some_windows()
+    windows, every = some_windows(), losses.LossWeights(squared=1.0, speed=1.0)
     body = rotation.MovingSkeleton(swaying(1.0).skeleton, moving(), torch.tensor(swaying(1.0).poses[0]))
-    for name, loss in losses.reconstruction_losses(windows, windows, body).items():
+    for name, loss in losses.reconstruction_losses(windows, windows, body, every).items():
         assert float(loss) < 3e-4, name
     wrong = 1.2 * windows.flip(0)
     wrong[:, 1:] = wrong[:, :1]  # and standing still
-    for name, loss in losses.reconstruction_losses(wrong, windows, body).items():
+    for name, loss in losses.reconstruction_losses(wrong, windows, body, every).items():
         assert float(loss) > 1e-3, name

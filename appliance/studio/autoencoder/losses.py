@@ -33,12 +33,14 @@ class LossWeights:
     hands: float = 0.8  # of all losses of dances with hands
 
 
-def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton) -> dict[str, Tensor]:
+def reconstruction_losses(
+    raw: Tensor, windows: Tensor, body: rotation.MovingSkeleton, weights: LossWeights
+) -> dict[str, Tensor]:
     """Losses of raw decoded quaternions (B, T, M, 4) against heading-free windows of the same shape.
 
     rotation: see rotation_loss; pace: the same for steps between poses, 0 for a window of one; speed: of the
     size of those steps, see advance_losses; unit_norm: squared; position: mean distance in metres; squared:
-    of the components, summed over a joint.
+    of the components, summed over a joint. speed and squared are left out where they have no weight.
     """
     made = rotation.normalize(raw)
     norms = raw.square().sum(-1)
@@ -46,15 +48,17 @@ def reconstruction_losses(raw: Tensor, windows: Tensor, body: rotation.MovingSke
     here, there = body(torch.cat([made[:, moments], windows[:, moments]])).chunk(2)
     distance = (here - there).square().sum(-1)
     steps, wanted = (each[:, 1:] - each[:, :-1] for each in (made, windows))
-    zero = raw.new_zeros(())
-    return {
+    parts = {
         "rotation": rotation_loss(raw, windows),
-        "pace": 2 * _length(steps - wanted) if steps.numel() else zero,
-        "speed": _mean_size_loss(steps, wanted) if steps.numel() else zero,
-        "squared": (raw - windows).square().sum(-1).mean(),
+        "pace": 2 * _length(steps - wanted) if steps.numel() else raw.new_zeros(()),
         "unit_norm": (norms - 1).square().mean(),
         "position": (distance + 1e-8).sqrt().mean(),
     }
+    if weights.speed:
+        parts["speed"] = _mean_size_loss(steps, wanted)
+    if weights.squared:
+        parts["squared"] = (raw - windows).square().sum(-1).mean()
+    return parts
 
 
 def advance_losses(raw: Tensor, windows: Tensor) -> dict[str, Tensor]:

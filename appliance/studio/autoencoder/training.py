@@ -189,7 +189,7 @@ class Training(TrainingLoop[Report]):
             coded = self.autoencoder.encode(windows)
             seen = coded + self.settings.latent_noise * torch.randn_like(coded)
         raw = self.autoencoder.decode_raw(seen)
-        parts.update(losses.reconstruction_losses(raw, lesson.answer, self.body))
+        parts.update(losses.reconstruction_losses(raw, lesson.answer, self.body, self.settings.weights))
         if hands is not None:
             parts.update(losses.advance_losses(raw, lesson.answer))
         return raw, coded, parts
