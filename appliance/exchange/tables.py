@@ -6,6 +6,7 @@ import csv
 import json
 import zipfile
 import zlib
+from collections.abc import Sequence
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
@@ -81,13 +82,11 @@ def read_npz(path: Path) -> Recording:
     )
 
 
-def _columns(recording: Recording) -> list[str]:
-    names = recording.skeleton.names
+def _columns(names: Sequence[str], stretched: bool) -> list[str]:
+    """Of a CSV; stretched: with the translations of bones that change their length."""
     columns = ["time", "root.x", "root.y", "root.z"]
     columns += [f"{name}.{part}" for name in names for part in "wxyz"]
-    if recording.translations is not None:
-        columns += [f"{name}.t{part}" for name in names for part in "xyz"]
-    return columns
+    return columns + [f"{name}.t{part}" for name in names for part in "xyz"] if stretched else columns
 
 
 def write_csv(path: Path, recording: Recording) -> None:
@@ -101,9 +100,10 @@ def write_csv(path: Path, recording: Recording) -> None:
     if recording.translations is not None:
         parts.append(recording.translations.reshape(count, -1))
     table = np.concatenate(parts, axis=1)
+    columns = _columns(recording.skeleton.names, recording.translations is not None)
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(MARK + json.dumps(facts_of(recording.skeleton, recording.fps)) + "\n")
-        csv.writer(file, lineterminator="\n").writerow(_columns(recording))
+        csv.writer(file, lineterminator="\n").writerow(columns)
         np.savetxt(file, table, fmt="%.10g", delimiter=",")
 
 
@@ -128,10 +128,8 @@ def read_csv(path: Path) -> Recording:
             raise ExchangeError(path, f"The skeleton in it cannot be read ({error}).", 1) from error
         skeleton = checked_skeleton(path, names, parents, offsets, ends, 1)
         header = next(csv.reader([file.readline(_LONGEST_LINE)]), [])
-        plain = [f"{name}.{part}" for name in names for part in "wxyz"]
-        expected = ["time", "root.x", "root.y", "root.z", *plain]
-        stretched = [*expected, *(f"{name}.t{part}" for name in names for part in "xyz")]
-        if header not in (expected, stretched):
+        plain, stretched = (_columns(names, each) for each in (False, True))
+        if header not in (plain, stretched):
             wrong = next(
                 (c for c, e in zip(header, stretched, strict=False) if c != e), "too few or too many"
             )
