@@ -9,24 +9,27 @@ from typing import Any
 import numpy as np
 
 from appliance.pose.quaternion import Array
+from appliance.studio.evaluation.pictures import BACKDROP, INK, new_figure, panels, save
 from appliance.studio.pose_space.projections import Projection
 
-SLATE, INK, FAINT = "#23262b", "#efe6d8", "#6b6660"
+DIM = "#6b6660"
+WIDTH = 12.0  # of the map, inches
 COLOURS = ("#e2583e", "#4fb3bf", "#e8b04b", "#9b7fd1", "#7fbf6a", "#d97fa8")
 
 
 def draw_projections(path: Path, names: Sequence[str], found: Sequence[Projection]) -> None:
     """A panel for each method, a colour for each recording."""
-    figure, panels = _panels(len(found), 4.2, 4.2)
-    for axes, projection in zip(panels, found, strict=True):
+    figure = new_figure(4.2 * len(found), 4.2)
+    side_by_side = panels(figure, 1, len(found))
+    for axes, projection in zip(side_by_side, found, strict=True):
         for number, points in enumerate(projection.points):
             axes.plot(*points[:, :2].T, color=COLOURS[number % len(COLOURS)], linewidth=0.6, alpha=0.9)
         step, longest = projection.continuity
         axes.set_title(f"{projection.name}\nstep {step:.1f} %, longest x{longest:.0f}", color=INK, fontsize=9)
         axes.set_xticks([])
         axes.set_yticks([])
-    _name(panels[0], names)
-    _save(figure, path)
+    _name(side_by_side[0], names)
+    save(figure, path)
 
 
 def draw_map(
@@ -46,19 +49,18 @@ def draw_map(
     margin = 0.5 * float(np.max(high - low)) / max(1.0, np.sqrt(len(figures)))
     left, bottom = (low - margin).tolist()
     right, top = (high + margin).tolist()
-    pyplot = _pyplot()
-    width = 12.0
-    figure = pyplot.figure(figsize=(width, width * (top - bottom) / (right - left)), facecolor=SLATE)
+    figure = new_figure(WIDTH, WIDTH * (top - bottom) / (right - left))
+    figure.set_layout_engine("none")  # the axes fill the picture
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set_axis_off()
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
-    axes.scatter(*known[:: max(1, len(known) // 8000), :2].T, s=2.0, color=FAINT, linewidths=0)
+    axes.scatter(*known[:: max(1, len(known) // 8000), :2].T, s=2.0, color=DIM, linewidths=0)
     spread = float(known[:, :2].std(axis=0).max())
     size = 0.8 * _spacing(places)
     for place, joints, bones in figures:
         away = float(np.linalg.norm(known[:, :2] - place, axis=1).min())
-        colour, strength = (INK, 0.95) if away <= nobody * spread else (FAINT, 0.8)
+        colour, strength = (INK, 0.95) if away <= nobody * spread else (DIM, 0.8)
         scale = size / max(float(np.ptp(joints[:, 1])), 1.6)
         for joint, parent in bones:
             ends = place + scale * joints[[joint, parent]][:, :2]
@@ -67,35 +69,24 @@ def draw_map(
         colour = COLOURS[number % len(COLOURS)]
         axes.plot(*points[:, :2].T, color=colour, linewidth=0.9, alpha=0.6, zorder=2)
     _name(axes, list(paths))
-    _save(figure, path)
+    save(figure, path)
     return left, right, bottom, top
 
 
 def draw_distance(path: Path, apart: Array, one: str, other: str, fps: float) -> None:
     """How far apart two recordings are on the map, over time."""
-    figure, (axes,) = _panels(1, 10.0, 3.0)
+    figure = new_figure(10.0, 3.0)
+    (axes,) = panels(figure, 1, 1)
     axes.plot(np.arange(len(apart)) / fps, apart, color=COLOURS[0], linewidth=1.0)
     axes.set_title(f"{one} and {other}: distance on the map over time (s)", color=INK, fontsize=10)
     axes.set_ylim(bottom=0)
-    _save(figure, path)
+    save(figure, path)
 
 
 def _spacing(places: Array) -> float:
     """Distance between neighbours of a grid."""
     columns = np.unique(np.round(places[:, 0], 6))
     return float(np.diff(columns).min()) if len(columns) > 1 else 1.0
-
-
-def _panels(count: int, width: float, height: float) -> tuple[Any, list[Any]]:
-    figure, axes = _pyplot().subplots(
-        1, count, figsize=(width * count, height), facecolor=SLATE, squeeze=False, layout="constrained"
-    )
-    for one in axes[0]:
-        one.set_facecolor(SLATE)
-        one.tick_params(colors=INK, labelsize=8)
-        for edge in one.spines.values():
-            edge.set_color(FAINT)
-    return figure, list(axes[0])
 
 
 def _name(axes: Any, names: Sequence[str]) -> None:
@@ -108,20 +99,6 @@ def _name(axes: Any, names: Sequence[str]) -> None:
             fontsize=9,
             transform=axes.transAxes,
             va="top",
-            bbox={"facecolor": SLATE, "edgecolor": "none", "pad": 2},
+            bbox={"facecolor": BACKDROP, "edgecolor": "none", "pad": 2},
             zorder=4,
         )
-
-
-def _pyplot() -> Any:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    return pyplot
-
-
-def _save(figure: Any, path: Path) -> None:
-    figure.savefig(path, dpi=110, facecolor=figure.get_facecolor())
-    _pyplot().close(figure)
