@@ -21,7 +21,7 @@ def measure(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_a_folder_that_somebody_still_writes_into_is_removed() -> None:
+def test_a_folder_is_removed_while_files_still_appear_in_it() -> None:
     with scratch_folder("bunraku-scratch-") as folder:
         (folder / "runtime").mkdir()
         until = time.monotonic() + 0.5

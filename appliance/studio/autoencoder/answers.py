@@ -111,7 +111,7 @@ class Answers:
         return most if kind < _WEAK_SHARE + _FULL_SHARE else int(torch.randint(2, most + 1, ()))
 
     def _on_the_way(self, start: Tensor, answer: Tensor, held: Tensor, passes: int) -> Tensor:
-        """Where a dance should be after so many passes with hands; held joints arrive at once."""
+        """Where a dance should be after a number of passes with hands; held joints arrive at once."""
         share = 1 - (1 - self._settings.step) ** passes
         share_of_each = held.clamp_min(share)[:, None, :, None].expand_as(answer[..., :1])
         return slerp_towards(start, answer, share_of_each)

@@ -1,4 +1,4 @@
-"""A line that somebody drew over the map: an SVG drawn on map.svg, or a CSV of points."""
+"""The line drawn over a map: an SVG made from map.svg, or a CSV of points."""
 
 from __future__ import annotations
 
