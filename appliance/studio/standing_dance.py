@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from appliance.pose import quaternion
-from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import FPS, Dataset
@@ -40,20 +39,25 @@ def standing(poses: Poses, given: Recording | None, dataset: Dataset) -> Recordi
 
     The feet are planted in a cycle: danced there and back, a dance is one.
     """
-    count = len(poses)
-    whole: Array
-    roots: Array
-    if given is None:
-        whole = np.tile(dataset.still_pose(), (count, 1, 1))
-        height = float(np.mean([take.recording.roots[:, 1].mean() for take in dataset.training]))
-        roots = np.tile([0.0, height, 0.0], (count, 1))
-    else:
-        whole, roots = given.poses[:count].copy(), given.roots[:count]
-    whole[:, list(dataset.moving)] = poses
-    there_and_back = Recording(
-        dataset.skeleton,
-        quaternion.continuous(np.concatenate([whole, whole[::-1]])),
-        np.concatenate([roots, roots[::-1]]),
-        FPS,
+    dance = on_the_spot(poses, dataset) if given is None else _on_its_path(poses, given, dataset)
+    there_and_back = replace(
+        dance,
+        poses=quaternion.continuous(np.concatenate([dance.poses, dance.poses[::-1]])),
+        roots=np.concatenate([dance.roots, dance.roots[::-1]]),
     )
-    return plant_feet(there_and_back).excerpt(0.0, count / FPS)
+    return plant_feet(there_and_back).excerpt(0.0, len(poses) / FPS)
+
+
+def on_the_spot(poses: Poses, dataset: Dataset) -> Recording:
+    """Poses (T, M, 4) with all joints, at the recordings' mean height; other joints stand as in those."""
+    whole = np.tile(dataset.still_pose(), (len(poses), 1, 1))
+    whole[:, list(dataset.moving)] = poses
+    height = float(np.mean([take.recording.roots[:, 1].mean() for take in dataset.training]))
+    roots = np.tile([0.0, height, 0.0], (len(poses), 1))
+    return Recording(dataset.skeleton, quaternion.continuous(whole), roots, FPS)
+
+
+def _on_its_path(poses: Poses, given: Recording, dataset: Dataset) -> Recording:
+    whole = given.poses[: len(poses)].copy()
+    whole[:, list(dataset.moving)] = poses
+    return Recording(dataset.skeleton, quaternion.continuous(whole), given.roots[: len(poses)], FPS)

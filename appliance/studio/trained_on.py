@@ -1,4 +1,4 @@
-"""The recordings that a checkpoint was trained on, read again with a progress bar."""
+"""A checkpoint with the recordings that it was trained on, read again with a progress bar."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from rich.progress import track
 
 from appliance.studio.data import sources
 from appliance.studio.data.dataset import Dataset
+from appliance.studio.evaluation.coders import TorchCoder, load_checkpoint
 from appliance.studio.studio_error import StudioError
 
 
@@ -29,6 +30,16 @@ def trained_on(
             f"{', '.join(dataset.moving_names)}. Give the recordings that the checkpoint was trained on."
         )
     return dataset
+
+
+def open_model(
+    model: str, checkpoint: Path, recordings: Path | None, console: Console
+) -> tuple[TorchCoder, Dataset]:
+    """A checkpoint of `train --model` and its recordings. Raises StudioError for one of another model."""
+    coder, state = load_checkpoint(checkpoint)
+    if state["settings"].get("model") != model:
+        raise StudioError(f"{checkpoint} is no {model} model. Train one with: bunraku train --model {model}.")
+    return coder, trained_on(checkpoint, coder.joints, state, recordings, console)
 
 
 def reading_progress(console: Console) -> Any:

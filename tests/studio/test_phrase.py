@@ -212,9 +212,7 @@ def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
     assert told["naturalness"]["seconds"] == pytest.approx(phrase.seconds)
     bytes_before = out.read_bytes()
     capsys.readouterr()
-    monkeypatch.setattr(
-        "appliance.studio.improviser.improvisation.draw_filmstrip", lambda *_, **__: None
-    )  # slow
+    monkeypatch.setattr("appliance.studio.dance_files.draw_filmstrip", lambda *_, **__: None)  # slow
     assert run(options)
     assert "continues at 100 %" in capsys.readouterr().err
     assert out.read_bytes() == bytes_before
@@ -223,7 +221,7 @@ def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
 def test_a_prompt_is_continued_where_it_ends_without_a_seam(
     checkpoint: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("appliance.studio.improviser.improvisation.draw_filmstrip", lambda *_, **__: None)
+    monkeypatch.setattr("appliance.studio.dance_files.draw_filmstrip", lambda *_, **__: None)
     write_bvh(tmp_path / "prompt.bvh", strolling(8.0))
     written = read_bvh(tmp_path / "prompt.bvh")
     options = ["--recordings", checkpoint[1], "--steps", 2, "--threads", 1, "--seconds", 4, "--from", 6]

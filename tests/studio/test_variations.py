@@ -139,6 +139,7 @@ def test_samples_of_the_prior_need_no_phrase_and_two_phrases_mix(
     ("arguments", "words"),
     [
         (["{rec}/sway_0.bvh", "--model", "{puppet}"], "is no sequence model"),
+        (["{rec}/sway_0.bvh", "--model", "{pose}"], "is no sequence model"),
         (["{rec}/sway_0.bvh", "--model", "{rec}/sway_0.bvh"], "is not a checkpoint"),
         (["{rec}/none.bvh", "--model", "{model}/checkpoint.pt"], "does not exist"),
         (["{rec}/sway_0.bvh", "--model", "{model}/checkpoint.pt", "--start", "9"], "is not in it"),
@@ -154,9 +155,10 @@ def test_what_cannot_be_varied_is_named(
     model: Path,
     recordings: Path,
     puppet_checkpoint: Path,
+    pose_checkpoint: Path,
     tmp_path: Path,
 ) -> None:
-    places = {"rec": recordings, "model": model, "puppet": puppet_checkpoint}
+    places = {"rec": recordings, "model": model, "puppet": puppet_checkpoint, "pose": pose_checkpoint}
     result = bunraku("vary", *(each.format(**places) for each in arguments), "--out", tmp_path)
     assert result.exit_code == 2 and words in " ".join(result.stderr.split()), result.output
 

@@ -43,16 +43,7 @@ def once(windows: Poses, hop: int) -> Poses:
 
 def to_the_end(windows: Poses, hop: int) -> Poses:
     """The same to the end of the last window: (W - 1) * hop + T poses."""
-    count, length, joints, _ = windows.shape
-    blending, danced = (
-        Blending(joints, length, hop),
-        np.empty(((count - 1) * hop + length, joints, 4), np.float32),
-    )
-    for tick in range(len(danced)):
-        if tick % hop == 0 and tick // hop < count:
-            blending.add(windows[tick // hop])
-        danced[tick] = blending.take()
-    return danced
+    return _blended(windows, hop, (len(windows) - 1) * hop + windows.shape[1])
 
 
 def cycle(windows: Poses, hop: int) -> Poses:
@@ -61,7 +52,7 @@ def cycle(windows: Poses, hop: int) -> Poses:
     It is danced twice and the second time is kept: its first poses are blended with the last windows.
     """
     ticks, length = len(windows) * hop, windows.shape[1]
-    return _blended(windows, hop, max(2 * ticks, ticks + length))[-ticks:]
+    return _blended(windows, hop, max(2 * ticks, ticks + length), cyclic=True)[-ticks:]
 
 
 @torch.no_grad()
@@ -82,13 +73,14 @@ def fed_back(autoencoder: Autoencoder, phrase: Poses, share: float, passes: int 
     return danced
 
 
-def _blended(windows: Poses, hop: int, ticks: int) -> Poses:
-    """So many poses, the windows over and over."""
+def _blended(windows: Poses, hop: int, ticks: int, cyclic: bool = False) -> Poses:
+    """`ticks` poses of the windows; cyclic: over and over."""
     count, length, joints, _ = windows.shape
     blending, danced = Blending(joints, length, hop), np.empty((ticks, joints, 4), dtype=np.float32)
     for tick in range(ticks):
-        if tick % hop == 0:
-            blending.add(windows[tick // hop % count])
+        number = tick // hop
+        if tick % hop == 0 and (cyclic or number < count):
+            blending.add(windows[number % count])
         danced[tick] = blending.take()
     return danced
 

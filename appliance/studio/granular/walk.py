@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
 
-from appliance.pictures.filmstrip import draw_filmstrip
 from appliance.pose import quaternion
-from appliance.pose.bvh import write_bvh
-from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.dance_files import write_dance
 from appliance.studio.data.dataset import FPS, Dataset, Take
 from appliance.studio.evaluation.coders import Poses, load_checkpoint
-from appliance.studio.export.packing import PHRASE_DIGITS
 from appliance.studio.granular import latent_paths
 from appliance.studio.granular.granular import cycle, decoded, encoded, fed_back, once
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.phrase import verdict
+from appliance.studio.standing_dance import on_the_spot
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
 
@@ -59,20 +55,10 @@ def run(options: GranularOptions) -> None:
             f"--hop {options.hop} leaves gaps between windows of {most} poses. Take at most {most}."
         )
     poses = _poses(options, autoencoder, dataset)
-    phrase = plant_feet(_whole(poses, dataset))
+    phrase = plant_feet(on_the_spot(poses, dataset))
     natural = measure(phrase, Yardstick.of(dataset.training, dataset.moving))
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    write_bvh(options.out, phrase, digits=PHRASE_DIGITS)
-    told: dict[str, Any] = {
-        "options": {
-            name: str(value) if isinstance(value, Path) else value for name, value in asdict(options).items()
-        },
-        "naturalness": natural.as_json(),
-    }
-    options.out.with_suffix(".json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    title = f"{options.out.stem}: {_words(options)}"
-    picture = options.out.with_suffix(".png")
-    draw_filmstrip(picture, phrase.skeleton, phrase.poses, phrase.roots, FPS, title=title, rows=2)
+    report = {"options": asdict(options), "naturalness": natural.as_json()}
+    write_dance(options.out, phrase, f"{options.out.stem}: {_words(options)}", report, rows=2)
     console.print(f"{options.out}: {verdict(natural)}", highlight=False, soft_wrap=True)
 
 
@@ -134,19 +120,6 @@ def _found(dataset: Dataset, where: str | None) -> tuple[Take, int]:
     if not 0 <= first < len(takes[name].recording):
         raise StudioError(f"{name} is {takes[name].recording.seconds:.1f} s long: {second} s is not in it.")
     return takes[name], first
-
-
-def _whole(poses: Poses, dataset: Dataset) -> Recording:
-    """All joints; those that the network does not know stand as in the recordings."""
-    whole = np.tile(dataset.still_pose(), (len(poses), 1, 1))
-    whole[:, list(dataset.moving)] = poses
-    roots = np.tile([0.0, _height(dataset), 0.0], (len(poses), 1))
-    return Recording(dataset.skeleton, quaternion.continuous(whole), roots, FPS)
-
-
-def _height(dataset: Dataset) -> float:
-    """Of the root above the floor, as the recordings have it in the mean, metres."""
-    return float(np.mean([take.recording.roots[:, 1].mean() for take in dataset.training]))
 
 
 def _words(options: GranularOptions) -> str:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,14 +12,12 @@ import torch
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
-from appliance.pictures.filmstrip import draw_filmstrip
-from appliance.pose.bvh import write_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.training_run import stop_signals
+from appliance.studio.dance_files import write_dance
 from appliance.studio.data.dataset import Dataset
 from appliance.studio.evaluation.coders import TorchCoder, load_puppet
-from appliance.studio.export.packing import PHRASE_DIGITS
 from appliance.studio.improviser.improviser import Improviser
 from appliance.studio.improviser.improviser_training import (
     ImproviserReport,
@@ -97,7 +94,7 @@ def continue_prompt(
     figures = {"joined_s": made.joined_s, "seam_degrees": made.seam, "usual_degrees": made.usual}
     natural = measure(made.dance, Yardstick.of(dataset.training, dataset.moving), endless=False)
     report = {"phrase": asdict(asked), **figures, "naturalness": natural.as_json()}
-    _write(options.out, made.dance, f"{options.out.stem}: {words}", report)
+    write_dance(options.out, made.dance, f"{options.out.stem}: {words}", report, rows=3)
     say(
         f"{options.out}: {made.dance.seconds:.1f} s; {words}. The largest step of a joint around there is "
         f"{made.seam:.1f} degrees, {made.usual:.1f} are usual in the prompt. {verdict(natural)}"
@@ -124,15 +121,7 @@ def write_phrase(
         "naturalness": natural.as_json(),
     }
     title = f"{options.out.stem}: {phrase.seconds:.0f} s, seed {options.phrase.seed}"
-    _write(options.out, phrase, title, report)
-
-
-def _write(out: Path, dance: Recording, title: str, report: Mapping[str, Any]) -> None:
-    out.parent.mkdir(parents=True, exist_ok=True)
-    write_bvh(out, dance, digits=PHRASE_DIGITS)
-    out.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    picture = out.with_suffix(".png")
-    draw_filmstrip(picture, dance.skeleton, dance.poses, dance.roots, dance.fps, title=title, rows=3)
+    write_dance(options.out, phrase, title, report, rows=3)
 
 
 def _training(

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from rich.console import Console
 
 from appliance.pictures.filmstrip import Strip, draw_strips
-from appliance.pose.bvh import write_bvh
+from appliance.studio.dance_files import write_recording, write_report
 from appliance.studio.data.dataset import FPS
 from appliance.studio.evaluation.dance_figures import degrees_apart, energy
 from appliance.studio.evaluation.nearest import reference_of, without_heading
-from appliance.studio.export.packing import PHRASE_DIGITS
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.phrase import verdict
 from appliance.studio.pose_space.drawing import read_line
 from appliance.studio.pose_space.latent_poses import even_path, latents_of, poses_of, wobbled
-from appliance.studio.pose_space.pose_model import map_of, open_pose_model
+from appliance.studio.pose_space.pose_model import map_of
 from appliance.studio.standing_dance import excerpt_of, standing
+from appliance.studio.trained_on import open_model
 
 COLUMNS = 8  # of the strip
 
@@ -42,7 +41,7 @@ class PathOptions:
 def run(options: PathOptions) -> None:
     """Walk, decode, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
-    coder, dataset = open_pose_model(options.model, options.recordings, console)
+    coder, dataset = open_model("pose", options.model, options.recordings, console)
     autoencoder, moving = coder.autoencoder, list(dataset.moving)
     given = None
     if options.phrase is not None:
@@ -55,8 +54,7 @@ def run(options: PathOptions) -> None:
         line = even_path(read_line(options.draw), round(options.seconds * FPS))
         poses = poses_of(autoencoder, map_of(autoencoder, dataset).latents(line))
     whole = standing(poses, given, dataset)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    write_bvh(options.out, whole, digits=PHRASE_DIGITS)
+    write_recording(options.out, whole)
     figures = {
         "nearest_recorded_pose_degrees": float(
             reference_of(dataset.training, dataset.moving_names).nearest(poses).mean()
@@ -74,10 +72,9 @@ def run(options: PathOptions) -> None:
     draw_strips(
         options.out.with_suffix(".png"), dataset.skeleton, strips, FPS, (), options.out.stem, columns=COLUMNS
     )
-    told = {key: str(value) if isinstance(value, Path) else value for key, value in asdict(options).items()}
     natural = measure(whole, Yardstick.of(dataset.training, dataset.moving), endless=False)
-    report = {"options": told, "figures": figures, "naturalness": natural.as_json()}
-    options.out.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    report = {"options": asdict(options), "figures": figures, "naturalness": natural.as_json()}
+    write_report(options.out.with_suffix(".json"), report)
     said = ", ".join(f"{name.replace('_', ' ')} {value:.1f}" for name, value in figures.items())
     console.print(f"{options.out}: {said}; {verdict(natural)}", highlight=False, soft_wrap=True)
 

@@ -19,10 +19,10 @@ from appliance.studio.pose_space import map_pictures
 from appliance.studio.pose_space.drawing import UNITS
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.pose_space.latent_poses import distance_over_time
-from appliance.studio.pose_space.pose_model import open_pose_model
 from appliance.studio.pose_space.projections import Projection, projections
 from appliance.studio.standing_dance import excerpt_of
 from appliance.studio.studio_error import StudioError
+from appliance.studio.trained_on import open_model
 
 PAGE_EVERY = 2  # poses from one to the next on the page
 MOST_PAGE_POSES = 6000
@@ -42,7 +42,7 @@ class MapOptions:
 def run(options: MapOptions) -> None:
     """Project, compare, draw; raises StudioError."""
     console = Console(stderr=True)
-    coder, dataset = open_pose_model(options.model, options.recordings, console)
+    coder, dataset = open_model("pose", options.model, options.recordings, console)
     autoencoder, moving = coder.autoencoder, list(dataset.moving)
     if len({file.stem for file in options.files}) < len(options.files):
         raise StudioError("Two of the recordings have the same name. Give each once.")

@@ -1,31 +1,15 @@
-"""A trained pose model with its recordings, and the map that belongs to it."""
+"""The training poses of a pose model, and the map that belongs to it."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-from rich.console import Console
 
 from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import Dataset
-from appliance.studio.evaluation.coders import TorchCoder, load_checkpoint
 from appliance.studio.granular.latent_paths import Latents
 from appliance.studio.improviser.naturalness import figure_shapes
 from appliance.studio.pose_space.latent_poses import PoseMap, latents_of
-from appliance.studio.studio_error import StudioError
-from appliance.studio.trained_on import trained_on
-
-
-def open_pose_model(
-    checkpoint: Path, recordings: Path | None, console: Console
-) -> tuple[TorchCoder, Dataset]:
-    """Raises StudioError for a checkpoint of another model, or without its recordings."""
-    coder, state = load_checkpoint(checkpoint)
-    if coder.window != 1:
-        raise StudioError(f"{checkpoint} is no pose model. Train one with: bunraku train --model pose.")
-    return coder, trained_on(checkpoint, coder.joints, state, recordings, console)
 
 
 def map_of(autoencoder: Autoencoder, dataset: Dataset, dimensions: int = 2) -> PoseMap:

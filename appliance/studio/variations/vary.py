@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -13,21 +11,18 @@ from rich.progress import track
 from rich.table import Table
 
 from appliance.pictures.filmstrip import Strip, draw_strips
-from appliance.pose.bvh import write_bvh
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
+from appliance.studio.dance_files import write_recording, write_report
 from appliance.studio.data.dataset import FPS, Dataset
 from appliance.studio.data.regions import regions_of
-from appliance.studio.evaluation.coders import Poses, TorchCoder, load_checkpoint
+from appliance.studio.evaluation.coders import Poses, TorchCoder
 from appliance.studio.evaluation.dance_figures import energy
 from appliance.studio.evaluation.nearest import Reference, reference_of
-from appliance.studio.export.packing import PHRASE_DIGITS
 from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
 from appliance.studio.pose_space.ground import Ground
-from appliance.studio.pose_space.pose_model import open_pose_model
 from appliance.studio.standing_dance import excerpt_of, standing
-from appliance.studio.studio_error import StudioError
-from appliance.studio.trained_on import trained_on
+from appliance.studio.trained_on import open_model
 from appliance.studio.variations import variations
 from appliance.studio.variations.timing import difference
 
@@ -69,7 +64,7 @@ class Figures:
 def run(options: VaryOptions) -> None:
     """Vary, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
-    coder, dataset = _model(options, console)
+    coder, dataset = open_model("sequence", options.model, options.recordings, console)
     reference = reference_of(dataset.training, dataset.moving_names)
     given = (
         None
@@ -81,7 +76,7 @@ def run(options: VaryOptions) -> None:
     yardstick = Yardstick.of(dataset.training, dataset.moving)
     figures, strips, natural = {}, [], {}
     if given is not None:
-        write_bvh(options.out / "phrase.bvh", given, digits=PHRASE_DIGITS)
+        write_recording(options.out / "phrase.bvh", given)
         moving = given.poses[:, list(dataset.moving)]
         figures["phrase"] = measured(moving, None, reference)
         strips.append(Strip(given.poses, given.roots, "phrase"))
@@ -90,7 +85,7 @@ def run(options: VaryOptions) -> None:
     )
     for name, poses in working:
         whole = standing(poses, given, dataset)
-        write_bvh(options.out / f"{name}.bvh", whole, digits=PHRASE_DIGITS)
+        write_recording(options.out / f"{name}.bvh", whole)
         figures[name] = measured(
             poses, None if given is None else given.poses[:, list(dataset.moving)], reference
         )
@@ -100,14 +95,12 @@ def run(options: VaryOptions) -> None:
         _draw_on_map(options, given, danced, console)
     title = _words(options)
     draw_strips(options.out / "variations.png", dataset.skeleton, strips, FPS, (), title, columns=COLUMNS)
-    told: dict[str, Any] = {
-        "options": {
-            key: str(value) if isinstance(value, Path) else value for key, value in asdict(options).items()
-        },
+    report = {
+        "options": asdict(options),
         "figures": {name: asdict(one) for name, one in figures.items()},
         "naturalness": {name: one.as_json() for name, one in natural.items()},
     }
-    (options.out / "variations.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    write_report(options.out / "variations.json", report)
     Console().print(_table(figures, natural, title))
     console.print(f"{options.out}: BVH of each, variations.png and variations.json.", highlight=False)
 
@@ -129,22 +122,12 @@ def _draw_on_map(
 ) -> None:
     """The link of both models: the phrase and its variations as a bundle of paths over the map of poses."""
     assert options.on_map is not None
-    coder, dataset = open_pose_model(options.on_map, options.recordings, console)
+    coder, dataset = open_model("pose", options.on_map, options.recordings, console)
     ground, paths = Ground.of(coder.autoencoder, dataset), {}
     if given is not None:
         paths["phrase"] = ground.path(given.poses[:, list(dataset.moving)])
     paths |= {name: ground.path(poses) for name, poses in danced.items()}
     ground.draw(options.out / "map.png", paths)
-
-
-def _model(options: VaryOptions, console: Console) -> tuple[TorchCoder, Dataset]:
-    coder, state = load_checkpoint(options.model)
-    if not coder.autoencoder.shape.variational:
-        raise StudioError(
-            f"{options.model} is no sequence model. Train one with: bunraku train --model sequence."
-        )
-    dataset = trained_on(options.model, coder.joints, state, options.recordings, console)
-    return coder, dataset
 
 
 def _dances(
