@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from appliance.dancer.foot_lock import JUMP_M, FootLock
 from appliance.dancer.forward_kinematics import Figure, soles_of
 from appliance.dancer.slerp import FloatArray
 from appliance.pose import quaternion
@@ -17,17 +18,16 @@ from appliance.pose.skeleton import Skeleton
 # Capture leaves planted feet some centimetres off the floor: up to FLOOR_NOISE_M they are set down on it.
 # From JUMP_M on the phrase really jumps, and keeps its height; in between, one blends into the other.
 FLOOR_NOISE_M = 0.03
-JUMP_M = 0.08
 PLANTED_PERCENTILE = 5.0  # of a point's heights over the phrase: its height while planted
 MOST_ABOVE_OTHER_FOOT_M = 0.03  # so that a foot that never stands in a phrase does not count as planted
 SUPPORT_M = 0.02  # points of the feet this close to the lowest one share its support
-SWINGING_M_S = 0.5  # a point at this speed counts half: it lands or lifts and does not carry
+SWINGING_M_S = 1.0  # a point at this speed counts half: it lands or lifts and does not carry
 # The share of a correction that is made at once; the rest follows in later ticks. Measured on three takes at
 # ten coding iterations with a held joint (untreated: 92 cm/s of slide): all at once leaves 11 cm/s, but the
 # hip shakes with 28 mm per tick^2 (99th percentile); 0.85 leaves 13 cm/s and 26 mm; 0.7 leaves 18 and 22.
 FOLLOW = 0.85
 LEAK_S = 6.0  # time constant of the root's return to its path
-FAR_M = 0.6  # this far from its path the root returns twice as fast
+FAR_M = 1.0  # this far from its path the root returns twice as fast
 
 
 class GroundingError(ValueError):
@@ -66,18 +66,21 @@ def lift(clearance: Array) -> Array:
 
 
 class Grounding:
-    """Stands a pose on the floor and pins the foot that carries it; once per tick.
+    """Stands a pose on the floor and pins the feet that carry it; once per tick.
 
     Vertically the lowest point of the soles comes to the phrase's lift above the floor. Horizontally the root
     leaves its path by as much as the supporting points would slide; support passes from foot to foot with
     their heights and speeds, so nothing pops; the offset decays in about LEAK_S. If a puppet's legs stand
-    still while the phrase's root travels, the feet finally slide after it: the stage has an edge.
+    still while the phrase's root travels, the feet finally slide after it: the stage has an edge. One root
+    cannot hold two feet that the puppet moves against each other: the legs make up for the rest (FootLock).
     """
 
     def __init__(self, skeleton: Skeleton, floor: Floor | None, tick_s: float = 0.02) -> None:
         """floor None: figures stay where the phrase has them."""
         self.figure = Figure(skeleton)
         self.root = np.zeros(3, dtype=np.float32)
+        self.pose = np.zeros((len(skeleton), 4), dtype=np.float32)
+        self._foot_lock = FootLock(skeleton, tick_s)
         self._rest = None if floor is None else floor.rest_heights.tolist()
         self._leak = tick_s / LEAK_S
         self._swinging = (SWINGING_M_S * tick_s) ** 2
@@ -97,15 +100,21 @@ class Grounding:
         self._offset_x, self._offset_z = metres
 
     def ground_pose(
-        self, pose: FloatArray, root: FloatArray, lift_m: float, rest_heights: FloatArray | None = None
+        self,
+        pose: FloatArray,
+        root: FloatArray,
+        lift_m: float,
+        rest_heights: FloatArray | None = None,
+        held: FloatArray | None = None,
     ) -> Figure:
         """Ground a pose (J, 4) with the phrase's root at (3,) metres and its feet lifted by lift_m.
 
-        rest_heights (S,): the floor of the phrase that plays now; None: unchanged.
-        Its positions and world rotations, and `root`, hold until the next call.
+        rest_heights (S,): the floor of the phrase that plays now; None: unchanged. held (J,): weights 0..1 of
+        the hands, whose legs are left as they are; None: all legs are, for nothing changed them.
+        Its positions and world rotations, `root` and `pose` hold until the next call.
         """
         self.figure.set_pose(pose, root)
-        self.root[:] = root
+        self.root[:], self.pose[:] = root, pose
         if self._rest is None:
             return self.figure
         if rest_heights is not None:
@@ -121,6 +130,9 @@ class Grounding:
         self._shift[:] = self._offset_x, self._height, self._offset_z
         self.figure.move(self._shift)
         np.add(self.root, self._shift, out=self.root)
+        above_floor = [clearance + self._height for clearance in clearances]
+        if self._foot_lock.lock(self.pose, self.figure, above_floor, lift_m, held):
+            self.figure.set_pose(self.pose, self.root)
         return self.figure
 
     def state(self) -> dict[str, Any]:
@@ -128,6 +140,8 @@ class Grounding:
         return {
             "figure": self.figure.state(),
             "root": self.root.copy(),
+            "pose": self.pose.copy(),
+            "foot_lock": self._foot_lock.state(),
             "rest": self._rest,
             "offset": [self._offset_x, self._offset_z],
             "step": [self._step_x, self._step_z],
@@ -138,7 +152,8 @@ class Grounding:
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a state."""
         self.figure.restore(state["figure"])
-        self.root[:] = state["root"]
+        self.root[:], self.pose[:] = state["root"], state["pose"]
+        self._foot_lock.restore(state["foot_lock"])
         self._rest, self._height, self._before = state["rest"], state["height"], state["before"]
         self._offset_x, self._offset_z = state["offset"]
         self._step_x, self._step_z = state["step"]

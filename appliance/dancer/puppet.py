@@ -69,7 +69,7 @@ class Puppet:
         return np.take(window, self.moving, axis=1, out=self._window, mode="clip")
 
     def restore(self, pose: FloatArray, whole: FloatArray) -> None:
-        """Write a pose of the moving joints (M, 4) into a pose of all joints (J, 4)."""
+        """Write a pose of the moving joints (M, 4) into one of all joints (J, 4); numbers (M,) as well."""
         whole[self.moving] = pose
 
     def dance(

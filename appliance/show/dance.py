@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
 from appliance.show.section import BundleFile, Section, key, refusal
 
+Blending = Literal["prompt", "hann"]
 MAIN = "main"  # the phrase that the show starts with
 
 
@@ -29,6 +30,11 @@ class DancerConfig(Section):
         within=(0, 64),
     )
     hop: int = key("Ticks from one window to the next; they are blended.", 1, within=(1, 8))
+    blending: Blending = key(
+        "How windows are blended. `prompt`: half of a step of the hand is in the output within 20 ms. "
+        "`hann`: as in the papers, after 60 ms, but smoother; better from about 30 iterations on.",
+        "prompt",
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -118,7 +118,9 @@ def assemble(
         skeleton=show.skeleton,
         puppet=puppet,
         motion=motion,
-        blending=Blending(len(puppet.joints), puppet.window, show.config.dancer.hop),
+        blending=Blending(
+            len(puppet.joints), puppet.window, show.config.dancer.hop, show.config.dancer.blending
+        ),
         grounding=Grounding(show.skeleton, floor),
         hands=Hands(puppeteers, puppet.joints, puppet.window),
         hand_places=[puppet.joints.index(hand.joint) for hand in show.config.hands],

@@ -42,7 +42,8 @@ class Tick:
         self.iterations = iterations
         self.latest_start_s = latest_start_s
         self.frame = JointFrame(len(parts.skeleton))
-        self.frame.pose[:] = parts.motion.window()[0]
+        self._danced = parts.motion.window()[0].copy()  # (J, 4), not yet grounded
+        self._held = np.zeros(len(parts.skeleton), np.float32)  # weights of the hands
         self.network_failed = False
         self.readings: Sequence[SensorReading] = ()
         self.sections_ms: NDArray[np.float32] = np.zeros(len(SECTIONS), np.float32)
@@ -71,8 +72,8 @@ class Tick:
                 self._regenerate(window)
             ends[PUPPET] = now()
             if not self.network_failed:
-                frame.pose[:] = parts.motion.window()[0]
-                parts.puppet.restore(parts.blending.take(), frame.pose)
+                self._danced[:] = parts.motion.window()[0]
+                parts.puppet.restore(parts.blending.take(), self._danced)
             ends[BLEND] = now()
             self._stand()
             ends[FIGURE] = now()
@@ -117,6 +118,7 @@ class Tick:
             "iterations": self.iterations.state(),
             "latest_start_s": self.latest_start_s,
             "network_failed": self.network_failed,
+            "danced": self._danced.copy(),
             "frame": {name: getattr(frame, name).copy() for name in _STANDING},
             "sensor": [frame.sensor_sequence, frame.sensor_arrival],
         }
@@ -128,6 +130,7 @@ class Tick:
         self.wearing.restore(state["wearing"])
         self.iterations.restore(state["iterations"])
         self.latest_start_s, self.network_failed = state["latest_start_s"], state["network_failed"]
+        self._danced[:] = state["danced"]
         for name in _STANDING:
             getattr(frame, name)[:] = state["frame"][name]
         frame.sensor_sequence, frame.sensor_arrival = state["sensor"]
@@ -146,9 +149,17 @@ class Tick:
             frame.sensor_arrival = parts.newest_primary.arrival
 
     def _stand(self) -> None:
-        """Put the pose on the floor and into the world."""
+        """Put the danced pose on the floor and into the world."""
         parts, frame, motion = self.parts, self.frame, self.parts.motion
-        figure = parts.grounding.ground_pose(frame.pose, motion.roots()[0], motion.lift, motion.rest_heights)
+        parts.puppet.restore(parts.hands.weights, self._held)
+        figure = parts.grounding.ground_pose(
+            self._danced,
+            motion.roots()[0],
+            motion.lift,
+            motion.rest_heights,
+            self._held if self.iterations.coding else None,
+        )
+        frame.pose[:] = parts.grounding.pose
         frame.world[:] = figure.world
         frame.positions[:] = figure.positions
         frame.root[:] = parts.grounding.root

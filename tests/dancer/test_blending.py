@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from appliance.dancer.blending import Blending
+from appliance.dancer.blending import Blending, Shape
 from appliance.pose import quaternion
 from tests.dancer.conftest import random_quaternions
 
@@ -21,9 +21,12 @@ def turning(ticks: int, joints: int = JOINTS) -> np.ndarray:
     return quaternion.from_axis_angle([0.3, 1.0, -0.4], angle).astype(np.float32)
 
 
-def blended(motion: np.ndarray, hop: int) -> np.ndarray:
+SHAPES = ("prompt", "hann")
+
+
+def blended(motion: np.ndarray, hop: int, shape: Shape) -> np.ndarray:
     """What comes out when the window of each due tick is cut out of one motion."""
-    blending = Blending(motion.shape[1], WINDOW, hop)
+    blending = Blending(motion.shape[1], WINDOW, hop, shape)
     out = []
     for tick in range(len(motion) - WINDOW):
         if blending.is_due:
@@ -32,17 +35,19 @@ def blended(motion: np.ndarray, hop: int) -> np.ndarray:
     return np.array(out)
 
 
+@pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("hop", HOPS)
-def test_windows_that_agree_give_the_motion_itself(hop: int) -> None:
+def test_windows_that_agree_give_the_motion_itself(hop: int, shape: Shape) -> None:
     motion = turning(TICKS)
-    out = blended(motion, hop)
+    out = blended(motion, hop, shape)
     assert np.degrees(quaternion.angle_between(out, motion[: len(out)])).max() < 0.02
 
 
+@pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("hop", HOPS)
-def test_a_constant_pose_stays_constant(hop: int) -> None:
+def test_a_constant_pose_stays_constant(hop: int, shape: Shape) -> None:
     pose = random_quaternions(np.random.default_rng(3), JOINTS)
-    out = blended(np.repeat(pose[None], TICKS, axis=0), hop)
+    out = blended(np.repeat(pose[None], TICKS, axis=0), hop, shape)
     assert np.abs(out - out[0]).max() < 2e-6
     assert quaternion.angle_between(out, pose).max() < 1e-5
 
@@ -77,10 +82,24 @@ def test_signs_of_the_windows_do_not_matter_and_never_jump(seed: int, hop: int) 
         before = b
 
 
-@pytest.mark.parametrize("hop", [1, 2, 3, 4])
-def test_a_sudden_change_of_the_windows_is_spread_over_their_overlap(hop: int) -> None:
+@pytest.mark.parametrize(
+    ("shape", "hop", "largest"),
+    [
+        ("hann", 1, 0.27),
+        ("hann", 2, 0.42),
+        ("hann", 3, 0.6),
+        ("hann", 4, 0.75),
+        ("prompt", 1, 0.34),
+        ("prompt", 2, 0.49),
+        ("prompt", 3, 0.6),
+        ("prompt", 4, 0.75),
+    ],
+)
+def test_a_sudden_change_of_the_windows_is_spread_over_their_overlap(
+    shape: Shape, hop: int, largest: float
+) -> None:
     """From one pose to another, 1 rad away, between two windows: no step of the output takes it at once."""
-    blending = Blending(1, WINDOW, hop)
+    blending = Blending(1, WINDOW, hop, shape)
     angles = []
     for tick in range(100):
         if blending.is_due:
@@ -91,11 +110,18 @@ def test_a_sudden_change_of_the_windows_is_spread_over_their_overlap(hop: int) -
     steps = np.diff(angles)
     assert steps.min() > -1e-5
     assert angles[-1] == pytest.approx(1.0, abs=1e-5)
-    assert steps.max() < {1: 0.27, 2: 0.42, 3: 0.6, 4: 0.75}[hop]
+    assert steps.max() < largest
 
 
-def test_a_target_step_reaches_the_output_as_the_docstring_says() -> None:
-    blending = Blending(1, WINDOW, 1)
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        ("prompt", [0.33, 0.61, 0.81, 0.93, 0.98, 1.0, 1.0, 1.0]),
+        ("hann", [0.01, 0.09, 0.26, 0.50, 0.74, 0.91, 0.99, 1.0]),
+    ],
+)
+def test_a_target_step_reaches_the_output_as_the_docstring_says(shape: Shape, expected: list[float]) -> None:
+    blending = Blending(1, WINDOW, 1, shape)
     shares = []
     for tick in range(40):
         angle = 0.0 if tick < 20 else 0.5
@@ -103,7 +129,6 @@ def test_a_target_step_reaches_the_output_as_the_docstring_says() -> None:
         pose = blending.take()[0]
         if tick >= 20:
             shares.append(float(quaternion.angle_between(pose, quaternion.IDENTITY)) / 0.5)
-    expected = [0.01, 0.09, 0.26, 0.50, 0.74, 0.91, 0.99, 1.0]
     assert shares[:8] == pytest.approx(expected, abs=0.006)
 
 

@@ -26,8 +26,11 @@ def draw_answer(path: Path, measurement: Measurement, joint: str, iterations: It
     free, pair = rehearsal.free(iterations[0]), measurement.pair
 
     def strip(poses: Poses, label: str, behind: Poses | None = None) -> Strip:
-        whole = rehearsal.whole(poses)
-        return Strip(whole, body.grounded(whole), label, None if behind is None else strip(behind, ""))
+        return Strip(
+            *body.grounded(rehearsal.whole(poses), joint),
+            label,
+            None if behind is None else strip(behind, ""),
+        )
 
     strips = (
         strip(rehearsal.phrase, f"The phrase: {pair.phrase_name}"),

@@ -53,8 +53,8 @@ class BodyFigures:
     The trunk is a tube along the spine from hip to neck, its radius half the distance between the shoulders.
     An upper arm is deep in it where the axis of its outer half is more than 0.3 radii below the surface.
     Release 0.1.0 on salsa_29 with hands of salsa_24 on lShldr at 10/9: 6 to 11 % of the ticks; the phrase
-    2 %. Foot skate is the horizontal speed of the lowest point of the soles, grounded as on stage: 0.14 and
-    0.06 m/s there; 0.07 and 0.02 on the default show's own phrase.
+    2 %. Foot skate is the horizontal speed of the lowest point of the soles, grounded as on stage: 0.14 m/s
+    there, 0.06 in the phrase; 0.07 and 0.02 on the default show's own phrase.
     """
 
     def __init__(self, phrase: Recording) -> None:
@@ -80,24 +80,30 @@ class BodyFigures:
                     deep |= _distance(point, positions[:, low], positions[:, high]) < reach
         return float(deep.mean())
 
-    def foot_skate(self, poses: Array) -> float:
-        """Sliding speed of the supporting foot, m/s, in poses (T, J, 4) on the phrase's path."""
+    def foot_skate(self, poses: Array, held: str | None = None, locked: bool = True) -> float:
+        """Sliding speed of the supporting foot, m/s, in poses (T, J, 4); held, locked: as in `grounded`."""
         if self._floor is None or len(poses) < 2:
             return float("nan")
+        grounded = self.grounded(poses, held, locked)
         lifts = self._floor.lifts[: len(poses)]
-        standing = measure_standing(self._skeleton, poses, self.grounded(poses), self._floor, lifts)
-        return standing.slide_cm_s / 100
+        return measure_standing(self._skeleton, *grounded, self._floor, lifts).slide_cm_s / 100
 
-    def grounded(self, poses: Array) -> Array:
-        """Roots (T, 3) in metres of poses (T, J, 4) on the phrase's path, grounded as on stage."""
+    def grounded(self, poses: Array, held: str | None = None, locked: bool = True) -> tuple[Array, Array]:
+        """Poses (T, J, 4) and roots (T, 3) in metres as on stage: feet on the floor, and locked there.
+
+        held: the joint that a hand holds; locked False: as at zero coding iterations, the phrase's own poses.
+        """
         path = self._recording.roots[: len(poses)].astype(np.float32)
         if self._floor is None:
-            return path
-        grounding, roots = Grounding(self._skeleton, self._floor), np.empty_like(path)
+            return poses, path
+        weights = np.array([name == held for name in self._skeleton.names], dtype=np.float32)
+        grounding = Grounding(self._skeleton, self._floor)
+        standing, roots = np.empty(poses.shape, np.float32), np.empty_like(path)
         for tick, pose in enumerate(poses.astype(np.float32)):
-            grounding.ground_pose(pose, path[tick], float(self._floor.lifts[tick]))
-            roots[tick] = grounding.root
-        return roots
+            lift = float(self._floor.lifts[tick])
+            grounding.ground_pose(pose, path[tick], lift, held=weights if locked else None)
+            standing[tick], roots[tick] = grounding.pose, grounding.root
+        return standing, roots
 
     def _shoulder_distance(self) -> float:
         """Metres, in the rest pose."""

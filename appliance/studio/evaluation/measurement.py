@@ -113,7 +113,7 @@ class Measurement:
             held=float(np.degrees(quaternion.angle_between(danced[:, held], hand_turns)).mean()),
             plausibility_degrees=float(far.mean()),
             found=float(np.isfinite(fit).mean()),
-            **self._of_body(shown),
+            **self._of_body(shown, joint),
         )
 
     def answer(self, joint: str, danced: Poses, free: Poses) -> float:
@@ -142,17 +142,17 @@ class Measurement:
             "plausibility_degrees": float(self.phrase_far.mean()),
             "energy_degrees_a_tick": figures.energy(self.phrase),
             "roughness_degrees_a_tick2": figures.roughness(self.phrase),
-            **self._of_body(self.rehearsal.phrase),
+            **self._of_body(self.rehearsal.phrase, locked=False),
         }
 
-    def _of_body(self, danced: Poses) -> dict[str, float]:
+    def _of_body(self, danced: Poses, held: str | None = None, locked: bool = True) -> dict[str, float]:
         """The largest step, arms in the trunk, feet that slide."""
         step, whole = figures.largest_step(without_heading(danced)), self.rehearsal.whole(danced)
         return {
             "largest_step": step,
             "snap": _ratio(step, self.reference.largest_step),
             "arm_in_trunk": self.body.arm_in_trunk(whole),
-            "foot_skate": self.body.foot_skate(whole),
+            "foot_skate": self.body.foot_skate(whole, held, locked),
         }
 
     def _fit_of_phrase(self, joint: str, others: list[int]) -> Floats:

@@ -35,7 +35,6 @@ from appliance.studio.experiments.families import (
     WITH_SENSOR,
     Condition,
     Trial,
-    as_recording,
     usual_trace,
 )
 from appliance.studio.experiments.page import write_page
@@ -213,7 +212,7 @@ def _takes(options: ExperimentOptions, coder: Coder) -> list[Take]:
 def _write_dances(trial: Trial, folder: Path) -> None:
     """BVH of the excerpt and of every dance on it."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_bvh(folder / "excerpt.bvh", as_recording(trial.once, trial.once.phrase))
+    write_bvh(folder / "excerpt.bvh", trial.once.recording)
     for condition, dance in trial.dances.items():
         write_bvh(folder / f"{condition.name}.bvh", trial.whole(dance))
 
@@ -224,7 +223,7 @@ def _pictures(trial: Trial, folder: Path, network: str) -> list[tuple[Any, ...]]
     held, wanted = [skeleton.index(trial.joint)], []
     for number, (words, base, conditions) in enumerate(FIGURES, 1):
         rehearsal = trial.once if base == "once" else trial.looped
-        recorded = as_recording(rehearsal, rehearsal.phrase)
+        recorded = rehearsal.recording
         strips = [Strip(recorded.poses, recorded.roots, "recorded")]
         for condition in conditions:
             danced = trial.whole(trial.dances[condition])

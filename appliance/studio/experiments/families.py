@@ -138,8 +138,7 @@ class Trial:
 
 def as_recording(rehearsal: Rehearsal, poses: Poses) -> Recording:
     """Poses (T, M, 4) of the moving joints as a whole body on the excerpt's path, feet on the floor."""
-    whole = rehearsal.whole(poses)
-    roots = _body_figures(rehearsal).grounded(whole)
+    whole, roots = _body_figures(rehearsal).grounded(rehearsal.whole(poses))
     return Recording(rehearsal.recording.skeleton, quaternion.continuous(whole), roots, FPS)
 
 

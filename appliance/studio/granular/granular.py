@@ -1,6 +1,6 @@
 """Decoding latents into endless motion, and feeding the network its own motion.
 
-Windows are blended as on the box: Hann weights, SLERP. The decoder knows no heading: the dancer faces ahead,
+Windows are blended by Hann weights and SLERP. The decoder knows no heading: the dancer faces ahead,
 or, between two excerpts, where the first one faces.
 """
 
@@ -62,7 +62,7 @@ def fed_back(autoencoder: Autoencoder, phrase: Poses, share: float, passes: int 
     Each tick its last window, a tick further on, is coded again, with a share of the phrase's window mixed
     into it by SLERP: 1 is the phrase coded, 0 is left alone with what it danced before.
     """
-    blending = Blending(phrase.shape[2], phrase.shape[1])
+    blending = Blending(phrase.shape[2], phrase.shape[1], shape="hann")
     own, danced = phrase[0], np.empty((len(phrase), *phrase.shape[2:]), dtype=np.float32)
     for tick, given in enumerate(phrase):
         mixed = quaternion.slerp(own, given, np.full(given.shape[:2], share)).astype(np.float32)
@@ -76,7 +76,7 @@ def fed_back(autoencoder: Autoencoder, phrase: Poses, share: float, passes: int 
 def _blended(windows: Poses, hop: int, ticks: int, cyclic: bool = False) -> Poses:
     """`ticks` poses of the windows; cyclic: over and over."""
     count, length, joints, _ = windows.shape
-    blending, danced = Blending(joints, length, hop), np.empty((ticks, joints, 4), dtype=np.float32)
+    blending, danced = Blending(joints, length, hop, "hann"), np.empty((ticks, joints, 4), dtype=np.float32)
     for tick in range(ticks):
         number = tick // hop
         if tick % hop == 0 and (cyclic or number < count):

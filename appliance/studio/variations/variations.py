@@ -1,7 +1,7 @@
 """Variations: a phrase's latents moved, mixed with another's, or sampled, and decoded into motion.
 
 A phrase longer than the model's window is covered by overlapping windows, all moved by the same noise, and
-blended by Hann weights and SLERP as on the box.
+blended by Hann weights and SLERP.
 """
 
 from __future__ import annotations
