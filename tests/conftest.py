@@ -38,7 +38,11 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(report, figures_report.NAME)
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process compiles all modules
     worker = os.environ.get("PYTEST_XDIST_WORKER")
-    if worker:  # its own share of the ports, so that no other worker takes one between choice and use
+    if worker:
+        # Files already run in parallel: what they start would only wait for its own threads.
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+            os.environ.setdefault(name, "1")
+        # Its own share of the ports, so that no other worker takes one between choice and use.
         share = slice(int(worker.removeprefix("gw")), None, int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))
         hw_sim.peers.PORTS = hw_sim.peers.PORTS[share]
 
