@@ -79,7 +79,7 @@ class FootLock:
         """Turn the legs in a pose (J, 4); whether anything was turned: `figure` then shows the old pose.
 
         figure: that pose, grounded. clearances (S,): of its soles' points above their place on the floor,
-        metres; lift_m: of a jump. held (J,): weights 0..1 of the hands; None: no foot is to be locked.
+        metres; lift_m: of a jump. held (J,): weights 0..1 of the hands; None: no foot is locked.
         """
         points, turned = figure.soles.tolist(), False
         for leg in self._legs:

@@ -110,7 +110,7 @@ class Grounding:
         """Ground a pose (J, 4) with the phrase's root at (3,) metres and its feet lifted by lift_m.
 
         rest_heights (S,): the floor of the phrase that plays now; None: unchanged. held (J,): weights 0..1 of
-        the hands, whose legs are left as they are; None: all legs are, for nothing changed them.
+        the hands, whose legs are left as they are; None: all legs are.
         Its positions and world rotations, `root` and `pose` hold until the next call.
         """
         self.figure.set_pose(pose, root)

@@ -24,7 +24,8 @@ class Iterations:
         """Take as many as fit, over fade_s; a sentence when these are fewer than were asked for."""
         allowed = min(max(coding, 1), self.most)
         self._before = self.coding, self.interaction
-        self._wanted = allowed, max(0, min(interaction - max(coding - allowed, 0), allowed))
+        fitting = min(interaction - max(coding - allowed, 0), allowed)
+        self._wanted = allowed, max(fitting, min(interaction, 1))  # a hand that is to hold holds
         self._tick, self._ticks = 0, max(1, round(fade_s * FPS))
         if self._ticks == 1:
             self.advance()

@@ -157,7 +157,7 @@ class Tick:
             motion.roots()[0],
             motion.lift,
             motion.rest_heights,
-            self._held if self.iterations.coding else None,
+            self._held,
         )
         frame.pose[:] = parts.grounding.pose
         frame.world[:] = figure.world

@@ -46,7 +46,7 @@ def crouching(skeleton: Skeleton) -> Recording:
 
 
 def stand(phrase: Recording, poses: np.ndarray, held: np.ndarray | None) -> Stood:
-    """Grounding over all ticks; held: (J,) or (T, J) weights, or None: at no coding iterations."""
+    """Grounding over all ticks; held: (J,) or (T, J) weights, or None: no lock."""
     floor = survey(phrase)
     grounding = Grounding(phrase.skeleton, floor)
     rows = []
@@ -113,7 +113,7 @@ def test_only_legs_turn_and_feet_keep_their_orientation(crouching: Recording) ->
     assert quaternion.angle_between(before[:, feet], after[:, feet]).max() < 1e-3
 
 
-def test_without_coding_iterations_the_phrase_keeps_its_legs(crouching: Recording) -> None:
+def test_without_the_lock_legs_are_left_as_they_are(crouching: Recording) -> None:
     poses = with_legs_moved(crouching, 0.2)
     assert np.array_equal(stand(crouching, poses, None).poses, poses.astype(np.float32))
 

@@ -91,7 +91,7 @@ class BodyFigures:
     def grounded(self, poses: Array, held: str | None = None, locked: bool = True) -> tuple[Array, Array]:
         """Poses (T, J, 4) and roots (T, 3) in metres as on stage: feet on the floor, and locked there.
 
-        held: the joint that a hand holds; locked False: as at zero coding iterations, the phrase's own poses.
+        held: the joint that a hand holds; locked False: with legs as they are.
         """
         path = self._recording.roots[: len(poses)].astype(np.float32)
         if self._floor is None:
