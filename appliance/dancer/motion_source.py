@@ -15,7 +15,7 @@ from appliance.dancer.repertoire import Repertoire
 from appliance.dancer.slerp import FloatArray, Slerp
 from appliance.dancer.stream import Stream
 from appliance.pose.recording import Recording
-from appliance.show.dance import MAIN
+from appliance.show.sources import MAIN
 
 MAX_RATE = 4.0
 RATE_CHANGE_PER_TICK = 0.08  # from standing to full speed in a quarter of a second

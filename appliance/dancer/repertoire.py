@@ -12,7 +12,7 @@ from appliance.dancer.phrase import FPS, NUMBER, Phrase, PhraseError
 from appliance.dancer.reading_head import ReadingHead
 from appliance.pose.recording import Recording
 from appliance.show.config_error import did_you_mean
-from appliance.show.dance import MAIN
+from appliance.show.sources import MAIN
 
 
 class Repertoire:

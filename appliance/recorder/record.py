@@ -25,8 +25,11 @@ _LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970
 SAID = "said"  # kind of the event that people were told something
 
 
-def record(joints: int, hands: int, sensors: int) -> np.dtype[np.void]:
+def record(joints: int, hands: int, sensors: int, live: int) -> np.dtype[np.void]:
     """One tick: its slot, what it heard, what it made of it, and how long that took.
+
+    live: 1 for a show with a live dancer, else 0. live_*: the pose that came of it in this tick; the arrival
+    is not a number where none did.
 
     reading_*: the newest believed reading of each sensor in this tick, where reading_here says that there is
     one, as the link gave it: with them and the slot the tick can be run again.
@@ -47,6 +50,9 @@ def record(joints: int, hands: int, sensors: int) -> np.dtype[np.void]:
             ("weights", "<f4", (hands,)),
             ("root", "<f4", (3,)),
             ("pose", "<f4", (joints, 4)),
+            ("live_arrival", "<f8", (live,)),
+            ("live_root", "<f4", (live, 3)),
+            ("live_pose", "<f4", (joints * live, 4)),
             ("reading_here", "u1", (sensors,)),
             ("reading_orientation", "<f8", (sensors, 4)),
             ("reading_times", "<f8", (sensors, 3)),  # measured_at, arrival, round_trip_s (not a number: none)
@@ -66,7 +72,7 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
 
     skeleton, bundled = show.skeleton, show.directory.resolve() == default_show_path().resolve()
     hands = [{"joint": hand.joint, "kind": hand.kind, "sensor": hand.sensor} for hand in show.config.hands]
-    layout = record(len(skeleton), len(hands), len(sensors))
+    layout = record(len(skeleton), len(hands), len(sensors), int(show.config.motion.live))
     files = [show.file.path, show.network, *dict.fromkeys(show.phrases.values())]
     return {
         "run": os.urandom(8).hex(),
@@ -92,7 +98,8 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
 def require_sound(facts: dict[str, Any]) -> None:
     """Raises KeyError, ValueError or TypeError where a file's facts are not those of a run."""
     figure, layout = skeleton_of(facts), layout_of(facts)
-    needed = record(len(figure), len(facts["hands"]), len(facts["sensors"]))
+    live = min(layout["live_arrival"].shape[0], 1)
+    needed = record(len(figure), len(facts["hands"]), len(facts["sensors"]), live)
     for name in needed.names or ():
         if layout[name] != needed[name]:
             raise ValueError(f"another '{name}' in its ticks")

@@ -15,9 +15,9 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import CHECKSUMS, COPY_AGAIN, bundle_bytes, checksum_problems, unlisted_files
 from appliance.show.config_error import ConfigError, Problem
-from appliance.show.dance import MAIN
 from appliance.show.network import WINDOW, inspect_network
 from appliance.show.show import Show, load_show
+from appliance.show.sources import MAIN
 
 LARGEST_BYTES = 25_000_000
 LARGEST_REPORT = 16_000_000

@@ -23,7 +23,7 @@ class CueConfig(Section):
 
     name: str = key("What `/cue` calls it.", length=(1, 64))
     phrase: Name | None = key(
-        "The phrase that the puppet starts from: `main`, or a name under motion.phrases. "
+        "The phrase that the puppet starts from: `main`, a name under motion.phrases, or `live`. "
         "It begins at its start; one that plays already goes on.",
         None,
     )

@@ -7,9 +7,9 @@ from typing import Any, Literal
 from pydantic import ValidationInfo, field_validator, model_validator
 
 from appliance.show.section import BundleFile, Section, key, refusal
+from appliance.show.sources import LIVE, MAIN
 
 Blending = Literal["prompt", "hann"]
-MAIN = "main"  # the phrase that the show starts with
 
 
 class DancerConfig(Section):
@@ -70,6 +70,11 @@ class MotionConfig(Section):
         {},
         length=(0, 32),
     )
+    live: bool = key(
+        "Whether somebody else's motion capture may take the phrase's place: cues and `/phrase` call it "
+        "`live`. It comes to the control port as `/mocap/0/joint/rot_local` (docs/osc.md).",
+        False,
+    )
     start_s: float = key("Where in `phrase` the excerpt starts, in seconds.", 0.0, within=(0, 86400))
     end_s: float | None = key(
         "Where it ends, in seconds; after start_s. null: at the phrase's end.", None, above=0, most=86400
@@ -89,9 +94,10 @@ class MotionConfig(Section):
     @classmethod
     def _names_that_can_be_called(cls, phrases: dict[str, str]) -> dict[str, str]:
         for name in phrases:
-            if name == MAIN:
+            if name in (MAIN, LIVE):
+                what = "phrase that the show starts with" if name == MAIN else "stream of motion capture"
                 raise refusal(
-                    f"'{MAIN}' is what the phrase that the show starts with is called.",
+                    f"'{name}' is what the {what} is called.",
                     "Give this one another name.",
                     at=name,
                 )
@@ -100,6 +106,11 @@ class MotionConfig(Section):
                     "A phrase's name has 1 to 64 characters.", "Write it like `quiet: quiet.bvh`.", at=name
                 )
         return phrases
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """What the puppet can start from, by the names that cues call, the one at the start first."""
+        return (*self.files, *([LIVE] if self.live else []))
 
     @property
     def files(self) -> dict[str, str]:

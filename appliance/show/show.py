@@ -153,7 +153,7 @@ class ShowConfig(Section):
     def names(self) -> dict[str, tuple[str, ...]]:
         """What a cue may name under phrase, hands, look and lights, each first what is in force at start."""
         return {
-            "phrase": tuple(self.motion.files),
+            "phrase": self.motion.sources,
             "hands": tuple(hand.joint for hand in self.hands),
             "look": tuple(looks_by_name(self.looks)),
             "lights": tuple(mapping.name for mapping in self.lights.mappings),

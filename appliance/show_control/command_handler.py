@@ -10,6 +10,7 @@ from appliance.box.show_state import ShowState
 from appliance.show_control.acknowledgements import Acknowledgements
 from appliance.show_control.command import Command, command
 from appliance.show_control.key_file import KeyFile
+from appliance.show_control.live_input import HEARD, LiveInput
 from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.orders import Order, Place
 from appliance.show_control.packet import Message, messages_in, readable
@@ -73,13 +74,14 @@ class CommandHandler:
         keys: KeyFile,
         send: Callable[[Address, Message], None],
         publish: Callable[[ShowState], None],
+        live: LiveInput,
     ) -> None:
         self.show_state = show_state
         self.refused = 0
         self.reason = ""
         self.acknowledgements = Acknowledgements(observer)
         self._observer, self._dispatch, self._keys = observer, dispatch, keys
-        self._send, self._publish = send, publish
+        self._send, self._publish, self._live = send, publish, live
         self._generation = -1
         self._is_new_stage = False
 
@@ -96,6 +98,9 @@ class CommandHandler:
                 self._refuse(f"{address} is an answer, no command.")
                 continue
             try:
+                if address in HEARD:
+                    self._live.hear(address, arguments, self._observer.facts, now)
+                    continue
                 if address in once:
                     raise ValueError(f"{address} came twice in a bundle: once is enough.")
                 if address in _ONCE_A_BUNDLE:

@@ -19,6 +19,7 @@ from appliance.show_control.console_messages import ConsoleMessages, held_back
 from appliance.show_control.heartbeat import Heartbeat
 from appliance.show_control.intake import Intake
 from appliance.show_control.key_file import KeyFile
+from appliance.show_control.live_input import LiveInput
 from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.orders import OrderSender
 from appliance.show_control.port import Port
@@ -53,8 +54,10 @@ class ControlProcess:
             self._heartbeat = Heartbeat(settings.heartbeat, now)
             opened.callback(self._heartbeat.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
+            live = LiveInput(folder)
+            opened.callback(live.close)
             self.handler = CommandHandler(
-                show_state, self.observer, self._dispatch, keys, self.port.send, writer.write
+                show_state, self.observer, self._dispatch, keys, self.port.send, writer.write, live
             )
             self._poll = select.poll()
             for one in (self.port, sender):

@@ -40,8 +40,7 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
             if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.hands.puppeteers):
                 words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
         elif order.name == "phrase":
-            if not motion.play(order.text, *order.values):
-                words = f"The phrase '{order.text}' plays already, and goes on."
+            words = parts.play(order.text, *order.values)
         elif order.name == "rate":
             motion.rate = order.values[0]
         elif order.name == "jump":

@@ -86,8 +86,22 @@ POWER_CUT = Fallback(
     "power-cut",
     "The power was cut: the dance went on where it was, less than a second before. Check the plug.",
 )
+SOURCE_LATE = Fallback(
+    "source-late",
+    "The live dancer's motion capture was silent for half a second: the phrase plays on, and the stream "
+    "takes over again with its next pose. Check the program that sends it, and the network.",
+)
 OF_THE_STAGE = (
     *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, ADDRESS_ABSENT, NOT_LET_IN),
     *(TICK_LATE, TICK_SKIPPED, OVER_BUDGET, ITERATIONS_LOWERED, NETWORK_FAILED),
-    *(RECEIVER_GONE, NOT_REALTIME, NOT_SHARED, NOT_RECORDED, PLACE_NOT_NOTED, STAGE_RESTARTED, POWER_CUT),
+    *(
+        RECEIVER_GONE,
+        NOT_REALTIME,
+        NOT_SHARED,
+        NOT_RECORDED,
+        PLACE_NOT_NOTED,
+        STAGE_RESTARTED,
+        POWER_CUT,
+        SOURCE_LATE,
+    ),
 )

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from appliance.box.show_state import ShowStateReader
+from appliance.show.sources import LIVE
 from appliance.show_control.orders import Order
 from appliance.stage.carry_out import obey
 from appliance.stage.iterations import Iterations
@@ -37,6 +38,9 @@ class Reconciler:
                     self.rate = values[0] if values else self._usual_rate or 1.0
                 elif number > before:
                     orders.append(Order(name.partition(" ")[0], values, text))
+        wanted, live = show_state.dance.get("phrase"), self.parts.live
+        if wanted and wanted[1] == LIVE and live is not None and not (orders or live.is_chosen):
+            orders.append(Order("phrase", wanted[2], LIVE))  # after a restart: checkpoints know phrases only
         rate = 0.0 if show_state.stands(now) else self.rate
         if rate != self.parts.motion.rate:
             orders.append(Order("rate", (rate,)))

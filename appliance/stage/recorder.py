@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from appliance.box.live_pose import LivePose
 from appliance.box.ring_file import RingFileWriter
 from appliance.recorder.keyframe import POSITION, packed
 from appliance.recorder.record import EVENT, TICK, layout_of
@@ -27,7 +28,7 @@ KEYFRAME_BYTES, KEYFRAME_JOINT_BYTES = 1 << 14, 1 << 9  # and for each joint
 EVENT_BYTES = 1024
 ENTRY = struct.Struct("<Q")  # kind of an entry of the log; then the tick's record, or the event as JSON
 
-_NO_ROUND_TRIP = float("nan")
+_NO_ROUND_TRIP = _NOT_HEARD = float("nan")
 
 
 class Recorder:
@@ -78,6 +79,7 @@ class Recorder:
         field["root"][0] = frame.root
         field["pose"][0] = frame.pose
         self._note_readings(tick)
+        self._note_live(tick.live_heard)
         self._log.publish()
         self._entries += 1
         self._ticks += 1
@@ -105,6 +107,15 @@ class Recorder:
     def close(self) -> None:
         """Let go of the file; it stays for the keeper, which may not have read all of it yet."""
         self._file.close()
+
+    def _note_live(self, heard: LivePose | None) -> None:
+        field = self._field
+        if not field["live_arrival"].size:
+            return
+        field["live_arrival"][0] = _NOT_HEARD if heard is None else heard.arrival
+        if heard is not None:
+            field["live_root"][0] = heard.root
+            field["live_pose"][0] = np.frombuffer(heard.rotations, np.float32).reshape(-1, 4)
 
     def _note_readings(self, tick: Tick) -> None:
         field = self._field

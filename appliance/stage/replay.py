@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from appliance.box.clock import Slot
+from appliance.box.live_pose import LivePose, LivePoseReader
 from appliance.dancer.puppet import Puppet
 from appliance.dancer.slerp import FloatArray
 from appliance.recorder.journal_error import JournalError
@@ -49,6 +51,7 @@ class Replay:
             )
         parts.link = self._link = _RecordedLink(run)
         parts.puppet = self._puppet = _RecordedPuppet(show)
+        parts.live_inbox = self._live = _RecordedLive(run)
         self._wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
         self.tick = Tick(parts, self._wearing, Iterations(1, 0, 1), 0.0)
 
@@ -106,7 +109,7 @@ class Replay:
 
     def _dance_row(self, row: int, comparison: Comparison) -> None:
         recorded = self._run.ticks[row]
-        self._link.row = row
+        self._link.row = self._live.row = row
         self._puppet.fails = bool(recorded["flags"] & NOT_FINITE)
         slot = Slot(
             int(recorded["tick"]),
@@ -151,6 +154,24 @@ class _RecordedPuppet(Puppet):
             self.forced += 1
             self.is_broken = True
         return poses
+
+
+class _RecordedLive(LivePoseReader):
+    """Gives the live pose of the row that is at hand."""
+
+    def __init__(self, run: Run) -> None:
+        self._ticks, self.row = run.ticks, 0
+
+    def read(self) -> LivePose | None:
+        recorded = self._ticks[self.row]
+        arrival = recorded["live_arrival"]
+        if not arrival.size or math.isnan(arrival[0]):
+            return None
+        x, y, z = recorded["live_root"][0].tolist()
+        return LivePose(float(arrival[0]), (x, y, z), recorded["live_pose"].tobytes())
+
+    def close(self) -> None:
+        pass
 
 
 class _RecordedLink(SensorLink):

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from appliance.box.clock import Slot, TickClock
+from appliance.box.live_pose import LivePoseReader
 from appliance.box.notify import Notifier
 from appliance.box.realtime import enter_realtime, leave_realtime
 from appliance.box.show_state import ShowStateReader
@@ -73,6 +74,8 @@ class Stage:
                 show, box, self.memory.profiles, box_file, self.sharing.folder / MEMORY
             )
             opened.callback(self.parts.close)
+            if self.parts.live is not None:
+                self.parts.live_inbox = LivePoseReader(self.sharing.folder)
             self.inbox = _open_inbox(self.sharing.folder)
             opened.callback(self.inbox.close)
             self.recorder = self._open_recorder()

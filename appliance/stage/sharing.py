@@ -101,7 +101,7 @@ class Sharing:
             "locked": locked,
             "coding": iterations.coding,
             "interaction": iterations.interaction,
-            "phrase": parts.motion.phrase,
+            "phrase": parts.source,
             "position_s": parts.motion.position_s,
             "cue": reconciler.cue,
             "applied": [reconciler.generation, reconciler.words],

@@ -8,14 +8,19 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
+from appliance.box.live_pose import LivePose, LivePoseReader
 from appliance.box.realtime import borrowed_priority
 from appliance.dancer.blending import Blending
 from appliance.dancer.grounding import Floor, Grounding, GroundingError
 from appliance.dancer.hands import Hands
+from appliance.dancer.live import Live
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Remote, TurningAxis, WornSensor
+from appliance.dancer.slerp import FloatArray
 from appliance.outputs.outputs import Outputs
 from appliance.pose.bvh import BvhError
 from appliance.pose.recording import Recording
@@ -27,6 +32,7 @@ from appliance.show.box import BoxConfig
 from appliance.show.config_error import ConfigError
 from appliance.show.posistagenet import misfits
 from appliance.show.show import HandConfig, Show
+from appliance.show.sources import LIVE
 from appliance.stage.admission import Admission, admit
 from appliance.stage.open_sensors import open_sensors
 from appliance.stage.phrase_cache import PhraseCache
@@ -53,6 +59,10 @@ class StageParts:
     primary: str | None
     link: SensorLink
     outputs: Outputs
+    crossfade_s: float
+    live: Live | None = None  # None: the show has no such source
+    live_inbox: LivePoseReader | None = None
+    live_refused: int = 0  # poses of another figure, or none
     complaints: tuple[str, ...] = ()
     newest_primary: SensorReading | None = field(default=None)
 
@@ -63,6 +73,43 @@ class StageParts:
         if reading.sensor == self.primary:
             self.newest_primary = reading
 
+    def hear_live(self) -> LivePose | None:
+        """The pose of a live dancer that has come since the last tick, once it is believed."""
+        heard = None if self.live is None or self.live_inbox is None else self.live_inbox.read()
+        if self.live is None or heard is None:
+            return None
+        pose, root = np.frombuffer(heard.rotations, np.float32), np.array(heard.root, np.float32)
+        if heard.joints == len(self.skeleton) and self.live.hear(
+            pose.reshape(-1, 4), root, heard.arrival, self.motion.window()[0]
+        ):
+            return heard
+        self.live_refused += 1
+        return None
+
+    @property
+    def lift(self) -> float:
+        """How far the figure is to be above the floor, metres: in a jump of the phrase."""
+        return self.motion.lift * (1.0 - (self.live.share if self.live is not None else 0.0))
+
+    @property
+    def source(self) -> str:
+        """The name of what the puppet starts from: a phrase's, or `live`."""
+        return LIVE if self.live is not None and self.live.is_chosen else self.motion.phrase
+
+    def starts_from(self, now: float) -> tuple[FloatArray, FloatArray]:
+        """The window (T, J, 4) and the roots (T, 3) of this tick; call it once a tick."""
+        window, roots = self.motion.window(), self.motion.roots()
+        return (window, roots) if self.live is None else self.live.lay_over(now, window, roots)
+
+    def play(self, name: str, *fade_s: float) -> str:
+        """Switch to a phrase, or to `live`; a sentence where nothing changes. Raises ValueError."""
+        if name != LIVE or self.live is None:
+            plays_already = not self.motion.play(name, *fade_s)
+            if self.live is None or not self.live.is_chosen:
+                return f"The phrase '{name}' plays already, and goes on." if plays_already else ""
+        self.live.choose(name == LIVE, *(fade_s or (self.crossfade_s,)))
+        return ""  # whether it is heard is news of its own
+
     def state(self) -> dict[str, Any]:
         """What the dance to come depends on, for `restore`: plain values and copies of arrays."""
         return {
@@ -70,6 +117,7 @@ class StageParts:
             "blending": self.blending.state(),
             "grounding": self.grounding.state(),
             "hands": self.hands.state(),
+            "live": None if self.live is None else self.live.state(),
             "newest_primary": self.newest_primary,
         }
 
@@ -79,12 +127,16 @@ class StageParts:
         self.blending.restore(state["blending"])
         self.grounding.restore(state["grounding"])
         self.hands.restore(state["hands"])
+        if self.live is not None:
+            self.live.restore(state["live"])
         self.newest_primary = restored_reading(state["newest_primary"])
 
     def close(self) -> None:
         """Free ports and sockets."""
         self.link.close()
         self.outputs.close()
+        if self.live_inbox is not None:
+            self.live_inbox.close()
 
 
 def assemble(
@@ -129,6 +181,8 @@ def assemble(
         primary=show.config.primary_sensor,
         link=link,
         outputs=_outputs(show, box, box_file),
+        live=Live(len(show.skeleton), puppet.window) if show.config.motion.live else None,
+        crossfade_s=show.config.motion.crossfade_s,
         complaints=complaints,
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.box.clock import Slot
+from appliance.box.live_pose import LivePose
 from appliance.outputs.joint_frame import JointFrame
 from appliance.recorder.record import SECTIONS
 from appliance.sensor.link import SensorReading
@@ -42,10 +43,12 @@ class Tick:
         self.iterations = iterations
         self.latest_start_s = latest_start_s
         self.frame = JointFrame(len(parts.skeleton))
-        self._danced = parts.motion.window()[0].copy()  # (J, 4), not yet grounded
+        self._whole, self._roots = parts.motion.window(), parts.motion.roots()
+        self._danced = self._whole[0].copy()  # (J, 4), not yet grounded
         self._held = np.zeros(len(parts.skeleton), np.float32)  # weights of the hands
         self.network_failed = False
         self.readings: Sequence[SensorReading] = ()
+        self.live_heard: LivePose | None = None
         self.sections_ms: NDArray[np.float32] = np.zeros(len(SECTIONS), np.float32)
         self._section_ends = [0.0] * len(SECTIONS)
         self._monotonic = monotonic
@@ -61,10 +64,12 @@ class Tick:
         for reading in self.readings:
             self.wearing.hear(reading)
             parts.hear(reading)
+        self.live_heard = parts.hear_live()
         ends[DRAIN] = ends[MOTION] = ends[HANDS] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
 
         if not frame.late:
-            window = parts.puppet.select(parts.motion.window())
+            self._whole, self._roots = parts.starts_from(slot.started)
+            window = parts.puppet.select(self._whole)
             ends[MOTION] = now()
             parts.hands.pull(slot.started, window)
             ends[HANDS] = now()
@@ -72,7 +77,7 @@ class Tick:
                 self._regenerate(window)
             ends[PUPPET] = now()
             if not self.network_failed:
-                self._danced[:] = parts.motion.window()[0]
+                self._danced[:] = self._whole[0]
                 parts.puppet.restore(parts.blending.take(), self._danced)
             ends[BLEND] = now()
             self._stand()
@@ -154,8 +159,8 @@ class Tick:
         parts.puppet.restore(parts.hands.weights, self._held)
         figure = parts.grounding.ground_pose(
             self._danced,
-            motion.roots()[0],
-            motion.lift,
+            self._roots[0],
+            parts.lift,
             motion.rest_heights,
             self._held,
         )

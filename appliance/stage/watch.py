@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 
 from appliance.box.fallback import Fallbacks
+from appliance.dancer.live import SILENT_S as LIVE_SILENT_S
 from appliance.dancer.puppeteers import HOLD_S
 from appliance.sensor import wire
 from appliance.sensor.state import LOW_BATTERY, SensorState
+from appliance.show.sources import LIVE
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
 from appliance.stage.health import Health
@@ -29,6 +31,7 @@ class Watch:
         self.fallbacks = Fallbacks(rows.OF_THE_STAGE)
         self._worn = [joints[0] for joints in parts.worn.values()]
         self._silent = [False] * len(self._worn)
+        self._is_source_late = False
         self._dropped: dict[str, int] = {}
         self._ways: dict[str, str] = {}
         self._said: set[tuple[str, str]] = set()  # what is so, and was said
@@ -36,7 +39,12 @@ class Watch:
         self.fallbacks.set(rows.NOT_LET_IN.name, " ".join(parts.complaints))
 
     def count_silences(self, now: float) -> None:
-        """At each tick: sensors that have just fallen silent. Some microseconds, without allocating."""
+        """At each tick: sensors, and a live dancer, that have just fallen silent. Allocates nothing."""
+        if (live := self._parts.live) is not None:
+            late = live.is_chosen and LIVE_SILENT_S < live.silent_s(now) < math.inf
+            if late and not self._is_source_late:
+                self.fallbacks.count(rows.SOURCE_LATE.name, now)
+            self._is_source_late = late
         for place, worn in enumerate(self._worn):
             silent = HOLD_S < worn.silent_s(now) < math.inf
             if silent != self._silent[place]:
@@ -73,12 +81,14 @@ class Watch:
         return [
             *(sentence for sensor in sensors for sentence in self._sensor_news(sensor)),
             *self._silence_news(now, {sensor.name for sensor in sensors}),
+            *self._source_news(now),
             *self._output_news(gone),
         ]
 
     def _update_fallbacks(self, now: float, health: Health, is_receiver_gone: bool) -> None:
         every, counts = self.fallbacks, self._parts.link.counts
         every.hold(rows.SENSOR_SILENT.name, any(self._silent))
+        every.hold(rows.SOURCE_LATE.name, self._is_source_late)
         every.follow(rows.READING_REFUSED.name, counts.get("norm", 0), now)
         every.follow(rows.PACKET_REFUSED.name, sum(counts.get(one, 0) for one in _FOREIGN), now)
         every.follow(rows.TICK_LATE.name, health.late, now)
@@ -130,6 +140,19 @@ class Watch:
                     if is_silent
                     else f"Sensor {name} is back. It takes its joint again."
                 )
+
+    def _source_news(self, now: float) -> Iterator[str]:
+        """What a person should know of the live dancer."""
+        live = self._parts.live
+        if live is None:
+            return
+        heard = live.silent_s(now) <= LIVE_SILENT_S
+        if live.is_chosen and self._changes("source", LIVE, not heard):
+            yield (
+                "The live dancer takes the phrase's place."
+                if heard
+                else "No live dancer is heard: the phrase plays on. Check the program that sends it."
+            )
 
     def _output_news(self, gone: set[str]) -> Iterator[str]:
         """What a person should know of the receivers, and of the network."""

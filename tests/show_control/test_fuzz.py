@@ -10,6 +10,7 @@ from pathlib import Path
 from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.show_control.command_handler import CommandHandler
 from appliance.show_control.key_file import KeyFile
+from appliance.show_control.live_input import LiveInput
 from appliance.show_control.order_dispatch import WAITING, OrderDispatch
 from appliance.show_control.orders import OrderSender
 from appliance.show_control.packet import Message, datagram
@@ -34,7 +35,7 @@ def test_nothing_that_comes_in_raises_or_sets_what_is_out_of_bounds(
 
     dispatch = OrderDispatch(sender)
     handler = CommandHandler(
-        ShowState(), StageObserver(folder), dispatch, KeyFile(key_file), tell, writer.write
+        ShowState(), StageObserver(folder), dispatch, KeyFile(key_file), tell, writer.write, LiveInput(folder)
     )
     reader = ShowStateReader(folder)
     now = time.monotonic()

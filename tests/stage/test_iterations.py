@@ -15,7 +15,15 @@ TIMES = st.tuples(st.integers(0, 64), st.integers(0, 64))
 
 @pytest.mark.parametrize(
     ("asked", "danced"),
-    [((5, 4), (5, 4)), ((12, 11), (8, 7)), ((12, 2), (8, 1)), ((60, 1), (8, 1)), ((12, 0), (8, 0)), ((3, 3), (3, 3)), ((0, 0), (1, 0))],
+    [
+        ((5, 4), (5, 4)),
+        ((12, 11), (8, 7)),
+        ((12, 2), (8, 1)),
+        ((60, 1), (8, 1)),
+        ((12, 0), (8, 0)),
+        ((3, 3), (3, 3)),
+        ((0, 0), (1, 0)),
+    ],
 )
 def test_without_a_fade_they_change_at_once_within_what_fits(
     asked: tuple[int, int], danced: tuple[int, int]

@@ -1,0 +1,130 @@
+"""Live motion: a whole dancer in somebody else's motion capture, in place of the phrase."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from appliance.dancer.extrapolation import Extrapolation
+from appliance.dancer.slerp import FloatArray, Slerp
+from appliance.pose import quaternion
+
+SILENT_S = 0.5  # after which the phrase plays on
+SHORTEST_S, LONGEST_S = 0.004, 0.1  # between two poses of a stream: 10 to 250 a second
+_FOLLOW = 0.1  # share of a new interval in the estimate
+_UNIT = 0.1  # a quaternion this far from unit length is none
+
+
+class Live:
+    """Lays a stream of poses over the phrase's window, fading in and out; once a tick.
+
+    Poses come at any rate, and are interpolated between the last two: that costs one interval. The window's
+    later poses are extrapolated as those of a hand are. Where the stream says where its root is, the
+    figure moves by as much, from where it stood at the takeover; else it stays on the phrase's path.
+    A stream that is silent for SILENT_S gives way to the phrase, and comes back with its next pose.
+    """
+
+    def __init__(self, joints: int, window: int, tick_s: float = 0.02) -> None:
+        self._tick_s = tick_s
+        self._slerp, self._over = Slerp(joints), Slerp(window * joints)
+        self._extrapolation = Extrapolation(joints, window)
+        self._is_new = np.ones((joints, 1), dtype=np.bool_)
+        self._before, self._newest, self._present = np.tile(quaternion.IDENTITY, (3, joints, 1))
+        self._window = np.tile(quaternion.IDENTITY, (window, joints, 1))
+        self._roots = np.zeros((window, 3), dtype=np.float32)
+        self._root = np.zeros((2, 3), dtype=np.float32)  # of the pose before, and of the newest
+        self._offset = np.zeros(3, dtype=np.float32)
+        self._has_root = False
+        self._arrival, self._interval_s = -math.inf, 0.02
+        self._chosen, self._share, self._step = False, 0.0, 1.0
+
+    @property
+    def is_chosen(self) -> bool:
+        """Whether the show starts from it, heard or not."""
+        return self._chosen
+
+    @property
+    def share(self) -> float:
+        """How much of what the puppet starts from it is, 0..1."""
+        return self._share * self._share * (3 - 2 * self._share)
+
+    def silent_s(self, now: float) -> float:
+        """Seconds since its last pose; infinite before the first."""
+        return now - self._arrival
+
+    def choose(self, chosen: bool, fade_s: float) -> None:
+        """Take over from the phrase, or give back to it, over fade_s."""
+        self._chosen, self._step = chosen, min(1.0, self._tick_s / max(fade_s, self._tick_s))
+
+    def hear(self, pose: FloatArray, root: FloatArray, arrival: float, phrase: FloatArray) -> bool:
+        """A pose (J, 4) of local quaternions, its root (3,) in metres (not numbers: unknown); False: no pose.
+
+        phrase (J, 4): the phrase's pose of this moment, whose signs the stream takes over.
+        """
+        lengths = np.sqrt(np.einsum("jk,jk->j", pose, pose))
+        if not (np.abs(lengths - 1.0) < _UNIT).all():  # also where one is not a number
+            return False
+        interval_s, was_silent = arrival - self._arrival, self.silent_s(arrival) > SILENT_S
+        if not was_silent:
+            self._interval_s += _FOLLOW * (min(max(interval_s, SHORTEST_S), LONGEST_S) - self._interval_s)
+        np.copyto(self._before, self._newest)
+        np.divide(pose, lengths[:, None], out=self._newest)
+        reference = phrase if was_silent and not self._share else self._before
+        signs = np.where(np.einsum("jk,jk->j", self._newest, reference) < 0.0, -1.0, 1.0)
+        self._newest *= signs[:, None].astype(np.float32)
+        knows_root = bool(np.isfinite(root).all())
+        self._root[0] = self._root[1]
+        self._root[1] = root if knows_root else 0.0
+        if was_silent:
+            np.copyto(self._before, self._newest)
+            self._root[0] = self._root[1]
+            self._is_new[:] = True
+        if knows_root and (was_silent or not self._has_root):
+            self._offset[:] = np.nan  # taken when the next window is laid over
+        self._has_root, self._arrival = knows_root, arrival
+        return True
+
+    def lay_over(self, now: float, window: FloatArray, roots: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The window (T, J, 4) and the roots (T, 3) that the puppet starts from, of the phrase's own."""
+        comes = self._chosen and self.silent_s(now) <= SILENT_S
+        self._share = min(1.0, self._share + self._step) if comes else max(0.0, self._share - self._step)
+        if not self._share:
+            self._offset[:] = np.nan
+            return window, roots
+        share = min(max((now - self._arrival) / self._interval_s, 0.0), 1.0)
+        self._slerp(self._before, self._newest, share, out=self._present)
+        self._extrapolation(self._present, self._is_new, out=self._window)
+        self._is_new[:] = False
+        rows = self._window.reshape(-1, 4)
+        self._over(rows, window.reshape(-1, 4), 1.0 - self.share, out=rows)
+        self._roots[:] = roots
+        if self._has_root:
+            root = self._root[0] + share * (self._root[1] - self._root[0])
+            if np.isnan(self._offset[0]):
+                self._offset[:] = roots[0] - root
+            self._roots += np.float32(self.share) * (root + self._offset - self._roots)
+        return self._window, self._roots
+
+    def state(self) -> dict[str, Any]:
+        """What later windows depend on, for `restore`: plain values and copies of arrays."""
+        return {
+            "poses": np.stack([self._before, self._newest, self._present]),
+            "roots": self._root.copy(),
+            "offset": self._offset.copy(),
+            "has_root": self._has_root,
+            "is_new": bool(self._is_new[0]),
+            "times": [self._arrival, self._interval_s],
+            "chosen": [self._chosen, self._share, self._step],
+            "extrapolation": self._extrapolation.state(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a state."""
+        self._before[:], self._newest[:], self._present[:] = state["poses"]
+        self._root[:], self._offset[:] = state["roots"], state["offset"]
+        self._has_root, self._is_new[:] = state["has_root"], state["is_new"]
+        self._arrival, self._interval_s = state["times"]
+        self._chosen, self._share, self._step = state["chosen"]
+        self._extrapolation.restore(state["extrapolation"])

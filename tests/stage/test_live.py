@@ -1,0 +1,158 @@
+"""A live dancer on the stage: what the puppet starts from, and the same again from the journal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.box.live_pose import LivePose, LivePoseReader, LivePoseWriter
+from appliance.pose import quaternion
+from appliance.recorder.reading import read_journal
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.config_error import ConfigError
+from appliance.show.show import load_show
+from appliance.show.sources import LIVE
+from appliance.stage import fallback as rows
+from appliance.stage.admission import Admission
+from appliance.stage.stage_parts import StageParts, assemble
+from appliance.stage.watch import Watch
+from tests.bundles import FIGURE, write_show
+from tests.recorder.night import Night
+from tests.stage.test_replay import danced
+
+FITS = Admission(3, 2, 3, 2, 64, 0.1, 0.2, 0.3, 10.0)
+CUES = [{"name": "guest", "phrase": "live", "fade_s": 0.2}, {"name": "own", "phrase": "main", "fade_s": 0.2}]
+BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+
+
+@pytest.fixture
+def show(tmp_path: Path) -> Path:
+    return write_show(tmp_path / "show", hands=[], motion={"live": True}, cues=CUES)
+
+
+@pytest.fixture
+def parts(show: Path) -> Iterator[StageParts]:
+    parts = assemble(load_show(show), BOX)
+    yield parts
+    parts.close()
+
+
+def pose(angle: float, joints: int = len(FIGURE)) -> bytes:
+    """All joints turned by an angle about z."""
+    turned = np.tile(quaternion.from_axis_angle([0.0, 0.0, 1.0], angle), (joints, 1))
+    return turned.astype(np.float32).tobytes()
+
+
+class Stream(LivePoseReader):
+    """Gives one pose at each read, while it plays."""
+
+    def __init__(self) -> None:
+        self.coming: LivePose | None = None
+
+    def read(self) -> LivePose | None:
+        coming, self.coming = self.coming, None
+        return coming
+
+    def close(self) -> None:
+        pass
+
+
+def angle_of(night: Night) -> float:
+    return float(quaternion.angle_between(night.tick.frame.pose[2], quaternion.IDENTITY))
+
+
+def with_a_guest(night: Night) -> None:
+    """A stream that comes, is called, falls silent, comes back and is sent away."""
+    stream = night.parts.live_inbox = Stream()
+
+    def dance(ticks: int, angle: float | None) -> None:
+        for _ in range(ticks):
+            if angle is not None:
+                now = night.slot.deadline
+                stream.coming = LivePose(now, (0.3, 0.9, now % 1.0), pose(angle))
+            night.dance(1)
+
+    dance(40, 0.5)
+    night.command("/cue", text="guest")
+    dance(60, 0.5)
+    assert angle_of(night) == pytest.approx(0.5, abs=1e-3)
+    dance(60, None)
+    assert angle_of(night) == pytest.approx(0.0, abs=1e-5)  # only the chest of the phrase moves
+    dance(40, 0.7)
+    assert angle_of(night) == pytest.approx(0.7, abs=1e-3)
+    night.command("/cue", text="own")
+    dance(400, 0.7)
+    assert angle_of(night) == pytest.approx(0.0, abs=1e-5)
+
+
+def test_a_night_with_a_guest_dances_again_bit_for_bit(show: Path, tmp_path: Path) -> None:
+    night = Night(show, tmp_path / "runtime")
+    with_a_guest(night)
+    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    assert np.isfinite(run.ticks["live_arrival"]).sum() == 40 + 60 + 40 + 400
+    for from_s in (0.0, 11.0):
+        replay, comparison = danced(run, show, from_s)
+        assert comparison.first is None and comparison.ticks > 50
+        assert replay.skipped == 0
+
+
+def test_a_show_without_a_guest_notes_none(tmp_path: Path) -> None:
+    night = Night(write_show(tmp_path / "plain"), tmp_path / "runtime")
+    night.dance(5)
+    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    assert run.ticks["live_pose"].nbytes == run.ticks["live_arrival"].nbytes == 0
+
+
+def test_a_stage_that_starts_again_goes_on_with_its_guest(show: Path, tmp_path: Path) -> None:
+    """A checkpoint knows phrases only; what show control declares knows the guest."""
+    night = Night(show, tmp_path / "runtime")
+    night.command("/phrase", 0.2, text=LIVE)
+    assert night.parts.source == LIVE
+    night.parts.live.choose(False, 0.0)  # type: ignore[union-attr]
+    (order,) = night.reconciler.pending(1.0)
+    assert (order.name, order.text) == ("phrase", LIVE)
+
+
+def test_a_guest_who_falls_silent_is_told_once_and_counted(parts: StageParts) -> None:
+    stream, watch = Stream(), Watch(parts, FITS)
+    parts.live_inbox = stream
+    parts.play(LIVE, 0.2)
+    for tick in range(200):
+        now = tick * 0.02
+        stream.coming = LivePose(now, (math.nan,) * 3, pose(0.1)) if tick < 50 or tick > 150 else None
+        parts.hear_live()
+        parts.starts_from(now)
+        watch.count_silences(now)
+    fallen = {one.name: one for one in watch.fallbacks.happened(4.0)}
+    assert fallen[rows.SOURCE_LATE.name].times == 1
+
+
+@pytest.mark.parametrize("joints", [0, 1, len(FIGURE) + 1])
+def test_a_guest_with_another_figure_is_not_believed(parts: StageParts, joints: int) -> None:
+    stream = parts.live_inbox = Stream()
+    stream.coming = LivePose(1.0, (math.nan,) * 3, pose(0.1, joints))
+    assert parts.hear_live() is None
+    assert parts.live_refused == 1
+
+
+def test_the_newest_pose_comes_whole_and_once(tmp_path: Path) -> None:
+    writer, reader = LivePoseWriter(tmp_path), LivePoseReader(tmp_path)
+    assert reader.read() is None
+    for arrival in (1.0, 2.0):
+        writer.write(arrival, (1.0, 2.0, math.nan), [1.0, 0.0, 0.0, 0.0] * 3)
+    heard = reader.read()
+    assert heard is not None and heard.arrival == 2.0 and heard.joints == 3
+    assert heard.root[:2] == (1.0, 2.0) and math.isnan(heard.root[2])
+    assert np.frombuffer(heard.rotations, np.float32).reshape(3, 4)[:, 0].tolist() == [1.0, 1.0, 1.0]
+    assert reader.read() is None
+    writer.close()
+    reader.close()
+
+
+def test_no_phrase_may_have_the_guests_name(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="'live' is what the stream of motion capture is called"):
+        load_show(write_show(tmp_path / "show", motion={"phrases": {LIVE: "phrase.bvh"}}))

@@ -1,0 +1,107 @@
+"""The real box with a live dancer: another program's motion capture in the phrase's place, over real UDP."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pythonosc.udp_client import SimpleUDPClient
+
+from appliance.outputs.frame_reader import FrameReader
+from appliance.pose import quaternion
+from hw_sim.peers import HOST
+from tests.bundles import FIGURE, write_show
+from tests.show_control.doubles import Asker
+from tests.system.box import Box, playing
+from tests.system.processes import wait_until
+
+pytestmark = pytest.mark.realtime
+
+ELBOW = FIGURE.index("lForeArm")  # it rests in the phrase
+
+
+@pytest.fixture
+def show(tmp_path: Path) -> Path:
+    return write_show(tmp_path / "show", hands=[], motion={"live": True})
+
+
+@contextlib.contextmanager
+def streaming(control: int, radians: float, rate: float = 60.0) -> Iterator[None]:
+    """A program that sends a dancer with a bent elbow, as the AI-Toolbox programs do."""
+    pose = np.tile(quaternion.IDENTITY.astype(float), (len(FIGURE), 1))
+    pose[ELBOW] = quaternion.from_axis_angle([0.0, 0.0, 1.0], radians)
+    client, is_over = SimpleUDPClient(HOST, control), threading.Event()
+
+    def send() -> None:
+        while not is_over.wait(1 / rate):
+            client.send_message("/mocap/0/joint/rot_local", pose.ravel().tolist())
+
+    thread = threading.Thread(target=send, daemon=True)
+    thread.start()
+    yield
+    is_over.set()
+    thread.join()
+
+
+def await_elbow(box: Box, reader: FrameReader, radians: float) -> None:
+    """Wait until the elbow that leaves the box has this angle."""
+
+    def has_it() -> bool:
+        frame = reader.newest(time.monotonic())
+        if frame is None:
+            return False
+        return abs(float(quaternion.angle_between(frame.pose[ELBOW], quaternion.IDENTITY)) - radians) < 0.01
+
+    wait_until(has_it, lambda: box.words)
+
+
+def has_begun(reader: FrameReader, seen: int) -> bool:
+    """Whether a stage after that of this generation dances."""
+    return reader.newest(time.monotonic()) is not None and reader.generation > seen
+
+
+def test_a_live_dancer_comes_falls_silent_comes_back_and_goes(show: Path, tmp_path: Path) -> None:
+    with (
+        playing(show, tmp_path) as box,
+        closing(Asker(box.control)) as desk,
+        closing(FrameReader(box.runtime)) as reader,
+    ):
+        box.frames(1)
+        assert desk.order("/phrase", "live", 0.2)[2] == 1
+        await_elbow(box, reader, 0.0)
+        with streaming(box.control, 0.8):
+            await_elbow(box, reader, 0.8)
+        await_elbow(box, reader, 0.0)  # silent: the phrase plays on
+        box.await_words("No live dancer is heard: the phrase plays on")
+        with streaming(box.control, 0.4):
+            await_elbow(box, reader, 0.4)
+            box.await_words("The live dancer takes the phrase's place")
+            seen = reader.generation
+            box.kill_and_restart()
+            wait_until(lambda: has_begun(reader, seen), lambda: box.words)
+            await_elbow(box, reader, 0.4)  # the stage starts again with its guest
+            assert desk.order("/phrase", "main", 0.2)[2] == 1
+            await_elbow(box, reader, 0.0)
+        assert box.end() == 0
+    assert "Traceback" not in box.words
+
+
+def test_a_flood_of_poses_costs_no_frame(show: Path, tmp_path: Path) -> None:
+    """Two thousand a second: the newest one counts, nothing queues up."""
+    with playing(show, tmp_path) as box, closing(Asker(box.control)) as desk:
+        box.frames(1)
+        assert desk.order("/phrase", "live", 0.0)[2] == 1
+        with streaming(box.control, 0.5, rate=2000.0):
+            frames = box.frames(100)
+            begun = time.monotonic()
+            assert desk.ask("/ping")[0].endswith("pong")
+        assert time.monotonic() - begun < 10.0
+        numbers = [frame[0] for frame in frames]
+        assert numbers == sorted(set(numbers))
+        assert box.end() == 0
