@@ -1,4 +1,4 @@
-"""Grounding: sets a figure whose legs the puppet has changed on the floor again, without sliding."""
+"""Grounding: what the puppet danced becomes a body: feet on the floor, no sliding, arms out of the trunk."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from appliance.dancer.arm_clearance import ArmClearance
 from appliance.dancer.foot_lock import JUMP_M, FootLock
 from appliance.dancer.forward_kinematics import Figure, soles_of
 from appliance.dancer.slerp import FloatArray
@@ -81,6 +82,7 @@ class Grounding:
         self.root = np.zeros(3, dtype=np.float32)
         self.pose = np.zeros((len(skeleton), 4), dtype=np.float32)
         self._foot_lock = FootLock(skeleton, tick_s)
+        self._arms = ArmClearance(skeleton)
         self._rest = None if floor is None else floor.rest_heights.tolist()
         self._leak = tick_s / LEAK_S
         self._swinging = (SWINGING_M_S * tick_s) ** 2
@@ -115,12 +117,19 @@ class Grounding:
         """
         self.figure.set_pose(pose, root)
         self.root[:], self.pose[:] = root, pose
-        if self._rest is None:
-            return self.figure
-        if rest_heights is not None:
+        is_changed = self._arms.clear(self.pose, self.figure)
+        if rest_heights is not None and self._rest is not None:
             self._rest = rest_heights.tolist()
+        if self._rest is not None:
+            is_changed |= self._stand(self._rest, lift_m, held)
+        if is_changed:
+            self.figure.set_pose(self.pose, self.root)
+        return self.figure
+
+    def _stand(self, rest: list[float], lift_m: float, held: FloatArray | None) -> bool:
+        """Move the figure onto the floor, and turn its legs; whether they were turned."""
         points = self.figure.soles.tolist()
-        clearances = [point[1] - rest for point, rest in zip(points, self._rest, strict=True)]
+        clearances = [point[1] - rest for point, rest in zip(points, rest, strict=True)]
         lowest = min(clearances)
         if self._before is not None:
             self._pin(points, self._before, clearances, lowest, lift_m)
@@ -131,9 +140,7 @@ class Grounding:
         self.figure.move(self._shift)
         np.add(self.root, self._shift, out=self.root)
         above_floor = [clearance + self._height for clearance in clearances]
-        if self._foot_lock.lock(self.pose, self.figure, above_floor, lift_m, held):
-            self.figure.set_pose(self.pose, self.root)
-        return self.figure
+        return self._foot_lock.lock(self.pose, self.figure, above_floor, lift_m, held)
 
     def state(self) -> dict[str, Any]:
         """What later positions depend on, for `restore`: plain values and copies of arrays."""
@@ -142,6 +149,7 @@ class Grounding:
             "root": self.root.copy(),
             "pose": self.pose.copy(),
             "foot_lock": self._foot_lock.state(),
+            "arms": self._arms.state(),
             "rest": self._rest,
             "offset": [self._offset_x, self._offset_z],
             "step": [self._step_x, self._step_z],
@@ -154,6 +162,7 @@ class Grounding:
         self.figure.restore(state["figure"])
         self.root[:], self.pose[:] = state["root"], state["pose"]
         self._foot_lock.restore(state["foot_lock"])
+        self._arms.restore(state["arms"])
         self._rest, self._height, self._before = state["rest"], state["height"], state["before"]
         self._offset_x, self._offset_z = state["offset"]
         self._step_x, self._step_z = state["step"]

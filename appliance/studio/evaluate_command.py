@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import Progress, track
 from rich.table import Table
 
+from appliance.pose.usual_joints import usual_joints
 from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.evaluation import puppetry, puppetry_report
 from appliance.studio.evaluation.answer_picture import draw_answer
@@ -20,7 +21,6 @@ from appliance.studio.evaluation.evaluation import Evaluation, evaluate, fitting
 from appliance.studio.evaluation.measurement import Iterations, Measurement
 from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.pairs import apart_from, pair_up
-from appliance.studio.evaluation.usual_joints import usual_joints
 from appliance.studio.studio_error import StudioError
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from appliance.dancer.puppeteers import FixedOrientation
 from appliance.pose import quaternion
+from appliance.pose.usual_joints import usual_joints
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.evaluation import puppetry
 from appliance.studio.evaluation.dance_figures import BodyFigures
@@ -17,7 +18,6 @@ from appliance.studio.evaluation.measurement import Figures, Measurement, Pair
 from appliance.studio.evaluation.nearest import Reference, reference_of, without_heading
 from appliance.studio.evaluation.onset import answer_to_steps
 from appliance.studio.evaluation.pairs import apart_from, pair_up
-from appliance.studio.evaluation.usual_joints import usual_joints
 from appliance.studio.studio_error import StudioError
 from tests.dancer.conftest import random_quaternions
 from tests.studio.puppets import NAMES, Freezing, Pasting, Remembering, Turning
@@ -161,7 +161,7 @@ def test_feet_that_stand_do_not_skate_and_feet_that_swing_do() -> None:
     for name, side in (("lThigh", 1), ("rThigh", -1)):
         swinging[:, phrase.skeleton.index(name)] = quaternion.from_axis_angle([1.0, 0, 0], side * angle)
     body = BodyFigures(phrase)
-    assert body.foot_skate(still) < 0.01 < body.foot_skate(swinging)
+    assert body.foot_skate(*body.grounded(still)) < 0.01 < body.foot_skate(*body.grounded(swinging))
 
 
 def test_a_hand_of_the_same_take_is_refused_and_both_are_kept_out_of_the_reference(tmp_path: Path) -> None:

@@ -6,15 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.dancer.grounding import Floor, Grounding, GroundingError, survey
+from appliance.dancer.trunk import Trunk
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.pose.skeleton import Skeleton
-from appliance.studio.evaluation.usual_joints import UPPER_ARMS, usual_joints
 from appliance.studio.standing import measure_standing
 
 ROUGHNESS_PERCENTILE = 99.0
-TRUNK_RADIUS = 0.5  # of the distance between the shoulders: 11 cm for the CMU dancers
 DEEP = 0.3  # of that radius below the surface: 3.5 cm
 ALONG_ARM = (0.5, 0.75, 1.0)  # of the upper arm: its inner half begins in the trunk
 
@@ -59,7 +57,7 @@ class BodyFigures:
 
     def __init__(self, phrase: Recording) -> None:
         self._recording, self._skeleton = phrase, phrase.skeleton
-        self._arms, self._spine = _arms(phrase.skeleton), _spine(phrase.skeleton)
+        self._trunk = Trunk.of(phrase.skeleton)
         self._floor: Floor | None
         try:
             self._floor = survey(phrase)
@@ -68,30 +66,29 @@ class BodyFigures:
 
     def arm_in_trunk(self, poses: Array) -> float:
         """Share of poses (T, J, 4) in which an upper arm is deep in the trunk."""
-        if len(self._arms) < len(UPPER_ARMS) or len(self._spine) < 2:
+        if self._trunk is None:
             return float("nan")
-        reach = (1 - DEEP) * TRUNK_RADIUS * self._shoulder_distance()
+        reach, spine = (1 - DEEP) * self._trunk.radius_m, self._trunk.spine
         positions, _ = self._skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
         deep: NDArray[np.bool_] = np.zeros(len(poses), dtype=bool)
-        for shoulder, elbow in self._arms:
+        for arm in self._trunk.arms:
             for share in ALONG_ARM:
-                point = (1 - share) * positions[:, shoulder] + share * positions[:, elbow]
-                for low, high in zip(self._spine[1:], self._spine[:-1], strict=True):
+                point = (1 - share) * positions[:, arm.shoulder] + share * positions[:, arm.elbow]
+                for low, high in zip(spine[1:], spine[:-1], strict=True):
                     deep |= _distance(point, positions[:, low], positions[:, high]) < reach
         return float(deep.mean())
 
-    def foot_skate(self, poses: Array, held: str | None = None, locked: bool = True) -> float:
-        """Sliding speed of the supporting foot, m/s, in poses (T, J, 4); held, locked: as in `grounded`."""
+    def foot_skate(self, poses: Array, roots: Array) -> float:
+        """Sliding speed of the supporting foot, m/s, in grounded poses (T, J, 4) with roots (T, 3)."""
         if self._floor is None or len(poses) < 2:
             return float("nan")
-        grounded = self.grounded(poses, held, locked)
         lifts = self._floor.lifts[: len(poses)]
-        return measure_standing(self._skeleton, *grounded, self._floor, lifts).slide_cm_s / 100
+        return measure_standing(self._skeleton, poses, roots, self._floor, lifts).slide_cm_s / 100
 
     def grounded(self, poses: Array, held: str | None = None, locked: bool = True) -> tuple[Array, Array]:
-        """Poses (T, J, 4) and roots (T, 3) in metres as on stage: feet on the floor, and locked there.
+        """Poses (T, J, 4) and roots (T, 3) in metres as on stage: feet locked, arms out of the trunk.
 
-        held: the joint that a hand holds; locked False: with legs as they are.
+        held: the joint that a hand holds; locked False: legs as they are.
         """
         path = self._recording.roots[: len(poses)].astype(np.float32)
         if self._floor is None:
@@ -104,39 +101,6 @@ class BodyFigures:
             grounding.ground_pose(pose, path[tick], lift, held=weights if locked else None)
             standing[tick], roots[tick] = grounding.pose, grounding.root
         return standing, roots
-
-    def _shoulder_distance(self) -> float:
-        """Metres, in the rest pose."""
-        rest = np.tile(quaternion.IDENTITY.astype(float), (len(self._skeleton), 1))
-        positions, _ = self._skeleton.forward_kinematics(rest, np.zeros(3))
-        (left, _), (right, _) = self._arms
-        return float(np.linalg.norm(positions[left] - positions[right]))
-
-
-def _arms(skeleton: Skeleton) -> list[tuple[int, int]]:
-    """Shoulder and elbow of the left and the right arm, as far as they are named."""
-    named = usual_joints(skeleton.names)
-    arms = []
-    for part in UPPER_ARMS:
-        if part in named:
-            shoulder = skeleton.index(named[part])
-            below = [joint for joint, parent in enumerate(skeleton.parents) if parent == shoulder]
-            if below:
-                lengths = [float(np.linalg.norm(skeleton.offsets[joint])) for joint in below]
-                arms.append((shoulder, below[int(np.argmax(lengths))]))
-    return arms
-
-
-def _spine(skeleton: Skeleton) -> list[int]:
-    """Joints from the neck (or what carries the head) down to the root."""
-    named = usual_joints(skeleton.names)
-    if "head" not in named:
-        return []
-    joint, spine = skeleton.parents[skeleton.index(named["head"])], []
-    while joint >= 0:
-        spine.append(joint)
-        joint = skeleton.parents[joint]
-    return spine
 
 
 def _distance(points: Array, starts: Array, ends: Array) -> Array:

@@ -138,21 +138,27 @@ class Measurement:
 
     def of_phrase(self) -> dict[str, float]:
         """The phrase's own figures, with which the others are compared."""
+        whole = self.rehearsal.whole(self.rehearsal.phrase)
+        _, roots = self.body.grounded(whole, locked=False)
         return {
             "plausibility_degrees": float(self.phrase_far.mean()),
             "energy_degrees_a_tick": figures.energy(self.phrase),
             "roughness_degrees_a_tick2": figures.roughness(self.phrase),
-            **self._of_body(self.rehearsal.phrase, locked=False),
+            **self._figures_of_body(self.rehearsal.phrase, whole, roots),
         }
 
-    def _of_body(self, danced: Poses, held: str | None = None, locked: bool = True) -> dict[str, float]:
-        """The largest step, arms in the trunk, feet that slide."""
-        step, whole = figures.largest_step(without_heading(danced)), self.rehearsal.whole(danced)
+    def _of_body(self, danced: Poses, held: str | None = None) -> dict[str, float]:
+        """The largest step, arms in the trunk and feet that slide, as they leave the box; held: by a hand."""
+        poses, roots = self.body.grounded(self.rehearsal.whole(danced), held)
+        return self._figures_of_body(danced, poses, roots)
+
+    def _figures_of_body(self, danced: Poses, poses: Array, roots: Array) -> dict[str, float]:
+        step = figures.largest_step(without_heading(danced))
         return {
             "largest_step": step,
             "snap": _ratio(step, self.reference.largest_step),
-            "arm_in_trunk": self.body.arm_in_trunk(whole),
-            "foot_skate": self.body.foot_skate(whole, held, locked),
+            "arm_in_trunk": self.body.arm_in_trunk(poses),
+            "foot_skate": self.body.foot_skate(poses, roots),
         }
 
     def _fit_of_phrase(self, joint: str, others: list[int]) -> Floats:

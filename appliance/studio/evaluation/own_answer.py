@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from appliance.pose.usual_joints import usual_joints
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset
 from appliance.studio.evaluation import puppetry
 from appliance.studio.evaluation.answer_picture import draw_answer
@@ -18,7 +19,6 @@ from appliance.studio.evaluation.nearest import reference_of
 from appliance.studio.evaluation.onset import CODED_WINDOWS
 from appliance.studio.evaluation.pairs import own_takes
 from appliance.studio.evaluation.puppetry_report import verdict
-from appliance.studio.evaluation.usual_joints import usual_joints
 from appliance.studio.studio_error import StudioError
 
 PARTS = ("left upper arm", "left forearm", "head")

@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from appliance.studio.evaluation.usual_joints import UPPER_ARMS, usual_joints
+from appliance.pose.usual_joints import UPPER_ARMS, usual_joints
 
 ANSWERS, ANSWERS_A_LITTLE = 8.0, 4.0  # degrees
 LIVELY = (0.7, 1.3)  # energy

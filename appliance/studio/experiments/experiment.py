@@ -20,11 +20,11 @@ from appliance.pictures.filmstrip import Strip, draw_strips
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.quaternion import Array
+from appliance.pose.usual_joints import usual_joints
 from appliance.show.show import load_show
 from appliance.studio.data.dataset import FPS, Take, load_dataset
 from appliance.studio.evaluation.coders import Coder, open_coder
 from appliance.studio.evaluation.evaluation import load_takes
-from appliance.studio.evaluation.usual_joints import usual_joints
 from appliance.studio.experiments.claims import Claim, claims
 from appliance.studio.experiments.excerpts import Excerpt, choose, named
 from appliance.studio.experiments.families import (
