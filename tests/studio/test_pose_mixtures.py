@@ -22,6 +22,7 @@ from appliance.studio.improviser.pose_mixtures_training import (
     load_pose_improviser,
 )
 from appliance.studio.improviser.pose_steps import pose_motion, pose_steps
+from tests.studio.bodies import body, moved
 from tests.studio.conftest import bunraku
 from tests.studio.test_improviser import walking
 from tests.studio.tiny import moving, skeleton, swaying
@@ -100,6 +101,19 @@ def test_the_likelihood_improves_and_comes_back_from_the_checkpoint(
     assert improviser.joints == dancer.moving_names
     looks = training.rows[:10][None]
     torch.testing.assert_close(improviser.network(looks).means, training.averaged(looks).means)
+
+
+def test_a_body_of_58_joints_dances_on(tmp_path: Path) -> None:
+    for name, seed in (("a", 1), ("b", 2)):
+        write_bvh(tmp_path / f"{name}.bvh", moved(body(fingers=9), seconds=4.0, seed=seed))
+    many = load_dataset(tmp_path)
+    training = PoseMixturesTraining(many, replace(TINY, steps=2))
+    training.run(lambda line: None, lambda: training.save_checkpoint(tmp_path / "checkpoint.pt"))
+    improviser, _ = load_pose_improviser(tmp_path / "checkpoint.pt")
+    start = pose_steps(many.training[0].recording, many.moving, improviser.rest).features[:10]
+    (dance,) = improviser.dances(torch.tensor(start)[None], many, 1.0, 1.0, 1)
+    assert len(many.moving) == 58 and dance.poses.shape == (50, 58, 4)
+    np.testing.assert_allclose(np.linalg.norm(dance.poses, axis=-1), 1.0, atol=1e-6)
 
 
 def test_a_resumed_training_is_the_same_training(dancer: Dataset, tmp_path: Path) -> None:
