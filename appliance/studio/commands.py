@@ -130,8 +130,8 @@ def train(
 ) -> None:
     """Train a dancer on recordings and write a show that can be played to --out.
 
-    Other models are those of 'Beyond Imitation', a checkpoint for the studio. Under torchrun the same command
-    trains in several processes.
+    Other models are those of 'Beyond Imitation': a checkpoint for the studio's other commands. Under torchrun
+    the same command trains in several processes.
     """
     with clear_errors("train"):
         from appliance.studio import train_command
