@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -42,5 +43,6 @@ def _is_for_people(error: Exception) -> bool:
 
 
 def _refuse(message: str) -> None:
-    print(f"bunraku: {message}", file=sys.stderr)
+    if os.environ.get("RANK", "0") == "0":  # of the processes that torchrun started, one speaks
+        print(f"bunraku: {message}", file=sys.stderr)
     raise typer.Exit(REFUSED)

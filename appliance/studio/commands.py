@@ -28,6 +28,8 @@ class NetworkName(StrEnum):
     lstm256 = "lstm256"
     lstm384 = "lstm384"
     dense64 = "dense64"
+    moves = "moves"
+    lstm_mixtures = "lstm-mixtures"
 
 
 class ModelName(StrEnum):
@@ -36,6 +38,7 @@ class ModelName(StrEnum):
     puppet = "puppet"
     pose = "pose"
     sequence = "sequence"
+    improviser = "improviser"
 
 
 class Device(StrEnum):
@@ -59,19 +62,25 @@ def train(
     recordings: Recordings = None,
     model: Annotated[
         ModelName,
-        typer.Option(help="puppet: a show. pose: for path and map. sequence: for vary."),
+        typer.Option(
+            help="puppet: a show. pose: for path and map. sequence: for vary. improviser: for improvise."
+        ),
     ] = ModelName.puppet,
     network: Annotated[
         NetworkName | None,
         typer.Option(
-            help="Architecture. As published: lstm (puppet), dense64 (pose), lstm384 (sequence).",
-            show_default="conditional, for other models mlp",
+            help="Architecture. As published: lstm (puppet), dense64 (pose), lstm384 (sequence), "
+            "lstm-mixtures (improviser).",
+            show_default="conditional; mlp; of improvisers moves",
         ),
     ] = None,
     window: Annotated[
         int,
         typer.Option(
-            min=0, max=128, help="Poses of a window, for granular.", show_default="8, of sequences 128"
+            min=0,
+            max=128,
+            help="Poses of a window, for granular; lstm-mixtures: that it looks back, 10 to 128.",
+            show_default="8, of sequences 128, lstm-mixtures 32",
         ),
     ] = 0,
     minutes: Annotated[
@@ -84,6 +93,22 @@ def train(
     depth: Annotated[
         int, typer.Option(min=0, help="Blocks of conditional and mlp, layers of an lstm. 0: its own.")
     ] = 0,
+    mixtures: Annotated[
+        int, typer.Option(min=0, max=64, help="Gaussians of an improviser; published: 3 to 25. 0: its own.")
+    ] = 0,
+    ahead: Annotated[
+        int, typer.Option(min=0, max=4, help="Poses that lstm-mixtures predicts at once, 1 to 4. 0: 1.")
+    ] = 0,
+    learning_rate: Annotated[
+        float, typer.Option(min=0.0, max=0.1, help="Adam's, at its largest. 0: as the network has it.")
+    ] = 0.0,
+    full_precision: Annotated[
+        bool, typer.Option("--full-precision", help="On a GPU: networks in fp32 too, not in bfloat16.")
+    ] = False,
+    puppet: Annotated[
+        Path | None,
+        typer.Option(help="checkpoint.pt of the dancer in whose latents an improviser (moves) goes on."),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the training in --out.")] = False,
     threads: Annotated[int, typer.Option(min=0, help="CPU cores to use. 0: all.")] = 0,
     device: Annotated[Device, typer.Option(help="auto: the GPU, if there is one.")] = Device.auto,
@@ -105,7 +130,8 @@ def train(
 ) -> None:
     """Train a dancer on recordings and write a show that can be played to --out.
 
-    With --model pose or sequence: the autoencoders of 'Beyond Imitation', a checkpoint for the studio.
+    Other models are those of 'Beyond Imitation': a checkpoint for the studio's other commands. Under torchrun
+    the same command trains in several processes.
     """
     with clear_errors("train"):
         from appliance.studio import train_command
@@ -123,6 +149,11 @@ def train(
                 latent=latent,
                 width=width,
                 depth=depth,
+                mixtures=mixtures,
+                ahead=ahead,
+                learning_rate=learning_rate,
+                full_precision=full_precision,
+                puppet=puppet,
                 resume=resume,
                 threads=threads,
                 device=device.value,
@@ -203,8 +234,15 @@ def export(
 
 @app.command()
 def improvise(
-    checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a training: the pose autoencoder.")],
     out: Annotated[Path, typer.Option(help="The phrase, a BVH file; report and picture go beside it.")],
+    checkpoint: Annotated[
+        Path | None,
+        typer.Argument(help="checkpoint.pt of a dancer; left out with --model.", show_default=False),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="checkpoint.pt of bunraku train --model improviser, instead of training one."),
+    ] = None,
     recordings: Annotated[
         Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
     ] = None,
@@ -228,7 +266,9 @@ def improvise(
     """Train an improviser on a dancer's recordings and let it make an endless phrase.
 
     The improviser is stored beside the phrase. The same command again continues its training; once trained,
-    it only dances, and another --seed gives another phrase.
+    it only dances, and another --seed gives another phrase. With --prompt it goes on where a recording ends.
+    The published network (--model, lstm-mixtures) makes no endless phrase: it goes on from the prompt, or
+    from a recorded moment that --seed chooses.
     """
     with clear_errors("improvise"):
         from appliance.studio.improviser import improvisation
@@ -239,6 +279,7 @@ def improvise(
                 checkpoint=checkpoint,
                 out=out,
                 recordings=recordings,
+                model=model,
                 minutes=minutes,
                 steps=steps,
                 threads=threads,

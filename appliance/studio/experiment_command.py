@@ -31,7 +31,7 @@ def experiment(
     network: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Another network of the same dancer beside it (checkpoint.pt, puppet.onnx); repeatable."
+            help="Another network of this dancer beside it (show, checkpoint.pt, puppet.onnx); repeatable."
         ),
     ] = None,
     joint: Annotated[

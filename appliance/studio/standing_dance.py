@@ -11,14 +11,16 @@ from appliance.pose import quaternion
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import FPS, Dataset
-from appliance.studio.evaluation.coders import Coder, Poses
+from appliance.studio.evaluation.coders import MovedJoints, Poses
 from appliance.studio.evaluation.evaluation import load_takes
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.steps import floor_under
 from appliance.studio.studio_error import StudioError
 
 
-def excerpt_of(file: Path, start_s: float, seconds: float, coder: Coder, skeleton: Skeleton) -> Recording:
+def excerpt_of(
+    file: Path, start_s: float, seconds: float, coder: MovedJoints, skeleton: Skeleton
+) -> Recording:
     """A part of a BVH file at 50 Hz, its floor at height 0. Raises StudioError for another skeleton, or where
     it is too short.
     """

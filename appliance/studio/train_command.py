@@ -9,17 +9,23 @@ from typing import Any
 
 import torch
 from rich.console import Console
+from torch import nn
 
-from appliance.studio.autoencoder.models import MODELS, settings_for
+from appliance.studio.autoencoder.models import MODELS, AnySettings, settings_for, settings_from
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.autoencoder.training_run import TrainingRun, parameters
 from appliance.studio.data import sources
 from appliance.studio.data.dataset import WINDOW
 from appliance.studio.data.sources import Sources
-from appliance.studio.evaluation.coders import load_checkpoint
+from appliance.studio.evaluation.coders import load_checkpoint, load_state
 from appliance.studio.evaluation.findings import MASKED_PICTURE, findings, require_windows
 from appliance.studio.evaluation.masked import draw_masked
 from appliance.studio.export.release import Request, release
+from appliance.studio.improviser import own_output
+from appliance.studio.improviser.learning import AnyTraining, train_until_done, training_for
+from appliance.studio.improviser.moves import MOVE
+from appliance.studio.improviser.pose_mixtures_training import PoseMixturesTraining
+from appliance.studio.processes import Processes, joined
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import reading_progress
 from appliance.studio.variations.sweep import report
@@ -40,6 +46,11 @@ class TrainOptions:
     latent: int = 0
     width: int = 0
     depth: int = 0
+    mixtures: int = 0
+    ahead: int = 0
+    learning_rate: float = 0.0
+    full_precision: bool = False
+    puppet: Path | None = None
     resume: bool = False
     threads: int = 0
     device: str = "auto"
@@ -54,50 +65,74 @@ class TrainOptions:
 def run(options: TrainOptions) -> bool:
     """Train, then write the show. False if it was stopped before its end.
 
-    Raises StudioError, DatasetError or BvhError.
+    Started by torchrun, all processes train, and the first one writes and prints. Raises StudioError,
+    DatasetError or BvhError.
     """
-    console = Console(stderr=True)
-    checkpoint = options.out / "checkpoint.pt"
+    device = choose_device(options.device)
     if options.threads:
         torch.set_num_threads(options.threads)
-    device = choose_device(options.device)
+    with joined(device) as processes:
+        return _train(options, device, processes)
+
+
+def _train(options: TrainOptions, device: str, processes: Processes) -> bool:
+    console = Console(stderr=True, quiet=not processes.leads)
+    checkpoint = options.out / "checkpoint.pt"
     settings, source, state = _settings_and_source(options, checkpoint)
     dataset = source.load(reading_progress(console))
     for line in findings(dataset):
         console.print(f"- {line}", highlight=False)
-    if any(take.errors for take in dataset.takes):
+    if processes.leads and any(take.errors for take in dataset.takes):
         draw_masked(options.out / MASKED_PICTURE, dataset.takes)
-    require_windows(dataset, settings.batch, settings.window)
-    training = Training(dataset, settings, device)
-    training.origin = source.as_state()
+    training: Training | AnyTraining
+    if isinstance(settings, Settings):
+        require_windows(dataset, settings.batch, settings.window)
+        training = Training(dataset, settings, device, processes)
+    else:
+        training = training_for(settings, dataset, _puppet(options, state), device, processes)
+    training.origin |= source.as_state()
     if state is not None:
         training.restore(state)
     options.out.mkdir(parents=True, exist_ok=True)
     console.print(_plan(training, device), highlight=False)
-    if not TrainingRun(training, options.out, console).run():
+    done = (
+        TrainingRun(training, options.out, console).run()
+        if isinstance(training, Training)
+        else train_until_done(training, checkpoint, console)
+    )
+    if done and processes.leads:
+        _finish(training, options, source, console)
+    if not done:
         again = f"bunraku train --resume --out {shlex.quote(str(options.out))}"
         console.print(
             f"Stopped at {100 * training.fraction:.0f} %; nothing is lost. Continue with: {again}",
             highlight=False,
             soft_wrap=True,
         )
-        return False
-    if settings.model != "puppet":
-        if settings.model == "sequence":
-            report(load_checkpoint(checkpoint)[0].autoencoder, dataset, options.out, console)
+    return done
+
+
+def _finish(
+    training: Training | AnyTraining, options: TrainOptions, source: Sources, console: Console
+) -> None:
+    """The report of a model, or the show of a puppet."""
+    settings, checkpoint = training.settings, options.out / "checkpoint.pt"
+    if isinstance(training, PoseMixturesTraining):
+        own_output.report(training, checkpoint, console)
+    if not isinstance(training, Training) or training.settings.model != "puppet":
+        if isinstance(training, Training) and settings.model == "sequence":
+            report(load_checkpoint(checkpoint)[0].autoencoder, training.dataset, options.out, console)
         console.print(f"{checkpoint} is ready. What it is for: {MODELS[settings.model].use}.")
-        return True
-    if settings.window != WINDOW:
+    elif training.settings.window != WINDOW:
         console.print(
             f"{checkpoint} dances by itself: bunraku granular {shlex.quote(str(checkpoint))} --out "
             f"phrase.bvh. It is no show: the box dances windows of {WINDOW} poses."
         )
-        return True
-    release(Request(checkpoint, source, options.out, options.name or "", options.phrase), dataset, console)
-    console.print(
-        f"{options.out} is a show. Dance it: bunraku play --show {shlex.quote(str(options.out))} --emulate"
-    )
-    return True
+    else:
+        request = Request(checkpoint, source, options.out, options.name or "", options.phrase)
+        release(request, training.dataset, console)
+        show = shlex.quote(str(options.out))
+        console.print(f"{options.out} is a show. Dance it: bunraku play --show {show} --emulate")
 
 
 def choose_device(wanted: str) -> str:
@@ -110,19 +145,19 @@ def choose_device(wanted: str) -> str:
 
 def _settings_and_source(
     options: TrainOptions, checkpoint: Path
-) -> tuple[Settings, Sources, dict[str, Any] | None]:
+) -> tuple[AnySettings, Sources, dict[str, Any] | None]:
     """Settings, recordings and, with --resume, the checkpoint's state. Raises StudioError."""
     if options.resume:
         if not checkpoint.exists():
             raise StudioError(f"{options.out} has no checkpoint.pt to resume. Omit --resume.")
-        state = load_checkpoint(checkpoint)[1]
-        settings = Settings.from_state(state["settings"])
+        state = load_state(checkpoint)
+        settings = settings_from(state["settings"])
         return _paced(settings, options), sources.remembered(state, options.recordings, checkpoint), state
     if checkpoint.exists():
         raise StudioError(
             f"{options.out} already has a training. Continue it with --resume, or give another --out."
         )
-    if options.recordings is None:
+    if options.recordings is None and options.puppet is None:
         raise StudioError("Give the folder of the recordings: --recordings FOLDER.")
     settings = settings_for(
         options.model,
@@ -131,16 +166,34 @@ def _settings_and_source(
         latent=options.latent,
         width=options.width,
         depth=options.depth,
+        mixtures=options.mixtures,
+        ahead=options.ahead,
+        learning_rate=options.learning_rate,
         seed=options.seed,
     )
+    if options.recordings is None:
+        assert options.puppet is not None
+        source = sources.remembered(load_state(options.puppet), None, options.puppet)
+        return _paced(settings, options), source, None
     source = sources.given(
         options.recordings, options.catalogue, options.held_out, options.true_fps, options.keep
     )
     return _paced(settings, options), source, None
 
 
-def _paced(settings: Settings, options: TrainOptions) -> Settings:
-    """Settings with the minutes or steps of the command line, if given. Raises StudioError for both."""
+def _puppet(options: TrainOptions, state: dict[str, Any] | None) -> Path | None:
+    """The dancer in whose latents our improviser goes on: given, or remembered by its checkpoint."""
+    remembered = None if state is None else state["origin"].get("puppet")
+    return options.puppet or (None if remembered is None else Path(remembered))
+
+
+def _paced(settings: AnySettings, options: TrainOptions) -> AnySettings:
+    """Settings with the minutes or steps and the precision of the command line, if given.
+
+    Raises StudioError for both minutes and steps.
+    """
+    if options.full_precision:
+        settings = replace(settings, mixed=False)
     if options.minutes is not None and options.steps is not None:
         raise StudioError("Give --minutes or --steps, not both: each sets the learning rate's pace.")
     if options.steps is not None:
@@ -150,13 +203,29 @@ def _paced(settings: Settings, options: TrainOptions) -> Settings:
     return settings
 
 
-def _plan(training: Training, device: str) -> str:
-    settings, shape = training.settings, training.autoencoder.shape
+def _plan(training: Training | AnyTraining, device: str) -> str:
+    settings, processes = training.settings, training.processes
     bound = f"{settings.steps} steps" if settings.steps else f"{settings.minutes:g} minutes"
     done = f", {100 * training.fraction:.0f} % done" if training.step else ""
     where = "the GPU" if device == "cuda" else f"the CPU ({torch.get_num_threads()} threads)"
-    count = parameters(training.autoencoder.network)
+    shared = f" in each of {processes.count} processes" if processes.count > 1 else ""
+    network, words = _described(training)
     return (
-        f"{settings.network}, windows of {shape.window} poses, latent {shape.latent}, width {shape.width}: "
-        f"{count / 1e6:.2f} million parameters; {bound} on {where}{done}."
+        f"{settings.network}, {words}: {parameters(network) / 1e6:.2f} million parameters; {bound} on "
+        f"{where}{shared}{done}."
     )
+
+
+def _described(training: Training | AnyTraining) -> tuple[nn.Module, str]:
+    """A training's network, and its sizes in words."""
+    if isinstance(training, Training):
+        sizes = training.autoencoder.shape
+        words = f"windows of {sizes.window} poses, latent {sizes.latent}, width {sizes.width}"
+        return training.autoencoder.network, words
+    if isinstance(training, PoseMixturesTraining):
+        shape = training.network.shape
+        return training.network, (
+            f"{shape.depth} x {shape.width}, looks back {shape.back} poses, predicts {shape.ahead}, "
+            f"{shape.mixtures} Gaussians over {shape.kept} components"
+        )
+    return training.improviser, f"moves of {MOVE} steps, {training.settings.mixtures} Gaussians"

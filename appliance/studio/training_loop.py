@@ -13,11 +13,16 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 import torch
 from torch import Tensor, nn
 
+from appliance.studio.processes import Processes
+from appliance.studio.studio_error import StudioError
+
+ALONE, PROCESSOR = Processes(), torch.device("cpu")
+
 
 class Duration(Protocol):
     """How to train: for `steps` steps if that is not 0, else for minutes of wall time.
 
-    smoothing: of the averaged weights, 0 to 1.
+    smoothing: of the averaged weights, 0 to 1; batch: of all processes; mixed: precision, on a GPU.
     """
 
     @property
@@ -29,8 +34,22 @@ class Duration(Protocol):
     @property
     def smoothing(self) -> float: ...
 
+    @property
+    def batch(self) -> int: ...
+
+    @property
+    def mixed(self) -> bool: ...
+
 
 Report = TypeVar("Report")
+
+
+def mixed_precision(device: torch.device, wanted: bool) -> torch.autocast:
+    """Inside it networks compute in bfloat16 on a GPU, their weights stay fp32; no effect on the processor.
+
+    Losses belong outside: 8 bits of precision are a third of a degree.
+    """
+    return torch.autocast(device.type, torch.bfloat16, enabled=wanted and device.type == "cuda")
 
 
 class TrainingLoop(ABC, Generic[Report]):
@@ -39,8 +58,17 @@ class TrainingLoop(ABC, Generic[Report]):
     report_type: type[Report]
     saved: ClassVar[tuple[str, ...]]  # networks and optimisers in a checkpoint
 
-    def __init__(self, duration: Duration) -> None:
-        self._duration = duration
+    def __init__(
+        self, duration: Duration, processes: Processes = ALONE, device: torch.device = PROCESSOR
+    ) -> None:
+        """Raises StudioError for a batch that the processes cannot share evenly."""
+        if duration.batch % processes.count:
+            raise StudioError(
+                f"{processes.count} processes cannot share a batch of {duration.batch} evenly. Start another "
+                "number of them: torchrun --nproc-per-node 2, 4 or 8."
+            )
+        self._duration, self.processes, self.device = duration, processes, device
+        self.mixed = mixed_precision(device, duration.mixed)
         self.step, self.seconds = 0, 0.0
         self.history: list[Report] = []
         self.origin: dict[str, Any] = {}  # what the training data came from
@@ -72,26 +100,32 @@ class TrainingLoop(ABC, Generic[Report]):
         save_every_s: float = 120.0,
         stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Train until done or stop() returns True; reports and saves at intervals of wall time."""
+        """Train until done or stop() returns True; reports and saves at intervals of wall time.
+
+        The leading process's clock and stop() count for all; only that process is told to report and save.
+        """
+        agreed, leads = self.processes.agreed, self.processes.leads
         sums: dict[str, float] = {}
         counted = 0
         began, offset = time.monotonic(), self.seconds
-        last_report = last_save = began
-        while self.fraction < 1.0 and not stop():
+        last_report = last_save = self.seconds
+        while self.fraction < 1.0 and not agreed(stop()):
             for name, value in self.train_step().items():
                 sums[name] = sums.get(name, 0.0) + float(value)
             counted += 1
-            now = time.monotonic()
-            self.seconds = offset + now - began
+            now = self.seconds = agreed(offset + time.monotonic() - began)
             if now - last_report >= report_every_s or self.fraction >= 1.0:
-                line = self.report({name: value / counted for name, value in sums.items()})
+                means = self.processes.mean(torch.tensor(list(sums.values()), dtype=torch.float64)) / counted
+                line = self.report(dict(zip(sums, means.tolist(), strict=True)))
                 self.history.append(line)
-                report(line)
+                if leads:
+                    report(line)
                 sums, counted, last_report = {}, 0, now
-            if now - last_save >= save_every_s:
+            if now - last_save >= save_every_s and leads:
                 save()
                 last_save = now
-        save()
+        if leads:
+            save()
 
     def save_checkpoint(self, path: Path) -> None:
         """Write the whole state; the old file stays until the new one is complete."""
@@ -106,6 +140,17 @@ class TrainingLoop(ABC, Generic[Report]):
         torch.set_rng_state(state["random"].cpu())
         self.step, self.seconds = state["step"], state["seconds"]
         self.history = [self.report_type(**line) for line in state["history"]]
+
+    def _descend(self, loss: Tensor, optimizer: torch.optim.Optimizer, *bounded: nn.Module) -> None:
+        """One step of an optimiser down the gradient of all processes' losses; of the bounded networks it is
+        at most 1 long.
+        """
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        self.processes.average_gradients(one for group in optimizer.param_groups for one in group["params"])
+        for network in bounded:
+            torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimizer.step()
 
     def _shared_state(self) -> dict[str, Any]:
         return {

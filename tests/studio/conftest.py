@@ -9,10 +9,13 @@ import pytest
 import torch
 from typer.testing import CliRunner, Result
 
+from appliance.studio import dance_files, standing_dance
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.commands import app
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.evaluation import answer_picture, own_answer, pictures
+from appliance.studio.improviser import own_output
+from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.pose_space import path
 from appliance.studio.variations import sweep, vary
 from tests.studio.tiny import write_recordings
@@ -35,10 +38,19 @@ def _small_answers() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(answer_picture, "COLUMNS", 2)
         patch.setattr(own_answer, "MOST_TICKS", 150)
-        for module in (pictures, sweep, vary, path):
+        for module in (pictures, sweep, vary, path, own_output):
             patch.setattr(module, "COLUMNS", 2)
         patch.setattr(sweep, "WINDOWS", 3)
+        patch.setattr(own_output, "SECONDS", 2.0)
+        patch.setattr(own_output, "DANCES", 1)
         yield
+
+
+@pytest.fixture
+def quickly_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Generated dances get no picture, and their feet are hardly planted: both take seconds."""
+    monkeypatch.setattr(dance_files, "draw_filmstrip", lambda *_, **__: None)
+    monkeypatch.setattr(standing_dance, "plant_feet", lambda dance: plant_feet(dance, 2))
 
 
 def bunraku(*arguments: object) -> Result:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -246,7 +247,9 @@ def test_a_trace_is_read_at_the_ticks(tmp_path: Path) -> None:
     np.testing.assert_allclose(2 * np.degrees(np.arccos(found[:, 0])), 90 * np.arange(100) / FPS, atol=0.05)
 
 
-def test_the_command_writes_page_strips_recordings_and_figures(tmp_path: Path, long_run: bool) -> None:
+def test_the_command_writes_page_strips_recordings_and_figures_of_two_networks_side_by_side(
+    tmp_path: Path, puppet_checkpoint: Path, long_run: bool
+) -> None:
     folder = tmp_path / "recordings"
     folder.mkdir()
     phrase = read_bvh(default_show_path() / "phrase.bvh")
@@ -256,8 +259,10 @@ def test_the_command_writes_page_strips_recordings_and_figures(tmp_path: Path, l
         [
             *(sys.executable, "-m", "appliance.cli.app", "experiment", "--out", str(tmp_path / "out")),
             *("--recordings", str(folder), "--excerpts", str(tmp_path / "excerpts.yaml")),
+            *("--network", str(puppet_checkpoint)),
             "--pictures" if long_run else "--no-pictures",
         ],
+        env={**os.environ, "COLUMNS": "200"},
         capture_output=True,
         text=True,
     )
@@ -267,12 +272,14 @@ def test_the_command_writes_page_strips_recordings_and_figures(tmp_path: Path, l
     )
     report = json.loads((tmp_path / "out/experiments.json").read_text())
     assert report["excerpts"]["mine"]["take"] == "solo"
-    (network,) = report["networks"].values()
-    assert set(network["claims"]) == set("abcdefg")
+    assert [name.partition(",")[0] for name in report["networks"]] == ["conditional", "mlp"]
+    for network in report["networks"].values():
+        assert set(network["claims"]) == set("abcdefg")
     page = (tmp_path / "out/experiments.html").read_text()
+    assert "".join(f"<th>{name}</th>" for name in ("claim", *report["networks"])) in page
     assert "http" not in page, "it opens without a network"
-    assert page.count("data:image/jpeg;base64,") == (6 if long_run else 0)
-    danced = sorted((tmp_path / "out").glob("*/mine/*.bvh"))
+    assert page.count("data:image/jpeg;base64,") == (12 if long_run else 0)
+    danced = sorted((tmp_path / "out").glob("conditional*/mine/*.bvh"))
     assert len(danced) == len(CONDITIONS) + 1
     assert len(read_bvh(next(path for path in danced if path.name == "turning_5s_10_10.bvh"))) == 750
 

@@ -278,3 +278,20 @@ def test_recordings_of_another_dancer_are_refused(checkpoint: tuple[Path, Path],
     result = bunraku("improvise", checkpoint[0], "--recordings", other, "--out", tmp_path / "p.bvh")
     assert result.exit_code == 2
     assert not (tmp_path / "p.bvh").exists()
+
+
+@pytest.mark.usefixtures("quickly_written")
+def test_an_improviser_is_trained_by_train_and_continues_a_prompt_like_its_own(
+    checkpoint: tuple[Path, Path], tmp_path: Path
+) -> None:
+    arguments = ["--model", "improviser", "--steps", 2, "--threads", 1, "--out", tmp_path / "moves"]
+    result = bunraku("train", "--puppet", checkpoint[0], "--recordings", checkpoint[1], *arguments)
+    assert result.exit_code == 0, result.output
+    write_bvh(tmp_path / "prompt.bvh", strolling(6.0))
+    asked = ["--prompt", tmp_path / "prompt.bvh", "--seconds", 2, "--recordings", checkpoint[1]]
+    model = tmp_path / "moves" / "checkpoint.pt"
+    result = bunraku("improvise", "--model", model, *asked, "--out", tmp_path / "on.bvh")
+    assert result.exit_code == 0, result.output
+    assert read_bvh(tmp_path / "on.bvh").seconds == pytest.approx(8.0, abs=0.2)
+    again = bunraku("train", "--resume", "--steps", 3, "--out", tmp_path / "moves")
+    assert again.exit_code == 0, again.output

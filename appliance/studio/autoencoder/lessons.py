@@ -10,6 +10,8 @@ import torch
 from torch import Tensor
 
 from appliance.studio.autoencoder import rotation
+from appliance.studio.processes import Processes
+from appliance.studio.training_loop import ALONE
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,9 @@ class Lessons(Protocol):
     """A source of lessons that sees the network's results."""
 
     def draw(self, batch: int, progress: float) -> list[Lesson]:
-        """The next lessons, `batch` windows in all, at a progress of 0 to 1 through the training."""
+        """The next lessons of this process, `batch` windows in all, at a progress of 0 to 1 through the
+        training.
+        """
 
     def follow(self, lesson: Lesson, made: Tensor) -> None:
         """Receive the windows that the network made of a lesson."""
@@ -58,11 +62,13 @@ class Lessons(Protocol):
 class Copies:
     """Lessons of the papers' autoencoder: the output should equal the input."""
 
-    def __init__(self, windows: Tensor, noise_degrees: float = 0.0) -> None:
-        self._windows, self._noise_degrees = windows, noise_degrees
+    def __init__(self, windows: Tensor, noise_degrees: float = 0.0, processes: Processes = ALONE) -> None:
+        self._windows, self._noise_degrees, self._processes = windows, noise_degrees, processes
 
     def draw(self, batch: int, progress: float) -> list[Lesson]:
-        windows = self._windows[torch.randint(len(self._windows), (batch,), device=self._windows.device)]
+        whole = batch * self._processes.count
+        rows = torch.randint(len(self._windows), (whole,), device=self._windows.device)
+        windows = self._windows[self._processes.share(rows)]
         return [Lesson(_shaken(windows, self._noise_degrees), windows)]
 
     def follow(self, lesson: Lesson, made: Tensor) -> None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 
 from appliance.studio.autoencoder.architectures import DEFAULT
 from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.autoencoder.training import Settings
 from appliance.studio.data.dataset import WINDOW
+from appliance.studio.evaluation.coders import IMPROVISER
+from appliance.studio.improviser.improviser_training import ImproviserSettings
+from appliance.studio.improviser.pose_mixtures_training import PoseMixturesSettings
 from appliance.studio.studio_error import StudioError
 
 SQUARED_ALONE = LossWeights(
@@ -18,7 +22,7 @@ SQUARED_ALONE = LossWeights(
 
 @dataclass(frozen=True)
 class Model:
-    """A kind of autoencoder: its window in poses, and settings by network, the default first.
+    """A kind of network: its window in poses, and settings by network, the default first.
 
     use: what its checkpoint is good for, for people; shortest, longest: windows that may be asked for.
     """
@@ -75,10 +79,24 @@ MODELS = {
         "bunraku vary",
         shortest=16,
     ),
+    # Section 'LSTM' of 'Beyond Imitation' is lstm-mixtures; its look-back is the window
+    IMPROVISER: Model(32, {"moves": {}, "lstm-mixtures": {}}, "bunraku improvise --model", shortest=10),
+}
+AnySettings = Settings | ImproviserSettings | PoseMixturesSettings
+IMPROVISERS: dict[str, type[ImproviserSettings] | type[PoseMixturesSettings]] = {
+    "moves": ImproviserSettings,
+    "lstm-mixtures": PoseMixturesSettings,
 }
 
 
-def settings_for(model: str, network: str | None = None, seed: int = 1, **sizes: int) -> Settings:
+def settings_from(saved: Mapping[str, Any]) -> AnySettings:
+    """The settings of any model's checkpoint."""
+    if saved.get("model") == IMPROVISER:
+        return IMPROVISERS[saved["network"]](**saved)
+    return Settings.from_state(saved)
+
+
+def settings_for(model: str, network: str | None = None, seed: int = 1, **sizes: float) -> AnySettings:
     """Settings of a model and network; sizes that are not 0 override its own. Raises StudioError."""
     kind = MODELS[model]
     network = network or next(iter(kind.networks))
@@ -90,5 +108,9 @@ def settings_for(model: str, network: str | None = None, seed: int = 1, **sizes:
     if not kind.shortest <= window <= kind.longest:
         fits = f"{kind.shortest} to {kind.longest} poses" if kind.longest > 1 else "one pose: omit it"
         raise StudioError(f"--window {window} is not for --model {model}, which takes {fits}.")
-    chosen = {"window": window, **kind.networks[network], **{k: v for k, v in sizes.items() if v}}
-    return Settings(model=model, network=network, seed=seed, **chosen)
+    make = IMPROVISERS.get(network, Settings)
+    asked, known = {k: v for k, v in sizes.items() if v}, {field.name for field in fields(make)}
+    for name in asked.keys() - known:
+        raise StudioError(f"--{name.replace('_', '-')} is not for the network {network}. Omit it.")
+    own = {"window": window} if "window" in known else {}
+    return make(model=model, network=network, seed=seed, **{**own, **kind.networks[network], **asked})

@@ -22,7 +22,8 @@ from appliance.studio.autoencoder.lessons import Copies, Lesson, Lessons
 from appliance.studio.autoencoder.networks import Mlp
 from appliance.studio.autoencoder.repertoire import Nearness
 from appliance.studio.data.dataset import WINDOW, Dataset, windows
-from appliance.studio.training_loop import TrainingLoop
+from appliance.studio.processes import Processes
+from appliance.studio.training_loop import ALONE, TrainingLoop
 
 SHORTEST_REACH = 0.04  # of the longest reach: what a joint without a bone below it counts as
 
@@ -47,6 +48,7 @@ class Settings:
     smoothing: float = 0.999  # of the averaged weights
     latent_noise: float = 0.05  # standard deviation; neighbouring latents must decode to neighbouring poses
     input_noise_degrees: float = 0.0
+    mixed: bool = True  # precision, on a GPU
     mirror: bool = True
     critic_every: int = 2  # steps; the prior moves slowly
     weights: losses.LossWeights = field(default_factory=losses.LossWeights)
@@ -88,10 +90,12 @@ class Training(TrainingLoop[Report]):
     report_type = Report
     saved = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer")
 
-    def __init__(self, dataset: Dataset, settings: Settings, device: str = "cpu") -> None:
-        super().__init__(settings)
+    def __init__(
+        self, dataset: Dataset, settings: Settings, device: str = "cpu", processes: Processes = ALONE
+    ) -> None:
+        super().__init__(settings, processes, torch.device(device))
         torch.manual_seed(settings.seed)
-        self.settings, self.device, self.dataset = settings, torch.device(device), dataset
+        self.settings, self.dataset = settings, dataset
         still = dataset.still_pose()
         rest = torch.tensor(still[list(dataset.moving)])
         network, shape = build(
@@ -127,8 +131,9 @@ class Training(TrainingLoop[Report]):
         self.lessons: Lessons = (
             Answers(self.train_windows, self.holding_chances(), settings.answers)
             if conditional
-            else Copies(self.train_windows, settings.input_noise_degrees)
+            else Copies(self.train_windows, settings.input_noise_degrees, processes)
         )
+        self._go_apart()
         self._critic_loss = torch.zeros((), device=self.device)
 
     def report(self, means: Mapping[str, float]) -> Report:
@@ -141,7 +146,7 @@ class Training(TrainingLoop[Report]):
         total = torch.zeros((), device=self.device)
         reported: dict[str, Tensor] = {}
         latents = []
-        for lesson in self.lessons.draw(settings.batch, self.fraction):
+        for lesson in self.lessons.draw(settings.batch // self.processes.count, self.fraction):
             raw, coded, parts = self._code(lesson)
             weight, suffix = (settings.weights.hands, "_with_hands") if lesson.hands else (1.0, "")
             for name, part in parts.items():
@@ -156,10 +161,7 @@ class Training(TrainingLoop[Report]):
             prior = losses.prior_loss(self.critic, coded)
             total = total + settings.weights.prior * prior
             reported |= {"prior": prior, "critic": self._critic_loss}
-        self.optimizer.zero_grad(set_to_none=True)
-        total.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(self.autoencoder.parameters(), 1.0)
-        self.optimizer.step()
+        self._descend(total, self.optimizer, self.autoencoder)
         self._average_weights(self.averaged, self.autoencoder)
         self.step += 1
         with torch.no_grad():
@@ -176,29 +178,33 @@ class Training(TrainingLoop[Report]):
         windows, hands, parts = lesson.windows, lesson.hands, {}
         for taken in range(lesson.passes - 1 if hands is not None else 0):
             assert hands is not None
-            coded = self.autoencoder.encode_held(windows, lesson.windows, hands.goal, hands.held)
-            raw = self.autoencoder.decode_raw(coded, lesson.windows, hands.held)
+            with self.mixed:
+                coded = self.autoencoder.encode_held(windows, lesson.windows, hands.goal, hands.held)
+                raw = self.autoencoder.decode_raw(coded, lesson.windows, hands.held).float()
             if taken == 0:
                 parts["first"] = losses.rotation_loss(raw, hands.first)
             windows = rotation.normalize(raw)
         if self.settings.variational:
-            coded, log_variance = self.autoencoder.encode_gaussian(windows)
+            with self.mixed:
+                coded, log_variance = self.autoencoder.encode_gaussian(windows)
+            coded, log_variance = coded.float(), log_variance.float()
             parts["divergence"] = losses.divergence(coded, log_variance)
-            seen = losses.sampled(coded, log_variance)
+            seen = coded + torch.exp(0.5 * log_variance) * self.processes.noise(coded)
         else:
-            coded = self.autoencoder.encode(windows)
-            seen = coded + self.settings.latent_noise * torch.randn_like(coded)
-        raw = self.autoencoder.decode_raw(seen)
+            with self.mixed:
+                coded = self.autoencoder.encode(windows)
+            coded = coded.float()
+            seen = coded + self.settings.latent_noise * self.processes.noise(coded)
+        with self.mixed:
+            raw = self.autoencoder.decode_raw(seen).float()
         parts.update(losses.reconstruction_losses(raw, lesson.answer, self.body, self.settings.weights))
         if hands is not None:
             parts.update(losses.advance_losses(raw, lesson.answer))
         return raw, coded, parts
 
     def _train_critic(self, latents: Tensor) -> Tensor:
-        loss = losses.critic_loss(self.critic, latents, torch.randn_like(latents))
-        self.critic_optimizer.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        self.critic_optimizer.step()
+        loss = losses.critic_loss(self.critic, latents, self.processes.noise(latents))
+        self._descend(loss, self.critic_optimizer)
         return loss.detach()
 
     def holding_chances(self) -> Tensor:
@@ -244,6 +250,15 @@ class Training(TrainingLoop[Report]):
         self.lessons.restore(state["lessons"])
         if self.device.type == "cuda" and state.get("random_gpu") is not None:
             torch.cuda.set_rng_state(state["random_gpu"].cpu(), self.device)
+        self._go_apart()
+
+    def _go_apart(self) -> None:
+        """Processes that answer hands draw lessons of their own, for a lesson costs more than to learn it.
+
+        All other chance is the same in all of them, and each takes its share: as one process would.
+        """
+        if isinstance(self.lessons, Answers) and not self.processes.leads:
+            torch.manual_seed(1_000_003 * (self.step + 1) + 1009 * self.settings.seed + self.processes.rank)
 
     def _heading_free(self, poses: np.ndarray[Any, np.dtype[np.float32]]) -> Tensor:
         return torch.cat(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -19,6 +20,17 @@ if TYPE_CHECKING:
     from appliance.studio.autoencoder.autoencoder import Autoencoder
 
 Poses = NDArray[np.float32]
+IMPROVISER = "improviser"  # the model of a checkpoint that is no autoencoder
+
+
+class MovedJoints(Protocol):
+    """What a network moves: joint names, and their rest pose (M, 4)."""
+
+    @property
+    def joints(self) -> tuple[str, ...]: ...
+
+    @property
+    def rest(self) -> Poses: ...
 
 
 class Coder(Protocol):
@@ -133,15 +145,33 @@ def load_checkpoint(path: Path) -> tuple[TorchCoder, dict[str, Any]]:
     """The averaged network of a checkpoint and the checkpoint's whole state. Raises StudioError."""
     from appliance.studio.autoencoder.training import load_autoencoder
 
-    try:
+    if load_state(path)["settings"].get("model") == IMPROVISER:
+        raise StudioError(f"{path} is an improviser, for bunraku improvise --model, and no autoencoder.")
+    with _from_training(path):
         autoencoder, joints, state = load_autoencoder(path)
+    architecture = state["settings"]["network"]
+    facts = {"file": path.name, "architecture": architecture, "precision": "fp32 in PyTorch"}
+    return TorchCoder(autoencoder, joints, facts), state
+
+
+def load_state(path: Path) -> dict[str, Any]:
+    """All of a checkpoint, whatever was trained. Raises StudioError."""
+    import torch
+
+    with _from_training(path):
+        state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
+        state["settings"]["seed"]
+    return state
+
+
+@contextmanager
+def _from_training(path: Path) -> Iterator[None]:
+    try:
+        yield
     except Exception as error:  # torch raises many classes for a file that it did not write
         raise StudioError(
             f"{path} is not a checkpoint of bunraku train ({str(error).splitlines()[0][:150]})."
         ) from error
-    architecture = state["settings"]["network"]
-    facts = {"file": path.name, "architecture": architecture, "precision": "fp32 in PyTorch"}
-    return TorchCoder(autoencoder, joints, facts), state
 
 
 def load_puppet(path: Path) -> tuple[TorchCoder, dict[str, Any]]:

@@ -21,7 +21,7 @@ from appliance.studio.data.dataset import (
     load_take,
     window_starts,
 )
-from appliance.studio.evaluation.coders import Coder, Poses
+from appliance.studio.evaluation.coders import Coder, MovedJoints, Poses
 from appliance.studio.studio_error import StudioError
 
 ITERATIONS = (1, 2, 5, 10)
@@ -72,7 +72,7 @@ class Evaluation:
 
 
 def load_takes(
-    files: Sequence[Path], coder: Coder, true_fps: float | None = None, all_frames: bool = False
+    files: Sequence[Path], coder: MovedJoints, true_fps: float | None = None, all_frames: bool = False
 ) -> list[Take]:
     """Recordings as training reads them: at their true rate, T-pose dropped, capture errors masked, 50 Hz.
 

@@ -1,46 +1,53 @@
-"""`bunraku improvise`: trains an improviser on recordings and writes a phrase that it danced."""
+"""`bunraku improvise`: a phrase that an improviser danced, or what it danced after a prompt."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
-from appliance.studio.autoencoder.training_run import stop_signals
 from appliance.studio.dance_files import write_dance
-from appliance.studio.data.dataset import Dataset
-from appliance.studio.evaluation.coders import TorchCoder, load_puppet
-from appliance.studio.improviser.improviser import Improviser
+from appliance.studio.data.dataset import FPS, Dataset, window_starts
+from appliance.studio.evaluation.coders import IMPROVISER, MovedJoints, TorchCoder, load_puppet, load_state
 from appliance.studio.improviser.improviser_training import (
-    ImproviserReport,
     ImproviserSettings,
     ImproviserTraining,
+    load_improviser,
 )
-from appliance.studio.improviser.moves import BEFORE, MOVE
-from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
+from appliance.studio.improviser.learning import (
+    fingerprint,
+    moves_training,
+    steps_of_dataset,
+    train_until_done,
+)
+from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.phrase import PhraseOptions, make_phrase, verdict
-from appliance.studio.improviser.prompt import continued
-from appliance.studio.improviser.steps import ROOT, Steps, steps_of_takes
+from appliance.studio.improviser.pose_mixtures_training import PoseMixturesSettings, load_pose_improviser
+from appliance.studio.improviser.prompt import Follower, MovesFollower, continued
+from appliance.studio.improviser.steps import Steps, floor_under
 from appliance.studio.standing_dance import excerpt_of
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
 
+Say = Callable[[str], None]
+PROMPT_S = 3.0  # of a recording, where the published improviser gets no prompt
+
 
 @dataclass(frozen=True)
 class ImproviseOptions:
-    """The command line of bunraku improvise."""
+    """The command line of bunraku improvise. checkpoint: of a puppet; model: of a trained improviser."""
 
-    checkpoint: Path
+    checkpoint: Path | None
     out: Path
     recordings: Path | None = None
+    model: Path | None = None
     minutes: float = 12.0
     steps: int = 0
     threads: int = 0
@@ -50,55 +57,75 @@ class ImproviseOptions:
 
 
 def run(options: ImproviseOptions) -> bool:
-    """Train, improvise, write the phrase. False if stopped before the end; raises StudioError."""
+    """Train if no model is given, improvise, write. False if stopped before the end; raises StudioError."""
     console = Console(stderr=True)
     if options.threads:
         torch.set_num_threads(options.threads)
-    coder, state = load_puppet(options.checkpoint)
-    autoencoder = coder.autoencoder
-    dataset = trained_on(options.checkpoint, coder.joints, state, options.recordings, console)
-    steps = steps_of_takes(autoencoder, dataset.training, dataset.moving, BEFORE + MOVE)
-    held_out = steps_of_takes(autoencoder, dataset.held_out, dataset.moving, BEFORE + MOVE)
-    training = _training(options, autoencoder, steps, held_out, console)
-    if not _train(training, improviser_file(options.out), console):
-        return False
 
     def say(message: str) -> None:
         console.print(message, highlight=False, soft_wrap=True)
 
-    if options.prompt is not None:
-        continue_prompt(options, coder, training.averaged, dataset, say)
+    state = None if options.model is None else _improviser_state(options.model)
+    if state is not None and state["settings"]["network"] == PoseMixturesSettings.network:
+        assert options.model is not None
+        published, _ = load_pose_improviser(options.model)
+        dataset = trained_on(options.model, published.joints, state, options.recordings, console)
+        continue_prompt(options, published, published, dataset, say)
         return True
-    phrase, natural = make_phrase(autoencoder, training.averaged, dataset, steps, options.phrase, say)
-    write_phrase(options, phrase, natural, dataset, training)
+    coder, puppet_state, puppet = _puppet(options, state)
+    dataset = trained_on(puppet, coder.joints, puppet_state, options.recordings, console)
+    steps = steps_of_dataset(coder.autoencoder, dataset)
+    if state is not None and options.model is not None:
+        improviser, settings, learned = load_improviser(options.model)[0], state["settings"], state["step"]
+    else:
+        training = _training(options, coder.autoencoder, dataset, steps, say)
+        if not train_until_done(training, improviser_file(options.out), console):
+            say("Stopped; nothing is lost. The same command continues.")
+            return False
+        improviser, settings, learned = training.averaged, asdict(training.settings), training.step
+    if options.prompt is not None:
+        continue_prompt(options, MovesFollower(coder.autoencoder, improviser), coder, dataset, say)
+        return True
+    phrase, natural = make_phrase(coder.autoencoder, improviser, dataset, steps, options.phrase, say)
+    report: dict[str, Any] = {
+        "phrase": asdict(options.phrase),
+        "improviser": {"settings": settings, "steps": learned},
+        "learned_from": [take.name for take in dataset.training if take.sound.any()],
+        "naturalness": natural.as_json(),
+    }
+    title = f"{options.out.stem}: {phrase.seconds:.0f} s, seed {options.phrase.seed}"
+    write_dance(options.out, phrase, title, report, rows=3)
     say(f"{options.out}: {verdict(natural)}")
     return True
 
 
 def continue_prompt(
-    options: ImproviseOptions,
-    coder: TorchCoder,
-    improviser: Improviser,
-    dataset: Dataset,
-    say: Callable[[str], None],
+    options: ImproviseOptions, follower: Follower, moves: MovedJoints, dataset: Dataset, say: Say
 ) -> None:
-    """The prompt and what the improviser dances after it, with a report and a picture."""
-    assert options.prompt is not None
+    """The prompt and what the improviser dances after it, with a report and a picture.
+
+    Without a prompt it goes on from a recorded moment, which is cut away: the seed chooses it.
+    """
     end = 1e9 if options.prompt_end is None else options.prompt_end
-    prompt = excerpt_of(options.prompt, 0.0, end, coder, dataset.skeleton)
+    prompt = (
+        _recorded_moment(dataset, options.phrase.seed)
+        if options.prompt is None
+        else excerpt_of(options.prompt, 0.0, end, moves, dataset.skeleton)
+    )
     asked = options.phrase
-    made = continued(
-        coder.autoencoder, improviser, dataset, prompt, asked.seconds, asked.temperature, asked.seed
-    )
-    words = f"the prompt ends at {made.joined_s:.1f} s"
+    made = continued(follower, dataset, prompt, asked.seconds, asked.temperature, asked.seed)
     figures = {"joined_s": made.joined_s, "seam_degrees": made.seam, "usual_degrees": made.usual}
-    natural = measure(made.dance, Yardstick.of(dataset.training, dataset.moving), endless=False)
+    dance, words = made.dance, f"the prompt ends at {made.joined_s:.1f} s"
+    if options.prompt is None:
+        dance, figures, words = dance.excerpt(made.joined_s), {}, "after a recorded moment"
+    natural = measure(dance, Yardstick.of(dataset.training, dataset.moving), endless=False)
     report = {"phrase": asdict(asked), **figures, "naturalness": natural.as_json()}
-    write_dance(options.out, made.dance, f"{options.out.stem}: {words}", report, rows=3)
-    say(
-        f"{options.out}: {made.dance.seconds:.1f} s; {words}. The largest step of a joint around there is "
-        f"{made.seam:.1f} degrees, {made.usual:.1f} are usual in the prompt. {verdict(natural)}"
+    write_dance(options.out, dance, f"{options.out.stem}: {words}", report, rows=3)
+    seam = (
+        f" The largest step of a joint around there is {made.seam:.1f} degrees, {made.usual:.1f} are usual "
+        "in the prompt."
     )
+    say(f"{options.out}: {dance.seconds:.1f} s; {words}.{seam if figures else ''} {verdict(natural)}")
 
 
 def improviser_file(out: Path) -> Path:
@@ -106,98 +133,61 @@ def improviser_file(out: Path) -> Path:
     return out.with_suffix(".improviser.pt")
 
 
-def write_phrase(
-    options: ImproviseOptions,
-    phrase: Recording,
-    natural: Naturalness,
-    dataset: Dataset,
-    training: ImproviserTraining,
-) -> None:
-    """The phrase, its report (JSON) and a picture of it."""
-    report: dict[str, Any] = {
-        "phrase": asdict(options.phrase),
-        "improviser": {"settings": asdict(training.settings), "steps": training.step},
-        "learned_from": [take.name for take in dataset.training if take.sound.any()],
-        "naturalness": natural.as_json(),
-    }
-    title = f"{options.out.stem}: {phrase.seconds:.0f} s, seed {options.phrase.seed}"
-    write_dance(options.out, phrase, title, report, rows=3)
+def _improviser_state(model: Path) -> dict[str, Any]:
+    state = load_state(model)
+    if state["settings"].get("model") != IMPROVISER:
+        raise StudioError(
+            f"{model} is no improviser. Train one with: bunraku train --model improviser, or give the "
+            "checkpoint of a dancer without --model."
+        )
+    return state
+
+
+def _puppet(
+    options: ImproviseOptions, state: dict[str, Any] | None
+) -> tuple[TorchCoder, dict[str, Any], Path]:
+    """The dancer in whose latents ours goes on: as given, or as the improviser's checkpoint remembers."""
+    remembered = None if state is None else state["origin"].get("puppet")
+    puppet = options.checkpoint or (None if remembered is None else Path(remembered))
+    if puppet is None:
+        raise StudioError("Give the dancer's checkpoint.pt, or an improviser with --model.")
+    coder, puppet_state = load_puppet(puppet)
+    if state is not None and fingerprint(coder.autoencoder) != state["origin"]["autoencoder"]:
+        raise StudioError(
+            f"{options.model} was trained with another dancer than {puppet}. Give that dancer's "
+            "checkpoint.pt as the argument, or train again with --puppet."
+        )
+    return coder, puppet_state, puppet
+
+
+def _recorded_moment(dataset: Dataset, seed: int) -> Recording:
+    """A few seconds of a training take, its floor at height 0."""
+    chance, frames = np.random.default_rng(seed), round(PROMPT_S * FPS)
+    starts = [(take, first) for take in dataset.training for first in window_starts(take, window=frames)]
+    if not starts:
+        raise StudioError(f"No recording has {PROMPT_S:g} s without a capture error. Give a --prompt.")
+    take, first = starts[int(chance.integers(len(starts)))]
+    moment = take.recording.excerpt(first / FPS, (first + frames) / FPS)
+    roots = moment.roots.copy()
+    roots[:, 1] -= floor_under(moment)
+    return replace(moment, roots=roots)
 
 
 def _training(
-    options: ImproviseOptions,
-    autoencoder: Autoencoder,
-    steps: list[Steps],
-    held_out: list[Steps],
-    console: Console,
+    options: ImproviseOptions, autoencoder: Autoencoder, dataset: Dataset, steps: list[Steps], say: Say
 ) -> ImproviserTraining:
     """The training stored beside the phrase, if it is for the same autoencoder; else a new one."""
     settings = ImproviserSettings(seed=options.phrase.seed, minutes=options.minutes, steps=options.steps)
-    rows = BEFORE + MOVE * settings.moves
-    if not any(len(stretch) >= rows for stretch in steps):
-        raise StudioError(
-            f"No recording has {rows / 12.5:.0f} s without a capture error: too little to improvise from."
-        )
-    training = ImproviserTraining(
-        [torch.tensor(stretch.features) for stretch in steps],
-        [torch.tensor(stretch.features) for stretch in held_out],
-        ROOT,
-        settings,
-    )
-    training.origin = {"autoencoder": fingerprint(autoencoder)}
+    training = moves_training(autoencoder, dataset, steps, settings)
     file = improviser_file(options.out)
-    if file.exists():
-        state = torch.load(file, map_location="cpu", weights_only=True)
-        if state["origin"] == training.origin and state["shape"] == asdict(training.improviser.shape):
-            training.restore(state)
-            # The phrase may have another seed than the improviser's training.
-            training.settings = replace(settings, seed=state["settings"]["seed"])
-            console.print(f"{file} continues at {100 * training.fraction:.0f} %.", highlight=False)
-            return training
-        console.print(f"{file} belongs to another autoencoder and is replaced.", highlight=False)
+    if not file.exists():
+        return training
+    state = load_state(file)
+    if state["origin"] != training.origin or state["shape"] != asdict(training.improviser.shape):
+        say(f"{file} belongs to another autoencoder and is replaced.")
+        return training
+    training.restore(state)
+    # The phrase may have another seed than the improviser's training.
+    training.settings = replace(settings, seed=state["settings"]["seed"])
+    say(f"{file} continues at {100 * training.fraction:.0f} %.")
     return training
-
-
-def fingerprint(autoencoder: Autoencoder) -> str:
-    """A hash of an autoencoder's weights."""
-    digest = hashlib.sha256()
-    for value in autoencoder.state_dict().values():
-        digest.update(value.numpy().tobytes())
-    return digest.hexdigest()[:16]
-
-
-def _train(training: ImproviserTraining, file: Path, console: Console) -> bool:
-    """Train until done or stopped (Ctrl-C, SIGTERM); the improviser's file is written either way."""
-    if training.fraction >= 1.0:
-        return True
-    file.parent.mkdir(parents=True, exist_ok=True)
-
-    with stop_signals() as stop_asked, _progress(console) as progress:
-        bar = progress.add_task("improviser", total=1.0, words="")
-
-        def stop() -> bool:
-            progress.update(bar, completed=training.fraction)
-            return stop_asked()
-
-        def report(line: ImproviserReport) -> None:
-            words = _history_line(line)
-            progress.update(bar, completed=line.fraction, words=words)
-            if not console.is_terminal:
-                console.print(f"{100 * line.fraction:5.1f} %  {words}", highlight=False, soft_wrap=True)
-
-        training.run(report, lambda: training.save_checkpoint(file), save_every_s=60.0, stop=stop)
-    if training.fraction < 1.0:
-        console.print("Stopped; nothing is lost. The same command continues.")
-    return training.fraction >= 1.0
-
-
-def _progress(console: Console) -> Progress:
-    columns = [TextColumn("learning to improvise"), BarColumn(), TaskProgressColumn()]
-    words = TextColumn("{task.fields[words]}")
-    return Progress(*columns, words, console=console, disable=not console.is_terminal)
-
-
-def _history_line(line: ImproviserReport) -> str:
-    parts = ", ".join(f"{name} {value:.3g}" for name, value in line.parts.items())
-    held = ", ".join(f"{name} {value:.3g}" for name, value in line.held_out.items())
-    return f"step {line.step}  {parts}" + (f"; held-out takes: {held}" if held else "")

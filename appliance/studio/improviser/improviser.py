@@ -30,6 +30,12 @@ class Mixture:
     means: Tensor
     log_scales: Tensor
 
+    @staticmethod
+    def of(numbers: Tensor, mixtures: int, narrowest: float = NARROWEST) -> Mixture:
+        """A network's output (B, K * (2 D + 1)) as K Gaussians; none has a log scale below `narrowest`."""
+        means, log_scales = numbers[:, mixtures:].reshape(len(numbers), 2, mixtures, -1).unbind(1)
+        return Mixture(numbers[:, :mixtures], means, log_scales.clamp(narrowest, WIDEST))
+
     def negative_log_likelihood(self, x: Tensor) -> Tensor:
         """(B,) nats a number of x (B, D)."""
         off = (x[:, None] - self.means) * torch.exp(-self.log_scales)
@@ -55,7 +61,7 @@ class Choreographer(nn.Module):
 
     def __init__(self, shape: MovesShape, width: int, layers: int, mixtures: int) -> None:
         super().__init__()
-        self.code, self.width, self.mixtures = shape.code, width, mixtures
+        self.width, self.mixtures = width, mixtures
         self.seen = nn.Linear(BEFORE * shape.inside + shape.code, width)
         self.cells = nn.ModuleList([nn.LSTMCell(width, width) for _ in range(layers)])
         self.head = nn.Linear(width, mixtures * (2 * shape.code + 1))
@@ -77,9 +83,7 @@ class Choreographer(nn.Module):
             remembered.append((h, c))
             hidden = hidden + h
         out = self.head(functional.dropout(hidden, dropout, training=dropout > 0))
-        rest = out[:, self.mixtures :].unflatten(1, (2, self.mixtures, self.code))
-        log_scales = rest[:, 1].clamp(NARROWEST, WIDEST)
-        return Mixture(out[:, : self.mixtures], rest[:, 0], log_scales), remembered
+        return Mixture.of(out, self.mixtures), remembered
 
 
 class Improviser(nn.Module):

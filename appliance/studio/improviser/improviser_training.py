@@ -13,8 +13,9 @@ from torch import Tensor
 
 from appliance.studio.autoencoder.losses import divergence, sampled
 from appliance.studio.improviser.improviser import Improviser
-from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, move_loss
-from appliance.studio.training_loop import TrainingLoop
+from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, Scale, move_loss
+from appliance.studio.processes import Processes
+from appliance.studio.training_loop import ALONE, TrainingLoop
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,9 @@ class ImproviserSettings:
     input_noise: float = 0.1
     own: float = 0.9  # share of moves that continue the network's own steps, at the end of the training
     smoothing: float = 0.995
+    mixed: bool = False  # precision: it trains on the processor
+    model: str = "improviser"
+    network: str = "moves"
 
 
 @dataclass
@@ -58,10 +62,15 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
     saved = ("improviser", "averaged", "optimizer")
 
     def __init__(
-        self, training: Sequence[Tensor], held_out: Sequence[Tensor], ways: int, settings: ImproviserSettings
+        self,
+        training: Sequence[Tensor],
+        held_out: Sequence[Tensor],
+        ways: int,
+        settings: ImproviserSettings,
+        processes: Processes = ALONE,
     ) -> None:
         """training, held_out: stretches of steps (T, features); those shorter than a row are not used."""
-        super().__init__(settings)
+        super().__init__(settings, processes)
         torch.manual_seed(settings.seed)
         self.settings = settings
         latent = training[0].shape[1] - ways
@@ -69,8 +78,9 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
         self.improviser = Improviser(shape, settings.lstm_width, settings.lstm_layers, settings.mixtures)
         self.improviser.scale.learn(torch.cat(list(training)))
         self.averaged = copy.deepcopy(self.improviser).requires_grad_(False)
-        self.rows, self.starts = self._laid_out(training)
-        self.held_rows, self.held_starts = self._laid_out(held_out)
+        scale = self.improviser.scale
+        self.rows, self.starts = laid_out(training, scale, self._length)
+        self.held_rows, self.held_starts = laid_out(held_out, scale, self._length)
         self.optimizer = torch.optim.Adam(self.improviser.parameters(), lr=settings.learning_rate, fused=True)
 
     def report(self, means: Mapping[str, float]) -> ImproviserReport:
@@ -82,18 +92,15 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
         for group in self.optimizer.param_groups:
             warm = min(1.0, (self.step + 1) / 100)
             group["lr"] = settings.learning_rate * warm * max(self._cosine(), 0.01)
-        chosen = self.starts[torch.randint(len(self.starts), (settings.batch,))]
+        rows = self.processes.share(torch.randint(len(self.starts), (settings.batch,)))
+        chosen = self.starts[rows]
         truth = self.rows[chosen[:, None] + torch.arange(self._length)]
         own = settings.own * min(1.0, 1.5 * self.fraction)
         parts = self._danced(self.improviser, truth, own, settings.dropout, settings.input_noise)
         numbers = MOVE * self.improviser.shape.inside
         weight = numbers / (2 * settings.closeness**2)
         loss = (weight * parts["moves"] + parts["divergence"]) / settings.code + parts["nats"]
-        self.optimizer.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(self.improviser.moves.parameters(), 1.0)
-        torch.nn.utils.clip_grad_norm_(self.improviser.choreographer.parameters(), 1.0)
-        self.optimizer.step()
+        self._descend(loss, self.optimizer, self.improviser.moves, self.improviser.choreographer)
         self._average_weights(self.averaged, self.improviser)
         self.step += 1
         return {name: part.detach() for name, part in parts.items()}
@@ -151,15 +158,16 @@ class ImproviserTraining(TrainingLoop[ImproviserReport]):
             mixture, state = choreographer(made[:, -BEFORE:].detach(), code.detach(), state, dropout)
         return {name: value / (self.settings.moves - (name == "nats")) for name, value in sums.items()}
 
-    def _laid_out(self, stretches: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
-        """All scaled steps, concatenated, and the indices at which a whole training row begins."""
-        starts, at = [], 0
-        for stretch in stretches:
-            starts.append(torch.arange(at, at + max(len(stretch) - self._length + 1, 0)))
-            at += len(stretch)
-        if not starts:
-            return torch.zeros(0, self.improviser.shape.inside), torch.zeros(0, dtype=torch.long)
-        return self.improviser.scale.inside(torch.cat(list(stretches))), torch.cat(starts)
+
+def laid_out(stretches: Sequence[Tensor], scale: Scale, length: int) -> tuple[Tensor, Tensor]:
+    """All scaled steps (N, inside) of stretches (T, features), and where a row of `length` steps begins."""
+    starts, at = [], 0
+    for stretch in stretches:
+        starts.append(torch.arange(at, at + max(len(stretch) - length + 1, 0)))
+        at += len(stretch)
+    if not starts:
+        return torch.zeros(0, scale.shape.inside), torch.zeros(0, dtype=torch.long)
+    return scale.inside(torch.cat(list(stretches))), torch.cat(starts)
 
 
 def load_improviser(path: Path) -> tuple[Improviser, dict[str, Any]]:

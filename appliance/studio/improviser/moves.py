@@ -18,17 +18,14 @@ PLACE_WEIGHT = 3.0  # of the root's displacement in the loss, to a latent direct
 
 
 @dataclass(frozen=True)
-class MovesShape:
-    """latent: size of the autoencoder's latent; kept: how many of its principal directions are used; ways:
-    numbers of the root's displacement; code: size of a move's code; width and depth of the dense networks.
+class StepShape:
+    """latent: numbers of a pose (an autoencoder's latent, or its quaternions); kept: how many of their
+    principal directions are used; ways: numbers of the root's displacement.
     """
 
     latent: int
     kept: int
     ways: int
-    code: int = 32
-    width: int = 512
-    depth: int = 2
 
     @property
     def features(self) -> int:
@@ -39,10 +36,19 @@ class MovesShape:
         return self.kept + self.ways
 
 
+@dataclass(frozen=True)
+class MovesShape(StepShape):
+    """code: size of a move's code; width and depth of the dense networks."""
+
+    code: int = 32
+    width: int = 512
+    depth: int = 2
+
+
 class Scale(nn.Module):
     """Maps steps to and from principal directions of latents and the root's displacement, standardised."""
 
-    def __init__(self, shape: MovesShape) -> None:
+    def __init__(self, shape: StepShape) -> None:
         super().__init__()
         self.shape = shape
         self.middle: Tensor

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -21,7 +22,7 @@ from appliance.studio.improviser.steps import HOP, Steps, danced_again, motion_o
 from appliance.studio.standing_dance import standing
 from appliance.studio.studio_error import StudioError
 
-KNOWN = 5  # of the prompt's steps that are decoded again, for the motion that is faded over
+KNOWN = 5  # of the prompt's steps that ours decodes again, for the motion that is faded over
 AROUND_S = 0.3  # on either side of the join, where a seam would show
 
 
@@ -37,33 +38,53 @@ class Continuation:
     usual: float
 
 
+class Follower(Protocol):
+    """An improviser: ours (MovesFollower) or the published one (pose_mixtures.PoseImproviser)."""
+
+    def follow(
+        self, prompt: Recording, dataset: Dataset, seconds: float, temperature: float, seed: int
+    ) -> tuple[Recording, int, int]:
+        """Motion at 50 Hz, the frame of the prompt that it begins with, and how many of its frames are faded
+        over into it: the prompt's own, danced again.
+        """
+
+
+@dataclass(frozen=True)
+class MovesFollower:
+    """Ours: goes on in the latents of its autoencoder, move by move."""
+
+    autoencoder: Autoencoder
+    improviser: Improviser
+
+    def follow(
+        self, prompt: Recording, dataset: Dataset, seconds: float, temperature: float, seed: int
+    ) -> tuple[Recording, int, int]:
+        """See Follower. Raises StudioError for a prompt that is too short."""
+        autoencoder, moving = self.autoencoder, list(dataset.moving)
+        steps = steps_of(autoencoder, prompt, moving)
+        if len(steps) < BEFORE + MOVE:
+            least = HOP * (BEFORE + MOVE + 1) + WINDOW
+            raise StudioError(
+                f"The prompt has {len(prompt) / FPS:.1f} s; the improviser continues from {least / FPS:.1f} "
+                "s or more. Give a longer one, or a later --from."
+            )
+        primer = torch.tensor(steps.features[-PRIMER:])[None]
+        moves = math.ceil(seconds * STEPS_S / MOVE)
+        danced = self.improviser.improvise(primer, moves, temperature, seed)[0].numpy()
+        together = Steps.of_features(np.concatenate([steps.features[-KNOWN:], danced]))
+        poses, roots = motion_of(autoencoder, together, prompt.poses[-1], moving)
+        poses = danced_again(autoencoder, poses, moving)
+        first = HOP * (len(steps) - KNOWN + 1) + WINDOW // 2
+        return Recording(prompt.skeleton, poses, roots, FPS), first, (KNOWN - 1) * HOP
+
+
 def continued(
-    autoencoder: Autoencoder,
-    improviser: Improviser,
-    dataset: Dataset,
-    prompt: Recording,
-    seconds: float,
-    temperature: float,
-    seed: int,
+    follower: Follower, dataset: Dataset, prompt: Recording, seconds: float, temperature: float, seed: int
 ) -> Continuation:
     """prompt: at 50 Hz, its floor at height 0. Raises StudioError where it is too short."""
     moving = list(dataset.moving)
-    steps = steps_of(autoencoder, prompt, moving)
-    if len(steps) < BEFORE + MOVE:
-        least = HOP * (BEFORE + MOVE + 1) + WINDOW
-        raise StudioError(
-            f"The prompt has {len(prompt) / FPS:.1f} s; the improviser continues from {least / FPS:.1f} s or "
-            "more. Give a longer one, or a later --from."
-        )
-    primer = torch.tensor(steps.features[-PRIMER:])[None]
-    moves = math.ceil(seconds * STEPS_S / MOVE)
-    danced = improviser.improvise(primer, moves, temperature, seed)[0].numpy()
-    together = Steps.of_features(np.concatenate([steps.features[-KNOWN:], danced]))
-    poses, roots = motion_of(autoencoder, together, prompt.poses[-1], moving)
-    poses = danced_again(autoencoder, poses, moving)
-    first = HOP * (len(steps) - KNOWN + 1) + WINDOW // 2  # frame of the prompt that the motion begins with
-    fade = (KNOWN - 1) * HOP
-    made = _placed(Recording(prompt.skeleton, poses, roots, FPS), prompt, first)
+    motion, first, fade = follower.follow(prompt, dataset, seconds, temperature, seed)
+    made = _placed(motion, prompt, first)
     count = min(first + len(made), first + fade + round(seconds * FPS))
     whole = _joined(prompt, made, first, fade, count)
     planted = standing(whole.poses[:, moving].astype(np.float32), whole, dataset)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,17 +56,21 @@ def steps_of_takes(
 
     A body that is not its own mirror image is not mirrored. shortest: stretches of fewer steps are omitted.
     """
-    found = []
+    found = (
+        steps_of(autoencoder, recording.without_first(first), moving)
+        for recording in sound_stretches(takes, moving)
+        for first in range(HOP)
+    )
+    return [steps for steps in found if len(steps) >= shortest]
+
+
+def sound_stretches(takes: Sequence[Take], moving: Sequence[int]) -> Iterator[Recording]:
+    """Each stretch of the takes without a capture error, and its mirror image if the body has two sides."""
     two_sided = bool(takes) and not asymmetry(takes[0].recording.skeleton, moving)
     for take in takes:
         for start, end in take.sound_runs:
             excerpt = take.recording.excerpt(start / FPS, end / FPS)
-            for recording in (excerpt, mirrored(excerpt)) if two_sided else (excerpt,):
-                for first in range(HOP):
-                    steps = steps_of(autoencoder, recording.without_first(first), moving)
-                    if len(steps) >= shortest:
-                        found.append(steps)
-    return found
+            yield from (excerpt, mirrored(excerpt)) if two_sided else (excerpt,)
 
 
 def steps_of(autoencoder: Autoencoder, recording: Recording, moving: Sequence[int]) -> Steps:
@@ -79,13 +83,16 @@ def steps_of(autoencoder: Autoencoder, recording: Recording, moving: Sequence[in
     windows = poses[torch.tensor(starts[:, None] + np.arange(WINDOW))]
     with torch.no_grad():
         latents = autoencoder.encode(autoencoder.without_heading(windows, autoencoder.facing(windows)))
-    at = starts + MIDDLE
+    return Steps(latents.numpy()[1:], ways_of(recording, starts + MIDDLE))
+
+
+def ways_of(recording: Recording, at: NDArray[np.int_]) -> NDArray[np.float32]:
+    """(T - 1, 4): the root's ways between T frames, see Steps."""
     heading = np.unwrap(yaws(quaternion.heading(recording.poses[at, 0])))
     moved = np.diff(recording.roots[at], axis=0)
     moved = quaternion.rotate(turns_about_y(-heading[:-1]), moved)
     height = (recording.roots[:, 1] - floor_under(recording))[at]
-    ways = np.stack([moved[:, 0], moved[:, 2], np.diff(heading), height[1:]], axis=1)
-    return Steps(latents.numpy()[1:], ways.astype(np.float32))
+    return np.stack([moved[:, 0], moved[:, 2], np.diff(heading), height[1:]], axis=1).astype(np.float32)
 
 
 def floor_under(recording: Recording) -> Array:
@@ -118,7 +125,7 @@ def motion_of(
     share = np.sin(np.pi * (np.arange(HOP) + 0.5) / WINDOW) ** 2
     poses = np.tile(still_pose, (count, 1, 1))
     poses[:, list(moving)] = quaternion.slerp(earlier, later, np.tile(share, len(steps) - 1)[:, None])
-    return quaternion.continuous(poses), _path(steps.ways, heading)
+    return quaternion.continuous(poses), path_along(steps.ways, heading, HOP)
 
 
 @torch.no_grad()
@@ -155,14 +162,14 @@ def danced_again(
     return quaternion.continuous(again)
 
 
-def _path(ways: NDArray[np.float32], heading: Array) -> Array:
-    """Roots (4 * (T - 1), 3) from the middle of the first window on: a smooth curve through the steps."""
+def path_along(ways: NDArray[np.float32], heading: Array, between: int) -> Array:
+    """Roots (between * (T - 1), 3) from the first step on: a smooth curve through the steps (T, 4)."""
     moved = np.zeros((len(ways), 3))
     moved[1:, 0], moved[1:, 2] = ways[1:, 0], ways[1:, 1]
     moved[1:] = quaternion.rotate(turns_about_y(heading[:-1]), moved[1:])
     knots = np.cumsum(moved, axis=0)
     knots[:, 1] = ways[:, 3]
-    return smooth_curve(knots, HOP)
+    return smooth_curve(knots, between)
 
 
 def smooth_curve(knots: Array, between: int) -> Array:
