@@ -16,8 +16,8 @@ from appliance.pose.skeleton import Skeleton
 # Measured on salsa_29 at 10/9, share of the ticks with an upper arm deep in the trunk: 3.5 % -> 0 with the
 # hand of salsa_24 on the left upper arm; 26 % -> 0.2 and 6.5 % with one that turns about z once in 5 s and
 # once in 1 s; 1.8 % -> 0 in the phrase. The held upper arm gives way by 0.3 degrees on average, by 3 where it
-# turns. At once and without a memory of the side arms snap: with the fast turn 25 degrees a tick squared (99th
-# percentile), where they have 10 so, and 8.5 untreated.
+# turns. At once and without a memory of the side arms snap: with the fast turn 25 degrees a tick squared
+# (99th percentile), where they have 10 so, and 8.5 untreated.
 CLEAR = 0.85  # of the trunk's radius: so far out the arm's axis is kept
 UPPER_ARM, FOREARM = (0.5, 0.75, 1.0), (0.5, 1.0)  # points along the bones
 MEMORY = 0.6  # of the radius: how much the side on which the arm is counts against the nearest way out
