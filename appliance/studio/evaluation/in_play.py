@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from appliance.dancer.blending import Blending
+from appliance.dancer.blending import Blending, Shape
 from appliance.dancer.hands import Hands
 from appliance.dancer.puppeteers import TAKE_S, Puppeteer
 from appliance.pose import quaternion
@@ -41,8 +41,8 @@ class Rehearsal:
     recording: with all joints.
     """
 
-    def __init__(self, coder: Coder, recording: Recording) -> None:
-        self.coder = coder
+    def __init__(self, coder: Coder, recording: Recording, shape: Shape = "prompt") -> None:
+        self.coder, self._shape = coder, shape
         self.places = [recording.skeleton.index(name) for name in coder.joints]
         poses = quaternion.continuous(recording.poses[:, self.places]).astype(np.float32)
         count = max(0, len(poses) - WINDOW + 1)
@@ -96,12 +96,12 @@ class Rehearsal:
             coded.append(
                 self.coder.iterate(windows[part], coding_iterations, interaction_iterations, held)[0]
             )
-        return blended(np.concatenate(coded))
+        return blended(np.concatenate(coded), self._shape)
 
 
-def blended(windows: Poses) -> Poses:
+def blended(windows: Poses, shape: Shape = "prompt") -> Poses:
     """Windows (T + 7, 8, M, 4), one each tick, blended into motion (T, M, 4) as the box does it."""
-    blending = Blending(windows.shape[2], windows.shape[1])
+    blending = Blending(windows.shape[2], windows.shape[1], shape=shape)
     danced = np.empty((len(windows), *windows.shape[2:]), dtype=np.float32)
     for tick, window in enumerate(windows):
         blending.add(window)

@@ -83,8 +83,8 @@ class Trial:
     def __init__(self, coder: Coder, excerpt: Excerpt, joint: str, trace: Array) -> None:
         """trace: (N, 4) orientations of the joint at 50 Hz, local to its parent, as a sensor gives them."""
         self.excerpt, self.joint, self._trace = excerpt, joint, trace
-        self.once = Rehearsal(coder, excerpt.recording)
-        self.looped = Rehearsal(coder, _looped(excerpt.recording, TURNING_TICKS + 2 * LEAD))
+        self.once = Rehearsal(coder, excerpt.recording, "hann")
+        self.looped = Rehearsal(coder, _looped(excerpt.recording, TURNING_TICKS + 2 * LEAD), "hann")
         self.place = coder.joints.index(joint)
         self.others = [place for place in range(len(coder.joints)) if place != self.place]
         self.dances: dict[Condition, Dance] = {}
