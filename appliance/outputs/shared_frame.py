@@ -30,6 +30,7 @@ from appliance.outputs.joint_frame import JointFrame
 from appliance.pose.foreign_file import plain_json
 from appliance.pose.skeleton import Skeleton
 
+
 @dataclass(frozen=True)
 class Facts:
     """What readers need to know about the show and what stays the same while a stage runs."""
