@@ -1,6 +1,6 @@
-"""The pictures of the page in docs/technician.md, taken by Chromium from a box that dances with emulated sensors.
+"""docs/pictures/page-*.png, by `python -m tools.page_pictures`: the page on a phone, taken by Chromium.
 
-`python -m tools.page_pictures` starts that box; `--address` takes them from another one.
+It starts a box with emulated sensors; `--address` takes the pictures from another one.
 """
 
 from __future__ import annotations
@@ -16,11 +16,14 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from playwright.sync_api import Browser, sync_playwright
+from PIL import Image
+from playwright.sync_api import Browser, TimeoutError, sync_playwright
 
 CHROMIUM = "/usr/bin/chromium"
 PAGES = ("tonight", "dance", "sensors")
 _FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+_COLOURS = 64  # a third of the bytes, and nothing that is seen
+_WELL_WITHIN_MS = 20_000
 _LINKED_S = 15.0  # the emulated sensor is on, its neutral pose taken, and no fallback of the start in force
 
 
@@ -31,13 +34,16 @@ def take_pictures(browser: Browser, address: str, folder: Path) -> list[Path]:
     tab = browser.new_page(viewport={"width": 390, "height": 844}, locale="en-GB")
     tab.goto(address)
     tab.wait_for_selector("body[data-heard]")
+    with contextlib.suppress(TimeoutError):
+        tab.wait_for_selector("body[data-level=well]", timeout=_WELL_WITHIN_MS)
     for page in PAGES:
         tab.click(f'[data-page="{page}"]')
         if page == "dance":
-            tab.wait_for_function("Number(document.body.dataset.tick) > 0")
+            tab.wait_for_selector("body[data-tick]")
         tab.wait_for_timeout(500)
         taken.append(folder / f"page-{page}.png")
         tab.screenshot(path=taken[-1])
+        Image.open(taken[-1]).quantize(_COLOURS).save(taken[-1], optimize=True)
     tab.close()
     return taken
 
@@ -64,12 +70,12 @@ def main(
     out: Annotated[Path, typer.Option(help="The folder.")] = _FOLDER,
 ) -> None:
     """Take the pictures of docs/technician.md."""
-    with contextlib.nullcontext(address) if address else _dancing() as found:
-        with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-            for path in take_pictures(browser, found, out):
-                print(path)
-            browser.close()
+    box = contextlib.nullcontext(address) if address else _dancing()
+    with box as found, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        for path in take_pictures(browser, found, out):
+            print(path)
+        browser.close()
 
 
 if __name__ == "__main__":

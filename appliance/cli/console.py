@@ -133,6 +133,7 @@ def console_command(
         control=control,
         viewers=tuple(console.viewers),
         names=tuple(console.names),
+        rehearsal=console.rehearsal,
     )
     return sys.executable, "-m", "appliance.console", settings.packed()
 

@@ -54,17 +54,16 @@ class Desk:
         """Whether show control carried it out, and its sentence. Raises NoAnswerError, ValueError."""
         reply = SENSORS_REPLY if address.startswith("/sensors/") else REPLY
         is_stream = address.startswith(STREAMS)
-        async with self._asking(
-            datagram((address, *arguments)), _STREAM_S if is_stream else PATIENCE_S
-        ) as replies:
-            try:
+        patience_s = _STREAM_S if is_stream else PATIENCE_S
+        try:
+            async with self._asking(datagram((address, *arguments)), patience_s) as replies:
                 while True:
                     about, values = await replies()
                     if about == reply and len(values) == 3 and values[0] == address:
                         return bool(values[1]), readable(str(values[2]))
-            except NoAnswerError:
-                if not is_stream:
-                    raise
+        except NoAnswerError:
+            if not is_stream or self._control is None:
+                raise
         return True, ""
 
     @contextlib.asynccontextmanager

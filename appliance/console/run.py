@@ -49,7 +49,7 @@ async def _serve(settings: Settings) -> int:
     guard, desk = Guard(settings.viewers, settings.names, devices), Desk(settings.control)
     box = BoxView(desk, stage, ProcessHealth(folder))
     health, notifier = ProcessHealthWriter(folder, "console", Fallbacks(())), Notifier()
-    app = Server(guard, devices, desk, stage, box, watchers).app()
+    app = Server(guard, devices, desk, stage, box, watchers, settings.rehearsal).app()
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=_LAST_REQUESTS_S, keepalive_timeout=30.0)
     await runner.setup()
     listening = socket.socket(fileno=settings.descriptor)

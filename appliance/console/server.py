@@ -40,10 +40,12 @@ class Server:
         stage: StageView,
         box: BoxView,
         watchers: Watchers,
+        rehearsal: bool,
     ) -> None:
+        self._rehearsal = rehearsal
         self._guard, self._devices, self._desk = guard, devices, desk
         self._stage, self._box, self._watchers = stage, box, watchers
-        self._wrong_pins = WrongPins()
+        self._wrong_pins, self._languages = WrongPins(), languages()
         self._refreshing: set[asyncio.Task[None]] = set()
 
     def app(self) -> web.Application:
@@ -79,8 +81,14 @@ class Server:
 
     async def _me(self, request: web.Request) -> web.Response:
         device = self._guard.device(request)
-        name = None if device is None else device.name
-        return web.json_response({"known": device is not None, "name": name, "languages": languages()})
+        return web.json_response(
+            {
+                "known": device is not None,
+                "name": None if device is None else device.name,
+                "languages": self._languages,
+                "rehearsal": self._rehearsal,
+            }
+        )
 
     async def _listed(self, request: web.Request) -> web.Response:
         own = self._guard.require_device(request)

@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass
 class Settings:
     """The port's socket is open already: `descriptor`. control: where commands arrive; None: nowhere.
 
-    folder: where the box's processes meet. kept: the file with PIN and remembered devices. viewers, names: as
-    in the box file.
+    folder: where the box's processes meet. kept: the file with PIN and remembered devices. viewers, names,
+    rehearsal: as in the box file.
     """
 
     folder: str
@@ -20,6 +20,7 @@ class Settings:
     control: tuple[str, int] | None = None
     viewers: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
+    rehearsal: bool = True
 
     def packed(self) -> str:
         """As one argument of a command line; there are no secrets in it."""

@@ -56,6 +56,11 @@ class ConsoleConfig(Section):
         length=(0, 8),
     )
 
+    rehearsal: bool = key(
+        "Show the page Rehearsal (phrase, iterations, hands); false: a venue that plays the show as it is.",
+        True,
+    )
+
     @model_validator(mode="after")
     def _open_to_a_viewer(self) -> ConsoleConfig:
         if not ipaddress.ip_address(self.host).is_loopback and not self.viewers:

@@ -1,4 +1,4 @@
-"""The page's process under test: alone, or beside a real box with emulated sensors; and HTTP clients of it."""
+"""The page under test, alone or beside a real box with emulated sensors; and an HTTP client of it."""
 
 from __future__ import annotations
 

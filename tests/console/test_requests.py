@@ -1,4 +1,4 @@
-"""Requests, one by one: looking is open, acting needs the PIN; whatever else comes is refused with a sentence."""
+"""Requests: looking is open, acting needs the PIN; whatever else comes is refused with a sentence."""
 
 from __future__ import annotations
 
@@ -141,6 +141,11 @@ def test_whatever_comes_as_a_body_is_refused(page: Page, chance: random.Random, 
                 break
     assert page.post("/api/command", b"x" * (LARGEST_REQUEST + 1)).status == 413
     assert page.get("/status").status == 200
+
+
+def test_a_venue_may_hide_the_rehearsal(tmp_path: Path) -> None:
+    with page_alone(tmp_path, rehearsal=False) as (page, _):
+        assert page.get("/api/me").value["rehearsal"] is False
 
 
 def test_no_path_leads_out_of_the_page(page: Page) -> None:

@@ -277,8 +277,9 @@ def raw_watcher(page: Page) -> Iterator[socket.socket]:
         one.settimeout(60)
         one.connect((HOST, page.port))
         one.sendall(
-            f"GET /watch HTTP/1.1\r\nHost: {HOST}:{page.port}\r\nOrigin: {page.origin}\r\nUpgrade: websocket\r\n"
-            "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+            f"GET /watch HTTP/1.1\r\nHost: {HOST}:{page.port}\r\nOrigin: {page.origin}\r\n"
+            "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
         )
         assert one.recv(12) == b"HTTP/1.1 101"
         yield one

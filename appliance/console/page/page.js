@@ -1,8 +1,10 @@
 // The page: which part is shown, what the box says, and the buttons of the night.
 import { Box } from "./box.js";
+import { showChoices } from "./choices.js";
 import { Dance } from "./dance.js";
 import { command, initDevice } from "./device.js";
 import { initPicture, showPicture } from "./picture.js";
+import { initRehearsal, showRehearsal } from "./rehearsal.js";
 import { showSensors } from "./sensors.js";
 import { clock, hasWords, loadWords, number, words } from "./words.js";
 
@@ -37,13 +39,16 @@ function verdict() {
   const said = { ...values };
   if ("since" in said) said.since = clock(said.since);
   if ("rate" in said) said.rate = number(said.rate, 1);
-  if (key === "fallbacks") said.words = spoken(value.fallbacks.find((one) => one.active) ?? said);
+  if (key === "fallbacks") said.words = beginning(spoken(value.fallbacks.find((one) => one.active) ?? said));
   setText(byId("verdict"), words(`verdict_${key}`, said));
 }
 
 function spoken(fallback) {
   return hasWords(`fallback_${fallback.name}`) ? words(`fallback_${fallback.name}`) : fallback.words;
 }
+
+// What happened; what the audience sees and what to do stand below, in full.
+const beginning = (sentence) => `${sentence.split(/[.:;] /)[0].replace(/\.$/, "")}.`;
 
 function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
@@ -71,39 +76,24 @@ function tonight(value) {
     pair.append(term, meaning);
     return pair;
   }));
-  choices(byId("cues"), byId("cues-part"), value.cues, "/cue");
-  choices(byId("looks"), byId("looks-part"), value.looks, "/look");
+  showChoices(byId("cues"), byId("cues-part"), value.cues, (name) => command("/cue", name));
+  showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));
   if (status && document.activeElement !== byId("master")) master(status.panic || status.blackout ? null : status.level);
   byId("panic").setAttribute("aria-pressed", Boolean(status?.panic));
   byId("blackout").setAttribute("aria-pressed", Boolean(status?.blackout));
-  byId("fallbacks-part").hidden = value.fallbacks.length === 0;
-  byId("fallbacks").replaceChildren(...[...value.fallbacks]
-    .sort((one, other) => other.active - one.active)
-    .map((one) => {
-      const item = document.createElement("li"), small = document.createElement("small");
-      item.textContent = spoken(one);
-      item.classList.toggle("active", one.active);
-      small.textContent = words(one.active ? "fallback_now" : "fallback_before", { times: one.times, name: one.name });
-      item.append(small);
-      return item;
-    }));
+  const over = value.fallbacks.filter((one) => !one.active);
+  byId("fallbacks-part").hidden = over.length === 0;
+  byId("fallbacks").replaceChildren(...over.map(told));
+  byId("fallbacks-now").replaceChildren(...value.fallbacks.filter((one) => one.active).map(told));
 }
 
-// Buttons stay the same elements while their names do: one that is replaced under a finger gets no click.
-function choices(parent, part, entries, address) {
-  part.hidden = entries.length === 0;
-  const names = entries.map((one) => one.name).join("\n");
-  if (parent.dataset.names !== names) {
-    parent.dataset.names = names;
-    parent.replaceChildren(...entries.map((one) => {
-      const button = document.createElement("button");
-      button.type = "button";
-      button.textContent = one.name;
-      button.addEventListener("click", () => command(address, one.name));
-      return button;
-    }));
-  }
-  entries.forEach((one, place) => parent.children[place].setAttribute("aria-pressed", one.now));
+function told(fallback) {
+  const item = document.createElement("li"), small = document.createElement("small");
+  item.textContent = spoken(fallback);
+  item.classList.toggle("active", fallback.active);
+  small.textContent = words(fallback.active ? "fallback_now" : "fallback_before", fallback);
+  item.append(small);
+  return item;
 }
 
 function master(level) {
@@ -124,10 +114,11 @@ function press(button, act) {
 
 const me = await fetch("/api/me").then((answer) => answer.json()).catch(() => ({ languages: ["en"] }));
 await loadWords(me.languages);
-export const box = new Box();
+const box = new Box();
 const dance = new Dance(byId("stage"), byId("held"), box, words);
 initDevice(me, words);
 initPicture();
+initRehearsal(me);
 for (const button of document.querySelectorAll("nav button")) button.addEventListener("click", () => show(button.dataset.page));
 byId("show-dance").addEventListener("change", () => show("dance"));
 addEventListener("hashchange", () => show(location.hash.slice(1)));
@@ -146,6 +137,7 @@ box.addEventListener("value", () => {
   tonight(box.value);
   showSensors(byId("cards"), box.value, words);
   showPicture(box.value);
+  showRehearsal(box.value, dance.show);
   dance.follow(box.value);
   document.body.dataset.heard = box.value.time;
 });
