@@ -48,7 +48,7 @@ def serve(context: typer.Context, box: BoxFile = None, chosen: ChosenFile = None
     descriptor = open_console_port(config.console).detach()
     print(f"The page: {address_of(descriptor)}. Its PIN: bunraku console pin.", flush=True)
     os.set_inheritable(descriptor, True)
-    command = console_command(config, descriptor)
+    command = console_command(config, descriptor, kept_in(config))
     os.execv(command[0], command)  # a fresh process, which loads only what the page needs
 
 
@@ -112,7 +112,7 @@ def address_of(descriptor: int) -> str:
 
 
 def console_command(
-    box: BoxConfig, descriptor: int, control: tuple[str, int] | None = None
+    box: BoxConfig, descriptor: int, kept: Path, control: tuple[str, int] | None = None
 ) -> tuple[str, ...]:
     """How to start the page of a box whose port is open. control: where commands arrive in fact.
 
@@ -123,7 +123,7 @@ def console_command(
         control = own.host, own.port
     if control is not None and control[0] == "0.0.0.0":
         control = "127.0.0.1", control[1]
-    folder, kept = _runtime(box), kept_in(box)
+    folder = _runtime(box)
     with contextlib.suppress(OSError):
         (folder / _WHERE).write_text(str(kept))
     settings = Settings(
@@ -139,15 +139,23 @@ def console_command(
 
 
 def page_companion(
-    box: BoxConfig, page: socket.socket, control: socket.socket | None, say: Callable[[str], None]
+    box: BoxConfig,
+    page: socket.socket,
+    control: socket.socket | None,
+    say: Callable[[str], None],
+    rehearsal: bool,
 ) -> Companion:
-    """The page's process beside the stage; says where browsers find it. Raises StageError."""
+    """The page's process beside the stage; says where browsers find it. Raises StageError.
+
+    rehearsal: PIN and devices are not the venue's; they stay until the machine is off.
+    """
     heard_on = None if control is None else control.getsockname()
-    command = console_command(box, page.fileno(), heard_on)
+    kept = _runtime(box) / _KEPT if rehearsal else kept_in(box)
+    command = console_command(box, page.fileno(), kept, heard_on)
     try:
-        say(f"The page: {address_of(page.fileno())}, PIN {Devices(kept_in(box)).pin}.")
+        say(f"The page: {address_of(page.fileno())}, PIN {Devices(kept).pin}.")
     except OSError as error:
-        say(f"{kept_in(box)}: no PIN can be kept there ({error.strerror}). No page; the dance goes on.")
+        say(f"{kept}: no PIN can be kept there ({error.strerror}). No page; the dance goes on.")
     return Companion("The page", command, "Browsers come back by themselves.", descriptors=(page.fileno(),))
 
 
@@ -164,7 +172,8 @@ def _devices(box: Path | None) -> Devices:
     with contextlib.suppress(
         OSError
     ):  # a page that runs says where it keeps them: a rehearsal does so elsewhere
-        path = Path((_runtime(config) / _WHERE).read_text())
+        told = Path((_runtime(config) / _WHERE).read_text())
+        path = told if told.is_file() else path
     try:
         return Devices(path)
     except OSError as error:

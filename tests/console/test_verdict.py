@@ -22,7 +22,7 @@ HEARD = {"name": "left-wrist", "is_worn": True, "heard": True}
 LOST = {"name": "right-wrist", "is_worn": True, "heard": False}
 SPARE = {"name": "spare", "is_worn": False, "heard": False}
 FELL = {"name": "receiver-gone", "active": True, "words": "A receiver is away."}
-HOUR_AGO = time.time() - 3600.0
+NOW, HOUR_AGO = 0.0, 3600.0  # seconds since a tick was late
 
 
 def status(**values: Any) -> Status:
@@ -30,7 +30,7 @@ def status(**values: Any) -> Status:
 
 
 @pytest.mark.parametrize(
-    ("frames", "told", "sensors", "fallbacks", "since", "trouble", "level", "key"),
+    ("frames", "told", "sensors", "fallbacks", "ago_s", "trouble", "level", "key"),
     [
         ("fresh", status(), [HEARD, SPARE], [], HOUR_AGO, "", "well", "well"),
         ("fresh", status(), [SPARE], [], HOUR_AGO, "", "well", "well_alone"),
@@ -44,14 +44,14 @@ def status(**values: Any) -> Status:
         ("fresh", status(), [HEARD, LOST], [FELL], HOUR_AGO, "", "warning", "sensors_missing"),
         ("fresh", status(), [HEARD], [FELL], HOUR_AGO, "", "warning", "fallbacks"),
         ("fresh", status(), [HEARD], [{**FELL, "active": False}], HOUR_AGO, "", "well", "well"),
-        ("fresh", status(late=2), [HEARD], [], time.time(), "", "warning", "late"),
+        ("fresh", status(late=2), [HEARD], [], NOW, "", "warning", "late"),
         ("fresh", status(late=2), [HEARD], [], HOUR_AGO, "", "well", "well"),
     ],
 )
 def test_the_worst_comes_first(
-    frames: str, told: Any, sensors: Any, fallbacks: Any, since: float, trouble: str, level: str, key: str
+    frames: str, told: Any, sensors: Any, fallbacks: Any, ago_s: float, trouble: str, level: str, key: str
 ) -> None:
-    said = verdict(frames, told, sensors, fallbacks, since, trouble)
+    said = verdict(frames, told, sensors, fallbacks, time.time() - ago_s, trouble)
     assert (said.level, said.key) == (level, key)
     for language in languages():
         sentence = table(language)[f"verdict_{key}"]

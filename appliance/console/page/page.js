@@ -18,7 +18,7 @@ function show(page) {
     if (button.dataset.page === known) button.setAttribute("aria-current", "page");
     else button.removeAttribute("aria-current");
   }
-  document.body.dataset.page = known;
+  document.body.dataset.shown = known;
   if (location.hash !== `#${known}`) history.replaceState(null, "", `#${known}`);
   scrollTo(0, 0);
   box.showFrames(known === "dance" && byId("show-dance").checked);
