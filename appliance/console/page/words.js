@@ -20,7 +20,7 @@ export function words(key, values = {}) {
 export const hasWords = (key) => key in own;
 
 export const clock = (seconds) =>
-  new Date(1000 * seconds).toLocaleTimeString(language, { hour: "2-digit", minute: "2-digit" });
+  new Date(1000 * seconds).toLocaleTimeString(language, { hour: "2-digit", minute: "2-digit", hourCycle: "h23" });
 
 export const number = (value, digits = 0) =>
   value.toLocaleString(language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
