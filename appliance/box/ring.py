@@ -9,13 +9,11 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 _HEAD = struct.Struct("<QII")  # sequence, payload's bytes, CRC-32
 _TAIL = struct.Struct("<Q")  # the sequence again
 _LINE = 64  # bytes: no slot shares a cache line with another
 _TRIES = 4
+_WHOLE = slice(None)  # made once: a slice is an object that the collector visits
 
 
 @dataclass(frozen=True)
@@ -51,15 +49,14 @@ class RingWriter:
     """Fill `payload`, then `publish`: one copy into the next slot; what was written before stays whole."""
 
     def __init__(self, ring: Ring, memory: mmap.mmap) -> None:
-        self._newest: NDArray[np.uint64] = np.frombuffer(memory, "<u8", 1, ring.at)
-        self._slots = [
-            np.frombuffer(memory, np.uint8, ring.slot_bytes, ring.slot_at(slot)) for slot in range(ring.slots)
-        ]
+        whole = memoryview(memory)
+        self._newest = whole[ring.at : ring.at + _TAIL.size].cast("Q")
+        starts = map(ring.slot_at, range(ring.slots))
+        self._slots = [whole[start : start + ring.slot_bytes] for start in starts]
         self._image = bytearray(ring.slot_bytes)
-        self._bytes = np.frombuffer(self._image, np.uint8)
         self._tail_at = ring.slot_bytes - _TAIL.size
         self.payload = memoryview(self._image)[_HEAD.size : _HEAD.size + ring.capacity]
-        self._sequence = int(self._newest[0])
+        self._sequence = self._newest[0]
 
     def publish(self) -> None:
         """Make the whole payload the newest one; nothing here is for the collector to visit."""
@@ -77,7 +74,7 @@ class RingWriter:
         check = zlib.crc32(payload, sequence & 0xFFFFFFFF)
         _HEAD.pack_into(self._image, 0, sequence, len(payload), check)
         _TAIL.pack_into(self._image, self._tail_at, sequence)
-        self._slots[sequence % len(self._slots)][...] = self._bytes
+        self._slots[sequence % len(self._slots)][_WHOLE] = self._image
         self._newest[0] = sequence
 
 

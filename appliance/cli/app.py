@@ -29,6 +29,7 @@ _MODULES = {  # in the order of `bunraku --help`; in each a function or a group 
     "play": _HERE,
     "project": "appliance.cli.project",
     "control": "appliance.cli.control",
+    "console": "appliance.cli.console",
     "keep": "appliance.cli.keep",
     "check": "appliance.cli.check",
     "pack": "appliance.cli.check",

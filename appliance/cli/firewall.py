@@ -48,7 +48,7 @@ def firewall(
 
 def rules(box: BoxConfig, access_points: Sequence[str] = ()) -> str:
     """One table of our own: all other tables stay as they are."""
-    lines = [*_sensors(box), *_commands(box), *_own_network(access_points)]
+    lines = [*_sensors(box), *_commands(box), *_page(box), *_own_network(access_points)]
     return _RULES.format(rules="\n".join(f"\t\t{line}" for line in lines))
 
 
@@ -69,6 +69,18 @@ def _commands(box: BoxConfig) -> Iterator[str]:
         )
 
 
+def _page(box: BoxConfig) -> Iterator[str]:
+    """From the listed viewers, IPv4 and IPv6 apart, as nft has them."""
+    console = box.console
+    if console is None or _is_loopback(console.host) or not console.port:
+        return
+    for family, version in (("ip", 4), ("ip6", 6)):
+        networks = [one for one in console.viewers if ipaddress.ip_network(one).version == version]
+        if networks:
+            viewers = ", ".join(networks)
+            yield f'{family} saddr {{ {viewers} }} tcp dport {console.port} accept comment "the page"'
+
+
 def _own_network(access_points: Sequence[str]) -> Iterator[str]:
     """Sensors on the box's own network ask it for addresses."""
     for card in access_points:
@@ -81,4 +93,4 @@ def _to(host: str) -> str:
 
 
 def _is_loopback(host: str) -> bool:
-    return ipaddress.IPv4Address(host).is_loopback
+    return ipaddress.ip_address(host).is_loopback

@@ -86,6 +86,11 @@ def play_show(
         opened.callback(speaker.close)
         shown = rehearse is not None and _has_display()
         control = None if alone or box.control is None else _opened(box.control, opened)
+        page = None
+        if box.console is not None and not alone:
+            from appliance.cli.console import open_console_port, page_companion
+
+            page = opened.enter_context(open_console_port(box.console, or_any=True))
         stage = Stage(show, box, speaker.say, box.path, rehearsal=emulate)
         with closing(stage):
             keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
@@ -93,6 +98,8 @@ def play_show(
             for line in _introduction(stage, emulate, control):
                 speaker.say(line)
             companions = () if alone else tuple(_companions(show, box, control, window or shown))
+            if page is not None:
+                companions += (page_companion(box, page, control, speaker.say, emulate),)
             with _running(companions + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:

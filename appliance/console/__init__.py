@@ -1,1 +1,1 @@
-"""The technician's page: a process of its own, which this release leaves empty."""
+"""The page for technicians: a process of its own, which browsers at the venue open."""

@@ -1,28 +1,30 @@
-"""`python -m appliance.console`: holds the page's place, says so to systemd, and listens nowhere."""
+"""`python -m appliance.console SETTINGS`: the page alone, and only what it needs is loaded."""
 
 from __future__ import annotations
 
 import sys
-import time
 
-from appliance.box.notify import Notifier
-from appliance.box.stop_signals import stop_signals
-
-_WORDS = "The technician's page comes with a later release. Nothing listens here."
-_LOOK_S = 0.2  # at power-off the stage waits for it
+from appliance.box.parent_death import end_with_parent
 
 
 def main() -> int:
-    """Until it is stopped; the exit status."""
-    with stop_signals() as stopped:
-        notifier = Notifier()
-        print(_WORDS, flush=True)
-        notifier.ready(_WORDS)
-        while not stopped():
-            notifier.ping(time.monotonic())
-            time.sleep(_LOOK_S)
-        notifier.stopping()
-    return 0
+    """Run with the settings that `bunraku console` or `bunraku play` hands over; the exit status."""
+    end_with_parent()
+    from appliance.box.log_writer import LogWriter
+    from appliance.console.run import run_console
+    from appliance.console.settings import Settings
+
+    speaker, settings = LogWriter(), Settings.unpacked(sys.argv[1])
+    try:
+        return run_console(settings)
+    except OSError as error:
+        speaker.say(
+            f"{error.filename or settings.folder}: the page has no place there ({error.strerror}). No "
+            "browser opens it; the dance goes on. Free space there, or give another folder as `state:`."
+        )
+        return 1
+    finally:
+        speaker.close()
 
 
 if __name__ == "__main__":

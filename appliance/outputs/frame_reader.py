@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.box.ring_file import RingFileReader
-from appliance.outputs.shared_frame import (
+from appliance.outputs.frame_layout import (
     FACTS,
     FILE,
     FORMAT,
@@ -23,9 +23,9 @@ from appliance.outputs.shared_frame import (
     KIND,
     LATE,
     WRITER,
-    Facts,
     FrameLayout,
 )
+from appliance.outputs.shared_frame import Facts
 from appliance.pose.foreign_file import plain_json
 
 State = Literal["absent", "fresh", "stale"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import struct
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,17 +12,23 @@ from typing import Any
 import numpy as np
 
 from appliance.box.ring_file import RingFileWriter
+from appliance.outputs.frame_layout import (
+    FACTS,
+    FILE,
+    FORMAT,
+    FRAME_HEAD,
+    FRAME_SLOTS,
+    FRAMES,
+    HEALTH,
+    HEALTH_BYTES,
+    HEALTH_SLOTS,
+    KIND,
+    LATE,
+    FrameLayout,
+)
 from appliance.outputs.joint_frame import JointFrame
 from appliance.pose.foreign_file import plain_json
 from appliance.pose.skeleton import Skeleton
-
-FILE, KIND, FORMAT, WRITER = "frame", "frame", 1, "the stage (bunraku play)"
-FACTS, HEALTH, FRAMES = range(3)  # the file's rings
-FRAME_SLOTS = 64  # a reader has 1.28 s to copy the newest frame
-HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
-LATE = 1  # flag
-# Tick, frame time, when it left the stage, the sensor's sequence and its arrival, flags, joints.
-FRAME_HEAD = struct.Struct("<qddqdII")
 
 
 @dataclass(frozen=True)
@@ -82,18 +87,6 @@ class Facts:
                 ),
             }
         )
-
-
-class FrameLayout:
-    """Where the arrays of J joints lie in a frame's payload: all float32, little-endian, in this order."""
-
-    def __init__(self, joints: int) -> None:
-        self.joints = joints
-        self.root_at = FRAME_HEAD.size
-        self.pose_at = self.root_at + 12
-        self.world_at = self.pose_at + 16 * joints
-        self.positions_at = self.world_at + 16 * joints
-        self.bytes = self.positions_at + 12 * joints
 
 
 class FrameWriter:

@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import PrivateAttr, field_validator, model_validator
 
+from appliance.show.console import ConsoleConfig
 from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
 from appliance.show.lights import VenueLightsConfig
@@ -136,6 +137,7 @@ class BoxConfig(Section):
     sensors: SensorsConfig = part(SensorsConfig)
     outputs: OutputsConfig = part(OutputsConfig)
     control: ControlConfig | None = key("Where commands by OSC arrive; null: nowhere.", ControlConfig())
+    console: ConsoleConfig | None = key("The page for technicians; null: none.", ConsoleConfig())
     lights: VenueLightsConfig = part(VenueLightsConfig)
     projector: ProjectorConfig = part(ProjectorConfig)
     runtime: LocalFile | None = key(

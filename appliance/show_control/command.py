@@ -10,6 +10,8 @@ from typing import NamedTuple
 from appliance.show.config_error import nearest
 from appliance.show_control.packet import is_readable
 
+REPLY, SENSORS_REPLY, PONG = "/reply", "/sensors/reply", "/pong"  # what the box answers with
+STREAMS = ("/player/", "/mocap/")  # answered only when refused or not carried out
 LONGEST_NAME = 100
 _MOST_FADE_S = 60.0
 _FAR = 1e6

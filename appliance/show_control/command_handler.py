@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from appliance.box.show_state import ShowState
 from appliance.show_control.acknowledgements import Acknowledgements
-from appliance.show_control.command import Command, command
+from appliance.show_control.command import PONG, REPLY, SENSORS_REPLY, STREAMS, Command, command
 from appliance.show_control.key_file import KeyFile
 from appliance.show_control.live_input import HEARD, LiveInput
 from appliance.show_control.order_dispatch import OrderDispatch
@@ -32,12 +32,10 @@ if TYPE_CHECKING:
     from appliance.outputs.shared_frame import Facts
     from appliance.sensor.keys import SensorKey
 
-REPLY, SENSORS_REPLY, PONG = "/reply", "/sensors/reply", "/pong"
 # What a box sends is never answered: two boxes would go on answering each other for ever.
 _ANSWERS = frozenset((REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END))
 _LISTED = ("/cues/", "/phrases/", "/looks/", "/hands/", "/fallbacks/")
 _ONCE_A_BUNDLE = frozenset((*QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
-_STREAMS = ("/player/", "/mocap/")  # answered only when refused or not carried out
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
 
 ORDERS: Mapping[str, tuple[Place, str]] = {
@@ -170,7 +168,7 @@ class CommandHandler:
         place, name = ORDERS[command.address]
         text = joint_name(command.text, self._observer.facts)
         keys = self._keys.keys() if command.address == "/sensors/reload" else _no_keys()
-        order = Order(name, command.values, text, keys, quiet=command.address.startswith(_STREAMS))
+        order = Order(name, command.values, text, keys, quiet=command.address.startswith(STREAMS))
         self._dispatch.dispatch_order(place, order, now, partial(self._reply, asker, command.address))
 
     def _send_roster(self, asker: Address, now: float) -> None:
@@ -187,7 +185,7 @@ class CommandHandler:
 
     def _reply(self, asker: Address, address: str, done: bool, words: str) -> None:
         """Reply to a command; to one of a stream only that it is not done."""
-        if done and address.startswith(_STREAMS):
+        if done and address.startswith(STREAMS):
             return
         if not done:
             self._refuse(words)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from appliance.box.show_state import ShowState
 from appliance.show_control.packet import Message
-from appliance.show_control.stage_observer import StageObserver
+
+if TYPE_CHECKING:
+    from appliance.show_control.stage_observer import StageObserver
 
 STATUS, END = "/bunraku/status", "/end"
 QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/hands", "/fallbacks")

@@ -12,6 +12,7 @@ from tests.boot.box import Box
 from tests.boot.hall import BOX, CONTROL, SENSORS
 
 EPHEMERAL = 32768  # from here on the kernel gives ports to those who only send
+PAGE = 8080  # of a box whose own file says nothing about it: appliance_box.yaml
 ROGUE, LISTENS_S = 7777, 1.5
 _LISTEN = f"""
 import socket
@@ -26,6 +27,7 @@ pytestmark = pytest.mark.boot
 
 def test_ports_that_listen_are_those_of_the_box_file(dancing: Box) -> None:
     dancing.await_unit("bunraku-control")
+    dancing.await_unit("bunraku-console")
     opened = set()
     for kind in ("udp", "tcp"):
         for line in dancing.machine.run(
@@ -34,7 +36,7 @@ def test_ports_that_listen_are_those_of_the_box_file(dancing: Box) -> None:
             host, _, port = line.split()[3].rpartition(":")
             if not host.startswith(("127.", "[::1]")) and int(port) < EPHEMERAL:
                 opened.add((kind, int(port)))
-    assert opened == {("udp", SENSORS), ("udp", CONTROL)}, dancing.machine.run("ss", "-lunptp")
+    assert opened == {("udp", SENSORS), ("udp", CONTROL), ("tcp", PAGE)}, dancing.machine.run("ss", "-lunptp")
 
 
 def test_the_firewall_lets_in_what_the_box_file_opens_and_nothing_else(dancing: Box) -> None:

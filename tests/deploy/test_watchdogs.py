@@ -38,7 +38,7 @@ def supervisor(tmp_path: Path) -> Iterator[Supervisor]:
 def box(tmp_path: Path) -> Path:
     path = tmp_path / "box.yaml"
     path.write_text(
-        "sensors: {udp: null}\ncontrol: {port: 0}\nstate: state\n"
+        "sensors: {udp: null}\ncontrol: {port: 0}\nconsole: {port: 0}\nstate: state\n"
         "outputs: {osc: [], dmx: [{universe: 1, wire: artnet, host: 127.0.0.1}]}\n"
     )
     return path
@@ -67,20 +67,14 @@ def running(supervisor: Supervisor, *command: str, **environ: str) -> Iterator[s
         (("-m", "appliance.cli", "lights"), {}),
         (("-m", "appliance.cli", "project", "--wait"), NO_DISPLAY),
         (("-m", "appliance.cli", "project", "--offscreen", "64x36"), {}),
-        (
-            (
-                "-m",
-                "appliance.console",
-            ),
-            {},
-        ),
+        (("-m", "appliance.cli", "console"), {}),
     ],
     ids=["control", "lights", "projector without a display", "projector", "console"],
 )
 def test_it_is_ready_pings_and_ends_when_asked(
     supervisor: Supervisor, box: Path, command: tuple[str, ...], environ: dict[str, str]
 ) -> None:
-    named = () if "appliance.console" in command else ("--box", str(box))
+    named = ("--box", str(box))
     with running(supervisor, *command, *named, **environ) as process:
         assert "STATUS=" in supervisor.waits_for("READY=1", PATIENCE_S)
         for _ in range(3):
@@ -115,7 +109,8 @@ def test_a_projector_that_waits_takes_the_display_that_comes(
 
 
 @pytest.mark.parametrize(
-    ("command", "box_file"), [("control", "control: null\n"), ("lights", "outputs: {dmx: []}\n")]
+    ("command", "box_file"),
+    [("control", "control: null\n"), ("console", "console: null\n"), ("lights", "outputs: {dmx: []}\n")],
 )
 def test_what_a_box_file_has_no_use_for_ends_well_and_is_not_tried_again(
     supervisor: Supervisor, tmp_path: Path, command: str, box_file: str

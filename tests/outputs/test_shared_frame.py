@@ -16,9 +16,10 @@ import pytest
 from appliance.box.ring import Ring
 from appliance.box.ring_file import RingFileWriter
 from appliance.outputs import shared_frame
+from appliance.outputs.frame_layout import FRAME_SLOTS, FrameLayout
 from appliance.outputs.frame_reader import STALE_S, FrameReader, SeenFrame
 from appliance.outputs.joint_frame import JointFrame
-from appliance.outputs.shared_frame import FRAME_SLOTS, Facts, FrameLayout, FrameWriter
+from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.pose.skeleton import Skeleton
 from tests.outputs.conftest import fill
 

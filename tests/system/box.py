@@ -129,6 +129,7 @@ def playing(
             "sensors": {"udp": {"host": HOST, "port": sensors}, "keys": "sensors.keys"},
             "outputs": {"osc": [*more_receivers, frames]},
             "control": {"host": HOST, "port": control},
+            "console": None,  # a process less: tests/console has it
             "runtime": "runtime",
         }
         for section, values in (settings or {}).items():

@@ -45,6 +45,14 @@ def test_commands_are_let_in_from_listed_senders_alone(tmp_path: Path) -> None:
     assert opened(text) == {9002}
 
 
+def test_the_page_is_let_in_from_listed_viewers_alone(tmp_path: Path) -> None:
+    path = box_file(tmp_path, "console: {host: '::', port: 8081, viewers: [192.168.0.0/24, 'fd00::/8']}\n")
+    text = rules(load_box(path))
+    assert 'ip saddr { 192.168.0.0/24 } tcp dport 8081 accept comment "the page"' in text
+    assert 'ip6 saddr { fd00::/8 } tcp dport 8081 accept comment "the page"' in text
+    assert "tcp dport" not in rules(load_box(None))
+
+
 def test_an_access_point_gives_addresses() -> None:
     text = rules(load_box(None), ["wlan0"])
     assert 'iifname "wlan0" udp dport 67 accept' in text

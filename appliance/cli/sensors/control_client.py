@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from appliance.show.box import BoxConfig
-from appliance.show_control.command_handler import SENSORS_REPLY as REPLY
+from appliance.show_control.command import SENSORS_REPLY as REPLY
 from appliance.show_control.order_dispatch import PATIENCE_S as ERRAND_S
 from appliance.show_control.packet import Message, datagram, messages_in, readable
 from appliance.show_control.port import Address

@@ -1,0 +1,115 @@
+"""Everything that the page tells about the box, once a second, as one value that JSON takes."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from appliance.box.fallback import Fallen
+from appliance.box.process_health import ProcessHealth
+from appliance.console.desk import Answer, Desk, NoAnswerError
+from appliance.console.stage_view import StageView
+from appliance.console.verdict import Verdict, verdict
+from appliance.show_control.sensor_roster import RosterLine
+from appliance.show_control.status_messages import STATUS, Status
+
+_NO_BATTERY = 255
+_SAME_STAGE_S = 5.0  # a stage that seems to have started this much later is another one
+_LISTS = {"/cues/cue": "cues", "/phrases/phrase": "phrases", "/looks/look": "looks"}
+
+
+class BoxView:
+    """Asks show control, looks at the shared frame, and remembers what the two forget.
+
+    value: the newest answer. A battery level stays after its sensor is gone; `since`: Unix seconds since
+    when no tick was late or skipped. words: the same as JSON.
+    """
+
+    def __init__(self, desk: Desk, stage: StageView, processes: ProcessHealth) -> None:
+        self._desk, self._stage, self._processes = desk, stage, processes
+        self._batteries: dict[str, int] = {}
+        self._late: tuple[int, int] | None = None
+        self._since = self._started = time.time()
+        self.value: dict[str, Any] = {}
+        self.words = "{}"
+
+    async def refresh(self) -> None:
+        """Ask once; takes as long as show control takes to answer, two seconds at most."""
+        trouble = ""
+        try:
+            answers = await self._desk.ask_all()
+        except NoAnswerError as error:
+            trouble, answers = str(error), []
+        self.value = self._value(answers, trouble, time.monotonic())
+        self.words = json.dumps(self.value)
+
+    def _value(self, answers: Sequence[Answer], trouble: str, now: float) -> dict[str, Any]:
+        status = next((_status(values) for address, values in answers if address == STATUS), None)
+        sensors = [self._sensor(line) for line in _roster(answers)]
+        fallbacks = [_fallback(values) for address, values in answers if address == "/fallbacks/fallback"]
+        if trouble:
+            fallbacks = [_told(who, one) for who, one in self._processes.fallbacks(now)]
+        frames = self._stage.state(now)
+        lists: dict[str, list[dict[str, Any]]] = {name: [] for name in _LISTS.values()}
+        for address, values in answers:
+            if address in _LISTS and len(values) == 2:
+                lists[_LISTS[address]].append({"name": values[0], "now": bool(values[1])})
+        hands = [values for address, values in answers if address == "/hands/hand" and len(values) == 3]
+        self._note_late(status)
+        judged: Verdict = verdict(frames, status, sensors, fallbacks, self._since, trouble)
+        return {
+            "time": time.time(),
+            "trouble": trouble,
+            "control": self._desk.has_control,
+            "frames": frames,
+            "status": None if status is None else status._asdict(),
+            "verdict": judged._asdict(),
+            "since": self._since,
+            "sensors": sensors,
+            "fallbacks": fallbacks,
+            "processes": [{"who": one.who, "late": one.late} for one in self._processes.members(now)],
+            "hands": [{"joint": joint, "who": who, "holds": bool(holds)} for joint, who, holds in hands],
+            "generation": self._stage.generation,
+            **lists,
+        }
+
+    def _sensor(self, line: RosterLine) -> dict[str, Any]:
+        """A sensor with its last known battery; heard: it sends now."""
+        if line.battery != _NO_BATTERY:
+            self._batteries[line.name] = line.battery
+        battery = self._batteries.get(line.name)
+        values = line._asdict() | {"battery": battery, "is_worn": bool(line.neutral)}
+        return values | {"heard": line.state == "linked"}
+
+    def _note_late(self, status: Status | None) -> None:
+        if status is None or status.uptime_s < 0:
+            return
+        late, started = (status.late, status.skipped), time.time() - status.uptime_s
+        if self._late is None or started > self._started + _SAME_STAGE_S:
+            self._started = started
+            self._since = started if late == (0, 0) else time.time()
+        elif late != self._late:
+            self._since = time.time()
+        self._late = late
+
+
+def _status(values: Sequence[Any]) -> Status | None:
+    """None from a show control of another release."""
+    return Status(*values) if len(values) == len(Status._fields) else None
+
+
+def _roster(answers: Sequence[Answer]) -> list[RosterLine]:
+    fields = len(RosterLine._fields)
+    lines = [values for address, values in answers if address == "/sensors/sensor"]
+    return [RosterLine(*values) for values in lines if len(values) == fields]
+
+
+def _fallback(values: Sequence[Any]) -> dict[str, Any]:
+    name, who, times, active, words = values
+    return {"name": name, "who": who, "times": times, "active": bool(active), "words": words}
+
+
+def _told(who: str, one: Fallen) -> dict[str, Any]:
+    return {"name": one.name, "who": who, "times": one.times, "active": one.active, "words": one.words}

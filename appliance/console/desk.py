@@ -1,0 +1,106 @@
+"""The page as a desk of show control: commands and questions by OSC, without waiting for each other."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import struct
+from collections.abc import AsyncIterator, Callable, Sequence
+from typing import Any
+
+from appliance.show_control.command import REPLY, SENSORS_REPLY, STREAMS
+from appliance.show_control.packet import BUNDLE, Message, datagram, messages_in, readable
+
+QUESTIONS = ("/status", "/fallbacks", "/cues", "/phrases", "/looks", "/hands", "/sensors/list")
+PATIENCE_S = 2.0  # show control answers within 0.6 s, and later while it starts
+_STREAM_S = 0.25  # of a stream's command only the refusal is answered
+_MOST_WAITING = 512
+_AT_ONCE = 32
+_NOW = struct.pack(">Q", 1)  # OSC's time tag for 'immediately'
+
+Answer = tuple[str, list[Any]]
+
+
+class NoAnswerError(Exception):
+    """Show control does not answer, or there is none; the message is for the user."""
+
+
+class Desk:
+    """Show control at an address; None: this box has none. Each question has a socket of its own."""
+
+    def __init__(self, control: tuple[str, int] | None) -> None:
+        self._control = control
+        self._free = asyncio.Semaphore(_AT_ONCE)
+
+    @property
+    def has_control(self) -> bool:
+        """Whether this box takes commands."""
+        return self._control is not None
+
+    async def ask_all(self) -> list[Answer]:
+        """Everything that show control tells, once. Raises NoAnswerError."""
+        open_questions, answers = set(QUESTIONS), list[Answer]()
+        async with self._asking(_bundle([(question,) for question in QUESTIONS]), PATIENCE_S) as replies:
+            while open_questions:
+                address, values = await replies()
+                answers.append((address, values))
+                if address == "/end":
+                    open_questions.discard(str(values[0]))
+                elif address == "/sensors/end" or (address, values[:1]) == (SENSORS_REPLY, ["/sensors/list"]):
+                    open_questions.discard("/sensors/list")
+        return answers
+
+    async def send_command(self, address: str, arguments: Sequence[str | int | float]) -> tuple[bool, str]:
+        """Whether show control carried it out, and its sentence. Raises NoAnswerError, ValueError."""
+        reply = SENSORS_REPLY if address.startswith("/sensors/") else REPLY
+        is_stream = address.startswith(STREAMS)
+        patience_s = _STREAM_S if is_stream else PATIENCE_S
+        try:
+            async with self._asking(datagram((address, *arguments)), patience_s) as replies:
+                while True:
+                    about, values = await replies()
+                    if about == reply and len(values) == 3 and values[0] == address:
+                        return bool(values[1]), readable(str(values[2]))
+        except NoAnswerError:
+            if not is_stream or self._control is None:
+                raise
+        return True, ""
+
+    @contextlib.asynccontextmanager
+    async def _asking(self, question: bytes, patience_s: float) -> AsyncIterator[Callable[[], Any]]:
+        """Send a datagram; inside, awaiting what is given returns the next message that comes back."""
+        if self._control is None:
+            raise NoAnswerError("This box takes no commands: its box file says `control: null`.")
+        silent = NoAnswerError("Show control does not answer. What is in force stays in force; try again.")
+        async with self._free:
+            try:
+                transport, replies = await asyncio.get_running_loop().create_datagram_endpoint(
+                    _Replies, remote_addr=self._control
+                )
+            except OSError:
+                raise silent from None
+            try:
+                async with asyncio.timeout(patience_s):
+                    transport.sendto(question)
+                    yield replies.waiting.get
+            except TimeoutError:
+                raise silent from None
+            finally:
+                transport.close()
+
+
+class _Replies(asyncio.DatagramProtocol):
+    """Messages as they come; what is no OSC is left out."""
+
+    def __init__(self) -> None:
+        self.waiting: asyncio.Queue[Answer] = asyncio.Queue(_MOST_WAITING)
+
+    def datagram_received(self, received: bytes, sender: Any) -> None:
+        with contextlib.suppress(ValueError, asyncio.QueueFull):
+            for message in messages_in(received):
+                self.waiting.put_nowait(message)
+
+
+def _bundle(messages: Sequence[Message]) -> bytes:
+    packed = map(datagram, messages)
+    return BUNDLE + _NOW + b"".join(struct.pack(">i", len(one)) + one for one in packed)

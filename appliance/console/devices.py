@@ -1,0 +1,148 @@
+"""The PIN, and the devices that gave it: remembered, listed, revoked; wrong PINs cost time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from appliance.box.record import WholeFile
+from appliance.pose.foreign_file import plain_json
+
+DIGITS = 6
+MOST_DEVICES = 32  # the one that was not seen for the longest time gives way
+LONGEST_NAME = 40
+FREE_TRIES, PAUSE_S = 5, 60.0
+_MOST_ASKERS = 256
+_ALL_TRIES = 60  # in PAUSE_S, of all addresses together: a million PINs take eleven days
+_LARGEST = 1 << 16
+
+
+@dataclass(frozen=True)
+class Device:
+    """A browser that gave the PIN. digest: of the token that it alone keeps; since: Unix seconds."""
+
+    id: str
+    name: str
+    digest: str
+    since: float
+
+
+class Devices:
+    """The file with PIN and devices, which other processes may change. Raises OSError without a place."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file = WholeFile(path, _LARGEST)
+        self._changed = -1
+        self._pin = ""
+        self._devices: tuple[Device, ...] = ()
+        self._look()
+        if not self._pin:
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self._write(new_pin(), ())
+
+    @property
+    def pin(self) -> str:
+        """Six digits."""
+        self._look()
+        return self._pin
+
+    @property
+    def devices(self) -> tuple[Device, ...]:
+        """Those that gave it, in that order."""
+        self._look()
+        return self._devices
+
+    def change_pin(self) -> str:
+        """A new PIN; all devices are forgotten."""
+        self._write(new_pin(), ())
+        return self._pin
+
+    def remember(self, name: str) -> str:
+        """Remember one more device; its token."""
+        token = secrets.token_hex(32)
+        kept = self.devices[-(MOST_DEVICES - 1) :]
+        self._write(self._pin, (*kept, Device(secrets.token_hex(4), name, _digest(token), time.time())))
+        return token
+
+    def known(self, token: str) -> Device | None:
+        """The device with this token."""
+        digest = _digest(token)
+        return next((one for one in self.devices if secrets.compare_digest(one.digest, digest)), None)
+
+    def revoke(self, device_id: str) -> bool:
+        """Whether there was such a device; it needs the PIN again."""
+        kept = tuple(one for one in self.devices if one.id != device_id)
+        if len(kept) == len(self._devices):
+            return False
+        self._write(self._pin, kept)
+        return True
+
+    def _look(self) -> None:
+        """Read the file again where it has changed; a spoilt one is as good as none."""
+        try:
+            changed = self._path.stat().st_mtime_ns
+        except OSError:
+            return
+        if changed == self._changed:
+            return
+        try:
+            values = plain_json(self._file.read()[0])
+            devices = tuple(Device(**device) for device in values["devices"])
+            pin = values["pin"]
+            if not (isinstance(pin, str) and len(pin) == DIGITS and pin.isdecimal()):
+                return
+        except (OSError, ValueError, KeyError, TypeError, IndexError):
+            return
+        self._pin, self._devices, self._changed = pin, devices, changed
+
+    def _write(self, pin: str, devices: tuple[Device, ...]) -> None:
+        values = {"pin": pin, "devices": [asdict(device) for device in devices]}
+        self._file.write(json.dumps(values, indent=1).encode())
+        self._pin, self._devices, self._changed = pin, devices, self._path.stat().st_mtime_ns
+
+
+@dataclass(frozen=True)
+class _Tries:
+    count: int = 0
+    since: float = 0.0
+
+    def more(self, now: float) -> _Tries:
+        fresh = now - self.since > PAUSE_S
+        return _Tries(1, now) if fresh else replace(self, count=self.count + 1)
+
+    def wait_s(self, most: int, now: float) -> float:
+        return max(0.0, self.since + PAUSE_S - now) if self.count >= most else 0.0
+
+
+class WrongPins:
+    """How many wrong PINs came from where; five a minute from one address are let through."""
+
+    def __init__(self) -> None:
+        self._of: dict[str, _Tries] = {}
+        self._all = _Tries()
+
+    def wait_s(self, asker: str, now: float) -> float:
+        """How long this address waits before its next try; 0: none."""
+        own = self._of.get(asker, _Tries()).wait_s(FREE_TRIES, now)
+        return max(own, self._all.wait_s(_ALL_TRIES, now))
+
+    def note(self, asker: str, now: float) -> None:
+        """One more wrong PIN."""
+        self._of[asker] = self._of.pop(asker, _Tries()).more(now)
+        self._all = self._all.more(now)
+        while len(self._of) > _MOST_ASKERS:
+            self._of.pop(next(iter(self._of)))
+
+
+def new_pin() -> str:
+    """Six digits that nobody guesses."""
+    return f"{secrets.randbelow(10**DIGITS):0{DIGITS}}"
+
+
+def _digest(token: str) -> str:
+    return hashlib.sha256(token.encode(errors="replace")).hexdigest()

@@ -1,0 +1,106 @@
+"""What stands before each request: from which network, for which name, from which page, by which device."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+from collections.abc import Awaitable, Callable, Sequence
+
+from aiohttp import web
+
+from appliance.console.devices import Device, Devices
+
+COOKIE = "bunraku_device"
+_READING = ("GET", "HEAD")
+_HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
+    "connect-src 'self' ws://{host} wss://{host}; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'"
+)
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Guard:
+    """Refuses with 403 and one sentence. viewers: networks that may look; names: the box's own."""
+
+    def __init__(self, viewers: Sequence[str], names: Sequence[str], devices: Devices) -> None:
+        self._viewers = [ipaddress.ip_network(one) for one in viewers]
+        own = socket.gethostname().lower()
+        self._names = {"localhost", own, f"{own}.local", *(name.lower() for name in names)}
+        self._devices = devices
+        self.refused = 0
+
+    @web.middleware
+    async def check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Let a request through, or refuse it."""
+        if complaint := self._complaint(request):
+            self.refused += 1
+            return web.Response(status=403, text=complaint, headers=_HEADERS)
+        try:
+            response = await handler(request)
+        except web.HTTPException as error:
+            error.headers.update(_HEADERS)
+            raise
+        if not response.prepared:
+            response.headers.update(_HEADERS)
+            response.headers["Content-Security-Policy"] = _POLICY.format(host=request.host)
+            response.headers.setdefault("Cache-Control", "no-store")
+        return response
+
+    def device(self, request: web.Request) -> Device | None:
+        """The device that sent it, if it is remembered."""
+        return self._devices.known(request.cookies.get(COOKIE, "")[:128])
+
+    def require_device(self, request: web.Request) -> Device:
+        """Raise 401 for a device that has not given the PIN."""
+        device = self.device(request)
+        if device is None:
+            self.refused += 1
+            raise web.HTTPUnauthorized(text="This needs the PIN. The box says it: bunraku console pin.")
+        return device
+
+    def _complaint(self, request: web.Request) -> str:
+        if not self._may_look(peer(request)):
+            return "This device may not open the page. The box file lists those that may: `console: viewers`."
+        if not self._is_own(request.host):
+            return "The box does not know this name as its own. Use its address, or list the name."
+        upgrades = request.headers.get("Upgrade", "").lower() == "websocket"
+        origin = request.headers.get("Origin")
+        if origin is None and not upgrades and request.method in _READING:
+            return ""
+        if origin != f"{request.scheme}://{request.host}":
+            return "This request comes from another page than the box's own."
+        return ""
+
+    def _may_look(self, address: str) -> bool:
+        try:
+            asker = ipaddress.ip_address(address)
+        except ValueError:
+            return False
+        return asker.is_loopback or any(asker in network for network in self._viewers)
+
+    def _is_own(self, host: str) -> bool:
+        """Addresses are: a foreign page that points its name at the box still sends its name."""
+        name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
+        if name.lower() in self._names:
+            return True
+        try:
+            ipaddress.ip_address(name.strip("[]"))
+        except ValueError:
+            return False
+        return True
+
+
+def peer(request: web.Request) -> str:
+    """The address that a request comes from; an IPv4 address also where it came in by IPv6."""
+    address = (request.remote or "").split("%")[0].lower()
+    return address.removeprefix("::ffff:")

@@ -1,0 +1,209 @@
+// The dance in 3D, drawn on a plain canvas: a body of capsules, its shadow, a floor. No library, no graphics card.
+const HEAD_BYTES = 16; // tick (float64), flags, joints (uint32): stage_view.py
+const GRID_M = 3;
+const INK = { body: [238, 226, 206], hand: [255, 138, 92], floor: "#2a2f36", shadow: "#000000" };
+
+export class Dance {
+  constructor(canvas, caption, box, words) {
+    this.canvas = canvas;
+    this.caption = caption;
+    this.box = box;
+    this.words = words;
+    this.yaw = 0.5;
+    this.pitch = 0.12;
+    this.zoom = 1;
+    this.centre = null;
+    this.show = null;
+    this.frame = null;
+    this.generation = -1;
+    box.addEventListener("frame", (event) => this.take(event.detail));
+    this.turnBy(canvas);
+    const next = () => {
+      if (!document.hidden && canvas.offsetParent !== null) this.draw();
+      requestAnimationFrame(next);
+    };
+    requestAnimationFrame(next);
+  }
+
+  // A new stage may dance another skeleton.
+  async follow(value) {
+    this.holds = new Set(value.hands.filter((one) => one.holds).map((one) => one.joint));
+    if (value.generation === this.generation || value.generation === 0) return;
+    try {
+      const show = await (await fetch("/api/show")).json();
+      this.generation = show.generation;
+      this.show = show.joints ? show : null;
+    } catch { /* asked again with the next word of the box */ }
+  }
+
+  take(buffer) {
+    const head = new DataView(buffer), joints = head.getUint32(12, true);
+    if (buffer.byteLength !== HEAD_BYTES + 28 * joints) return;
+    const numbers = new Float32Array(buffer, HEAD_BYTES);
+    this.frame = { tick: head.getFloat64(0, true), world: numbers.subarray(0, 4 * joints), positions: numbers.subarray(4 * joints) };
+    this.takenAt = performance.now();
+    document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
+  }
+
+  turnBy(canvas) {
+    const fingers = new Map();
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      fingers.set(event.pointerId, [event.clientX, event.clientY]);
+    });
+    const gone = (event) => fingers.delete(event.pointerId);
+    canvas.addEventListener("pointerup", gone);
+    canvas.addEventListener("pointercancel", gone);
+    canvas.addEventListener("pointermove", (event) => {
+      const before = fingers.get(event.pointerId);
+      if (!before) return;
+      const at = [event.clientX, event.clientY];
+      if (fingers.size === 1) this.turn((at[0] - before[0]) / 150, (at[1] - before[1]) / 150);
+      else {
+        const other = [...fingers].find(([id]) => id !== event.pointerId)[1];
+        const apart = (one) => Math.hypot(one[0] - other[0], one[1] - other[1]);
+        this.magnify(apart(at) / Math.max(apart(before), 1));
+      }
+      fingers.set(event.pointerId, at);
+    });
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.magnify(Math.exp(-event.deltaY / 500));
+    }, { passive: false });
+    canvas.addEventListener("keydown", (event) => {
+      const ways = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] };
+      if (ways[event.key]) this.turn(...ways[event.key]);
+      else if (event.key === "+") this.magnify(1.1);
+      else if (event.key === "-") this.magnify(1 / 1.1);
+      else return;
+      event.preventDefault();
+    });
+  }
+
+  turn(yaw, pitch) {
+    this.yaw += yaw;
+    this.pitch = Math.min(1.4, Math.max(-0.2, this.pitch + pitch));
+  }
+
+  magnify(by) { this.zoom = Math.min(4, Math.max(0.4, this.zoom * by)); }
+
+  draw() {
+    const { canvas, frame, show } = this, ratio = Math.min(devicePixelRatio || 1, 2);
+    const wide = Math.round(canvas.clientWidth * ratio), high = Math.round(canvas.clientHeight * ratio);
+    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+    const ink = canvas.getContext("2d");
+    ink.clearRect(0, 0, wide, high);
+    if (!frame || !show || frame.positions.length !== 3 * show.joints.length) {
+      this.tell(this.words(this.box.framesWanted ? "no_dance" : "dance_off"));
+      return;
+    }
+    const point = (joint) => frame.positions.subarray(3 * joint, 3 * joint + 3);
+    const root = point(0);
+    this.centre ??= [root[0], root[2]];
+    this.centre = this.centre.map((value, axis) => value + 0.05 * (root[2 * axis] - value));
+    const eye = this.eye(wide, high);
+    this.drawFloor(ink, eye, ratio);
+    const bones = this.bones(point);
+    ink.lineCap = "round";
+    ink.strokeStyle = INK.shadow;
+    ink.globalAlpha = 0.45;
+    for (const { from, to, radius } of bones) this.stroke(ink, eye([from[0], 0, from[2]]), eye([to[0], 0, to[2]]), 1.6 * radius);
+    ink.globalAlpha = 1;
+    const seen = bones.map((bone) => ({ ...bone, a: eye(bone.from), b: eye(bone.to) }));
+    seen.sort((one, other) => other.a.away + other.b.away - one.a.away - one.b.away);
+    for (const { a, b, radius, held } of seen) this.drawBone(ink, a, b, radius, held);
+    for (const joint of this.heldJoints()) this.drawRing(ink, eye(point(joint)), ratio);
+    document.body.dataset.tick = frame.tick;
+    document.body.dataset.root = Array.from(root, (value) => value.toFixed(3)).join(" ");
+    const isOld = performance.now() - this.takenAt > 1500;
+    const names = this.heldJoints().map((joint) => show.joints[joint]);
+    this.tell(isOld ? this.words("dance_stands") : names.length ? this.words("held", { names: names.join(", ") }) : this.words("free"));
+  }
+
+  heldJoints() {
+    return this.show.held.filter((name) => this.holds?.has(name)).map((name) => this.show.joints.indexOf(name));
+  }
+
+  tell(sentence) {
+    if (this.caption.textContent !== sentence) this.caption.textContent = sentence;
+  }
+
+  // From metres to pixels, with the distance from the eye: 4.5 m away from the dancer, 1 m above the floor.
+  eye(wide, high) {
+    const [sy, cy, sp, cp] = [Math.sin(this.yaw), Math.cos(this.yaw), Math.sin(this.pitch), Math.cos(this.pitch)];
+    const size = 1.75 * Math.min(wide * 1.15, high) * this.zoom, [x0, z0] = this.centre;
+    return ([x, y, z]) => {
+      const side = cy * (x - x0) - sy * (z - z0), near = sy * (x - x0) + cy * (z - z0), up = y - 0.95;
+      const away = Math.max(0.4, 4.5 - (cp * near + sp * up)), scale = size / away;
+      return { x: wide / 2 + scale * side, y: high / 2 - scale * (cp * up - sp * near), away, scale };
+    };
+  }
+
+  bones(point) {
+    const { show, frame } = this, held = new Set(this.heldJoints());
+    const bones = [];
+    const add = (joint, from, to) => {
+      const name = show.joints[joint].toLowerCase(), length = Math.hypot(...from.map((v, axis) => to[axis] - v));
+      const trunk = /hip|pelvis|root|spine|torso|chest|back/.test(name);
+      const radius = /head/.test(name) ? 0.085 : Math.min(trunk ? 0.085 : 0.055, Math.max(0.022, 0.2 * length));
+      if (length > 0.005) bones.push({ from: [...from], to: [...to], radius, held: held.has(joint) });
+    };
+    show.parents.forEach((parent, joint) => { if (parent >= 0) add(parent, point(parent), point(joint)); });
+    for (const [joint, offset] of show.ends) {
+      const turned = rotated(frame.world.subarray(4 * joint, 4 * joint + 4), offset), from = point(joint);
+      add(joint, from, turned.map((value, axis) => value + from[axis]));
+    }
+    return bones;
+  }
+
+  drawBone(ink, a, b, radius, held) {
+    const light = Math.min(1, Math.max(0.45, 1.25 - 0.16 * ((a.away + b.away) / 2 - 3)));
+    const colour = held ? INK.hand : INK.body;
+    const shade = (part) => `rgb(${colour.map((value) => Math.round(value * light * part)).join(" ")})`;
+    ink.strokeStyle = "#0d0f11";
+    this.stroke(ink, a, b, radius * 1.22);
+    ink.strokeStyle = shade(0.62);
+    this.stroke(ink, a, b, radius);
+    ink.strokeStyle = shade(1);
+    const shift = 0.22 * radius;
+    const lit = (end) => ({ ...end, x: end.x - shift * end.scale, y: end.y - shift * end.scale });
+    this.stroke(ink, lit(a), lit(b), radius * 0.6);
+  }
+
+  stroke(ink, a, b, radius) {
+    ink.lineWidth = Math.max(1, radius * (a.scale + b.scale));
+    ink.beginPath();
+    ink.moveTo(a.x, a.y);
+    ink.lineTo(b.x, b.y);
+    ink.stroke();
+  }
+
+  drawRing(ink, at, ratio) {
+    ink.strokeStyle = `rgb(${INK.hand.join(" ")})`;
+    ink.lineWidth = 3 * ratio;
+    ink.beginPath();
+    ink.arc(at.x, at.y, Math.max(12 * ratio, 0.12 * at.scale), 0, 7);
+    ink.stroke();
+  }
+
+  drawFloor(ink, eye, ratio) {
+    ink.strokeStyle = INK.floor;
+    ink.lineWidth = ratio;
+    ink.beginPath();
+    const [x0, z0] = this.centre.map((value) => Math.round(2 * value) / 2);
+    for (let step = -GRID_M; step <= GRID_M; step += 0.5) {
+      for (const [from, to] of [[[x0 + step, 0, z0 - GRID_M], [x0 + step, 0, z0 + GRID_M]], [[x0 - GRID_M, 0, z0 + step], [x0 + GRID_M, 0, z0 + step]]]) {
+        const [a, b] = [eye(from), eye(to)];
+        ink.moveTo(a.x, a.y);
+        ink.lineTo(b.x, b.y);
+      }
+    }
+    ink.stroke();
+  }
+}
+
+// A vector turned by a unit quaternion w, x, y, z.
+function rotated([w, x, y, z], [a, b, c]) {
+  const [s, t, u] = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)];
+  return [a + w * s + y * u - z * t, b + w * t + z * s - x * u, c + w * u + x * t - y * s];
+}

@@ -1,0 +1,111 @@
+// This device: the PIN, what is asked of the box with it, and the devices that it knows.
+import { request } from "./box.js";
+import { language } from "./words.js";
+
+const byId = (id) => document.getElementById(id);
+let known = false, waiting = null, words = (key) => key, silence = 0;
+
+export function initDevice(me, table) {
+  words = table;
+  tell(me.known);
+  byId("give-pin").addEventListener("click", () => askPin(null));
+  byId("pin-cancel").addEventListener("click", () => byId("pin").close());
+  byId("pin-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    givePin();
+  });
+  byId("languages").replaceChildren(...me.languages.map((one) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = new Intl.DisplayNames([one], { type: "language" }).of(one);
+    button.lang = one;
+    button.setAttribute("aria-pressed", one === language);
+    button.addEventListener("click", () => {
+      localStorage.setItem("language", one);
+      location.reload();
+    });
+    return button;
+  }));
+}
+
+// Ask the box for something; a device that it does not know gives the PIN first, and then it is done at once.
+export async function command(address, ...given) {
+  const answer = await request("/api/command", { address, arguments: given });
+  if (answer.status === 401) {
+    tell(false);
+    askPin(() => command(address, ...given));
+    return false;
+  }
+  const done = answer.status === 200 && answer.value.done;
+  say(answer.status === 200 ? answer.value.words : answer.words || words("no_page"), !done);
+  return done;
+}
+
+export function say(sentence, refused = false) {
+  const said = byId("said");
+  said.textContent = sentence;
+  said.classList.toggle("refused", refused);
+  clearTimeout(silence);
+  silence = setTimeout(() => { said.textContent = ""; }, refused ? 8000 : 3000);
+}
+
+function askPin(then) {
+  waiting = then;
+  byId("pin-said").textContent = "";
+  byId("pin-input").value = "";
+  if (!byId("pin").open) byId("pin").showModal();
+  byId("pin-input").focus();
+}
+
+async function givePin() {
+  byId("pin-send").disabled = true;
+  const answer = await request("/api/pin", { pin: byId("pin-input").value, name: deviceName() });
+  byId("pin-send").disabled = false;
+  if (answer.status !== 200) {
+    const keys = { 403: "pin_wrong", 429: "pin_wait", 0: "no_page" };
+    byId("pin-said").textContent = words(keys[answer.status] ?? "pin_wrong");
+    byId("pin-input").select();
+    return;
+  }
+  byId("pin").close();
+  tell(true);
+  const then = waiting;
+  waiting = null;
+  then?.();
+}
+
+// Such as "iPhone, Safari" or "Linux, Chrome": enough to tell the devices in a list apart.
+function deviceName() {
+  const said = navigator.userAgent;
+  const machine = ["iPhone", "iPad", "Android", "Windows", "Macintosh", "Linux"].find((one) => said.includes(one));
+  const browser = ["Firefox", "Edg", "Chrome", "Safari"].find((one) => said.includes(one));
+  return [machine, browser].filter(Boolean).join(", ");
+}
+
+async function tell(isKnown) {
+  known = isKnown;
+  document.body.dataset.known = known ? "yes" : "no";
+  byId("known").textContent = words(known ? "known" : "unknown");
+  byId("give-pin").hidden = known;
+  byId("devices-part").hidden = !known;
+  if (!known) return;
+  const answer = await request("/api/devices");
+  if (answer.status === 200) byId("devices").replaceChildren(...answer.value.map(listed));
+}
+
+function listed(device) {
+  const item = document.createElement("li"), since = document.createElement("small"), row = document.createElement("div");
+  item.textContent = device.own ? `${device.name} (${words("this_device")})` : device.name;
+  since.textContent = new Date(1000 * device.since).toLocaleString(language);
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = words("revoke");
+  button.addEventListener("click", async () => {
+    await request("/api/revoke", { id: device.id });
+    tell(!device.own);
+  });
+  row.className = "row";
+  row.append(button);
+  item.append(since, row);
+  return item;
+}

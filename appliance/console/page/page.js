@@ -1,0 +1,148 @@
+// The page: which part is shown, what the box says, and the buttons of the night.
+import { Box } from "./box.js";
+import { showChoices } from "./choices.js";
+import { Dance } from "./dance.js";
+import { command, initDevice } from "./device.js";
+import { initPicture, showPicture } from "./picture.js";
+import { initRehearsal, showRehearsal } from "./rehearsal.js";
+import { showSensors } from "./sensors.js";
+import { clock, hasWords, loadWords, number, words } from "./words.js";
+
+const byId = (id) => document.getElementById(id);
+const STILL_PX = 14; // a thumb that scrolls moves farther between touch and release
+
+function show(page) {
+  const known = byId(page) && document.querySelector(`[data-page="${page}"]`) ? page : "tonight";
+  for (const section of document.querySelectorAll("main > section")) section.hidden = section.id !== known;
+  for (const button of document.querySelectorAll("nav button")) {
+    if (button.dataset.page === known) button.setAttribute("aria-current", "page");
+    else button.removeAttribute("aria-current");
+  }
+  document.body.dataset.shown = known;
+  if (location.hash !== `#${known}`) history.replaceState(null, "", `#${known}`);
+  scrollTo(0, 0);
+  box.showFrames(known === "dance" && byId("show-dance").checked);
+}
+
+function verdict() {
+  const value = box.value;
+  if (value === null || box.isSilent) {
+    const silent = value !== null || performance.now() > 4000;
+    document.body.dataset.level = silent ? "fault" : "waiting";
+    byId("verdict").textContent = words(silent ? "no_page" : "waiting");
+    document.body.classList.toggle("silent", silent);
+    return;
+  }
+  document.body.classList.remove("silent");
+  const { level, key, values } = value.verdict;
+  document.body.dataset.level = level;
+  const said = { ...values };
+  if ("since" in said) said.since = clock(said.since);
+  if ("rate" in said) said.rate = number(said.rate, 1);
+  if (key === "fallbacks") said.words = beginning(spoken(value.fallbacks.find((one) => one.active) ?? said));
+  setText(byId("verdict"), words(`verdict_${key}`, said));
+}
+
+function spoken(fallback) {
+  return hasWords(`fallback_${fallback.name}`) ? words(`fallback_${fallback.name}`) : fallback.words;
+}
+
+// What happened; what the audience sees and what to do stand below, in full.
+const beginning = (sentence) => `${sentence.split(/[.:;] /)[0].replace(/\.$/, "")}.`;
+
+function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+function tonight(value) {
+  const status = value.status;
+  const worn = value.sensors.filter((one) => one.is_worn);
+  const figures = [
+    ["show", status?.show || "–"],
+    ["state", words(`state_${status?.state ?? "unknown"}`)],
+    ["cue_now", status?.cue || "–"],
+    ["phrase_now", status?.phrase || "–"],
+    ["sensors", worn.length ? words("n_of_m", { n: worn.filter((one) => one.heard).length, m: worn.length }) : "–"],
+    ["rate", status ? `${number(status.rate_hz, 1)} Hz` : "–"],
+    ["late_ticks", status ? number(status.late + status.skipped) : "–"],
+    ["temperature", status && status.temperature_c >= 0 ? `${number(status.temperature_c)} °C` : "–"],
+  ];
+  const list = byId("figures");
+  list.replaceChildren(...figures.map(([key, said]) => {
+    const pair = document.createElement("div");
+    const term = document.createElement("dt"), meaning = document.createElement("dd");
+    term.textContent = words(key);
+    meaning.textContent = said;
+    pair.append(term, meaning);
+    return pair;
+  }));
+  showChoices(byId("cues"), byId("cues-part"), value.cues, (name) => command("/cue", name));
+  showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));
+  if (status && document.activeElement !== byId("master")) master(status.panic || status.blackout ? null : status.level);
+  byId("panic").setAttribute("aria-pressed", Boolean(status?.panic));
+  byId("blackout").setAttribute("aria-pressed", Boolean(status?.blackout));
+  const over = value.fallbacks.filter((one) => !one.active);
+  byId("fallbacks-part").hidden = over.length === 0;
+  byId("fallbacks").replaceChildren(...over.map(told));
+  byId("fallbacks-now").replaceChildren(...value.fallbacks.filter((one) => one.active).map(told));
+}
+
+function told(fallback) {
+  const item = document.createElement("li"), small = document.createElement("small");
+  item.textContent = spoken(fallback);
+  item.classList.toggle("active", fallback.active);
+  small.textContent = words(fallback.active ? "fallback_now" : "fallback_before", fallback);
+  item.append(small);
+  return item;
+}
+
+function master(level) {
+  if (level !== null) byId("master").value = Math.round(100 * level);
+  byId("master-said").textContent = `${byId("master").value} %`;
+}
+
+// A press counts when finger or mouse is released where it touched; a thumb that scrolls over it does nothing.
+function press(button, act) {
+  let from = null;
+  button.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY]; });
+  button.addEventListener("click", (event) => {
+    const moved = event.detail && from ? Math.hypot(event.clientX - from[0], event.clientY - from[1]) : 0;
+    from = null;
+    if (moved <= STILL_PX) act();
+  });
+}
+
+const me = await fetch("/api/me").then((answer) => answer.json()).catch(() => ({ languages: ["en"] }));
+await loadWords(me.languages);
+const box = new Box();
+const dance = new Dance(byId("stage"), byId("held"), box, words);
+initDevice(me, words);
+initPicture();
+initRehearsal(me);
+for (const button of document.querySelectorAll("nav button")) button.addEventListener("click", () => show(button.dataset.page));
+byId("show-dance").addEventListener("change", () => show("dance"));
+addEventListener("hashchange", () => show(location.hash.slice(1)));
+byId("go").addEventListener("click", () => command("/go"));
+byId("stop").addEventListener("click", () => command("/stop"));
+press(byId("panic"), () => command("/panic"));
+press(byId("blackout"), () => command("/blackout", box.value?.status?.blackout ? 0 : 1));
+byId("master").addEventListener("input", () => master(null));
+byId("master").addEventListener("change", () => {
+  command("/master", Number(byId("master").value) / 100, 0.3);
+  byId("master").blur();
+});
+byId("neutral-all").addEventListener("click", () => command("/sensors/neutral"));
+byId("heading-all").addEventListener("click", () => command("/sensors/heading"));
+box.addEventListener("value", () => {
+  tonight(box.value);
+  showSensors(byId("cards"), box.value, words);
+  showPicture(box.value);
+  showRehearsal(box.value, dance.show);
+  dance.follow(box.value);
+  document.body.dataset.heard = box.value.time;
+});
+box.addEventListener("value", verdict);
+box.addEventListener("beat", verdict);
+show(location.hash.slice(1) || "tonight");
+verdict();
+document.body.dataset.ready = "yes";

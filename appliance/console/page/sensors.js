@@ -1,0 +1,74 @@
+// One card for each sensor. A card stays the same element, so that a press on it is never lost.
+import { command } from "./device.js";
+import { hasWords, number } from "./words.js";
+
+const cards = new Map();
+
+export function showSensors(parent, value, words) {
+  const names = value.sensors.map((one) => one.name);
+  for (const [name, card] of cards) {
+    if (!names.includes(name)) {
+      card.root.remove();
+      cards.delete(name);
+    }
+  }
+  for (const sensor of value.sensors) {
+    if (!cards.has(sensor.name)) {
+      cards.set(sensor.name, made(sensor.name, words));
+      parent.append(cards.get(sensor.name).root);
+    }
+    fill(cards.get(sensor.name), sensor, words);
+  }
+  parent.dataset.empty = names.length === 0;
+  parent.title = names.length ? "" : words("no_sensors");
+}
+
+function made(name, words) {
+  const root = document.createElement("article"), title = document.createElement("h3"), state = document.createElement("p");
+  const facts = document.createElement("dl"), complaint = document.createElement("p"), row = document.createElement("div");
+  title.textContent = name;
+  complaint.className = "complaint";
+  row.className = "row";
+  for (const [key, address] of [["find", "/sensors/strobe"], ["neutral", "/sensors/neutral"], ["heading", "/sensors/heading"]]) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = words(key);
+    button.setAttribute("aria-label", `${words(key)}: ${name}`);
+    button.addEventListener("click", () => command(address, name));
+    row.append(button);
+  }
+  root.append(title, state, facts, complaint, row);
+  return { root, state, facts, complaint };
+}
+
+function fill(card, sensor, words) {
+  card.root.dataset.state = sensor.state;
+  card.root.dataset.sensor = sensor.name;
+  const ago = !sensor.heard && sensor.age_s >= 0 ? ` ${words("heard_before", { time: duration(sensor.age_s) })}` : "";
+  card.state.textContent = words(`sensor_${sensor.state}`) + ago;
+  card.complaint.textContent = sensor.complaint;
+  const grades = ["system", "gyro", "accel", "mag"].map((_, place) => (sensor.calibration >> (6 - 2 * place)) & 3);
+  const battery = sensor.battery === null ? words("unknown_value") : `${sensor.battery} %${sensor.heard ? "" : ` (${words("last")})`}`;
+  const facts = [
+    ["rate", `${number(sensor.rate_hz, 1)} Hz`],
+    ["loss", `${number(100 * sensor.loss, 1)} %`],
+    ["round_trip", sensor.round_trip_s >= 0 ? `${number(1000 * sensor.round_trip_s, 1)} ms` : "–"],
+    ["battery", battery],
+    ["calibration", words("of_three", { gyro: grades[1], accel: grades[2] })],
+    ["neutral_pose", hasWords(`neutral_${sensor.neutral}`) ? words(`neutral_${sensor.neutral}`) : sensor.neutral || words("not_worn")],
+    ["way", sensor.way || "–"],
+    ["firmware", sensor.firmware || "–"],
+  ];
+  card.facts.replaceChildren(...facts.map(([key, said]) => {
+    const pair = document.createElement("div"), term = document.createElement("dt"), meaning = document.createElement("dd");
+    term.textContent = words(key);
+    meaning.textContent = said;
+    pair.append(term, meaning);
+    return pair;
+  }));
+}
+
+function duration(seconds) {
+  if (seconds < 90) return `${Math.round(seconds)} s`;
+  return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${number(seconds / 3600, 1)} h`;
+}

@@ -1,0 +1,34 @@
+// The table of words: /words/LANGUAGE.json; a word that a language lacks is English.
+let english = {}, own = {};
+export let language = "en";
+
+export async function loadWords(languages) {
+  const wished = [localStorage.getItem("language"), ...navigator.languages.map((one) => one.split("-")[0]), "en"];
+  language = wished.find((one) => languages.includes(one)) ?? "en";
+  english = await table("en");
+  own = language === "en" ? english : await table(language);
+  document.documentElement.lang = language;
+  for (const element of document.querySelectorAll("[data-words]")) element.textContent = words(element.dataset.words);
+  for (const element of document.querySelectorAll("[data-label]")) element.setAttribute("aria-label", words(element.dataset.label));
+}
+
+export function words(key, values = {}) {
+  const sentence = own[key] ?? english[key] ?? key;
+  return sentence.replace(/\{(\w+)\}/g, (_, name) => values[name] ?? "");
+}
+
+export const hasWords = (key) => key in own;
+
+export const clock = (seconds) =>
+  new Date(1000 * seconds).toLocaleTimeString(language, { hour: "2-digit", minute: "2-digit", hourCycle: "h23" });
+
+export const number = (value, digits = 0) =>
+  value.toLocaleString(language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+
+async function table(name) {
+  try {
+    return await (await fetch(`/words/${name}.json`)).json();
+  } catch {
+    return {};
+  }
+}

@@ -1,0 +1,104 @@
+"""The page's process: serves browsers, asks the box once a second, until a stop signal."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+import time
+from pathlib import Path
+
+from aiohttp import web
+
+from appliance.box.fallback import Fallbacks
+from appliance.box.notify import Notifier
+from appliance.box.process_health import ProcessHealth, ProcessHealthWriter
+from appliance.console.box_view import BoxView
+from appliance.console.desk import Desk
+from appliance.console.devices import Devices
+from appliance.console.guard import Guard
+from appliance.console.server import Server
+from appliance.console.settings import Settings
+from appliance.console.stage_view import StageView
+from appliance.console.watchers import Watchers
+
+TICK_S = 0.02
+_REFRESH_S = 1.0
+_PULSE_S = 0.1
+_IDLE_S = 0.2  # how often the stage is looked for while no browser shows the dance
+_NICER = 10  # the dance goes first, also without real-time rights
+_LAST_REQUESTS_S = 0.5
+_WAITING_CONNECTIONS = 64
+
+
+def run_console(settings: Settings) -> int:
+    """Serve the page until SIGTERM or Ctrl-C; the exit status. Raises OSError where it has no place."""
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, max(_NICER, os.getpriority(os.PRIO_PROCESS, 0)))
+    return asyncio.run(_serve(settings))
+
+
+async def _serve(settings: Settings) -> int:
+    stopped = asyncio.Event()
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, stopped.set)
+    folder = Path(settings.folder)
+    devices, stage, watchers = Devices(Path(settings.kept)), StageView(folder), Watchers()
+    guard, desk = Guard(settings.viewers, settings.names, devices), Desk(settings.control)
+    box = BoxView(desk, stage, ProcessHealth(folder))
+    health, notifier = ProcessHealthWriter(folder, "console", Fallbacks(())), Notifier()
+    app = Server(guard, devices, desk, stage, box, watchers, settings.rehearsal).app()
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=_LAST_REQUESTS_S, keepalive_timeout=30.0)
+    await runner.setup()
+    listening = socket.socket(fileno=settings.descriptor)
+    listening.setblocking(False)
+    await web.SockSite(runner, listening, backlog=_WAITING_CONNECTIONS).start()
+    notifier.ready("The page is served.")
+    tasks = [
+        asyncio.create_task(_pulse(notifier, health)),
+        asyncio.create_task(_refresh(box, watchers)),
+        asyncio.create_task(_send_frames(stage, watchers)),
+        asyncio.create_task(stopped.wait()),
+    ]
+    ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    notifier.stopping()
+    for task in tasks:
+        task.cancel()
+    await watchers.close()
+    await runner.cleanup()
+    faults = [fault for task in ended if (fault := task.exception())]
+    if faults:  # a task of ours broke: start anew, and let its traceback be seen
+        health.close()
+        raise faults[0]
+    health.end(time.monotonic())
+    health.close()
+    stage.close()
+    return 0
+
+
+async def _pulse(notifier: Notifier, health: ProcessHealthWriter) -> None:
+    while True:
+        notifier.ping(time.monotonic())
+        health.publish_health(time.monotonic())
+        await asyncio.sleep(_PULSE_S)
+
+
+async def _refresh(box: BoxView, watchers: Watchers) -> None:
+    while True:
+        await box.refresh()
+        watchers.put_words(box.words)
+        await asyncio.sleep(_REFRESH_S)
+
+
+async def _send_frames(stage: StageView, watchers: Watchers) -> None:
+    while True:
+        if watchers.frames_wanted:
+            frame = stage.newest(time.monotonic())
+            if frame is not None:
+                watchers.put_frame(frame)
+            await asyncio.sleep(TICK_S * watchers.every)
+        else:
+            stage.state(time.monotonic())
+            await asyncio.sleep(_IDLE_S)

@@ -1,0 +1,173 @@
+"""The page's server: what can be looked at, what can be done, and each request's bounds."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import secrets
+import time
+from typing import Any
+
+from aiohttp import web
+
+from appliance.console.box_view import BoxView
+from appliance.console.desk import Desk, NoAnswerError
+from appliance.console.devices import DIGITS, LONGEST_NAME, Devices, WrongPins
+from appliance.console.guard import COOKIE, Guard, peer
+from appliance.console.metrics import CONTENT_TYPE, metrics
+from appliance.console.page_files import PageFiles, languages
+from appliance.console.stage_view import StageView
+from appliance.console.watchers import Watchers
+from appliance.show_control.command import FORMS, command
+from appliance.show_control.packet import is_readable
+from appliance.show_control.status_messages import QUESTIONS
+
+LARGEST_REQUEST = 4096  # bytes
+_YEAR_S = 365 * 24 * 3600
+_MOST_ARGUMENTS = 16
+_NOT_FROM_HERE = frozenset((*QUESTIONS, "/sensors/list", "/ping"))  # answered to the page in another way
+
+
+class Server:
+    """Routes and what stands behind them."""
+
+    def __init__(
+        self,
+        guard: Guard,
+        devices: Devices,
+        desk: Desk,
+        stage: StageView,
+        box: BoxView,
+        watchers: Watchers,
+        rehearsal: bool,
+    ) -> None:
+        self._rehearsal = rehearsal
+        self._guard, self._devices, self._desk = guard, devices, desk
+        self._stage, self._box, self._watchers = stage, box, watchers
+        self._wrong_pins, self._languages = WrongPins(), languages()
+        self._refreshing: set[asyncio.Task[None]] = set()
+
+    def app(self) -> web.Application:
+        """The application, ready to serve."""
+        app = web.Application(middlewares=[self._guard.check], client_max_size=LARGEST_REQUEST)
+        app.add_routes(
+            [
+                web.get("/status", self._status),
+                web.get("/metrics", self._metrics),
+                web.get("/watch", self._watch),
+                web.get("/api/show", self._show),
+                web.get("/api/me", self._me),
+                web.get("/api/devices", self._listed),
+                web.post("/api/pin", self._take_pin),
+                web.post("/api/revoke", self._revoke),
+                web.post("/api/command", self._command),
+                web.get("/{path:.*}", PageFiles().serve),
+            ]
+        )
+        return app
+
+    async def _status(self, request: web.Request) -> web.Response:
+        return web.Response(text=self._box.words, content_type="application/json")
+
+    async def _metrics(self, request: web.Request) -> web.Response:
+        return web.Response(body=metrics(self._box.value).encode(), headers={"Content-Type": CONTENT_TYPE})
+
+    async def _watch(self, request: web.Request) -> web.StreamResponse:
+        return await self._watchers.serve(request, self._box.words)
+
+    async def _show(self, request: web.Request) -> web.Response:
+        return web.json_response({**self._stage.facts, "generation": self._stage.generation})
+
+    async def _me(self, request: web.Request) -> web.Response:
+        device = self._guard.device(request)
+        return web.json_response(
+            {
+                "known": device is not None,
+                "name": None if device is None else device.name,
+                "languages": self._languages,
+                "rehearsal": self._rehearsal,
+            }
+        )
+
+    async def _listed(self, request: web.Request) -> web.Response:
+        own = self._guard.require_device(request)
+        return web.json_response(
+            [
+                {"id": one.id, "name": one.name, "since": one.since, "own": one == own}
+                for one in self._devices.devices
+            ]
+        )
+
+    async def _take_pin(self, request: web.Request) -> web.Response:
+        asker, now = peer(request), time.monotonic()
+        if wait_s := self._wrong_pins.wait_s(asker, now):
+            headers = {"Retry-After": str(math.ceil(wait_s))}
+            raise web.HTTPTooManyRequests(text="Too many wrong PINs. Wait a minute.", headers=headers)
+        said = await _said(request)
+        pin, name = said.get("pin"), said.get("name", "")
+        if not isinstance(pin, str) or not isinstance(name, str) or not is_readable([name]):
+            raise web.HTTPBadRequest(text="A PIN is six digits, and a name is a text.")
+        if not secrets.compare_digest(pin.encode()[: 4 * DIGITS], self._devices.pin.encode()):
+            self._wrong_pins.note(asker, now)
+            raise web.HTTPForbidden(text="This is not the PIN. The box says it: bunraku console pin.")
+        token = self._devices.remember(name.strip()[:LONGEST_NAME] or "unnamed")
+        response = web.json_response({"known": True})
+        is_https = request.scheme == "https"
+        response.set_cookie(
+            COOKIE, token, max_age=_YEAR_S, httponly=True, samesite="Strict", secure=is_https, path="/"
+        )
+        return response
+
+    async def _revoke(self, request: web.Request) -> web.Response:
+        self._guard.require_device(request)
+        device_id = (await _said(request)).get("id")
+        if not isinstance(device_id, str) or not self._devices.revoke(device_id):
+            raise web.HTTPNotFound(text="There is no such device.")
+        return web.json_response({"done": True})
+
+    async def _command(self, request: web.Request) -> web.Response:
+        self._guard.require_device(request)
+        said = await _said(request)
+        address, arguments = said.get("address"), said.get("arguments", [])
+        if not isinstance(address, str) or address not in FORMS or address in _NOT_FROM_HERE:
+            raise web.HTTPBadRequest(text="This is no command of the page.")
+        if not _are_plain(arguments):
+            raise web.HTTPBadRequest(text="Arguments are numbers and texts, sixteen at most.")
+        try:
+            command(address, arguments)  # show control says the same; this keeps its port free of it
+            done, words = await self._desk.send_command(address, arguments)
+        except ValueError as error:
+            done, words = False, str(error)
+        except NoAnswerError as error:
+            raise web.HTTPServiceUnavailable(text=str(error)) from None
+        self._refresh_soon()
+        return web.json_response({"done": done, "words": words})
+
+    def _refresh_soon(self) -> None:
+        """All browsers see what a command changed without waiting for the next second."""
+        if not self._refreshing:
+            task = asyncio.create_task(self._refresh())
+            self._refreshing.add(task)
+            task.add_done_callback(self._refreshing.discard)
+
+    async def _refresh(self) -> None:
+        await self._box.refresh()
+        self._watchers.put_words(self._box.words)
+
+
+async def _said(request: web.Request) -> dict[str, Any]:
+    """The body as an object. Raises 400, and 413 above LARGEST_REQUEST."""
+    try:
+        said = json.loads(await request.read())
+    except (ValueError, RecursionError):
+        raise web.HTTPBadRequest(text="This is no JSON.") from None
+    if not isinstance(said, dict):
+        raise web.HTTPBadRequest(text="This is no JSON object.")
+    return said
+
+
+def _are_plain(arguments: object) -> bool:
+    if not isinstance(arguments, list) or len(arguments) > _MOST_ARGUMENTS:
+        return False
+    return all(isinstance(one, str) or (isinstance(one, int | float) and abs(one) < 1e9) for one in arguments)

@@ -1,0 +1,41 @@
+"""The settings of a box file that the page's process needs, as it gets them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The port's socket is open already: `descriptor`. control: where commands arrive; None: nowhere.
+
+    folder: where the box's processes meet. kept: the file with PIN and remembered devices. viewers, names,
+    rehearsal: as in the box file.
+    """
+
+    folder: str
+    descriptor: int
+    kept: str
+    control: tuple[str, int] | None = None
+    viewers: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    rehearsal: bool = True
+
+    def packed(self) -> str:
+        """As one argument of a command line; there are no secrets in it."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def unpacked(cls, text: str) -> Settings:
+        """From that argument."""
+        values = json.loads(text)
+        control = values["control"]
+        return cls(
+            **values
+            | {
+                "control": None if control is None else (str(control[0]), int(control[1])),
+                "viewers": tuple(values["viewers"]),
+                "names": tuple(values["names"]),
+            }
+        )

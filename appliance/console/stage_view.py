@@ -1,0 +1,103 @@
+"""What the page sees of the stage: its newest frame as bytes, and what stays the same while it runs."""
+
+from __future__ import annotations
+
+import math
+import struct
+from pathlib import Path
+from typing import Any, Literal
+
+from appliance.box.ring_file import RingFileReader
+from appliance.outputs.frame_layout import (
+    FACTS,
+    FILE,
+    FORMAT,
+    FRAME_HEAD,
+    FRAMES,
+    KIND,
+    LATE,
+    WRITER,
+    FrameLayout,
+)
+from appliance.pose.foreign_file import plain_json
+
+FRAME = struct.Struct("<dII")  # tick, flags, joints; then world rotations (w, x, y, z) and positions, float32
+STALE_S = 0.5
+_LOOK_S = 0.1
+
+
+class StageView:
+    """The shared frame of a runtime folder, read without numpy; never waits, never raises.
+
+    facts: show, skeleton and hands, as the page gets them; empty before the first stage. generation: another
+    number for each new stage.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._file = RingFileReader(folder / FILE, KIND, FORMAT, WRITER)
+        self._looked_at = -math.inf
+        self._sequence = 0
+        self._layout = FrameLayout(0)
+        self._frame_time = -math.inf
+        self.facts: dict[str, Any] = {}
+        self.generation = 0
+
+    def newest(self, now: float) -> bytes | None:
+        """The newest frame for browsers; None where there is none that was not given before."""
+        self._follow(now)
+        if not self._file.rings:
+            return None
+        ring = self._file.rings[FRAMES]
+        if ring.newest_sequence() == self._sequence or (found := ring.newest()) is None:
+            return None
+        self._sequence, payload = found
+        if len(payload) != self._layout.bytes:
+            return None
+        tick, self._frame_time, _, _, _, flags, joints = FRAME_HEAD.unpack_from(payload)
+        return FRAME.pack(tick, flags & LATE, joints) + payload[self._layout.world_at :]
+
+    def state(self, now: float) -> Literal["absent", "fresh", "stale"]:
+        """stale: its newest frame is older than half a second, or it died."""
+        self.newest(now)
+        if not self._file.is_there or self._frame_time == -math.inf:
+            return "absent"
+        is_fresh = self._file.writer_lives() and now - self._frame_time <= STALE_S
+        return "fresh" if is_fresh else "stale"
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+    def _follow(self, now: float) -> None:
+        if abs(now - self._looked_at) < _LOOK_S:
+            return
+        self._looked_at = now
+        if not self._file.look():
+            return
+        self._sequence, self._frame_time = 0, -math.inf
+        rings = self._file.rings
+        found = rings[FACTS].newest() if len(rings) > FRAMES else None
+        try:
+            self.facts = _for_browsers(plain_json(found[1] if found else b""))
+        except (ValueError, KeyError, TypeError, IndexError):
+            self._file.refuse(f"holds no facts about a show. Start {WRITER} again.")
+            return
+        self._layout = FrameLayout(len(self.facts["joints"]))
+        self.generation += 1
+
+
+def _for_browsers(facts: dict[str, Any]) -> dict[str, Any]:
+    """No paths and no process numbers of the box."""
+    skeleton = facts["skeleton"]
+    return {
+        "show": facts["show_name"],
+        "joints": skeleton["joints"],
+        "parents": skeleton["parents"],
+        "ends": skeleton["ends"],
+        "held": [skeleton["joints"][joint] for joint in facts["held"]],
+        "hands": facts["hands"],
+        "coding": facts["coding"],
+        "interaction": facts["interaction"],
+        "most_iterations": facts["most_iterations"],
+        "rehearsal": facts["rehearsal"],
+    }

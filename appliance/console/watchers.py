@@ -1,0 +1,124 @@
+"""Browsers that watch: one slot each for words and for a frame, overwritten, so that the newest wins."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+
+from aiohttp import WSMsgType, web
+
+MOST = 64
+LONGEST_MESSAGE = 64  # bytes; what a browser says here is whether it wants frames
+_SEND_BUFFER = 16384  # bytes in the kernel: frames that wait there are old when a slow browser gets them
+_QUIET_S = 10.0  # a browser that answers no ping for this long is gone
+_FEW = 8  # browsers that get each frame; with more of them each gets every second one
+
+
+class _Watcher:
+    """One browser."""
+
+    def __init__(self) -> None:
+        self.words: str | None = None
+        self.frame: bytes | None = None
+        self.wants_frames = False
+        self.ready = asyncio.Event()
+
+    async def send_on(self, browser: web.WebSocketResponse) -> None:
+        """Send what lies in the slots, for as long as the browser takes it."""
+        with contextlib.suppress(ConnectionError):
+            while True:
+                await self.ready.wait()
+                self.ready.clear()
+                words, self.words = self.words, None
+                if words is not None:
+                    await browser.send_str(words)
+                frame, self.frame = self.frame, None
+                if frame is not None:
+                    await browser.send_bytes(frame)
+
+
+class Watchers:
+    """All of them. A browser that takes nothing costs its slots alone."""
+
+    def __init__(self) -> None:
+        self._watchers: dict[_Watcher, web.WebSocketResponse] = {}
+
+    def __len__(self) -> int:
+        return len(self._watchers)
+
+    @property
+    def frames_wanted(self) -> bool:
+        """Whether any browser shows the dance."""
+        return any(one.wants_frames for one in self._watchers)
+
+    @property
+    def every(self) -> int:
+        """Ticks from one frame to the next."""
+        return 1 if sum(one.wants_frames for one in self._watchers) <= _FEW else 2
+
+    def put_words(self, words: str) -> None:
+        """For each browser, in place of what it has not taken yet."""
+        for one in self._watchers:
+            one.words = words
+            one.ready.set()
+
+    def put_frame(self, frame: bytes) -> None:
+        """The same for those that show the dance."""
+        for one in self._watchers:
+            if one.wants_frames:
+                one.frame = frame
+                one.ready.set()
+
+    async def serve(self, request: web.Request, words: str) -> web.StreamResponse:
+        """One browser, from its first word to its last."""
+        if len(self._watchers) >= MOST:
+            raise web.HTTPServiceUnavailable(text="Too many browsers watch already. Close one.")
+        browser = web.WebSocketResponse(
+            heartbeat=_QUIET_S, max_msg_size=LONGEST_MESSAGE, compress=False, writer_limit=1, timeout=1.0
+        )
+        await browser.prepare(request)
+        _keep_little(request)
+        watcher = _Watcher()
+        watcher.words = words
+        watcher.ready.set()
+        self._watchers[watcher] = browser
+        sending = asyncio.create_task(watcher.send_on(browser))
+        try:
+            async for message in browser:
+                wanted = _wish(message.data) if message.type == WSMsgType.TEXT else None
+                if wanted is None:
+                    await browser.close(code=1008, message=b"not understood")
+                    break
+                watcher.wants_frames = wanted
+        finally:
+            del self._watchers[watcher]
+            sending.cancel()
+        return browser
+
+    async def close(self) -> None:
+        """Say goodbye to all: they come back by themselves."""
+        for browser in list(self._watchers.values()):
+            with contextlib.suppress(ConnectionError, TimeoutError):
+                async with asyncio.timeout(0.5):
+                    await browser.close(code=1001, message=b"the page's process ends")
+
+
+def _wish(text: str) -> bool | None:
+    """Whether a browser wants frames; None for anything else that it may have said."""
+    try:
+        said = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    wanted = said.get("frames") if isinstance(said, dict) else None
+    return wanted if isinstance(wanted, bool) else None
+
+
+def _keep_little(request: web.Request) -> None:
+    transport = request.transport
+    if transport is not None:
+        transport.set_write_buffer_limits(high=0)
+        taken = transport.get_extra_info("socket")
+        if taken is not None:
+            taken.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)

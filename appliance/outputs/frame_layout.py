@@ -1,0 +1,25 @@
+"""How the shared frame lies in its file; without numpy, for processes that do not load it."""
+
+from __future__ import annotations
+
+import struct
+
+FILE, KIND, FORMAT, WRITER = "frame", "frame", 1, "the stage (bunraku play)"
+FACTS, HEALTH, FRAMES = range(3)  # the file's rings
+FRAME_SLOTS = 64  # a reader has 1.28 s to copy the newest frame
+HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
+LATE = 1  # flag
+# Tick, frame time, when it left the stage, the sensor's sequence and its arrival, flags, joints.
+FRAME_HEAD = struct.Struct("<qddqdII")
+
+
+class FrameLayout:
+    """Where the arrays of J joints lie in a frame's payload: all float32, little-endian, in this order."""
+
+    def __init__(self, joints: int) -> None:
+        self.joints = joints
+        self.root_at = FRAME_HEAD.size
+        self.pose_at = self.root_at + 12
+        self.world_at = self.pose_at + 16 * joints
+        self.positions_at = self.world_at + 16 * joints
+        self.bytes = self.positions_at + 12 * joints

@@ -1,0 +1,198 @@
+"""Requests: looking is open, acting needs the PIN; whatever else comes is refused with a sentence."""
+
+from __future__ import annotations
+
+import random
+import socket
+from pathlib import Path
+from urllib.parse import urlparse
+
+import pytest
+
+from appliance.console.devices import FREE_TRIES
+from appliance.console.server import LARGEST_REQUEST
+from hw_sim.peers import HOST
+from tests.console.page import Page, page_alone
+from tests.system.processes import run_bunraku
+
+
+def test_looking_needs_no_pin_and_every_file_is_the_box_s_own(page: Page) -> None:
+    whole = 0
+    for path in (
+        "/",
+        "/page.js",
+        "/box.js",
+        "/dance.js",
+        "/words.js",
+        "/page.css",
+        "/words/de.json",
+        "/icon.svg",
+    ):
+        answer = page.get(path)
+        assert answer.status == 200, path
+        whole += len(answer.text.encode())
+        assert "http://" not in answer.text.replace("http://www.w3.org/2000/svg", ""), (
+            "nothing comes from elsewhere"
+        )
+        assert "https://" not in answer.text
+        policy = answer.headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy and "unsafe" not in policy
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+        again = page.get(path, If_None_Match=answer.headers["ETag"])
+        assert (again.status, again.text) == (304, "")
+    assert whole < 100_000
+    assert page.get("/status").value["verdict"]["key"] == "stage_absent"
+
+
+def test_acting_needs_the_pin_and_a_remembered_device_needs_it_once(page: Page) -> None:
+    refused = page.command("/panic")
+    assert refused.status == 401 and "PIN" in refused.text
+    assert page.get("/api/devices").status == 401
+    wrong = page.post("/api/pin", {"pin": f"{(int(page.pin) + 1) % 1_000_000:06}", "name": "x"})
+    assert wrong.status == 403 and "Set-Cookie" not in wrong.headers
+    page.unlock()
+    assert page.get("/api/me").value["known"] is True
+    assert page.command("/panic").status == 503, "no show control answers here, and it says so"
+    (own,) = page.get("/api/devices").value
+    assert own["own"] and own["name"] == "a test"
+    assert page.post("/api/revoke", {"id": own["id"]}).status == 200
+    assert page.command("/panic").status == 401
+
+
+def test_the_cookie_is_for_the_page_alone(page: Page) -> None:
+    answer = page.post("/api/pin", {"pin": page.pin, "name": "phone"})
+    assert "HttpOnly" in answer.headers["Set-Cookie"] and "SameSite=Strict" in answer.headers["Set-Cookie"]
+
+
+def test_devices_are_listed_and_revoked_at_the_prompt(page: Page) -> None:
+    page.unlock()
+    listed = run_bunraku("console", "devices", "--box", page.box_file).stdout
+    assert "a test" in listed
+    assert run_bunraku("console", "revoke", listed.split()[0], "--box", page.box_file).returncode == 0
+    assert page.command("/panic").status == 401
+    missing = run_bunraku("console", "revoke", "nobody", "--box", page.box_file)
+    assert missing.returncode == 2 and "no device nobody" in missing.stderr
+    before = page.pin
+    assert run_bunraku("console", "pin", "--new", "--box", page.box_file).stdout.strip() == page.pin != before
+    assert page.post("/api/pin", {"pin": before, "name": ""}).status == 403
+
+
+def test_wrong_pins_are_slowed_down_and_then_even_the_right_one_waits(page: Page) -> None:
+    pin = page.pin
+    for _ in range(FREE_TRIES):
+        assert page.post("/api/pin", {"pin": "x" * 6, "name": ""}).status == 403
+    late = page.post("/api/pin", {"pin": pin, "name": ""})
+    assert late.status == 429 and 0 < int(late.headers["Retry-After"]) <= 60
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "https://{host}", "http://{host}.evil.example"]
+)
+def test_a_forged_origin_is_refused_with_and_without_the_cookie(page: Page, origin: str) -> None:
+    page.unlock()
+    forged = origin.format(host=f"{HOST}:{page.port}")
+    for path, said in (("/api/command", {"address": "/panic"}), ("/api/pin", {"pin": page.pin, "name": ""})):
+        answer = page.post(path, said, Origin=forged)
+        assert answer.status == 403 and "another page" in answer.text
+    assert page.request("POST", "/api/command", b'{"address": "/panic"}', {}).status == 403, "none at all"
+    answer = page.get("/watch", Upgrade="websocket", Connection="Upgrade", Origin=forged)
+    assert answer.status == 403
+
+
+def test_a_name_that_is_not_the_box_s_is_refused(page: Page) -> None:
+    """A foreign page that points its own name at the box (DNS rebinding) gets nothing."""
+    assert page.get("/status", Host="evil.example").status == 403
+    assert page.get("/status", Host=f"localhost:{page.port}").status == 200
+    assert page.get("/status", Host=f"[::1]:{page.port}").status == 200
+    assert page.get("/status", Host=f"{socket.gethostname()}.local").status == 200
+
+
+def test_no_command_that_the_page_does_not_have(page: Page) -> None:
+    page.unlock()
+    for address, arguments in (
+        ("/status", []),
+        ("/nothing", []),
+        (5, []),
+        ("/cue", [["a"]]),
+        ("/cue", "a"),
+        ("/cue", [None] * 3),
+        ("/cue", ["a"] * 99),
+    ):
+        assert page.post("/api/command", {"address": address, "arguments": arguments}).status == 400
+    for address, arguments in (
+        ("/master", [2.0]),
+        ("/master", ["a"]),
+        ("/cue", ["a" * 101]),
+        ("/cue", ["\x07"]),
+    ):
+        answer = page.post("/api/command", {"address": address, "arguments": arguments})
+        assert answer.status == 200 and answer.value["done"] is False and answer.value["words"]
+
+
+def test_whatever_comes_as_a_body_is_refused(page: Page, chance: random.Random, long_run: bool) -> None:
+    page.unlock()
+    bodies = [b"", b"[]", b"5", b"null", b"{", b"[" * 3000, b'{"pin": 5}', b"\xff\xfe", b'{"pin": NaN}']
+    bodies += [chance.randbytes(chance.randrange(200)) for _ in range(1000 if long_run else 100)]
+    for body in bodies:
+        for path in ("/api/pin", "/api/command", "/api/revoke"):
+            answer = page.post(path, body)
+            assert 400 <= answer.status < 500, (path, body)
+            if answer.status == 429:
+                break
+    assert page.post("/api/command", b"x" * (LARGEST_REQUEST + 1)).status == 413
+    assert page.get("/status").status == 200
+
+
+def test_a_venue_may_hide_the_rehearsal(tmp_path: Path) -> None:
+    with page_alone(tmp_path, rehearsal=False) as (page, _):
+        assert page.get("/api/me").value["rehearsal"] is False
+
+
+def test_no_path_leads_out_of_the_page(page: Page) -> None:
+    for path in (
+        "/../server.py",
+        "/..%2fserver.py",
+        "/%2e%2e/server.py",
+        "//etc/passwd",
+        "/words/../../run.py",
+        "/nothing",
+    ):
+        assert page.get(path).status == 404, path
+    for method in ("PUT", "DELETE", "OPTIONS", "PATCH"):
+        assert page.request(method, "/status", b"", {"Origin": page.origin}).status in (404, 405)
+
+
+def test_the_raw_port_survives_what_is_no_http(page: Page, chance: random.Random, long_run: bool) -> None:
+    starts = [
+        b"GET / HTTP/1.1\r\nHost: a\r\n",
+        b"GET /watch HTTP/1.1\r\n",
+        b"POST /api/pin HTTP/1.1\r\n",
+        b"",
+    ]
+    for _ in range(1000 if long_run else 100):
+        with socket.create_connection((HOST, page.port), 60) as one:
+            one.sendall(chance.choice(starts) + chance.randbytes(chance.randrange(400)))
+    assert page.get("/status").status == 200
+
+
+def test_a_page_for_a_network_refuses_others(tmp_path: Path) -> None:
+    """The test's own way to it is by loopback, which always may look; the guard is asked about the rest."""
+    from appliance.console.guard import Guard
+
+    with page_alone(tmp_path, host="::", viewers=["192.168.0.0/24", "fd00::/8"]) as (page, _):
+        assert page.is_open(), "IPv4 comes in by the same socket"
+        host = urlparse(page.origin).port
+        with socket.create_connection(("::1", host), 60) if socket.has_ipv6 else socket.socket() as one:
+            one.sendall(f"GET /status HTTP/1.1\r\nHost: [::1]:{host}\r\nConnection: close\r\n\r\n".encode())
+            assert one.recv(100).startswith(b"HTTP/1.1 200")
+    guard = Guard(["192.168.0.0/24", "fd00::/8"], [], None)  # type: ignore[arg-type]
+    for address, may in (
+        ("127.0.0.1", True),
+        ("::1", True),
+        ("192.168.0.9", True),
+        ("fd00::5", True),
+        ("192.168.1.9", False),
+        ("2001:db8::1", False),
+        ("", False),
+    ):
+        assert guard._may_look(address) is may, address

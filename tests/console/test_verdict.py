@@ -1,0 +1,85 @@
+"""The one sentence: which it is, and that each has its words in each language."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from typing import Any
+
+import pytest
+
+from appliance.console.page_files import FOLDER, languages
+from appliance.console.verdict import verdict
+from appliance.show_control.status_messages import Status
+
+GOOD: dict[str, Any] = dict.fromkeys(Status._fields, 0) | {
+    "state": "dancing",
+    "rate_hz": 50.0,
+    "level": 1.0,
+}
+HEARD = {"name": "left-wrist", "is_worn": True, "heard": True}
+LOST = {"name": "right-wrist", "is_worn": True, "heard": False}
+SPARE = {"name": "spare", "is_worn": False, "heard": False}
+FELL = {"name": "receiver-gone", "active": True, "words": "A receiver is away."}
+NOW, HOUR_AGO = 0.0, 3600.0  # seconds since a tick was late
+
+
+def status(**values: Any) -> Status:
+    return Status(**{**GOOD, **values})
+
+
+@pytest.mark.parametrize(
+    ("frames", "told", "sensors", "fallbacks", "ago_s", "trouble", "level", "key"),
+    [
+        ("fresh", status(), [HEARD, SPARE], [], HOUR_AGO, "", "well", "well"),
+        ("fresh", status(), [SPARE], [], HOUR_AGO, "", "well", "well_alone"),
+        ("absent", status(), [HEARD], [], HOUR_AGO, "", "fault", "stage_absent"),
+        ("stale", status(), [HEARD], [], HOUR_AGO, "", "fault", "stage_hung"),
+        ("fresh", None, [], [], HOUR_AGO, "It is silent.", "fault", "no_control"),
+        ("fresh", status(panic=1, state="panic"), [LOST], [FELL], HOUR_AGO, "", "held", "panic"),
+        ("fresh", status(blackout=1, state="blackout"), [HEARD], [], HOUR_AGO, "", "held", "blackout"),
+        ("fresh", status(state="stopped"), [HEARD], [], HOUR_AGO, "", "held", "stopped"),
+        ("fresh", status(level=0.0), [HEARD], [], HOUR_AGO, "", "held", "dark"),
+        ("fresh", status(), [HEARD, LOST], [FELL], HOUR_AGO, "", "warning", "sensors_missing"),
+        ("fresh", status(), [HEARD], [FELL], HOUR_AGO, "", "warning", "fallbacks"),
+        ("fresh", status(), [HEARD], [{**FELL, "active": False}], HOUR_AGO, "", "well", "well"),
+        ("fresh", status(late=2), [HEARD], [], NOW, "", "warning", "late"),
+        ("fresh", status(late=2), [HEARD], [], HOUR_AGO, "", "well", "well"),
+    ],
+)
+def test_the_worst_comes_first(
+    frames: str, told: Any, sensors: Any, fallbacks: Any, ago_s: float, trouble: str, level: str, key: str
+) -> None:
+    said = verdict(frames, told, sensors, fallbacks, time.time() - ago_s, trouble)
+    assert (said.level, said.key) == (level, key)
+    for language in languages():
+        sentence = table(language)[f"verdict_{key}"]
+        assert set(re.findall(r"\{(\w+)\}", sentence)) <= set(said.values), "a value that nothing fills in"
+
+
+def test_missing_sensors_are_named() -> None:
+    assert verdict("fresh", status(), [HEARD, LOST], [], HOUR_AGO, "").values["names"] == "right-wrist"
+
+
+@pytest.mark.parametrize("language", languages())
+def test_each_language_knows_the_words_of_the_page(language: str) -> None:
+    """A language may add words (fallbacks are English otherwise); it lacks none, with the same values."""
+    english, own = table("en"), table(language)
+    assert english.keys() <= own.keys()
+    for key, sentence in english.items():
+        assert set(re.findall(r"\{\w+\}", sentence)) == set(re.findall(r"\{\w+\}", own[key])), key
+    page = (FOLDER / "index.html").read_text()
+    assert set(re.findall(r'data-(?:words|label)="(\w+)"', page)) <= english.keys()
+
+
+def test_german_speaks_of_fallbacks_that_exist() -> None:
+    from tests.stage.test_fallbacks import EVERY
+
+    known = {f"fallback_{name}" for name in EVERY} | {"fallback_now", "fallback_before"}
+    assert {key for key in table("de") if key.startswith("fallback_")} <= known
+
+
+def table(language: str) -> dict[str, str]:
+    found: dict[str, str] = json.loads((FOLDER / "words" / f"{language}.json").read_text())
+    return found
