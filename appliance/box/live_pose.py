@@ -69,3 +69,8 @@ class LivePoseReader:
     def close(self) -> None:
         """Release the file."""
         self._block.close()
+
+
+def forget_live_pose(folder: Path) -> None:
+    """A show that ended as it should leaves no guest."""
+    (folder / FILE).unlink(missing_ok=True)

@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from appliance.box.live_pose import forget_live_pose
 from appliance.box.log_writer import LogWriter
 from appliance.box.show_state import forget_show_state
 from appliance.box.stop_signals import stop_signals
@@ -215,6 +216,7 @@ def _companions(
 def _forget_run(stage: Stage) -> None:
     """After a clean end the next show starts from its beginning."""
     forget_show_state(stage.sharing.folder)
+    forget_live_pose(stage.sharing.folder)
     if stage.box.state_folder is not None:
         forget_memory(stage.sharing.noted, stage.box.state_folder)
 
