@@ -29,12 +29,15 @@ BONES_ALIKE = 3.0  # of thigh and shin neither is longer than this times the oth
 
 @dataclass
 class _Leg:
-    """thigh, shin, foot: joints; hip: the joint above; rows: its points among the soles; toe: one of them."""
+    """thigh, shin, foot: joints; hip: the joint above; below: foot and what hangs on it; rows: its points
+    among the soles.
+    """
 
     hip: int
     thigh: int
     shin: int
     foot: int
+    below: list[int]
     rows: range
     x: float = 0.0  # offset of the foot from its path, metres
     z: float = 0.0
@@ -66,7 +69,7 @@ class FootLock:
                 continue
             long, short = (math.hypot(*skeleton.offsets[joint].tolist()) for joint in (shin, foot))
             if max(long, short) < BONES_ALIKE * min(long, short):
-                self._legs.append(_Leg(hip, thigh, shin, foot, rows))
+                self._legs.append(_Leg(hip, thigh, shin, foot, skeleton.descendants(foot), rows))
 
     def lock(
         self,
@@ -75,13 +78,13 @@ class FootLock:
         clearances: list[float],
         lift_m: float,
         held: FloatArray | None,
-    ) -> bool:
-        """Turn the legs in a pose (J, 4); whether anything was turned: `figure` then shows the old pose.
+    ) -> None:
+        """Turn the legs in a pose (J, 4) and in its figure.
 
-        figure: that pose, grounded. clearances (S,): of its soles' points above their place on the floor,
+        figure: the pose, grounded. clearances (S,): of its soles' points above their place on the floor,
         metres; lift_m: of a jump. held (J,): weights 0..1 of the hands; None: no foot is locked.
         """
-        points, turned = figure.soles.tolist(), False
+        points = figure.soles.tolist()
         for leg in self._legs:
             if self._before is not None:
                 share = 0.0
@@ -91,9 +94,7 @@ class FootLock:
                 self._offset(leg, points, self._before, clearances, lift_m, share)
             if leg.x or leg.z:
                 self._reach(leg, pose, figure, points[leg.rows[-1]])
-                turned = True
         self._before = points
-        return turned
 
     def state(self) -> dict[str, Any]:
         """What later poses depend on, for `restore`: plain values."""
@@ -153,6 +154,11 @@ class FootLock:
         pose[leg.thigh] = two_bones.multiply(two_bones.inverse(above), thigh)
         pose[leg.shin] = two_bones.multiply(two_bones.inverse(thigh), shin)
         pose[leg.foot] = two_bones.multiply(two_bones.inverse(shin), foot)
+        figure.world[leg.thigh], figure.world[leg.shin] = thigh, shin
+        figure.positions[leg.shin] = bent
+        shift = two_bones.subtract(reached, ankle)
+        figure.positions[leg.below] += shift  # the foot keeps its orientation
+        figure.soles[leg.rows.start : leg.rows.stop] += shift
 
 
 def _vector(values: FloatArray) -> Vector:

@@ -117,17 +117,16 @@ class Grounding:
         """
         self.figure.set_pose(pose, root)
         self.root[:], self.pose[:] = root, pose
-        is_changed = self._arms.clear(self.pose, self.figure)
+        if self._arms.clear(self.pose, self.figure):
+            self.figure.set_pose(self.pose, root)
         if rest_heights is not None and self._rest is not None:
             self._rest = rest_heights.tolist()
         if self._rest is not None:
-            is_changed |= self._stand(self._rest, lift_m, held)
-        if is_changed:
-            self.figure.set_pose(self.pose, self.root)
+            self._stand(self._rest, lift_m, held)
         return self.figure
 
-    def _stand(self, rest: list[float], lift_m: float, held: FloatArray | None) -> bool:
-        """Move the figure onto the floor, and turn its legs; whether they were turned."""
+    def _stand(self, rest: list[float], lift_m: float, held: FloatArray | None) -> None:
+        """Move the figure onto the floor, and turn its legs."""
         points = self.figure.soles.tolist()
         clearances = [point[1] - rest for point, rest in zip(points, rest, strict=True)]
         lowest = min(clearances)
@@ -140,7 +139,7 @@ class Grounding:
         self.figure.move(self._shift)
         np.add(self.root, self._shift, out=self.root)
         above_floor = [clearance + self._height for clearance in clearances]
-        return self._foot_lock.lock(self.pose, self.figure, above_floor, lift_m, held)
+        self._foot_lock.lock(self.pose, self.figure, above_floor, lift_m, held)
 
     def state(self) -> dict[str, Any]:
         """What later positions depend on, for `restore`: plain values and copies of arrays."""

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from appliance.dancer import two_bones
 from appliance.dancer.foot_lock import FootLock
-from appliance.dancer.grounding import Grounding, survey
+from appliance.dancer.grounding import Grounding, sole_positions, survey
 from appliance.dancer.two_bones import Vector
 from appliance.pose import quaternion
 from appliance.pose.recording import Recording
@@ -111,6 +111,21 @@ def test_only_legs_turn_and_feet_keep_their_orientation(crouching: Recording) ->
     _, after = skeleton.forward_kinematics(locked.poses, locked.roots)
     feet = list(skeleton.feet)
     assert quaternion.angle_between(before[:, feet], after[:, feet]).max() < 1e-3
+
+
+def test_the_figure_shows_what_the_pose_says(crouching: Recording) -> None:
+    """The lock moves joints of the figure by itself: forward kinematics would cost as much again."""
+    skeleton, floor = crouching.skeleton, survey(crouching)
+    grounding, held = Grounding(skeleton, floor), nobody(skeleton)
+    for tick, pose in enumerate(with_legs_moved(crouching, 0.2).astype(np.float32)):
+        figure = grounding.ground_pose(pose, crouching.roots[tick].astype(np.float32), 0.0, held=held)
+        positions, world = skeleton.forward_kinematics(
+            grounding.pose.astype(float), grounding.root.astype(float)
+        )
+        soles = sole_positions(skeleton, grounding.pose[None].astype(float), grounding.root[None])[0]
+        assert np.abs(figure.positions - positions).max() < 1e-5
+        assert quaternion.angle_between(figure.world.astype(float), world).max() < 1e-3
+        assert np.abs(figure.soles - soles).max() < 1e-5
 
 
 def test_without_the_lock_legs_are_left_as_they_are(crouching: Recording) -> None:
