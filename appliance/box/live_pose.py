@@ -1,4 +1,4 @@
-"""The live pose: the newest pose of somebody else's motion capture, from show control to the stage."""
+"""The live pose: the newest pose of a live dancer's motion capture, from show control to the stage."""
 
 from __future__ import annotations
 

@@ -169,9 +169,8 @@ def _devices(box: Path | None) -> Devices:
 
     config = load_box(box_here(box))
     path = kept_in(config)
-    with contextlib.suppress(
-        OSError
-    ):  # a page that runs says where it keeps them: a rehearsal does so elsewhere
+    # A page that runs says where it keeps them: in a rehearsal elsewhere.
+    with contextlib.suppress(OSError):
         told = Path((_runtime(config) / _WHERE).read_text())
         path = told if told.is_file() else path
     try:

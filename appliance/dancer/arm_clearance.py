@@ -50,7 +50,7 @@ class ArmClearance:
         """Turn the arms in a pose (J, 4); whether anything was turned: `figure` shows the pose as it was."""
         if self._trunk is None:
             return False
-        places = [_vector(place) for place in figure.positions.tolist()]
+        places = [two_bones.vector(place) for place in figure.positions.tolist()]
         trunk = [_bone(places[low], places[high]) for high, low in pairwise(self._trunk.spine)]
         left, right = (places[arm.shoulder] for arm in self._trunk.arms)
         up = two_bones.subtract(places[self._trunk.spine[0]], places[self._trunk.spine[-1]])
@@ -66,8 +66,8 @@ class ArmClearance:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a state."""
-        self._ways = [None if way is None else _vector(way) for way in state["ways"]]
-        self._turns = [_vector(turn) for turn in state["turns"]]
+        self._ways = [None if way is None else two_bones.vector(way) for way in state["ways"]]
+        self._turns = [two_bones.vector(turn) for turn in state["turns"]]
 
     def _clear(
         self,
@@ -87,7 +87,10 @@ class ArmClearance:
         bend = self._correction(2 * number + 1, elbow, wrist, FOREARM, around)
         if turn is None and bend is None:
             return False
-        above, upper, lower = (_world(figure, joint) for joint in (arm.above, arm.shoulder, arm.elbow))
+        above, upper, lower = (
+            two_bones.quaternion(figure.world[joint].tolist())
+            for joint in (arm.above, arm.shoulder, arm.elbow)
+        )
         if turn is not None:
             upper, lower = two_bones.multiply(turn, upper), two_bones.multiply(turn, lower)
             pose[arm.shoulder] = two_bones.multiply(two_bones.inverse(above), upper)
@@ -143,7 +146,7 @@ class ArmClearance:
             turn, along = two_bones.multiply(more, turn), two_bones.rotate(more, along)
         w, *axis = turn
         sine = math.sqrt(max(0.0, 1.0 - w * w))
-        return two_bones.scale(_vector(axis), 2 * math.atan2(sine, w) / sine if sine > 1e-9 else 0.0)
+        return two_bones.scale(two_bones.vector(axis), 2 * math.atan2(sine, w) / sine if sine > 1e-9 else 0.0)
 
 
 def _from_trunk(point: Vector, trunk: list[_Bone]) -> tuple[float, Vector]:
@@ -165,11 +168,3 @@ def _from_trunk(point: Vector, trunk: list[_Bone]) -> tuple[float, Vector]:
 def _bone(start: Vector, end: Vector) -> _Bone:
     along = two_bones.subtract(end, start)
     return start, along, max(two_bones.dot(along, along), 1e-12)
-
-
-def _world(figure: Figure, joint: int) -> Quaternion:
-    return cast(Quaternion, tuple(figure.world[joint].tolist()))
-
-
-def _vector(values: Any) -> Vector:
-    return cast(Vector, tuple(values))

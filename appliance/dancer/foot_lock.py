@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any
 
 from appliance.dancer import two_bones
 from appliance.dancer.forward_kinematics import Figure, soles_of
 from appliance.dancer.slerp import FloatArray
-from appliance.dancer.two_bones import Quaternion, Vector
 from appliance.pose.skeleton import Skeleton
 
 # Measured at ten coding and nine interaction iterations (salsa_29 with hands of salsa_24), mean slide of the
@@ -139,13 +138,16 @@ class FootLock:
         """Turn thigh and shin so that the foot stands at its offset, and the foot back; shorten the offset
         to what the leg reaches.
         """
-        hip, knee, ankle = (_vector(figure.positions[joint]) for joint in (leg.thigh, leg.shin, leg.foot))
+        hip, knee, ankle = (
+            two_bones.vector(figure.positions[joint].tolist()) for joint in (leg.thigh, leg.shin, leg.foot)
+        )
         target = ankle[0] + leg.x, ankle[1], ankle[2] + leg.z
-        ahead = two_bones.subtract(cast(Vector, tuple(toe)), ankle)
+        ahead = two_bones.subtract(two_bones.vector(toe), ankle)
         bent, reached = two_bones.bend(hip, knee, ankle, target, ahead)
         leg.x, leg.z = reached[0] - ankle[0], reached[2] - ankle[2]
         above, thigh, shin, foot = (
-            _quaternion(figure.world[joint]) for joint in (leg.hip, leg.thigh, leg.shin, leg.foot)
+            two_bones.quaternion(figure.world[joint].tolist())
+            for joint in (leg.hip, leg.thigh, leg.shin, leg.foot)
         )
         turn = two_bones.between(two_bones.subtract(knee, hip), two_bones.subtract(bent, hip))
         thigh = two_bones.multiply(turn, thigh)
@@ -159,11 +161,3 @@ class FootLock:
         shift = two_bones.subtract(reached, ankle)
         figure.positions[leg.below] += shift  # the foot keeps its orientation
         figure.soles[leg.rows.start : leg.rows.stop] += shift
-
-
-def _vector(values: FloatArray) -> Vector:
-    return cast(Vector, tuple(values.tolist()))
-
-
-def _quaternion(values: FloatArray) -> Quaternion:
-    return cast(Quaternion, tuple(values.tolist()))

@@ -1,4 +1,4 @@
-"""Live motion: a whole dancer in somebody else's motion capture, in place of the phrase."""
+"""Live motion: a live dancer's motion capture in place of the phrase."""
 
 from __future__ import annotations
 

@@ -6,6 +6,7 @@ One leg costs 15 us; numpy would take ten times as long for vectors of three.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -48,6 +49,18 @@ def _within_reach(now: Vector, step: Vector, reach: float) -> Vector:
     a, b, c = dot(step, step), dot(now, step), dot(now, now) - reach * reach
     share = (-b + math.sqrt(max(0.0, b * b - a * c))) / a
     return add(now, scale(step, min(max(share, 0.0), 1.0)))
+
+
+def vector(values: Iterable[float]) -> Vector:
+    """Three numbers as a vector."""
+    x, y, z = values
+    return x, y, z
+
+
+def quaternion(values: Iterable[float]) -> Quaternion:
+    """Four numbers, w first, as a quaternion."""
+    w, x, y, z = values
+    return w, x, y, z
 
 
 def between(a: Vector, b: Vector) -> Quaternion:

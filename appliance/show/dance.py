@@ -71,7 +71,7 @@ class MotionConfig(Section):
         length=(0, 32),
     )
     live: bool = key(
-        "Whether somebody else's motion capture may take the phrase's place: cues and `/phrase` call it "
+        "Whether a live dancer's motion capture may take the phrase's place: cues and `/phrase` call it "
         "`live`. It comes to the control port as `/mocap/0/joint/rot_local` (docs/osc.md).",
         False,
     )

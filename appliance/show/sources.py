@@ -3,4 +3,4 @@
 from __future__ import annotations
 
 MAIN = "main"  # the phrase that the show starts with
-LIVE = "live"  # somebody else's motion capture, in place of a phrase
+LIVE = "live"  # a live dancer's motion capture, in place of a phrase

@@ -1,7 +1,7 @@
 """The processes of one training, which `torchrun` starts: each takes its share of a batch.
 
-PyTorch's own launcher says who is who in the environment (RANK, LOCAL_RANK, WORLD_SIZE); without it there is
-one process, and nothing here costs anything.
+PyTorch's launcher numbers the processes in the environment (RANK, LOCAL_RANK, WORLD_SIZE). Without it there
+is one process, and nothing here costs anything.
 """
 
 from __future__ import annotations

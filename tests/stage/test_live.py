@@ -112,7 +112,8 @@ def test_a_stage_that_starts_again_goes_on_with_its_guest(show: Path, tmp_path: 
     night = Night(show, tmp_path / "runtime")
     night.command("/phrase", 0.2, text=LIVE)
     assert night.parts.source == LIVE
-    night.parts.live.choose(False, 0.0)  # type: ignore[union-attr]
+    assert night.parts.live is not None
+    night.parts.live.choose(False, 0.0)
     (order,) = night.reconciler.pending(1.0)
     assert (order.name, order.text) == ("phrase", LIVE)
 
