@@ -39,6 +39,8 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
             words = iterations.ask(int(coding), int(interaction), *fade_s)
             if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.hands.puppeteers):
                 words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
+        elif order.name == "allow":
+            iterations.allow(int(order.values[0]))
         elif order.name == "phrase":
             words = parts.play(order.text, *order.values)
         elif order.name == "rate":

@@ -20,9 +20,10 @@ class Health:
     over_budget: int = 0
     not_finite: int = 0
     worst_ms: float = 0.0
-    rate_hz: float = 0.0  # of the last second, as are the next two
+    rate_hz: float = 0.0  # of the last second, as are the next three
     p50_ms: float = 0.0
     p99_ms: float = 0.0
+    slowest_ms: float = 0.0
     _times_ms: np.ndarray = field(default_factory=lambda: np.zeros(_SECOND_OF_TICKS))
     _filled: int = 0
     _ticks_then: int = 0
@@ -51,6 +52,7 @@ class Health:
         self.rate_hz = (self.ticks - self._ticks_then) / max(now - self._then, 1e-9)
         self.p50_ms = float(times_ms[len(times_ms) // 2]) if len(times_ms) else 0.0
         self.p99_ms = float(times_ms[int(0.99 * (len(times_ms) - 1))]) if len(times_ms) else 0.0
+        self.slowest_ms = float(times_ms[-1]) if len(times_ms) else 0.0
         self._filled, self._ticks_then, self._then = 0, self.ticks, now
 
     def snapshot(self, now: float) -> dict[str, Any]:

@@ -10,11 +10,15 @@ from appliance.dancer.phrase import FPS
 
 @dataclass(slots=True)
 class Iterations:
-    """Coding and interaction iterations; orders may change them up to `most`, which fits the budget."""
+    """Coding and interaction iterations; orders may change them up to `most`, which fits the budget.
+
+    wished: what the show or the newest order asked for, though fewer may fit.
+    """
 
     coding: int
     interaction: int
     most: int
+    wished: tuple[int, int] = (1, 0)
     _before: tuple[int, int] = (0, 0)
     _wanted: tuple[int, int] = (0, 0)
     _tick: int = 0
@@ -23,6 +27,7 @@ class Iterations:
     def ask(self, coding: int, interaction: int, fade_s: float = 0.0) -> str:
         """Take as many as fit, over fade_s; a sentence when these are fewer than were asked for."""
         allowed = min(max(coding, 1), self.most)
+        self.wished = coding, interaction
         self._before = self.coding, self.interaction
         fitting = min(interaction - max(coding - allowed, 0), allowed)
         self._wanted = allowed, max(fitting, min(interaction, 1))  # a hand that is to hold holds
@@ -39,6 +44,11 @@ class Iterations:
             f"the dancer runs with {self._wanted[0]} and {self._wanted[1]}: {why}."
         )
 
+    def allow(self, most: int) -> None:
+        """More fit than was measured at the start: dance what was last asked for."""
+        self.most = most
+        self.ask(*self.wished)
+
     @property
     def asked(self) -> tuple[int, int]:
         """Coding and interaction iterations at the end of the way that they are on."""
@@ -51,6 +61,7 @@ class Iterations:
             "before": self._before,
             "wanted": self._wanted,
             "ticks": [self._tick, self._ticks],
+            "wished": self.wished,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -59,6 +70,8 @@ class Iterations:
         (coding, interaction), (wanted_coding, wanted_interaction) = state["before"], state["wanted"]
         self._before, self._wanted = (coding, interaction), (wanted_coding, wanted_interaction)
         self._tick, self._ticks = state["ticks"]
+        coding, interaction = state.get("wished", state["wanted"])
+        self.wished = coding, interaction
 
     def advance(self) -> None:
         """One tick further on the way to what was asked for, in whole iterations: each is a small step."""

@@ -15,7 +15,7 @@ from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, S
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.show_control.orders import Order, OrderInbox
-from appliance.stage.admission import Admission
+from appliance.stage.admission import Admission, SecondLook
 from appliance.stage.admission_cache import admitted
 from appliance.stage.carry_out import carry_out
 from appliance.stage.health import Health
@@ -87,9 +87,10 @@ class Stage:
                 self.sharing.folder, self.parts, show, box, self.resuming.comes_back
             )
             self._closing = opened.pop_all()
-        self.iterations = Iterations(
-            self.admission.coding, self.admission.interaction, self.admission.most_coding
-        )
+        measured = self.admission
+        wished = measured.asked_coding, measured.asked_interaction
+        self.iterations = Iterations(measured.coding, measured.interaction, measured.most_coding, wished)
+        self.second_look = SecondLook(self.admission)
         self.reconciler = Reconciler(show.config.name, self.parts, self.iterations, show_state)
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
@@ -253,6 +254,9 @@ class Stage:
         """Once a second, after the frame has left."""
         times = self.iterations
         self.health.look(now)
+        if most := self.second_look.most_that_fits(self.health.slowest_ms, times.coding):
+            self._carry_out(Order("allow", (float(most),)), now)
+            self._say_and_note(self.watch.note_second_look(most))
         news = self.watch.check(now, self.health, self.parts.link.states(now))
         line = self.health.line(times.coding, times.interaction, self._sensor_age_s(now), self._is_locked)
         line = "  ".join(filter(None, (line, self.watch.fallbacks.line(now))))

@@ -67,6 +67,13 @@ class Watch:
         """Which real-time rights the stage did not get, sentences."""
         self.fallbacks.set(rows.NOT_REALTIME.name, " ".join(missing))
 
+    def note_second_look(self, most: int) -> str:
+        """Iterations that admission lowered fit after all: up to `most`. The sentence about it."""
+        self.fallbacks.set(rows.ITERATIONS_LOWERED.name, "")
+        return (
+            f"Up to {most} coding iterations fit by now. The dancer dances the show's own iterations again."
+        )
+
     def check(self, now: float, health: Health, sensors: Sequence[SensorState] = ()) -> list[str]:
         """Once a second: bring the fallbacks up to date; sentences about what changed since the last call.
 

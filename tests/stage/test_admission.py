@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
-from appliance.stage.admission import PACED, admit
+from appliance.stage.admission import PACED, Admission, SecondLook, admit
 from tests.fake_clock import FakeTime
 
 
@@ -110,3 +112,31 @@ def test_a_network_that_is_slow_now_and_then_within_the_budget_is_measured_as_it
         time.work(0.004 if next(runs) % 20 == 19 else 0.001)
 
     assert admit(dance, 1, 1, 10.0, clock=time.monotonic).p99_ms == pytest.approx(8.0)
+
+
+def test_other_programs_do_not_lower_a_show() -> None:
+    """Measured by the processor time of the thread: what sleeps, or waits for its turn, costs nothing."""
+    admission = admit(lambda coding, interaction: time.sleep(0.002), 3, 2, 1.0)
+    assert admission.fits
+
+
+def test_a_show_that_was_lowered_is_danced_whole_after_ten_seconds_in_which_it_would_have_fitted() -> None:
+    look = SecondLook(lowered(5.0))
+    assert [look.most_that_fits(slowest_ms=2.0, coding=2) for _ in range(12)] == [*[0] * 9, 10, 0, 0]
+
+
+def test_a_second_in_which_it_would_not_have_fitted_begins_the_ten_anew() -> None:
+    look = SecondLook(lowered(5.0))
+    slowest_ms = [*[2.0] * 8, 2.6, *[2.0] * 10]
+    assert [look.most_that_fits(ms, coding=2) for ms in slowest_ms] == [*[0] * 18, 10]
+
+
+def test_a_show_that_fitted_is_not_looked_at_again() -> None:
+    look = SecondLook(lowered(0.2))
+    assert not any(look.most_that_fits(slowest_ms=2.0, coding=8) for _ in range(30))
+
+
+def lowered(pass_ms: float) -> Admission:
+    """A show of eight iterations that cost this much each, of a budget of 10 ms."""
+    time = FakeTime()
+    return admit(Puppet(time, pass_ms=pass_ms).dance, 8, 7, 10.0, clock=time.monotonic)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,8 +18,10 @@ from appliance.show.box import BoxConfig, OutputsConfig, RealtimeConfig, Sensors
 from appliance.show.show import load_show
 from appliance.show_control.orders import Order
 from appliance.stage import run
+from appliance.stage.admission import SecondLook
 from appliance.stage.fallback import SENSOR_SILENT
 from appliance.stage.run import Stage
+from appliance.stage.watch import Watch
 from tests.bundles import swaying_phrase, write_show
 from tests.fake_clock import FakeTime
 
@@ -205,3 +208,20 @@ def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(
     assert "heard at this moment" in words
     waits_until = evening.stage.wearing.state()["left-wrist"]["waits_until"]
     assert waits_until == pytest.approx(began + 0.3 + 3.0)
+
+
+def test_a_show_that_one_busy_start_lowered_dances_its_own_iterations_ten_seconds_later(
+    evening: Evening,
+) -> None:
+    stage, asked = evening.stage, (evening.stage.iterations.coding, evening.stage.iterations.interaction)
+    measured = replace(stage.admission, p99_ms=50.0, coding=1, interaction=1, most_coding=1)
+    stage.watch, stage.second_look = Watch(stage.parts, measured), SecondLook(measured)
+    stage.iterations.most = 1
+    stage.iterations.ask(*asked)
+    evening.dance(9.0)
+    assert stage.iterations.asked == (1, 1)
+    evening.dance(3.0)
+    assert stage.iterations.asked == asked
+    assert [words for words in evening.said if "coding iterations fit by now" in words]
+    now = evening.time.now
+    assert not [one for one in stage.watch.fallbacks.happened(now) if one.active and "lowered" in one.name]
