@@ -5,6 +5,7 @@ View coordinates are metres to the right, upwards and towards the viewer; there 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,7 @@ SKY = np.array([0.30, 0.35, 0.46])
 GROUND = np.array([0.20, 0.14, 0.12])
 RIM = np.array([0.42, 0.58, 0.92])
 SUPERSAMPLE = 2
+_AROUND_M = 0.10  # as far as limbs take light from each other
 
 
 @dataclass(frozen=True)
@@ -46,32 +48,47 @@ class Frame:
 
 def render(cones: Cones, colours: Array, frame: Frame) -> Array:
     """Picture (height, width, 4), alpha premultiplied, of cones in view coordinates; colours (C, 3) 0..1."""
-    right, up = frame.rays(SUPERSAMPLE)
+    picture = np.zeros((frame.height, frame.width, 4))
+    part, place = _around(cones, frame)
+    if not (part.width and part.height):
+        return picture
+    right, up = part.rays(SUPERSAMPLE)
     depth = np.full((len(up), len(right)), -np.inf)
     normals = np.zeros((*depth.shape, 3))
     paint = np.zeros((*depth.shape, 3))
     for number in range(len(cones.joint)):
         a, b = cones.start[number], cones.end[number]
-        ra, rb = cones.start_radius[number], cones.end_radius[number]
+        ra, rb = float(cones.start_radius[number]), float(cones.end_radius[number])
         low, high = np.minimum(a - ra, b - rb), np.maximum(a + ra, b + rb)
         columns = slice(*np.searchsorted(right, [low[0], high[0]]))
         rows = slice(*np.searchsorted(-up, [-high[1], -low[1]]))
         if columns.start == columns.stop or rows.start == rows.stop:
             continue
-        x, y = np.meshgrid(right[columns], up[rows])
-        near, normal = _meet(x, y, a, b, float(ra), float(rb))
-        front = near > depth[rows, columns]
-        depth[rows, columns][front] = near[front]
-        normals[rows, columns][front] = normal[front]
-        paint[rows, columns][front] = colours[number]
+        near = depth[rows, columns]
+        for met, reached, normal in _meet(right[None, columns], up[rows, None], a, b, ra, rb, near):
+            near[met] = reached
+            normals[rows, columns][met] = normal
+            paint[rows, columns][met] = colours[number]
     if not (hit := np.isfinite(depth)).any():
-        return np.zeros((frame.height, frame.width, 4))
+        return picture
     lit = np.zeros((*depth.shape, 4))
-    lit[hit, :3] = _shade(normals[hit], paint[hit]) * _openness(depth, frame)[hit, None]
+    lit[hit, :3] = _shade(normals[hit], paint[hit]) * _openness(depth, part)[hit, None]
     lit[hit, 3] = 1.0
-    shape = (frame.height, SUPERSAMPLE, frame.width, SUPERSAMPLE, 4)
-    averaged: Array = lit.reshape(shape).mean(axis=(1, 3))
-    return averaged
+    shape = (part.height, SUPERSAMPLE, part.width, SUPERSAMPLE, 4)
+    picture[place] = lit.reshape(shape).mean(axis=(1, 3))
+    return picture
+
+
+def _around(cones: Cones, frame: Frame) -> tuple[Frame, tuple[slice, slice]]:
+    """The part of a frame that the cones and what they darken can reach, and its rows and columns."""
+    radius = np.maximum(cones.start_radius, cones.end_radius)[:, None]
+    low = (np.minimum(cones.start, cones.end) - radius).min(axis=0) - 2 * _AROUND_M - 0.02
+    high = (np.maximum(cones.start, cones.end) + radius).max(axis=0) + 2 * _AROUND_M + 0.02
+    size, scale = (frame.width, frame.height), frame.pixels_per_metre
+    left, right = (int(np.clip(frame.x0 + scale * x, 0, size[0])) for x in (low[0], high[0] + 1 / scale))
+    top, bottom = (int(np.clip(frame.y0 - scale * y, 0, size[1])) for y in (high[1], low[1] - 1 / scale))
+    part = Frame(right - left, bottom - top, frame.x0 - left, frame.y0 - top, scale)
+    return part, (slice(top, bottom), slice(left, right))
 
 
 def floor_shadow(cones: Cones, floor: float, lift: float, frame: Frame) -> Array:
@@ -97,41 +114,48 @@ def floor_shadow(cones: Cones, floor: float, lift: float, frame: Frame) -> Array
     return darkness
 
 
-def _meet(x: Array, y: Array, a: Array, b: Array, ra: float, rb: float) -> tuple[Array, Array]:
-    """Nearest depth (..) and normal (.., 3) where rays along -z meet a rounded cone; -inf beside it.
+Met = tuple[Array, Array, Array]  # which rays (rows, columns), bool; their depths (P,) and normals (P, 3)
 
-    The ray against the cone's side is a quadratic; the rounded ends are two spheres.
+
+def _meet(x: Array, y: Array, a: Array, b: Array, ra: float, rb: float, behind: Array) -> Iterator[Met]:
+    """Where rays along -z at x (1, columns) and y (rows, 1) meet a rounded cone in front of `behind`.
+
+    The ray against the cone's side is a quadratic; the rounded ends are two spheres. `behind` (rows, columns)
+    is to be brought up to date between what is given.
     """
-    depth, normal = np.full(x.shape, -np.inf), np.zeros((*x.shape, 3))
     for centre, radius in ((a, ra), (b, rb)):
         dx, dy = x - centre[0], y - centre[1]
         inside = radius * radius - dx * dx - dy * dy
-        dz = np.sqrt(np.maximum(inside, 0))
-        front = (inside > 0) & (centre[2] + dz > depth)
-        depth[front] = (centre[2] + dz)[front]
-        normal[front] = np.stack([dx, dy, dz], axis=-1)[front] / radius
+        met = inside > 0
+        met[met] = centre[2] + np.sqrt(inside[met]) > behind[met]
+        if met.any():
+            dz = np.sqrt(inside[met])
+            side = (np.broadcast_to(dx, met.shape)[met], np.broadcast_to(dy, met.shape)[met], dz)
+            yield met, centre[2] + dz, np.stack(side, axis=-1) / radius
     bone = b - a
     m0, rr = float(bone @ bone), ra - rb
     d2 = m0 - rr * rr
-    if d2 <= 1e-12:
-        return depth, normal
-    far = max(a[2], b[2]) + ra + rb  # rays start here and run along -z
-    oa = np.stack([x - a[0], y - a[1], np.full(x.shape, far - a[2])], axis=-1)
-    m1, m2, m3, m5 = oa @ bone, -float(bone[2]), -oa[..., 2], np.sum(oa * oa, axis=-1)
+    m2 = -float(bone[2])
     k2 = d2 - m2 * m2
-    k1 = d2 * m3 - m1 * m2 + m2 * rr * ra
-    k0 = d2 * m5 - m1 * m1 + m1 * rr * ra * 2 - m0 * ra * ra
+    if d2 <= 1e-12 or abs(k2) < 1e-12:
+        return
+    far = max(a[2], b[2]) + ra + rb  # rays start here and run along -z
+    dx, dy, dz = x - a[0], y - a[1], float(far - a[2])
+    m1 = dx * bone[0] + (dy * bone[1] + dz * bone[2])
+    k1 = (m2 * rr * ra - d2 * dz) - m2 * m1
+    k0 = d2 * (dx * dx + (dy * dy + dz * dz)) + (2 * rr * ra - m1) * m1 - m0 * ra * ra
     h = k1 * k1 - k0 * k2
-    if abs(k2) < 1e-12:
-        return depth, normal
-    t = (-np.sqrt(np.maximum(h, 0)) - k1) / k2
-    along = m1 - ra * rr + t * m2
-    front = (h >= 0) & (along > 0) & (along < d2) & (far - t > depth)
-    depth[front] = (far - t)[front]
-    oa[..., 2] -= t
-    side = d2 * oa[front] - bone * along[front][:, None]
-    normal[front] = side / np.linalg.norm(side, axis=-1, keepdims=True)
-    return depth, normal
+    met = h >= 0
+    t = (-np.sqrt(h[met]) - k1[met]) / k2
+    along = m1[met] - ra * rr + t * m2
+    front = (along > 0) & (along < d2) & (far - t > behind[met])
+    met[met] = front
+    if not met.any():
+        return
+    t, along = t[front], along[front]
+    rays = (np.broadcast_to(dx, met.shape)[met], np.broadcast_to(dy, met.shape)[met], dz - t)
+    normal = d2 * np.stack(rays, axis=-1) - bone * along[:, None]
+    yield met, far - t, normal / np.sqrt(np.einsum("ij,ij->i", normal, normal))[:, None]
 
 
 def _shade(normal: Array, paint: Array) -> Array:
@@ -140,8 +164,9 @@ def _shade(normal: Array, paint: Array) -> Array:
     key = np.clip((facing + 0.25) / 1.25, 0, 1)[:, None] ** 1.4
     upward = (0.5 + 0.5 * normal[:, 1])[:, None]
     edge = np.clip(1 - normal[:, 2], 0, 1)[:, None]
-    rim = edge**3 * np.clip(0.35 + 0.65 * (normal @ _unit(0.8, 0.35, -0.3)), 0, 1)[:, None]
-    gloss = np.clip(normal @ HALFWAY, 0, 1)[:, None] ** 40
+    rim = edge * edge * edge * np.clip(0.35 + 0.65 * (normal @ _unit(0.8, 0.35, -0.3)), 0, 1)[:, None]
+    gloss8 = np.clip(normal @ HALFWAY, 0, 1)[:, None] ** 8
+    gloss = gloss8 * gloss8 * gloss8 * gloss8 * gloss8
     light = 0.95 * key * KEY + upward * SKY + (1 - upward) * GROUND
     colour: Array = np.clip(paint * light + 0.55 * rim * RIM + 0.16 * gloss * KEY, 0, 1)
     return colour
@@ -153,7 +178,7 @@ def _openness(depth: Array, frame: Frame) -> Array:
     hit = np.isfinite(near)
     surface = np.where(hit, near, near[hit].min() - 0.3)
     openness = np.ones(near.shape)
-    for metres, strength in ((0.03, 0.3), (0.10, 0.4)):
+    for metres, strength in ((0.03, 0.3), (_AROUND_M, 0.4)):
         around = surface
         for axis in (0, 1, 0, 1):
             around = _box_mean(around, max(1, round(metres * frame.pixels_per_metre)), axis)
