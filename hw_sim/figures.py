@@ -12,10 +12,12 @@ from hw_sim.latency import (
     Floats,
     Restart,
     Transport,
+    light_ms,
     missing_frames,
     percentiles,
     power_on_s,
     response_ms,
+    responses,
     steps,
     transport,
 )
@@ -26,6 +28,7 @@ FREE_SETTLING_S = 1.0
 LATE = 1  # flag of the journal
 POWER_ON_S, POWER_ON_AND_JOIN_S = 1.0, 5.0  # until a reading is used: network up; Wi-Fi joined first
 RESTART_S = 1.5
+LIGHT_MS = 75.0  # from a step of the hand to half of it on the screen, at 60 pictures a second
 NAMED = {"p50": 50.0, "p99": 99.0, "p999": 99.9, "max": 100.0}
 FEW = {"p50": 50.0, "max": 100.0}
 
@@ -40,6 +43,7 @@ class Evidence:
     power_ons: Run
     restarts: Sequence[Restart]
     firmware: bool = False  # the compiled firmware was the sensor, and joined a simulated Wi-Fi each time
+    light: Run | None = None  # with a projector on a screen that was watched
 
     @property
     def transports(self) -> tuple[Transport, Transport]:
@@ -74,6 +78,21 @@ class Limit(NamedTuple):
         return self.value is not None and self.value <= self.most
 
 
+def _light(run: Run | None) -> dict[str, Any]:
+    """What the projector's run adds: hand to light, pictures a second; nothing without it."""
+    if run is None:
+        return {}
+    standing = [moment for moment in steps(run.readings) if moment >= run.stood_from + 0.5]
+    seen = [one.seen_at for one in run.pictures]
+    rate = (len(seen) - 1) / (seen[-1] - seen[0]) if len(seen) > 1 else 0.0
+    found = light_ms(responses(standing, run.frames), run.pictures)
+    return {
+        "hand_to_light_ms": percentiles(found, FEW),
+        "pictures_a_second": round(rate, 1),
+        "light_steps": len(found),
+    }
+
+
 def figures_of(evidence: Evidence) -> dict[str, Any]:
     """All figures; milliseconds, seconds and megabytes as their names say, None where nothing came."""
     locked, (way, free_way) = evidence.locked, evidence.transports
@@ -103,6 +122,7 @@ def figures_of(evidence: Evidence) -> dict[str, Any]:
         "readings": len(way.latency_ms),
         "overtaken_readings": way.overtaken,
         "steps": len(response),
+        **_light(evidence.light),
     }
 
 
@@ -114,6 +134,7 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
     )
     power_on_limit_s = POWER_ON_AND_JOIN_S if figures["firmware"] else POWER_ON_S
     late_share = 100.0 * figures["late_ticks"] / max(1, figures["ticks"])
+    light = figures.get("hand_to_light_ms")
     return [
         Limit("transport, median", figures["transport_ms"]["p50"], 3.0, "ms"),
         Limit(
@@ -131,6 +152,7 @@ def verdict(figures: dict[str, Any]) -> list[Limit]:
         Limit("sensor's power-on to its reading in a frame, median", power_on_s, power_on_limit_s, "s"),
         Limit("box's restart to a reading in a frame, median", restart_s, RESTART_S, "s"),
         Limit("the same from its end, median", kill_s, RESTART_S, "s"),
+        *([Limit("hand to light, median", light["p50"], LIGHT_MS, "ms")] if light else []),
     ]
 
 
@@ -146,6 +168,7 @@ def table(figures: dict[str, Any], limits: Sequence[Limit]) -> list[str]:
         f"  ({figures['readings']} readings, {figures['overtaken_readings']} of them overtaken by newer)",
         f"  running free  p50 {_ms(free['p50'])}  p99 {_ms(free['p99'])}",
         f"response to a step, half of the way  p50 {_ms(response['p50'])}   ({figures['steps']} steps)",
+        *_light_lines(figures),
         f"{figures['power_ons']} power-ons of a sensor, {figures['restarts']} restarts of the box",
         "tick by section, p50  "
         + "  ".join(f"{name} {_ms(part['p50'])}" for name, part in figures["sections_ms"].items()),
@@ -156,6 +179,15 @@ def table(figures: dict[str, Any], limits: Sequence[Limit]) -> list[str]:
         mark = "ok  " if limit.holds else "FAIL"
         lines.append(f"{mark}  {limit.words}: {value} (at most {limit.most:.2f} {limit.unit})")
     return lines
+
+
+def _light_lines(figures: dict[str, Any]) -> list[str]:
+    if "hand_to_light_ms" not in figures:
+        return []
+    light = figures["hand_to_light_ms"]
+    rate, count = figures["pictures_a_second"], figures["light_steps"]
+    found = f"p50 {_ms(light['p50'])}  max {_ms(light['max'])}"
+    return [f"hand to light, half of the way  {found}   ({count} steps, {rate:.0f} pictures a second)"]
 
 
 def _ms(value: float | None) -> str:

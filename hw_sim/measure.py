@@ -42,13 +42,18 @@ def measure(
     firmware: Annotated[
         bool, typer.Option("--firmware", help="The compiled firmware is the sensor (make firmware).")
     ] = False,
+    light: Annotated[
+        bool,
+        typer.Option("--light", help="From the hand to the light too: needs an X11 screen, and fills it."),
+    ] = False,
 ) -> None:
     """Measure the whole way, datagram in to datagram out, with an emulated sensor on a venue's network.
 
     Two runs: the tick in phase with the sensor, then running free while the sensor's clock drifts through one
     whole beat, so that every offset between the two counts alike. Then how soon a reading is used after the
-    sensor's power-on, and after the box was killed and restarted. Exit status 0 when all limits hold, else
-    1.
+    sensor's power-on, and after the box was killed and restarted. --light adds the projector: each picture
+    says in a corner when its dance left the stage, and is read back from the screen. Exit status 0 when all
+    limits hold, else 1.
     """
     try:
         with scratch_folder("bunraku-measure-") as scratch:
@@ -63,7 +68,12 @@ def measure(
             power_ons = run(setting, course)
             times = min(max(2, round(seconds / 6)), MOST_RESTARTS)
             print(f"Killing and starting the box {times} times ...", flush=True)
-            evidence = Evidence(locked, free, power_ons, run_restarts(setting, times), firmware)
+            restarts = run_restarts(setting, times)
+            seen = None
+            if light:
+                print(f"Watching the projector's pictures for {free_s:g} s ...", flush=True)
+                seen = run(setting, light_course(free_s))
+            evidence = Evidence(locked, free, power_ons, restarts, firmware, seen)
     except (ProbeError, OSError, ValueError) as error:
         print(f"bunraku measure: {error}", file=sys.stderr)
         raise typer.Exit(REFUSED) from None
@@ -98,6 +108,11 @@ def power_on_course(seconds: float, powered_s: float) -> Course:
     """The sensor is switched off and on again and again; once in each third second of the given ones."""
     power_ons = min(max(2, round(seconds / 3)), MOST_POWER_ONS)
     return Course("power-ons", (powered_s + REBOOT_S) * power_ons, seed=3, reboot_every_s=powered_s)
+
+
+def light_course(seconds: float) -> Course:
+    """In phase, with the projector; the phrase stands still but for the first seconds."""
+    return Course("light", seconds, seconds - 2.0, drift_ppm=LOCKED_DRIFT_PPM, seed=4, projects=True)
 
 
 def _setting(show: Path | None, box: Path | None, scratch: Path, firmware: bool) -> Setting:

@@ -57,6 +57,11 @@ def play_command(setting: Setting, box: Path) -> list[str]:
     return [sys.executable, "-m", "appliance.cli", "play", "--show", str(setting.show), "--box", str(box)]
 
 
+def project_command(box: Path) -> list[str]:
+    """The projector, on the whole screen, with time stamps."""
+    return [sys.executable, "-m", "appliance.cli", "project", "--box", str(box), "--fullscreen", "--stamp"]
+
+
 def emulate_command(setting: Setting, port: int, log: Path, *options: str) -> list[str]:
     """The followed sensor, on a venue's network."""
     return [

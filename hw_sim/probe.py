@@ -7,8 +7,9 @@ import os
 import socket
 import subprocess
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from hw_sim.osc_receiver import OscReceiver, decode
 from hw_sim.peers import (
     FRAME,
     HOST,
+    STARTS_WITHIN_S,
+    ProbeError,
     Setting,
     emulate_command,
     first_frame,
@@ -29,9 +32,11 @@ from hw_sim.peers import (
     listening_closely,
     play_command,
     process,
+    project_command,
     stop,
     write_box_file,
 )
+from hw_sim.screen import Picture, Screen, Watcher
 
 PLAYER_STOP = b"/player/stop\0\0\0\0,\0\0\0"
 POSE = b"/mocap/0/joint/rot_local\0"
@@ -40,7 +45,10 @@ STEADY_S = 1.0  # how long the box dances with the sensor before it is killed
 
 @dataclass(frozen=True)
 class Course:
-    """Plan of one run. In its last `standing_s` the phrase stands still, so that only steps show."""
+    """Plan of one run. In its last `standing_s` the phrase stands still, so that only steps show.
+
+    projects: a projector shows the dance on the screen, and its pictures are watched.
+    """
 
     name: str
     seconds: float
@@ -49,6 +57,7 @@ class Course:
     drift_ppm: float = 0.0
     seed: int = 1
     reboot_every_s: float | None = None
+    projects: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,6 +71,7 @@ class Run:
     rss_mb: float
     start_to_first_frame_s: float
     stood_from: float
+    pictures: Sequence[Picture] = ()
 
 
 def run(setting: Setting, course: Course) -> Run:
@@ -70,7 +80,13 @@ def run(setting: Setting, course: Course) -> Run:
     folder.mkdir()
     sensors, control = free_ports(2)
     log, words = folder / "sent.csv", folder / "box.txt"
-    with OscReceiver(HOST) as receiver, listening_closely():
+    with ExitStack() as opened:
+        receiver = opened.enter_context(OscReceiver(HOST))
+        screen = opened.enter_context(closing(Screen())) if course.projects else None
+        opened.enter_context(listening_closely())
+        if screen is not None:
+            picture = {**setting.box.get("projector", {}), "size": list(screen.size)}
+            setting = replace(setting, box={**setting.box, "projector": picture})
         box = write_box_file(
             *(setting, folder, (sensors, control, receiver.port)),
             journal={"folder": "run.journal", "minutes": max(1.0, course.seconds / 60.0 + 0.5)},
@@ -82,7 +98,8 @@ def run(setting: Setting, course: Course) -> Run:
             emulate = emulate_command(setting, sensors, log, *_options(course))
             with process(emulate, folder / "emulator.txt") as emulator:
                 first_reading(emulator, log, folder / "emulator.txt")
-                datagrams, rss_mb, stood_from = _watch(receiver, stage, course, control)
+                with _seen(screen, box, folder) as pictures:
+                    datagrams, rss_mb, stood_from = _watch(receiver, stage, course, control)
             stop(stage, words)
     header, ticks = read_journal(folder / "run.journal")
     return Run(
@@ -93,7 +110,32 @@ def run(setting: Setting, course: Course) -> Run:
         rss_mb=rss_mb,
         start_to_first_frame_s=first - begun,
         stood_from=stood_from,
+        pictures=pictures,
     )
+
+
+@contextmanager
+def _seen(screen: Screen | None, box: Path, folder: Path) -> Iterator[list[Picture]]:
+    """The pictures that a projector shows on the screen meanwhile; without a screen there is no projector.
+
+    Raises ProbeError where the projector shows no picture.
+    """
+    if screen is None:
+        yield []
+        return
+    words = folder / "projector.txt"
+    with process(project_command(box), words) as projector:
+        watcher = Watcher(screen)
+        watcher.start()
+        until = time.monotonic() + STARTS_WITHIN_S
+        try:
+            while not watcher.pictures:
+                if projector.poll() is not None or time.monotonic() > until:
+                    raise ProbeError(f"The projector shows no picture:\n{words.read_text().strip()}")
+                time.sleep(0.05)
+            yield watcher.pictures
+        finally:
+            watcher.stop()
 
 
 def run_restarts(setting: Setting, times: int) -> list[Restart]:

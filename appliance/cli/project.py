@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -40,11 +41,14 @@ def project(
     wait: Annotated[
         bool, typer.Option("--wait", help="Without a display, wait for one; look every 10 s.")
     ] = False,
+    stamp: Annotated[
+        bool, typer.Option("--stamp", hidden=True, help="Time stamps in a corner, for `measure --light`.")
+    ] = False,
     chosen: ChosenFile = None,
 ) -> int:
     """Show what the stage dances, on a projector: before it starts, while it dances and when it is back."""
     options = parse_options(window, fullscreen, offscreen, frames, seconds, info)
-    return project_show(box_of(box, chosen), options, wait)
+    return project_show(box_of(box, chosen), replace(options, stamps=stamp), wait)
 
 
 def parse_options(

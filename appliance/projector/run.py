@@ -33,6 +33,7 @@ from appliance.projector.pacing import USUAL_RATE, Pacing
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, NO_PLACE, ProjectorError
 from appliance.projector.resolution import Resolution
+from appliance.projector.stamp import stamp
 from appliance.projector.watchdog import Patience, end_process, guarded
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
@@ -45,13 +46,17 @@ _JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
 
 @dataclass(frozen=True)
 class Options:
-    """The options of the command line. kind None: as the box file says; frames: a folder for PNGs."""
+    """The options of the command line. kind None: as the box file says; frames: a folder for PNGs.
+
+    stamps: draw when the dance left the stage into each picture's corner.
+    """
 
     kind: Kind | None = None
     size: Size | None = None
     frames: Path | None = None
     seconds: float | None = None
     shows_info: bool = False
+    stamps: bool = False
 
 
 class Run:
@@ -152,6 +157,8 @@ class Run:
         screen, size, begun = self.context.gl.screen, self._window.size, time.monotonic()
         lines = self._lines if self._controls.shows_info else ()
         left_stage = self.projector.draw(now, screen, size, lines, self._resolution.share)
+        if self._options.stamps:
+            stamp(screen, left_stage)
         if self._options.frames is not None:
             self._write_png(self._options.frames, screen.read(viewport=(0, 0, *size), components=4), size)
         self.context.finish()  # else the driver queues pictures, and each is older when shown

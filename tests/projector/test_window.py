@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -30,6 +28,7 @@ from appliance.show.box import BoxConfig
 from appliance.show.projector import ProjectorConfig
 from tests.bundles import write_show
 from tests.projector.stage_double import StageDouble
+from tests.virtual_display import virtual_display
 
 PICTURE = """
 import os, sys
@@ -58,25 +57,6 @@ final.release()
 context.close()
 window.close()
 """
-
-
-@contextlib.contextmanager
-def virtual_display() -> Iterator[str]:
-    """A real X server without a screen. It does not reset, unresponsive meanwhile, when a window closes."""
-    reading, writing = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "640x480x24", "-nolisten", "tcp", "-noreset"],
-        pass_fds=[writing],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(writing)
-    try:
-        with os.fdopen(reading) as told:
-            yield f":{told.readline().strip()}"
-    finally:
-        server.terminate()
-        server.wait()
 
 
 def picture(kind: str, **environment: str) -> np.ndarray:
