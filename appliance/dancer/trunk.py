@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from appliance.pose import quaternion
+from appliance.pose.roles import UPPER_ARMS
 from appliance.pose.skeleton import Skeleton
-from appliance.pose.usual_joints import UPPER_ARMS, usual_joints
 
 TRUNK_RADIUS = 0.5  # of the distance between the shoulders: 11 cm for the CMU dancers
 
@@ -34,13 +34,13 @@ class Trunk:
     @classmethod
     def of(cls, skeleton: Skeleton) -> Trunk | None:
         """None where head or arms are not named."""
-        named = usual_joints(skeleton.names)
+        named = skeleton.roles
         if "head" not in named or any(part not in named for part in UPPER_ARMS):
             return None
-        spine = skeleton.ancestors(skeleton.index(named["head"]))[1:]
+        spine = skeleton.ancestors(named["head"])[1:]
         arms = []
         for part in UPPER_ARMS:
-            shoulder = skeleton.index(named[part])
+            shoulder = named[part]
             elbow = _longest(skeleton, shoulder)
             wrist = None if elbow is None else _longest(skeleton, elbow)
             if elbow is None or wrist is None or shoulder == 0:

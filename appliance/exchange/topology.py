@@ -2,61 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
+from appliance.pose.joint_names import CHAINS, place_of
 from appliance.pose.quaternion import Array
+from appliance.pose.roles import places_of
 
-# Words for a joint, in the order in which it lies on its chain; the longest word that is in a name counts.
-_CHAINS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "spine": (
-        ("hips", "hip", "pelvis", "root"),
-        ("abdomen", "lowerback", "waist"),
-        ("spine", "back"),
-        ("torso", "chest", "thorax"),
-        ("upperchest", "sternum", "spineshoulder"),
-        ("neck",),
-        ("head", "skull"),
-        ("headtop", "headend", "topofhead", "nose"),
-    ),
-    "arm": (
-        ("collar", "clavicle"),
-        ("shoulder",),
-        ("shldr", "upperarm", "arm", "uparm"),
-        ("elbow", "forearm", "lowerarm"),
-        ("wrist",),
-        ("hand",),
-        ("handtip", "handend"),
-    ),
-    "leg": (
-        ("buttock", "hipjoint"),
-        ("hip", "upleg", "upperleg", "thigh", "femur"),
-        ("knee", "leg", "shin", "calf", "lowerleg", "tibia"),
-        ("ankle",),
-        ("foot",),
-        ("toe", "toebase", "ball", "toes"),
-        ("toeend", "toetip"),
-    ),
-    "eye": (("eye",),),
-    **{
-        words[0]: (words, tuple(f"{word}tip" for word in words))
-        for words in (
-            ("thumb", "handthumb"),
-            ("index", "handindex"),
-            ("middle", "mid", "handmiddle"),
-            ("ring", "handring"),
-            ("pinky", "little", "handpinky"),
-            ("finger", "fingerbase"),
-        )
-    },
-}
-_SIDE = re.compile(r"^(left|right)|^[lr](?=[_.\- ])|(left|right)$|[_.\- ][lr]$", re.IGNORECASE)
-_LETTER_SIDE = re.compile(r"^[lrLR](?=[A-Z])")
-_NEGLIGIBLE = re.compile(r"^(mixamorig|bip\d*|j_bip|character\d*)[:_ ]?", re.IGNORECASE)
 _CHEST = 4  # the place on the spine up to which arms may hang
 _AT_REST: dict[str, tuple[float, float, float]] = {
     "spine": (0.0, 1.0, 0.0),
@@ -68,35 +22,9 @@ _FOOT_AT_REST, _ANKLE, _TOES = (0.0, -0.4, 0.9), 3, 5
 _HAND, _HEAD = 5, 6
 
 
-class Role(NamedTuple):
-    """Where a joint belongs: the chain, its side (1 left, -1 right, 0 middle), its place, its number."""
-
-    chain: str
-    side: int
-    place: int
-    number: int
-
-
-def role_of(name: str) -> Role | None:
-    """What a joint of this name is on a human figure; None for an unknown word."""
-    plain = _NEGLIGIBLE.sub("", name)
-    side = 0
-    match = _SIDE.search(plain) or _LETTER_SIDE.search(plain)
-    if match:
-        side = 1 if match[0].strip("_.- ").casefold().startswith("l") else -1
-        plain = plain[: match.start()] + plain[match.end() :]
-    digits = re.findall(r"\d+", plain)
-    word = re.sub(r"[^a-z]", "", plain.casefold())
-    for chain in [name for name in _CHAINS if name != "spine"] if side else ["spine"]:
-        for place, words in enumerate(_CHAINS[chain]):
-            if word in words:
-                return Role(chain, side, place, int(digits[-1]) if digits else 0)
-    return None
-
-
 def parents_by_name(names: Sequence[str]) -> list[int] | str:
     """Each joint's parent, or why it cannot be known, in words."""
-    roles = [role_of(name) for name in names]
+    roles = places_of(names)
     unknown = [name for name, role in zip(names, roles, strict=True) if role is None]
     if unknown:
         return f"unknown: {', '.join(unknown[:5])}"
@@ -111,7 +39,7 @@ def parents_by_name(names: Sequence[str]) -> list[int] | str:
     head = [joint for joint in spine if known[joint].place <= _HEAD][-1]
     for side in (1, -1):
         hand = chest
-        for chain in _CHAINS:
+        for chain in CHAINS:
             limb = sorted((j for j in known if known[j][:2] == (chain, side)), key=lambda j: known[j][2:])
             start = {"arm": chest, "leg": spine[0], "eye": head}.get(chain, hand)
             for above, joint in pairwise([start, *limb]):
@@ -128,12 +56,12 @@ def directions_at_rest(names: Sequence[str], parents: Sequence[int]) -> Array | 
     """
     found: Array = np.zeros((len(names), 3))
     for joint, name in enumerate(names):
-        role = role_of(name)
+        role = place_of(name)
         if role is None:
             return None
         if parents[joint] < 0:
             continue
-        above = role_of(names[parents[joint]])
+        above = place_of(names[parents[joint]])
         x, y, z = _AT_REST.get(role.chain, _AT_REST["arm"])
         on_ankle = above is not None and (above.chain, above.place) == ("leg", _ANKLE)
         if role.chain == "leg" and (role.place >= _TOES or on_ankle):

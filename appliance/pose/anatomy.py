@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.pose.joint_names import side_of
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
@@ -39,7 +40,7 @@ class Anatomy:
         points = np.vstack([self.positions, *(tip for _, tip in self.tips)])
         self.height = float(np.ptp(points, axis=0).max()) or 1.0
         self.reach = self._reaches()
-        self.head = next((j for j in range(joints) if "head" in skeleton.names[j].casefold()), None)
+        self.head = skeleton.head
         self.trunk = self._trunk()
 
     def length(self, joint: int) -> float:
@@ -124,7 +125,7 @@ class Anatomy:
         length = float(np.linalg.norm(total))
         side = total / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
         left = sum(
-            float(self.positions[joint] @ side) * _sidedness(self.skeleton.names[joint])
+            float(self.positions[joint] @ side) * side_of(self.skeleton.names[joint])
             for joint in range(len(self.skeleton))
         )
         if abs(left) > 1e-3 * self.height:
@@ -179,12 +180,3 @@ class Anatomy:
                 trunk.add(joint)
                 joint = self.skeleton.parents[joint]
         return sorted(trunk)
-
-
-def _sidedness(name: str) -> int:
-    """1 for names of the left, -1 of the right, 0 for the middle and for names that do not say."""
-    folded = name.rpartition(":")[2]
-    for number, (word, letter) in ((1, ("left", "l")), (-1, ("right", "r"))):
-        if word in folded.casefold() or (folded[:1].casefold() == letter and folded[1:2].isupper()):
-            return number
-    return 0

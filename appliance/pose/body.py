@@ -41,9 +41,7 @@ class Body:
         )
         self._radius[list(self._trunk)] = 0.055 * self.height
         self._radius[0] *= 0.7  # where the legs part
-        self._head = next(
-            (j for j in reversed(range(joints)) if "head" in skeleton.names[j].casefold()), None
-        )
+        self._head = skeleton.head
 
     def cones(self, positions: Array, world: Array) -> Cones:
         """The figure's volume for world positions (J, 3) and world rotations (J, 4)."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
+from appliance.pose.roles import roles_of
 
 
 class UnknownJointError(KeyError):
@@ -57,9 +58,23 @@ class Skeleton:
         return self.names == other.names and self.parents == other.parents
 
     @cached_property
+    def roles(self) -> dict[str, int]:
+        """Part of a body ('left upper arm') to joint, as far as the names say (roles.ROLES)."""
+        return roles_of(self.names)
+
+    @cached_property
     def feet(self) -> tuple[int, ...]:
-        """Joints that stand on the floor: those named foot or ankle."""
+        """Joints that stand on the floor: both feet by the table of names, else those named foot or ankle."""
+        named = sorted(self.roles[role] for role in ("left foot", "right foot") if role in self.roles)
+        if len(named) == 2:
+            return tuple(named)
         return tuple(i for i, n in enumerate(self.names) if any(w in n.casefold() for w in ("foot", "ankle")))
+
+    @cached_property
+    def head(self) -> int | None:
+        """The head by the table of names, else the first joint with 'head' in its name."""
+        called = (joint for joint, name in enumerate(self.names) if "head" in name.casefold())
+        return self.roles.get("head", next(called, None))
 
     @cached_property
     def reaches(self) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import Progress, track
 from rich.table import Table
 
-from appliance.pose.usual_joints import usual_joints
+from appliance.pose.roles import held_joints
 from appliance.studio.data.dataset import Take, load_dataset
 from appliance.studio.evaluation import puppetry, puppetry_report
 from appliance.studio.evaluation.answer_picture import draw_answer
@@ -133,7 +133,7 @@ def _held_joints(coder: Coder, names: Sequence[str]) -> list[str]:
     for name in names:
         if name not in coder.joints:
             raise StudioError(f"No hand can hold '{name}': the network moves {', '.join(coder.joints)}.")
-    found = list(names) or list(usual_joints(coder.joints).values())
+    found = list(names) or list(held_joints(coder.joints).values())
     if not found:
         raise StudioError(f"Say what to hold with --joint: the network moves {', '.join(coder.joints)}.")
     return found

@@ -9,7 +9,7 @@ import pytest
 
 from appliance.dancer.puppeteers import FixedOrientation
 from appliance.pose import quaternion
-from appliance.pose.usual_joints import usual_joints
+from appliance.pose.roles import held_joints
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.evaluation import puppetry
 from appliance.studio.evaluation.dance_figures import BodyFigures
@@ -190,8 +190,8 @@ def test_a_hand_of_the_same_take_is_refused_and_both_are_kept_out_of_the_referen
         (("bone1", "bone2"), []),
     ],
 )  # fmt: skip
-def test_the_usual_joints_are_found_on_any_skeleton(joints: tuple[str, ...], expected: list[str]) -> None:
-    assert list(usual_joints(joints).values()) == expected
+def test_the_held_joints_are_found_on_any_skeleton(joints: tuple[str, ...], expected: list[str]) -> None:
+    assert list(held_joints(joints).values()) == expected
 
 
 def test_the_baselines_of_the_held_out_salsa(recordings_dir: Path) -> None:

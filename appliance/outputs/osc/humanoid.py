@@ -2,63 +2,50 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
-# Names of Daz (CMU's cgspeed files), MotionBuilder, Mixamo and Xsens, lower case and without their side.
-_CENTRE = {
-    "hip": "Hips", "hips": "Hips", "pelvis": "Hips",
-    "abdomen": "Spine", "spine": "Spine",
-    "chest": "Chest", "spine1": "Chest",
-    "upperchest": "UpperChest", "spine2": "UpperChest",
-    "neck": "Neck", "head": "Head", "jaw": "Jaw",
+from appliance.pose.joint_names import FINGERS
+from appliance.pose.roles import SIDES, places_of, roles_of, trunk_of
+
+_LIMBS = {
+    "collar": "Shoulder", "upper arm": "UpperArm", "forearm": "LowerArm", "hand": "Hand",
+    "thigh": "UpperLeg", "shin": "LowerLeg", "foot": "Foot", "toe": "Toes",
 }  # fmt: skip
-_SIDED = {
-    "collar": "Shoulder", "shoulder": "Shoulder",
-    "shldr": "UpperArm", "arm": "UpperArm", "upperarm": "UpperArm",
-    "forearm": "LowerArm", "lowerarm": "LowerArm", "elbow": "LowerArm", "hand": "Hand", "wrist": "Hand",
-    "thigh": "UpperLeg", "upleg": "UpperLeg", "upperleg": "UpperLeg", "hip": "UpperLeg",
-    "shin": "LowerLeg", "leg": "LowerLeg", "lowerleg": "LowerLeg", "knee": "LowerLeg",
-    "foot": "Foot", "ankle": "Foot", "toe": "Toes", "toes": "Toes", "toebase": "Toes", "eye": "Eye",
-}  # fmt: skip
-_FINGERS = {
-    "thumb": "Thumb", "index": "Index", "mid": "Middle", "middle": "Middle",
-    "ring": "Ring", "pinky": "Little", "little": "Little",
-}  # fmt: skip
-_PHALANXES = {"": "Proximal", "1": "Proximal", "2": "Intermediate", "3": "Distal"}
-_SIDE = re.compile(r"(left|right|l|r)(.+)")
-_FINGER = re.compile(rf"(?:hand)?({'|'.join(_FINGERS)})([123]?)")
+_FINGERS = dict(zip(FINGERS, ("Thumb", "Index", "Middle", "Ring", "Little"), strict=True))
+_PHALANXES = {0: "Proximal", 1: "Proximal", 2: "Intermediate", 3: "Distal"}
 
 
 def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
     """Unity bone name -> index of the joint that moves it; the first joint wins, unknown ones are left out.
 
-    Where there are collars, a shoulder is the joint of the upper arm (Xsens), else it is the collar bone
-    (MotionBuilder). A skeleton without a known hip gives its root to Hips: without Hips nothing moves.
+    Of a trunk of several joints the first is the spine, the second the chest, the last the upper chest. A
+    skeleton without a known hip gives its root to Hips: without Hips nothing moves.
     """
-    collars = any("collar" in name.lower() for name in joints)
+    roles, places = roles_of(joints), places_of(joints)
     bones: dict[str, int] = {}
-    for index, name in enumerate(joints):
-        bone = humanoid_bone(name, collars)
-        if bone:
-            bones.setdefault(bone, index)
+    for name in ("hips", "neck", "head"):
+        if name in roles:
+            bones[name.capitalize()] = roles[name]
+    bones |= _trunk(trunk_of(places), roles)
+    for side in SIDES.values():
+        for part, bone in _LIMBS.items():
+            if f"{side} {part}" in roles:
+                bones[f"{side.capitalize()}{bone}"] = roles[f"{side} {part}"]
+    for joint, place in enumerate(places):
+        if place is None or place.place or not place.side:
+            continue
+        side = SIDES[place.side].capitalize()
+        if place.chain == "eye":
+            bones.setdefault(f"{side}Eye", joint)
+        elif place.chain in _FINGERS and place.number in _PHALANXES:
+            bones.setdefault(f"{side}{_FINGERS[place.chain]}{_PHALANXES[place.number]}", joint)
     if "Hips" not in bones:
         bones = {"Hips": 0} | {bone: joint for bone, joint in bones.items() if joint != 0}
     return bones
 
 
-def humanoid_bone(joint: str, collars: bool = False) -> str | None:
-    """Unity's name for one joint, None if it has none: 'lShldr', 'mixamorig:LeftArm' -> 'LeftUpperArm'."""
-    name = re.sub(r"[\s_.-]", "", joint.rsplit(":", 1)[-1]).lower()
-    if name in _CENTRE:
-        return _CENTRE[name]
-    sided = _SIDE.fullmatch(name)
-    if not sided:
-        return None
-    side = "Left" if sided[1].startswith("l") else "Right"
-    if sided[2] == "shoulder" and collars:
-        return f"{side}UpperArm"
-    if sided[2] in _SIDED:
-        return side + _SIDED[sided[2]]
-    finger = _FINGER.fullmatch(sided[2])
-    return f"{side}{_FINGERS[finger[1]]}{_PHALANXES[finger[2]]}" if finger else None
+def _trunk(trunk: Sequence[int], roles: dict[str, int]) -> dict[str, int]:
+    if len(trunk) < 2:
+        return {role.capitalize(): roles[role] for role in ("spine", "chest") if role in roles}
+    upper = {"UpperChest": trunk[-1]} if len(trunk) > 2 else {}
+    return {"Spine": trunk[0], "Chest": trunk[1], **upper}

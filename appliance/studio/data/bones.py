@@ -34,5 +34,5 @@ def limb_ends(skeleton: Skeleton) -> set[int]:
     """Heads, hands, feet and smaller parts: by name, or because little is below them."""
     reach = skeleton.reaches
     small = set(np.flatnonzero(reach <= LIMB_END * reach[0]).tolist())
-    heads = {joint for joint, name in enumerate(skeleton.names) if "head" in name.casefold()}
+    heads = set() if skeleton.head is None else {skeleton.head}
     return (small | heads | set(skeleton.feet)) - {0}

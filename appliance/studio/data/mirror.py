@@ -21,12 +21,12 @@ SIDEWAYS = (0, 2)  # left and right lie along x or along z; a mirror on the floo
 _WORDS = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
 _OTHER = {**_WORDS, **{right: left for left, right in _WORDS.items()}}
 # Where a name has its side, the likeliest first: mixamorig:LeftArm, hand_left; L_Arm, arm.l.001; lShldr,
-# LThumb, Bip_LHand; ArmL; lfoot.
+# LThumb, Bip_LHand; ArmL, ArmLT; lfoot.
 _PLACES = (
     r"left|right|Left|Right|LEFT|RIGHT",
     r"(?<![A-Za-z0-9])[lLrR](?![A-Za-z0-9])",
     r"(?<![A-Za-z0-9])[lLrR](?=[A-Z])",
-    r"(?<=[a-z0-9])[LR]$",
+    r"(?<=[a-z0-9])[LR](?=T?$)",
     r"^[lr]",
 )
 

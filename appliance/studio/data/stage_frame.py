@@ -105,7 +105,7 @@ def _without_root(recording: Recording) -> Recording:
 def _is_z_up(recording: Recording) -> bool:
     """Whether the head is above the root along z, at rest and in the mean of the dance."""
     skeleton = recording.skeleton
-    head = next((j for j, name in enumerate(skeleton.names) if "head" in name.casefold()), None)
+    head = skeleton.head
     if not head:
         return False
     rest = np.tile(quaternion.IDENTITY.astype(float), (1, len(skeleton), 1))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from appliance.pose.usual_joints import usual_joints
+from appliance.pose.roles import held_joints
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset
 from appliance.studio.evaluation import puppetry
 from appliance.studio.evaluation.answer_picture import draw_answer
@@ -38,7 +38,7 @@ def own_answer(coder: Coder, dataset: Dataset, picture: Path) -> dict[str, Any]:
     try:
         takes = own_takes(dataset)
         reference = reference_of(takes.reference, coder.joints)
-        named = usual_joints(coder.joints)
+        named = held_joints(coder.joints)
         joints = [named[part] for part in PARTS if part in named] or list(named.values())[: len(PARTS)]
         if not joints:
             raise StudioError(

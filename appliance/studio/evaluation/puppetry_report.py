@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from appliance.pose.usual_joints import UPPER_ARMS, usual_joints
+from appliance.pose.roles import UPPER_ARMS, held_joints
 
 ANSWERS, ANSWERS_A_LITTLE = 8.0, 4.0  # degrees
 LIVELY = (0.7, 1.3)  # energy
@@ -23,7 +23,7 @@ def verdict(found: dict[str, Any], minutes: float) -> str:
 
     minutes: of dance that it learned from.
     """
-    named = [name for part, name in usual_joints(joints_of(found)).items() if part in UPPER_ARMS]
+    named = [name for part, name in held_joints(joints_of(found)).items() if part in UPPER_ARMS]
     rows = [strongest(found[joint])[1] for joint in named or joints_of(found)]
     what = f"a hand moves its other joints by {statistics.fmean(row['answer'] for row in rows):.1f} degrees"
     if None not in (energies := [row["energy"] for row in rows]):

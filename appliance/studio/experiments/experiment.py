@@ -20,7 +20,7 @@ from appliance.pictures.filmstrip import Strip, draw_strips
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.quaternion import Array
-from appliance.pose.usual_joints import usual_joints
+from appliance.pose.roles import held_joints
 from appliance.show.show import load_show
 from appliance.studio.data.dataset import FPS, Take, load_dataset
 from appliance.studio.evaluation.coders import Coder, open_coder
@@ -188,7 +188,7 @@ def _coders(options: ExperimentOptions) -> dict[str, Coder]:
 
 
 def _joint(wanted: str | None, coder: Coder) -> str:
-    joint = wanted or usual_joints(coder.joints).get("left upper arm")
+    joint = wanted or held_joints(coder.joints).get("left upper arm")
     if joint not in coder.joints:
         words = (
             f"'{wanted}' is not moved by the network"

@@ -14,6 +14,7 @@ import numpy as np
 from rich.console import Console
 
 from appliance.pose import quaternion
+from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import Dataset, Take, find_catalogue, load_take
@@ -35,7 +36,7 @@ EQUALITY_WINDOWS = 16
 PHRASE_S = 60.0
 SHORT_PHRASE_S = 20.0  # a held-out excerpt shorter than this gives way to a longer one from training
 HANGING_DEGREES = 80.0  # below horizontal: a hanging arm does not touch the hip
-FIRST_HANDS = "lshldr leftshoulder leftarm leftupperarm lforearm leftforearm lhand lefthand"
+FIRST_HANDS = ("left upper arm", "left forearm", "left hand", "right upper arm", "head")
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,10 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
             f"phrase.bvh is {phrase.seconds:.0f} s of the recording {take}: the bundle contains a recording. "
             "Give your own with --phrase, or replace the file and run bunraku export again."
         )
-    hand: dict[str, Any] = {"sensor": "left-wrist", "joint": first_hand(coder.joints)}
+    joint, doubt = first_hand(dataset.skeleton, coder.joints)
+    if doubt:
+        say(doubt)
+    hand: dict[str, Any] = {"sensor": "left-wrist", "joint": joint}
     hanging = hanging_orientation(dataset.skeleton, hand["joint"])
     if hanging is not None:
         hand["at_neutral"] = hanging
@@ -104,10 +108,35 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     return report
 
 
-def first_hand(joints: tuple[str, ...]) -> str:
-    """The joint that a new show assigns to its sensor: the left upper arm, if its name is known."""
-    folded = {name.casefold().replace("_", ""): name for name in joints}
-    return next((folded[name] for name in FIRST_HANDS.split() if name in folded), joints[-1])
+def first_hand(skeleton: Skeleton, joints: Sequence[str]) -> tuple[str, str]:
+    """The joint that a new show gives to its sensor, and what is doubtful about it, in words ('': nothing).
+
+    The left upper arm by the names, else by the skeleton's shape. joints: those that the network moves.
+    """
+    called = {role: skeleton.names[joint] for role, joint in skeleton.roles.items()}
+    named = next((called[role] for role in FIRST_HANDS if called.get(role) in joints), None)
+    if named is not None:
+        meant = called.get("left upper arm") == named
+        why = f"The left upper arm does not move or has no known name: the first hand holds {named}."
+        return named, "" if meant else f"{why} Another: hands: in show.yaml."
+    chosen = _arm_by_shape(skeleton, joints) or joints[-1]
+    return chosen, (
+        f"No joint has a name that is known for an arm (bunraku inspect lists them). The first hand holds "
+        f"{chosen}, by the skeleton's shape. Another: hands: in show.yaml."
+    )
+
+
+def _arm_by_shape(skeleton: Skeleton, joints: Sequence[str]) -> str | None:
+    """The first long bone of the limb that begins highest, the left one where sides are known."""
+    anatomy = Anatomy(skeleton)
+    starts = []
+    for _, first in anatomy.limbs():
+        chain = anatomy.chain(first)
+        joint = chain[anatomy.limb_start(chain)]
+        if skeleton.names[joint] in joints:
+            above = round(float(anatomy.positions[joint, 1]) / anatomy.height, 1)
+            starts.append((above, float(anatomy.positions[joint] @ anatomy.across), skeleton.names[joint]))
+    return max(starts)[2] if starts else None
 
 
 def hanging_orientation(skeleton: Skeleton, joint: str) -> list[float] | None:

@@ -1,0 +1,130 @@
+"""The table of joint names: which place of a human figure a name means, in the words of the usual systems.
+
+Rokoko, Xsens, Captury, OptiTrack, Mixamo, MotionBuilder, Unreal, Unity and VRM, Vicon, SMPL, Kinect, CMU
+(BVH, ASF), Daz and Blender. Every guess about a joint's meaning in this house looks here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+# Words for a joint, in the order in which it lies on its chain; letter case and punctuation do not count, a
+# number at the end is the joint's number.
+CHAINS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "spine": (
+        ("hips", "hip", "pelvis", "root", "hipmaster", "hipsmaster"),
+        ("abdomen", "ab", "lowerback", "waist", "l5"),
+        ("spine", "back", "upperback", "l3"),
+        ("torso", "torsoa", "torsob", "torsoc", "chest", "thorax", "t12"),
+        ("upperchest", "sternum", "spineshoulder", "t8"),
+        ("neck", "lowerneck", "upperneck"),
+        ("head", "skull"),
+        ("headtop", "headend", "topofhead", "nose"),
+    ),
+    "arm": (
+        ("collar", "clavicle"),
+        ("shoulder",),
+        ("shldr", "upperarm", "arm", "uparm", "uarm", "humerus"),
+        ("elbow", "forearm", "lowerarm", "farm", "radius"),
+        ("wrist",),
+        ("hand",),
+        ("handtip", "handend"),
+    ),
+    "leg": (
+        ("buttock", "hipjoint"),
+        ("hip", "upleg", "upperleg", "thigh", "femur"),
+        ("knee", "leg", "shin", "calf", "lowerleg", "tibia"),
+        ("ankle",),
+        ("foot",),
+        ("toe", "toebase", "ball", "toes"),
+        ("toeend", "toetip"),
+    ),
+    "eye": (("eye",),),
+    **{
+        words[0]: (words, tuple(f"{word}tip" for word in words))
+        for words in (
+            ("thumb", "handthumb"),
+            ("index", "handindex"),
+            ("middle", "mid", "handmiddle"),
+            ("ring", "handring"),
+            ("pinky", "little", "handpinky"),
+            ("finger", "fingerbase"),
+        )
+    },
+}
+FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+_PLACES = {
+    (word, chain == "spine"): (chain, place)
+    for chain, places in CHAINS.items()
+    for place, words in enumerate(places)
+    for word in words
+}
+_IN_FRONT = re.compile(
+    r"^(.*[:|]|mixamorig\d*_?|bip\d*[ _]|j_bip_c_|j_bip_|character\d*[_ ]|skeleton[ _]?\d*[_ ]|joint_|jnt_|"
+    r"cc_base_|def[-_]|b_|valvebiped[._]|bip\d+_)+(?=.)",
+    re.IGNORECASE,
+)
+_BEHIND = re.compile(r"[_.\- ](jnt|joint|bone)$", re.IGNORECASE)
+_SIDES = (  # where a name has its side, the most explicit first; the rest must be a word of the table
+    re.compile(r"^(?P<side>left|right)(?P<rest>.+)$"),
+    re.compile(r"^(?P<rest>.+?)(?P<side>left|right)(?P<number>\d*)$"),
+    re.compile(r"^(?P<rest>.+?)(?P<side>[lr])t(?P<number>\d*)$"),
+    re.compile(r"^(?P<side>[lr])(?P<rest>.+)$"),
+    re.compile(r"^(?P<rest>.+?)(?P<side>[lr])(?P<number>\d*)$"),
+)
+
+
+class Place(NamedTuple):
+    """Where a joint belongs: the chain, its side (1 left, -1 right, 0 middle), its place, its number."""
+
+    chain: str
+    side: int
+    place: int
+    number: int
+
+
+def place_of(name: str) -> Place | None:
+    """Where on a human figure a joint of this name is; None for a name that is not in the table."""
+    folded = "".join(letter for letter in _without_frills(name).casefold() if letter.isalnum())
+    for side, word in ((0, folded), *_sided(folded)):
+        plain = word if (word, side == 0) in _PLACES else word.rstrip("0123456789")
+        if not plain:
+            continue
+        known = _PLACES.get((plain, side == 0)) or _PLACES.get((re.sub(r"\d", "", plain), side == 0))
+        if known is not None:
+            digits = re.findall(r"\d+", word if plain != word else "")
+            return Place(known[0], side, known[1], int(digits[-1]) if digits else 0)
+    return None
+
+
+def side_of(name: str) -> int:
+    """1 for names of the left, -1 of the right, 0 for the middle and for names that do not say.
+
+    Also where the rest of the name is no word of the table.
+    """
+    known = place_of(name)
+    if known is not None:
+        return known.side
+    plain = _without_frills(name)
+    words = re.search(r"left|right", plain, re.IGNORECASE) or re.search(
+        r"^[lr](?=[A-Z_.\- ])|(?<=[_.\- ])[lr](?=$|[_.\- \d])|(?<=[a-z])[LR]T?$",
+        plain,
+        re.IGNORECASE if re.search(r"(^|[_.\- ])[lr]([_.\- ]|$)", plain, re.IGNORECASE) else re.NOFLAG,
+    )
+    return 0 if words is None else 1 if words[0].casefold().startswith("l") else -1
+
+
+def _without_frills(name: str) -> str:
+    """A name without what programs put before and behind it."""
+    return _BEHIND.sub("", _IN_FRONT.sub("", name))
+
+
+def _sided(folded: str) -> Iterator[tuple[int, str]]:
+    """(side, the rest) by each way in which a name may say its side; a number stays at the end."""
+    for pattern in _SIDES:
+        found = pattern.match(folded)
+        if found:
+            parts = found.groupdict()
+            yield (1 if parts["side"].startswith("l") else -1), parts["rest"] + (parts.get("number") or "")

@@ -1,0 +1,160 @@
+"""Dancers in twelve conventions: names, units, axes, zero poses and rates, as their systems have them.
+
+Everything here is made by this script after the systems' documentation; nothing is a recording of anybody.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from appliance.pose.skeleton import Skeleton
+
+Bone = tuple[
+    str, str, tuple[float, float, float]
+]  # role, role of its parent, metres in a T-pose that faces +z
+
+_TRUNK: list[Bone] = [
+    ("hips", "", (0, 0, 0)),
+    ("spine", "hips", (0, 0.10, 0)),
+    ("chest", "spine", (0, 0.22, 0)),
+    ("neck", "chest", (0, 0.20, 0)),
+    ("head", "neck", (0, 0.10, 0.01)),
+]
+_SIDE: list[Bone] = [
+    ("collar", "chest", (0.03, 0.15, 0)),
+    ("upper arm", "collar", (0.14, 0, 0)),
+    ("forearm", "upper arm", (0.28, 0, 0)),
+    ("hand", "forearm", (0.26, 0, 0)),
+    ("thigh", "hips", (0.10, -0.04, 0)),
+    ("shin", "thigh", (0, -0.43, 0)),
+    ("foot", "shin", (0, -0.41, 0)),
+    ("toe", "foot", (0, -0.07, 0.14)),
+]
+ENDS = {"head": (0.0, 0.2, 0.0), "hand": (0.17, 0.0, 0.0), "toe": (0.0, 0.0, 0.06)}
+
+
+@dataclass(frozen=True)
+class Convention:
+    """How a system writes a dancer. names: of hips, spine, chest, neck, head, then of a side's eight joints.
+
+    side: a pattern of `word` and of `side`, one of the two in `sides`; metres: in a unit of length; up: the
+    vertical axis; turned_degrees: how far the dancer is turned from +z about the vertical; zero: what the
+    zero pose is (T, A, or x: all bones along x); floor_root: the name of a root on the floor, '' without.
+    """
+
+    names: str
+    sides: tuple[str, str] = ("Left", "Right")
+    side: str = "{side}{word}"
+    prefix: str = ""
+    metres: float = 0.01
+    up: str = "y"
+    turned_degrees: float = 0.0
+    zero: str = "T"
+    floor_root: str = ""
+    fps: float = 60.0
+
+    def name(self, role: str) -> str:
+        words = self.names.split()
+        side, _, part = role.partition(" ")
+        if side not in ("left", "right"):
+            middle = [name for name, _, _ in _TRUNK]
+            return self.prefix + words[middle.index(role)]
+        word = words[len(_TRUNK) + [name for name, _, _ in _SIDE].index(part)]
+        return self.prefix + self.side.format(word=word, side=self.sides[side == "right"])
+
+    def roles(self) -> dict[str, str]:
+        """Role to name."""
+        return {role: self.name(role) for role, _, _ in bones()}
+
+
+_MOTIONBUILDER = "Hips Spine Spine1 Neck Head Shoulder Arm ForeArm Hand UpLeg Leg Foot ToeBase"
+CONVENTIONS = {
+    "Rokoko": Convention(
+        "Hips Spine1 Spine2 Neck Head Shoulder Arm ForeArm Hand Thigh Shin Foot Toe", fps=100.0
+    ),
+    "Xsens": Convention(
+        "Hips Chest Chest2 Neck Head Collar Shoulder Elbow Wrist Hip Knee Ankle Toe", fps=240.0
+    ),
+    "Captury": Convention(
+        _MOTIONBUILDER.replace("Spine1", "Spine4"), metres=0.001, floor_root="Root", fps=50.0
+    ),
+    "OptiTrack": Convention(_MOTIONBUILDER, prefix="Skeleton 001:", metres=1.0, fps=120.0),
+    "Mixamo": Convention(_MOTIONBUILDER, prefix="mixamorig:", fps=30.0),
+    "Unreal": Convention(
+        "pelvis spine_01 spine_03 neck_01 head clavicle upperarm lowerarm hand thigh calf foot ball",
+        sides=("l", "r"),
+        side="{word}_{side}",
+        up="z",
+        floor_root="root",
+        zero="A",
+    ),
+    "Unity": Convention(
+        "Hips Spine Chest Neck Head Shoulder UpperArm LowerArm Hand UpperLeg LowerLeg Foot Toes",
+        side="{word}_{side}",
+        sides=("L", "R"),
+        metres=1.0,
+        turned_degrees=180.0,
+    ),
+    "Vicon": Convention(
+        "Pelvis Abdomen Thorax Neck Head Clavicle Humerus Radius Hand Femur Tibia Foot Toes",
+        sides=("L", "R"),
+        metres=0.001,
+        up="z",
+        turned_degrees=90.0,
+        fps=100.0,
+    ),
+    "SMPL": Convention(
+        "Pelvis Spine1 Spine3 Neck Head Collar Shoulder Elbow Wrist Hip Knee Ankle Foot",
+        sides=("L", "R"),
+        side="{side}_{word}",
+        metres=1.0,
+        fps=30.0,
+    ),
+    "CMU": Convention(_MOTIONBUILDER, metres=0.0564, fps=120.0),
+    "LAFAN": Convention(_MOTIONBUILDER.replace("ToeBase", "Toe"), zero="x", fps=30.0),
+    "joint_Root": Convention(
+        "HipMaster TorsoA TorsoC Neck Head Clavicle Shoulder Elbow Hand Hip Knee Foot Toe",
+        sides=("LT", "RT"),
+        side="{word}{side}",
+        prefix="joint_",
+        floor_root="joint_Root",
+        fps=30.0,
+    ),
+}
+
+
+def bones() -> list[Bone]:
+    """The whole body in the order of a BVH file."""
+    found = list(_TRUNK)
+    middle = {role for role, _, _ in _TRUNK}
+    for side, sign in (("left", 1), ("right", -1)):
+        found += [
+            (f"{side} {role}", above if above in middle else f"{side} {above}", (sign * x, y, z))
+            for role, above, (x, y, z) in _SIDE
+        ]
+    return _depth_first(found)
+
+
+def _depth_first(given: list[Bone], above: str = "") -> list[Bone]:
+    return [part for bone in given if bone[1] == above for part in (bone, *_depth_first(given, bone[0]))]
+
+
+def skeleton_of(convention: str) -> Skeleton:
+    """The skeleton in metres, Y up, facing +z, its zero pose a T, with the convention's names and root."""
+    system, whole = CONVENTIONS[convention], bones()
+    names = [system.name(role) for role, _, _ in whole]
+    order = [role for role, _, _ in whole]
+    parents = [order.index(above) if above else -1 for _, above, _ in whole]
+    offsets = [offset for _, _, offset in whole]
+    ends = []
+    for joint, role in enumerate(order):
+        tip = ENDS.get(role.rpartition(" ")[2] if role.startswith(("left", "right")) else role)
+        if tip is not None:
+            sign = -1.0 if role.startswith("right") else 1.0
+            ends.append((joint, (sign * tip[0], tip[1], tip[2])))
+    if system.floor_root:
+        names, parents = [system.floor_root, *names], [-1, *(parent + 1 for parent in parents)]
+        offsets, ends = [(0, 0, 0), *offsets], [(joint + 1, tip) for joint, tip in ends]
+    return Skeleton(tuple(names), tuple(parents), np.array(offsets, float), tuple(ends))
