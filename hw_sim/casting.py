@@ -51,7 +51,8 @@ def choose_keys(
             raise ValueError(f"{path}: {unknown_sensor(name, keys)}")
     wanted = count or min(max(len(keys), 1), MOST_SENSORS)
     if not names and len(keys) < wanted:
-        raise ValueError(f"{path} has {len(keys)} sensor(s), not {wanted}; add some, or give another --keys")
+        has = "1 sensor" if len(keys) == 1 else f"{len(keys) or 'no'} sensors"
+        raise ValueError(f"{path} has {has}, not {wanted}. Add some, or give another --keys")
     return [keys[name] for name in names or list(keys)[:wanted]]
 
 

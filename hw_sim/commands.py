@@ -13,6 +13,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from appliance.pose.file_trouble import sentence
 from hw_sim import motions
 from hw_sim.casting import MOST_SENSORS, MotionKind, cast_sensors, choose_keys, name_and_motion, parse_axis
 from hw_sim.device import Lane
@@ -188,5 +189,6 @@ def _stopped_by_signals() -> Iterator[Callable[[], bool]]:
 
 
 def _refuse(error: Exception) -> NoReturn:
-    typer.echo(f"bunraku emulate: {error}", err=True)
+    words = (sentence(error) if isinstance(error, OSError) else None) or f"{str(error).rstrip('.')}."
+    typer.echo(f"bunraku emulate: {words}", err=True)
     sys.exit(REFUSED)

@@ -11,6 +11,8 @@ from typing import Annotated, Any
 import typer
 import yaml
 
+from appliance.pose.file_trouble import sentence
+from appliance.pose.foreign_file import content
 from appliance.sensor.keys import create_keys
 from hw_sim.emulated_sensor import REBOOT_S
 from hw_sim.figures import FREE_SETTLING_S, Evidence, figures_of, table, verdict
@@ -19,6 +21,7 @@ from hw_sim.probe import Course, run, run_restarts
 
 REFUSED, FAILED = 2, 1
 BEAT_S = 0.02
+_LARGEST_YAML = 1 << 20
 LOCKED_DRIFT_PPM = 60.0  # what a wearable's crystal may be off by; the lock has to follow it
 POWERED_S = 1.5  # how long a sensor is on until it is switched off again
 POWERED_FIRMWARE_S = 5.0  # the firmware joins a simulated Wi-Fi first, which takes seconds
@@ -75,7 +78,8 @@ def measure(
                 seen = run(setting, light_course(free_s))
             evidence = Evidence(locked, free, power_ons, restarts, firmware, seen)
     except (ProbeError, OSError, ValueError) as error:
-        print(f"bunraku measure: {error}", file=sys.stderr)
+        words = sentence(error) if isinstance(error, OSError) else None
+        print(f"bunraku measure: {words or error}", file=sys.stderr)
         raise typer.Exit(REFUSED) from None
     figures = figures_of(evidence)
     limits = verdict(figures)
@@ -138,9 +142,7 @@ def _setting(show: Path | None, box: Path | None, scratch: Path, firmware: bool)
 
 def _plain_yaml(path: Path) -> dict[str, Any]:
     try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except OSError as error:
-        raise ProbeError(f"{path}: cannot be read ({error.strerror}). Check its name and place.") from error
+        values = yaml.safe_load(content(path, _LARGEST_YAML).decode()) or {}
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ProbeError(f"{path}: is not YAML. `bunraku check` says where.") from error
     if not isinstance(values, dict):

@@ -21,6 +21,7 @@ prepare_environment()
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
 
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
+from appliance.pose.file_trouble import sentence  # noqa: E402
 
 PLUG_INS = "bunraku.commands"
 REFUSED = 2
@@ -145,9 +146,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def refuse(error: Exception) -> NoReturn:
     """Exit with one clear line for an error that the user can correct; raise any other."""
-    if not _is_correctable(error):
+    words = sentence(error) if isinstance(error, OSError) else str(error) if _is_correctable(error) else None
+    if words is None:
         raise error
-    print(f"bunraku: {error}", file=sys.stderr)
+    print(f"bunraku: {words}", file=sys.stderr)
     status = getattr(error, "exit_status", REFUSED)
     if status != REFUSED:
         Notifier().ready(str(error))  # systemd must not count this as a failed start

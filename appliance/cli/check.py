@@ -9,6 +9,7 @@ import typer
 
 from appliance.cli.network_proof import proved
 from appliance.cli.options import BoxFile
+from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
 from appliance.show.bundle import (
@@ -94,8 +95,7 @@ def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you cha
         before = content(checksums, LARGEST_CHECKSUMS) if checksums.exists() else None
         write_checksums(show)
     except OSError as error:
-        what = error.filename or show
-        raise StageError(f"{what}: it cannot be packed ({error.strerror}). Nothing was changed.") from error
+        raise StageError(f"{sentence(error, show)} Nothing was changed.") from error
     try:
         print(proved(network, lambda: _refuse_damage(show)), end="")
     except StageError:

@@ -11,6 +11,7 @@ import typer
 from appliance.box.clock import TICK_S
 from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
 from appliance.pose.bvh import read_bvh
+from appliance.pose.file_trouble import sentence
 from appliance.pose.recording import Recording
 from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal
@@ -102,4 +103,4 @@ def render_dance(dance: RecordedDance, out: Path, look: str, show: Path | None) 
 
 
 def _unwritable(out: Path, error: OSError) -> StageError:
-    return StageError(f"{out}: the picture cannot be written ({error.strerror}).")
+    return StageError(sentence(error, out) or "")

@@ -9,6 +9,8 @@ from contextlib import contextmanager
 
 import typer
 
+from appliance.pose.file_trouble import sentence
+
 REFUSED, INTERRUPTED = 2, 130  # exit statuses
 
 
@@ -25,9 +27,12 @@ def clear_errors(command: str) -> Iterator[None]:
             "Install the studio with: pip install 'bunraku[studio]'"
         )
     except (ValueError, RuntimeError, OSError) as error:
-        if not _is_for_people(error):
+        words = (
+            sentence(error) if isinstance(error, OSError) else str(error) if _is_for_people(error) else None
+        )
+        if words is None:
             raise
-        _refuse(str(error))
+        _refuse(words)
 
 
 def _is_for_people(error: Exception) -> bool:
@@ -37,9 +42,7 @@ def _is_for_people(error: Exception) -> bool:
     from appliance.studio.data.dataset import DatasetError
     from appliance.studio.studio_error import StudioError
 
-    return isinstance(
-        error, BvhError | ConfigError | DatasetError | MissingPicturesError | StudioError | OSError
-    )
+    return isinstance(error, BvhError | ConfigError | DatasetError | MissingPicturesError | StudioError)
 
 
 def _refuse(message: str) -> None:

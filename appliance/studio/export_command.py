@@ -10,17 +10,14 @@ from rich.console import Console
 from appliance.studio.data import sources
 from appliance.studio.evaluation.coders import load_puppet
 from appliance.studio.export.release import Request, release
-from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import reading_progress
 
 
 def run(checkpoint: Path, out: Path, recordings: Path | None, phrase: Path | None, name: str | None) -> None:
-    """Write the bundle and print what ships and why. Raises StudioError."""
+    """Write the bundle and print what ships and why. Raises StudioError, or OSError."""
     console = Console(stderr=True)
     if checkpoint.is_dir():
         checkpoint = checkpoint / "checkpoint.pt"
-    if not checkpoint.exists():
-        raise StudioError(f"{checkpoint} does not exist. Give the checkpoint.pt of a training.")
     source = sources.remembered(load_puppet(checkpoint)[1], recordings, checkpoint)
     dataset = source.load(reading_progress(console))
     report = release(Request(checkpoint, source, out, name or "", phrase), dataset, console)

@@ -17,6 +17,7 @@ from appliance.studio.autoencoder.training_run import TrainingRun, parameters
 from appliance.studio.data import sources
 from appliance.studio.data.dataset import WINDOW
 from appliance.studio.data.sources import Sources
+from appliance.studio.disk_room import require_room
 from appliance.studio.evaluation.coders import load_checkpoint, load_state
 from appliance.studio.evaluation.findings import MASKED_PICTURE, findings, require_windows
 from appliance.studio.evaluation.masked import draw_masked
@@ -79,6 +80,8 @@ def _train(options: TrainOptions, device: str, processes: Processes) -> bool:
     console = Console(stderr=True, quiet=not processes.leads)
     checkpoint = options.out / "checkpoint.pt"
     settings, source, state = _settings_and_source(options, checkpoint)
+    if processes.leads:
+        require_room(options.out)
     dataset = source.load(reading_progress(console))
     for line in findings(dataset):
         console.print(f"- {line}", highlight=False)

@@ -128,10 +128,16 @@ class TrainingLoop(ABC, Generic[Report]):
             save()
 
     def save_checkpoint(self, path: Path) -> None:
-        """Write the whole state; the old file stays until the new one is complete."""
+        """Write the whole state; the old file stays until the new one is complete. Raises StudioError."""
         partial = path.with_suffix(".partial")
-        torch.save(self.state(), partial)
-        partial.replace(path)
+        try:
+            torch.save(self.state(), partial)
+            partial.replace(path)
+        except (OSError, RuntimeError) as error:  # torch's writer says RuntimeError for a full disk
+            partial.unlink(missing_ok=True)
+            kept = "The one before is kept: make" if path.exists() else "Make"
+            words = f"{path}: the checkpoint cannot be written; is the disk full?"
+            raise StudioError(f"{words} {kept} room, then continue with --resume.") from error
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a checkpoint."""

@@ -153,7 +153,7 @@ def test_the_first_run_writes_a_key_file_for_its_owner_alone(emulate: Emulate, t
         (["--sensor", "head=waltz"], "there are: turning, dance, still, step, trace"),
         (["--sensor", "head", "--sensor", "head"], "different sensors"),
         (["--sensor", "head", "--count", "1"], "either --sensor or --count"),
-        (["--count", "5"], "has 2 sensor(s), not 5"),
+        (["--count", "5"], "has 2 sensors, not 5"),
         (["--motion", "step", "--step-degrees", "90"], "Give at most 40"),
         (["--motion", "trace"], "--trace"),
         (["--axis", "up"], "three numbers"),
@@ -161,7 +161,7 @@ def test_the_first_run_writes_a_key_file_for_its_owner_alone(emulate: Emulate, t
         (["--seconds-per-turn", "0"], "stand still"),
         (["--host", "no.such.host.invalid"], "bunraku emulate: "),
         (["--serial", "/dev/none"], "a cable carries one sensor, not 2"),
-        (["--log", "/no/such/folder/log.csv"], "No such file or directory"),
+        (["--log", "/no/such/folder/log.csv"], "there is no folder /no/such/folder"),
     ],
 )
 def test_a_wish_that_cannot_be_met_is_one_clear_line(

@@ -147,5 +147,5 @@ def test_what_is_no_network_is_refused(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(b"nothing of the kind")
         with pytest.raises(StudioError, match=f"{name} is not a"):
             open_coder(tmp_path / name)
-    with pytest.raises(StudioError, match="does not exist"):
+    with pytest.raises(FileNotFoundError):
         open_coder(tmp_path / "nowhere")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.pose.foreign_file import opened
 from appliance.show.network import WINDOW
 from appliance.show.show import load_show
 from appliance.studio.autoencoder.held_joints import HeldJoints
@@ -62,13 +63,14 @@ class OnnxCoder:
     window = WINDOW
 
     def __init__(self, path: Path) -> None:
-        """Raises StudioError if bunraku did not export the file."""
+        """Raises StudioError if bunraku did not export the file, or OSError."""
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.log_severity_level = 3
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        opened(path).close()
         try:
             self._session = onnxruntime.InferenceSession(str(path), options, ["CPUExecutionProvider"])
             facts = self._session.get_modelmeta().custom_metadata_map
@@ -76,8 +78,8 @@ class OnnxCoder:
             self.rest = np.array(json.loads(facts["bunraku.rest"]), dtype=np.float32)
         except Exception as error:  # onnxruntime raises another class for each kind of damage
             raise StudioError(
-                f"{path} is not a network that bunraku exported ({str(error).splitlines()[0][:150]}). "
-                "Give a show folder, a puppet.onnx or a checkpoint.pt."
+                f"{path} is not a network that bunraku exported, or it is damaged. Give "
+                "a show folder, a puppet.onnx or a checkpoint.pt."
             ) from error
         self.facts = {
             "file": path.name,
@@ -155,9 +157,10 @@ def load_checkpoint(path: Path) -> tuple[TorchCoder, dict[str, Any]]:
 
 
 def load_state(path: Path) -> dict[str, Any]:
-    """All of a checkpoint, whatever was trained. Raises StudioError."""
+    """All of a checkpoint, whatever was trained. Raises StudioError, or OSError."""
     import torch
 
+    opened(path).close()
     with _from_training(path):
         state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
         state["settings"]["seed"]
@@ -170,7 +173,8 @@ def _from_training(path: Path) -> Iterator[None]:
         yield
     except Exception as error:  # torch raises many classes for a file that it did not write
         raise StudioError(
-            f"{path} is not a checkpoint of bunraku train ({str(error).splitlines()[0][:150]})."
+            f"{path} is not a checkpoint of bunraku train, or it is damaged. Give the checkpoint.pt of a "
+            "training."
         ) from error
 
 
@@ -196,6 +200,4 @@ def open_coder(path: Path) -> Coder:
         if not (path / "show.yaml").exists() and (path / "checkpoint.pt").exists():
             return load_puppet(path / "checkpoint.pt")[0]
         return OnnxCoder(load_show(path).network)
-    if not path.exists():
-        raise StudioError(f"{path} does not exist. Give a show folder, a puppet.onnx or a checkpoint.pt.")
     return load_puppet(path)[0] if path.suffix == ".pt" else OnnxCoder(path)

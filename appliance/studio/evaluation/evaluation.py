@@ -80,8 +80,6 @@ def load_takes(
     """
     takes = []
     for file in files:
-        if not file.is_file():
-            raise StudioError(f"{file} does not exist. Give BVH files to evaluate on.")
         known = Catalogue({"*": true_fps}) if true_fps else find_catalogue(file.parent, [file])
         take = load_take(file, known, dict(zip(coder.joints, coder.rest, strict=True)))
         if all_frames:

@@ -15,6 +15,7 @@ from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.dance_files import write_dance
 from appliance.studio.data.dataset import FPS, Dataset, window_starts
+from appliance.studio.disk_room import require_room
 from appliance.studio.evaluation.coders import IMPROVISER, MovedJoints, TorchCoder, load_puppet, load_state
 from appliance.studio.improviser.improviser_training import (
     ImproviserSettings,
@@ -73,6 +74,7 @@ def run(options: ImproviseOptions) -> bool:
         continue_prompt(options, published, published, dataset, say)
         return True
     coder, puppet_state, puppet = _puppet(options, state)
+    require_room(options.out.parent)
     dataset = trained_on(puppet, coder.joints, puppet_state, options.recordings, console)
     steps = steps_of_dataset(coder.autoencoder, dataset)
     if state is not None and options.model is not None:

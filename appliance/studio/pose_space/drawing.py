@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from appliance.pose.foreign_file import opened
 from appliance.pose.quaternion import Array
 from appliance.studio.studio_error import StudioError
 
@@ -15,9 +16,8 @@ LARGEST = 5_000_000  # bytes
 
 
 def read_line(file: Path) -> Array:
-    """(N, 2) points of the map. Raises StudioError."""
-    if not file.is_file():
-        raise StudioError(f"{file} does not exist. Give the SVG or CSV with the line.")
+    """(N, 2) points of the map. Raises StudioError, or OSError."""
+    opened(file).close()
     if file.stat().st_size > LARGEST:
         raise StudioError(f"{file} is larger than {LARGEST // 1_000_000} MB: that is no line.")
     points = _of_csv(file) if file.suffix.casefold() == ".csv" else _of_svg(file)
