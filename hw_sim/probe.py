@@ -195,7 +195,7 @@ def _frames(datagrams: Sequence[tuple[float, bytes]], joint: int) -> list[Frame]
         if datagram.startswith(FRAME):
             mark = arrival, _mark(datagram)
         elif datagram.startswith(POSE) and mark is not None:
-            at, (tick, _, sequence, late) = mark
+            at, (tick, _, sequence, late, _) = mark
             numbers = decode(datagram)[0][1][4 * joint : 4 * joint + 4]
             frames.append(Frame(at, int(tick), int(sequence), bool(late), np.array(numbers, float)))
             mark = None
@@ -207,7 +207,7 @@ def _has_reading(datagram: bytes) -> bool:
 
 
 def _mark(datagram: bytes) -> list[Any]:
-    """A frame message's tick, frame time, sensor sequence, late."""
+    """A frame message's tick, second, sensor sequence, late, rest of the second."""
     return list(decode(datagram)[0][1])
 
 

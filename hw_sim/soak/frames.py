@@ -76,10 +76,11 @@ class FrameWatch:
 
     def _hear(self, datagram: bytes, arrival: float) -> None:
         try:
-            (_, (tick, deadline, _, late)), *_ = decode(datagram)
+            (_, (tick, second, _, late, rest)), *_ = decode(datagram)
+            deadline = float(second) + float(rest)  # type: ignore[arg-type]
         except (MalformedOscError, ValueError):
             return
-        lateness_ms = 1000.0 * (arrival - float(deadline))  # type: ignore[arg-type]
+        lateness_ms = 1000.0 * (arrival - deadline)
         self._count(int(tick), arrival)  # type: ignore[arg-type]
         bad = bool(late) or lateness_ms > self._late_ms
         self.heard += 1

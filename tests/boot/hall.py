@@ -71,7 +71,7 @@ class Audience:
                     seconds, nanoseconds = struct.unpack("qq", told[0][2])
                     self._frame = seconds + 1e-9 * nanoseconds, arguments
                 elif address.endswith("/joint/pos_world") and self._frame is not None:
-                    at, (tick, _, sequence, late) = self._frame
+                    at, (tick, _, sequence, late, _) = self._frame
                     x, _, z = arguments[:3]
                     self.frames.append(Seen(at, tick, sequence, bool(late), (float(x), float(z))))
                     self._frame = None

@@ -31,8 +31,9 @@ LATE_MS = 15.0
 
 
 def frame(tick: int, deadline: float, late: bool = False) -> bytes:
-    """`/bunraku/frame ,hdhi` by hand."""
-    return b"/bunraku/frame\0\0,hdhi\0\0\0" + struct.pack(">qdqi", tick, deadline, -1, late)
+    """`/bunraku/frame ,iiiif` by hand."""
+    second = int(deadline)
+    return b"/bunraku/frame\0\0,iiiif\0\0" + struct.pack(">iiiif", tick, second, -1, late, deadline - second)
 
 
 class Stage:

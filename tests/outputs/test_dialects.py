@@ -64,11 +64,13 @@ def test_joint_names_with_reserved_signs_stay_one_part_of_the_address() -> None:
 
 
 def test_a_frame_message_carries_tick_time_sequence_and_lateness() -> None:
-    frame = JointFrame(1, tick=1 << 40, frame_time=123456.789, late=True, sensor_sequence=1 << 33)
+    frame = JointFrame(1, tick=1 << 30, frame_time=123456.75, late=True, sensor_sequence=1 << 30)
     encoder = FrameMessage()
-    assert read(encoder.encode(frame)) == [("/bunraku/frame", [1 << 40, 123456.789, 1 << 33, 1])]
-    frame.late, frame.sensor_sequence = False, -1
-    assert read(encoder.encode(frame)) == [("/bunraku/frame", [1 << 40, 123456.789, -1, 0])]
+    assert read(encoder.encode(frame)) == [("/bunraku/frame", [1 << 30, 123456, 1 << 30, 1, 0.75])]
+    frame.late, frame.sensor_sequence, frame.tick = False, -1, (1 << 31) + 5
+    assert read(encoder.encode(frame)) == [("/bunraku/frame", [5, 123456, -1, 0, 0.75])]
+    frame.sensor_sequence = (1 << 32) - 1
+    assert read(encoder.encode(frame)) == [("/bunraku/frame", [5, 123456, (1 << 31) - 1, 0, 0.75])]
 
 
 @pytest.mark.parametrize("dialect", sorted(DIALECTS))

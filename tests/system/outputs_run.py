@@ -263,10 +263,10 @@ def table(figures: dict[str, Any]) -> list[str]:
 
 
 def _dumped(file: Path) -> Heard:
-    """The real oscdump's output: address, type tags, tick, time, sequence, late."""
+    """The real oscdump's output: address, type tags, tick, second, sequence, late, its rest."""
     heard = Heard()
     for line in file.read_text().splitlines():
-        found = re.search(r"/bunraku/frame \S+ (\d+) \S+ -?\d+ (\d)$", line.strip())
+        found = re.search(r"/bunraku/frame \S+ (\d+) \d+ -?\d+ (\d) [\d.]+$", line.strip())
         if found:
             heard.ticks.append(int(found[1]))
             heard.late += int(found[2])
