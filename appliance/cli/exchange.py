@@ -88,6 +88,8 @@ def import_(
         print(line)
     print(f"{out}: {imported.recording.seconds:.1f} s, {len(imported.recording.skeleton)} joints.")
     try:
-        print(draw_dance(RecordedDance(imported.recording, (), out.stem), picture or out.with_suffix(".png")))
+        print(
+            draw_dance(RecordedDance(imported.recording, None, out.stem), picture or out.with_suffix(".png"))
+        )
     except StageError as error:  # the recording is written: only its picture is missing
         print(f"There is no picture: {error}", file=sys.stderr)

@@ -6,12 +6,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from appliance.box.clock import TICK_S
 from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
 from appliance.pose.bvh import read_bvh
 from appliance.pose.file_trouble import sentence
+from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal
@@ -22,10 +24,10 @@ from appliance.stage.stage_error import StageError
 
 @dataclass(frozen=True)
 class RecordedDance:
-    """A recording, the joints that hands held in it, its title."""
+    """A recording, how firmly hands held each joint in it (N, J; None: no hand did), its title."""
 
     recording: Recording
-    held: tuple[int, ...]
+    holds: Array | None
     title: str
 
     def part(self, start_s: float, seconds: float) -> RecordedDance:
@@ -37,7 +39,9 @@ class RecordedDance:
             raise StageError(
                 f"{self.title}: nothing was danced after second {start_s:g}. Choose an earlier start."
             )
-        return replace(self, recording=part)
+        first = min(round(start_s * whole.fps), len(whole))
+        holds = None if self.holds is None else self.holds[first : first + len(part)]
+        return replace(self, recording=part, holds=holds)
 
 
 def filmstrip(
@@ -62,12 +66,14 @@ def filmstrip(
 def load_dance(source: Path, metres_per_unit: float = 0.01) -> RecordedDance:
     """All of a BVH recording or of a journal. Raises BvhError or JournalError."""
     if source.suffix.lower() == ".bvh":
-        return RecordedDance(read_bvh(source, metres_per_unit=metres_per_unit), (), source.stem)
+        return RecordedDance(read_bvh(source, metres_per_unit=metres_per_unit), None, source.stem)
     journal = read_journal(source)
-    held = tuple(journal.skeleton.index(hand["joint"]) for hand in journal.header["hands"])
+    held = [journal.skeleton.index(hand["joint"]) for hand in journal.header["hands"]]
     ticks = journal.ticks
+    holds = np.zeros(ticks["pose"].shape[:2], np.float32)
+    holds[:, held] = ticks["weights"]
     return RecordedDance(
-        Recording(journal.skeleton, ticks["pose"], ticks["root"], 1.0 / TICK_S), held, source.stem
+        Recording(journal.skeleton, ticks["pose"], ticks["root"], 1.0 / TICK_S), holds, source.stem
     )
 
 
@@ -76,7 +82,7 @@ def draw_dance(dance: RecordedDance, out: Path) -> Path:
     danced = dance.recording
     try:
         return draw_filmstrip(
-            out, danced.skeleton, danced.poses, danced.roots, danced.fps, held=dance.held, title=dance.title
+            out, danced.skeleton, danced.poses, danced.roots, danced.fps, holds=dance.holds, title=dance.title
         )
     except MissingPicturesError as error:
         raise StageError(str(error)) from error
@@ -95,7 +101,7 @@ def render_dance(dance: RecordedDance, out: Path, look: str, show: Path | None) 
     try:
         from appliance.projector.strip import render_strip
 
-        return render_strip(out, dance.recording, looks, look, dance.held)
+        return render_strip(out, dance.recording, looks, look, dance.holds)
     except ProjectorError as error:
         raise StageError(str(error)) from error
     except OSError as error:

@@ -33,9 +33,10 @@ def rehearsal_picture(journal: Path, out: Path, show: Show) -> list[str]:
     if trouble is None:
         return [f"What was just danced, as the projector shows it: {out}"]
     dance = load_dance(journal).part(-PICTURED_S, PICTURED_S)
+    marked = ", held joints highlighted" if dance.holds is not None and dance.holds.any() else ""
     return [
         f"The projection cannot be rendered here: {trouble}",
-        f"What was just danced, held joints highlighted: {draw_dance(dance, out)}",
+        f"What was just danced{marked}: {draw_dance(dance, out)}",
     ]
 
 

@@ -21,7 +21,8 @@ from appliance.outputs.frame_layout import (
 )
 from appliance.pose.foreign_file import plain_json
 
-FRAME = struct.Struct("<dII")  # tick, flags, joints; then world rotations (w, x, y, z) and positions, float32
+# Tick, flags, joints; then world rotations (w, x, y, z), positions and holds, float32.
+FRAME = struct.Struct("<dII")
 STALE_S = 0.5
 _LOOK_S = 0.1
 

@@ -99,5 +99,6 @@ def _frame(phrase: Recording, place: int) -> SeenFrame:
     """One instant of the phrase, as the stage would show it."""
     pose = phrase.poses[place]
     positions, world = phrase.skeleton.forward_kinematics(pose, phrase.roots[place])
-    small = [np.asarray(part, np.float32) for part in (pose, world, positions, phrase.roots[place])]
+    free = np.zeros(len(pose))
+    small = [np.asarray(part, np.float32) for part in (pose, world, positions, phrase.roots[place], free)]
     return SeenFrame(0, _PASS_S * _SETTLING_PASSES, 0.0, False, -1, 0.0, *small)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-FILE, KIND, FORMAT, WRITER = "frame", "frame", 1, "the stage (bunraku play)"
+FILE, KIND, FORMAT, WRITER = "frame", "frame", 2, "the stage (bunraku play)"
 FACTS, HEALTH, FRAMES = range(3)  # the file's rings
 FRAME_SLOTS = 64  # a reader has 1.28 s to copy the newest frame
 HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
@@ -22,4 +22,5 @@ class FrameLayout:
         self.pose_at = self.root_at + 12
         self.world_at = self.pose_at + 16 * joints
         self.positions_at = self.world_at + 16 * joints
-        self.bytes = self.positions_at + 12 * joints
+        self.holds_at = self.positions_at + 12 * joints
+        self.bytes = self.holds_at + 4 * joints

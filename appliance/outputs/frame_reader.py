@@ -48,6 +48,7 @@ class SeenFrame:
     world: NDArray[np.float32]  # (J, 4) w, x, y, z
     positions: NDArray[np.float32]  # (J, 3) world, metres
     root: NDArray[np.float32]  # (3,) world, metres
+    holds: NDArray[np.float32]  # (J,) 0..1: how firmly a hand holds each joint
 
 
 class FrameReader:
@@ -164,4 +165,5 @@ class FrameReader:
             np.frombuffer(payload, "<f4", 4 * joints, layout.world_at).reshape(joints, 4),
             np.frombuffer(payload, "<f4", 3 * joints, layout.positions_at).reshape(joints, 3),
             np.frombuffer(payload, "<f4", 3, layout.root_at),
+            np.frombuffer(payload, "<f4", joints, layout.holds_at),
         )

@@ -25,6 +25,7 @@ class JointFrame:
     world: NDArray[np.float32] = field(init=False)  # (J, 4) w, x, y, z
     positions: NDArray[np.float32] = field(init=False)  # (J, 3) world, metres
     root: NDArray[np.float32] = field(init=False)  # (3,) world, metres
+    holds: NDArray[np.float32] = field(init=False)  # (J,) 0..1: how firmly a hand holds each joint now
 
     def __post_init__(self) -> None:
         self.pose = np.zeros((self.joints, 4), np.float32)
@@ -32,3 +33,4 @@ class JointFrame:
         self.world = self.pose.copy()
         self.positions = np.zeros((self.joints, 3), np.float32)
         self.root = np.zeros(3, np.float32)
+        self.holds = np.zeros(self.joints, np.float32)

@@ -105,6 +105,7 @@ class FrameWriter:
         self._payload = payload = self._ring.payload
         self._joints = layout.joints
         self._root = np.frombuffer(payload, "<f4", 3, layout.root_at)
+        self._holds = np.frombuffer(payload, "<f4", layout.joints, layout.holds_at)
         self._pose, self._world, self._positions = (
             np.frombuffer(payload, "<f4", layout.joints * width, at).reshape(layout.joints, width)
             for width, at in ((4, layout.pose_at), (4, layout.world_at), (3, layout.positions_at))
@@ -128,6 +129,7 @@ class FrameWriter:
         self._pose[...] = frame.pose
         self._world[...] = frame.world
         self._positions[...] = frame.positions
+        self._holds[...] = frame.holds
         self._ring.publish()
 
     def write_health(self, health: Mapping[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""Filmstrip: a picture of a dance, instant beside instant, with the held joints in colour."""
+"""Filmstrip: a picture of a dance, instant beside instant, with held joints in colour."""
 
 from __future__ import annotations
 
@@ -31,13 +31,15 @@ class MissingPicturesError(RuntimeError):
 class Strip:
     """A dance for a row of its own: local unit quaternions (N, J, 4), roots (N, 3) metres, what it is.
 
-    behind: a dance whose figures stand behind these as ghosts, so that one sees what is different.
+    behind: a dance whose figures stand behind these as ghosts, so that one sees what is different;
+    holds: (N, J) how firmly a hand holds each joint, 0..1.
     """
 
     poses: Array
     roots: Array
     label: str = ""
     behind: Strip | None = None
+    holds: Array | None = None
 
 
 def draw_strips(
@@ -45,7 +47,6 @@ def draw_strips(
     skeleton: Skeleton,
     strips: Sequence[Strip],
     fps: float,
-    held: Sequence[int] = (),
     title: str = "",
     columns: int = 8,
 ) -> Path:
@@ -56,13 +57,13 @@ def draw_strips(
     count = min((len(strip.poses) for strip in strips), default=0)
     chosen = np.linspace(0, count - 1, min(columns, count)).round().astype(np.int64)
     rows = [_row(strip, chosen) for strip in strips]
-    return _draw(path, skeleton, rows, fps, held, title)
+    return draw_rows(path, skeleton, rows, fps, title, _held(skeleton, rows))
 
 
 def _row(strip: Strip, chosen: NDArray[np.int64], colour: Array = IVORY) -> Row:
     behind = None if strip.behind is None else _row(strip.behind, chosen, SLATE)
     poses, roots = np.asarray(strip.poses, float), np.asarray(strip.roots, float)
-    return Row(poses, roots, chosen, strip.label, colour, behind)
+    return Row(poses, roots, chosen, strip.label, colour, behind, strip.holds)
 
 
 def draw_filmstrip(
@@ -71,7 +72,7 @@ def draw_filmstrip(
     poses: Array,
     roots: Array,
     fps: float,
-    held: Sequence[int] = (),
+    holds: Array | None = None,
     title: str = "",
     columns: int = 10,
     rows: int | None = None,
@@ -80,21 +81,32 @@ def draw_filmstrip(
 ) -> Path:
     """Draw columns x rows evenly spaced instants of a dance into a PNG and return its path.
 
-    poses: (N, J, 4) local unit quaternions; roots: (N, 3) metres; fps: poses a second; held: joints drawn in
-    colour with the way that they have just gone; against: other poses (N, J, 4) for a second row below the
-    first, instant by instant (original above reconstruction). Two rows unless said otherwise.
+    poses: (N, J, 4) local unit quaternions; roots: (N, 3) metres; fps: poses a second; holds: (N, J) how
+    firmly a hand holds each joint, 0..1: its colour, and the way that it has gone while it was held;
+    against: other poses (N, J, 4) for a second row below the first, instant by instant (original above
+    reconstruction). Two rows unless said otherwise.
     Raises MissingPicturesError where matplotlib is missing, ValueError where there is no pose.
     """
     drawn = _rows(np.asarray(poses, float), np.asarray(roots, float), columns, rows or 2, against, labels)
-    return _draw(path, skeleton, drawn, fps, held, title)
+    drawn = [replace(row, holds=holds) for row in drawn]
+    return draw_rows(path, skeleton, drawn, fps, title, _held(skeleton, drawn))
 
 
-def _draw(
-    path: Path | str, skeleton: Skeleton, rows: Sequence[Row], fps: float, held: Sequence[int], title: str
-) -> Path:
-    names = ", ".join(skeleton.names[joint] for joint in held)
-    rows = [replace(row, held=tuple(held)) for row in rows]
-    return draw_rows(path, skeleton, rows, fps, title, f"held: {names}" if names else "")
+def held_throughout(poses: Array, joints: Sequence[int]) -> Array:
+    """(N, J) holds of a dance (N, J, 4) in which hands hold these joints from its first pose to its last."""
+    holds = np.zeros(poses.shape[:2])
+    holds[:, list(joints)] = 1.0
+    return holds
+
+
+def _held(skeleton: Skeleton, rows: Sequence[Row]) -> str:
+    """Which joints are held at any time, a legend; empty where none is."""
+    held = np.zeros(len(skeleton), bool)
+    for row in rows:
+        if row.holds is not None:
+            held |= (row.holds > 0).any(axis=0)
+    names = ", ".join(np.array(skeleton.names)[held])
+    return f"held: {names}" if names else ""
 
 
 def draw_rows(
@@ -145,13 +157,15 @@ def _rows(
     return [Row(poses, roots, chosen, labels[0], IVORY), Row(other, roots, chosen, labels[1], SLATE)]
 
 
-def _draw_trails(axes: Any, trails: list[Array]) -> None:
+def _draw_trails(axes: Any, trails: list[tuple[Array, Array]]) -> None:
     from matplotlib.collections import LineCollection
 
-    for pixels in trails:
+    for pixels, holds in trails:
         pieces = np.stack([pixels[:-1], pixels[1:]], axis=1)
         ages = np.linspace(0, 1, len(pieces))
-        colours = np.concatenate([np.tile(VERMILION, (len(pieces), 1)), ages[:, None] ** 1.3], axis=1)
+        colours = np.concatenate(
+            [np.tile(VERMILION, (len(pieces), 1)), (holds[1:] * ages**1.3)[:, None]], axis=1
+        )
         widths = 1.0 + 3.5 * ages
         axes.add_collection(
             LineCollection(list(pieces), colors=colours, linewidths=widths, capstyle="butt", zorder=1)

@@ -29,8 +29,8 @@ GHOST = 0.55  # how dense the figure is that stands behind another one
 class Row:
     """Poses drawn beside each other: local rotations (N, J, 4), roots (N, 3) metres, a label, a colour.
 
-    chosen: which of the N; behind: a row whose figures stand behind these as ghosts; held: joints in colour;
-    stamps: words below the figures, left out: their seconds.
+    chosen: which of the N; behind: a row whose figures stand behind these as ghosts; holds: (N, J) 0..1, how
+    far each joint is in colour; stamps: words below the figures, left out: their seconds.
     """
 
     poses: Array
@@ -39,7 +39,7 @@ class Row:
     label: str = ""
     colour: Array = field(default_factory=lambda: IVORY)
     behind: Row | None = None
-    held: tuple[int, ...] = ()
+    holds: Array | None = None
     stamps: tuple[str, ...] | None = None
 
 
@@ -52,7 +52,7 @@ class Stage:
         self.scale = HEIGHT_PX / self.body.height
         self.times: list[tuple[float, float, str]] = []
         self.labels: list[tuple[float, str]] = []
-        self.trails: list[Array] = []
+        self.trails: list[tuple[Array, Array]] = []  # pixels (n, 2) from old to new, how firmly held (n,)
         columns = max(len(row.chosen) for row in rows)
         above = self._highest(rows)
         self.floor_px = round(above * self.scale * np.cos(ELEVATION)) + 24
@@ -101,7 +101,8 @@ class Stage:
         on_stage = replace(cones, start=cones.start @ _turn().T, end=cones.end @ _turn().T)
         _over(self.floor[rows], left, self._shadow(on_stage, frame))
         colours = np.tile(row.colour, (len(cones.joint), 1))
-        colours[np.isin(cones.joint, row.held)] = VERMILION
+        if row.holds is not None:
+            colours += row.holds[index][cones.joint][:, None] * (VERMILION - colours)
         _over(self.figures[rows], left, render(_seen(cones), colours, frame))
 
     def _cones(self, row: Row, index: int, floor: float) -> Cones:
@@ -121,16 +122,18 @@ class Stage:
         return shadow
 
     def _trail(self, row: Row, index: int, centre: float, floor: float, top: int) -> None:
-        """The way that the end of each held bone has gone, as pixels from old to new."""
+        """The way that the end of each bone has gone while it was held."""
+        if row.holds is None:
+            return
         first = max(0, index - round(TRAIL_S * self.fps))
         here = row.roots[index] * [1, 0, 1] + [0, floor, 0]
         span = slice(first, index + 1)
         positions, _ = self.skeleton.forward_kinematics(row.poses[span], row.roots[span])
-        for joint in row.held:
+        for joint in np.flatnonzero(row.holds[span].any(axis=0)).tolist():
             child = next((c for c, p in enumerate(self.skeleton.parents) if p == joint), joint)
             seen = (positions[:, child] - here) @ _view().T * self.scale
             pixels = np.stack([centre + seen[:, 0], top + self.floor_px - seen[:, 1]], axis=-1)
-            self.trails.append(pixels)
+            self.trails.append((pixels, row.holds[span, joint]))
 
 
 def straight(premultiplied: Array) -> Array:

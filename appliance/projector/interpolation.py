@@ -23,17 +23,18 @@ class _Seen(NamedTuple):
     left: float  # when it left the stage
     positions: Floats
     world: Floats
+    holds: Floats
 
 
 class Interpolation:
-    """Follows one stage's frames. Between two of them, positions are linear and world rotations slerped.
+    """Follows one stage's frames. Between two, positions and holds are linear, world rotations slerped.
 
     The dance is shown one tick behind its newest possible frame, so that the frame after the wanted time is
     usually there; if not, the newest one is held. Nothing is ever extrapolated.
     """
 
-    def __init__(self, reader: FrameReader, held: tuple[int, ...]) -> None:
-        self._reader, self._held = reader, held
+    def __init__(self, reader: FrameReader) -> None:
+        self._reader = reader
         self._seen: deque[_Seen] = deque(maxlen=_KEPT)
         self._tick = -1
         self._latency_s: float | None = None  # from a frame's time to its leaving the stage
@@ -61,16 +62,16 @@ class Interpolation:
         after = next((k for k, seen in enumerate(self._seen) if seen.time > time_s), len(self._seen))
         trail = [seen for seen in list(self._seen)[:after] if seen.time >= time_s - TRAIL_S]
         before = self._seen[after - 1]
-        positions, world = before.positions, before.world
+        positions, world, holds = before.positions, before.world, before.holds
         if after < len(self._seen):
-            positions, world = _between(before, self._seen[after], time_s)
+            positions, world, holds = _between(before, self._seen[after], time_s)
         return Moment(
             time_s=time_s,
             positions=positions,
             world=world,
             trail=[(seen.positions, seen.world) for seen in trail or [before]],
             trail_times=[seen.time for seen in trail or [before]],
-            held=self._held,
+            holds=holds,
         )
 
     @property
@@ -86,7 +87,7 @@ class Interpolation:
         if frame.tick <= self._tick or (self._seen and frame.frame_time <= self._seen[-1].time):
             return
         self._tick = frame.tick
-        self._seen.append(_Seen(frame.frame_time, frame.left, frame.positions, frame.world))
+        self._seen.append(_Seen(frame.frame_time, frame.left, frame.positions, frame.world, frame.holds))
 
     def _follow_latency(self, now: float) -> None:
         """Follow the latency of nine in ten frames, so slowly that it does not show."""
@@ -102,12 +103,13 @@ class Interpolation:
         self._before = now
 
 
-def _between(before: _Seen, after: _Seen, time_s: float) -> tuple[Floats, Floats]:
-    """Positions (J, 3) and world rotations (J, 4) at a time between two frames."""
+def _between(before: _Seen, after: _Seen, time_s: float) -> tuple[Floats, Floats, Floats]:
+    """Positions (J, 3), world rotations (J, 4) and holds (J,) at a time between two frames."""
     gap_s = after.time - before.time
     if gap_s > _LONGEST_GAP_S:
-        return before.positions, before.world
+        return before.positions, before.world, before.holds
     share = np.float32((time_s - before.time) / gap_s)
     positions = before.positions + share * (after.positions - before.positions)
     world = quaternion.slerp(before.world, after.world, share)
-    return positions.astype(np.float32), world.astype(np.float32)
+    holds = before.holds + share * (after.holds - before.holds)
+    return positions.astype(np.float32), world.astype(np.float32), holds.astype(np.float32)

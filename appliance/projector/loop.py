@@ -165,7 +165,7 @@ class Projector:
         self.is_preparing = False
 
     def _switch_to(self, facts: Facts) -> None:
-        self._poses = Interpolation(self._reader, facts.held)
+        self._poses = Interpolation(self._reader)
         show = (facts.skeleton, self._looks(facts))
         if self._drawn is not None and _are_alike(self._drawn, show):
             return

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose.recording import Recording
-from appliance.projector.moment import TRAIL_S, Moment
+from appliance.projector.moment import TRAIL_S, Floats, Moment
 from appliance.projector.picture.renderer import Renderer
 
 FINER = 2  # drawn this many times larger and then shrunk, as a projector's pixels melt on the wall
@@ -17,8 +15,8 @@ FINER = 2  # drawn this many times larger and then shrunk, as a projector's pixe
 Image = NDArray[np.uint8]
 
 
-def moment_of(recording: Recording, time_s: float, held: Sequence[int] = ()) -> Moment:
-    """The dance of a recording at one time, with what came before it; held: joints that hands hold."""
+def moment_of(recording: Recording, time_s: float, holds: Floats | None = None) -> Moment:
+    """The dance of a recording at one time, with what came before it; holds: (J,) weights."""
     last = min(round(time_s * recording.fps), len(recording) - 1)
     first = max(0, last - round(TRAIL_S * recording.fps))
     positions, world = recording.skeleton.forward_kinematics(
@@ -31,7 +29,7 @@ def moment_of(recording: Recording, time_s: float, held: Sequence[int] = ()) -> 
         world=world[-1],
         trail=list(zip(positions, world, strict=True)),
         trail_times=[index / recording.fps for index in range(first, last + 1)],
-        held=tuple(held),
+        holds=holds,
     )
 
 

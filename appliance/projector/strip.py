@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.context import offscreen
@@ -23,15 +24,18 @@ COLOURS = 256  # in the file: 160 kB instead of 800, and no more than 2 of 255 o
 
 
 def render_strip(
-    out: Path, recording: Recording, looks: Mapping[str, LookConfig], look: str, held: Sequence[int] = ()
+    out: Path, recording: Recording, looks: Mapping[str, LookConfig], look: str, holds: Array | None = None
 ) -> Path:
     """Render ten instants at equal distances, the last one at the end, into `out`; returns it.
 
-    held: joints that hands hold. Raises ProjectorError where nothing can be rendered here, OSError where
-    `out` cannot be written.
+    holds: (N, J) how firmly hands hold each joint, 0..1. Raises ProjectorError where nothing can be rendered
+    here, OSError where `out` cannot be written.
     """
     chosen = np.unique(np.linspace(0, len(recording) - 1, COLUMNS * ROWS + 1)[1:].round().astype(int))
-    moments = [moment_of(recording, last / recording.fps, held) for last in chosen.tolist()]
+    moments = [
+        moment_of(recording, last / recording.fps, None if holds is None else holds[last].astype(np.float32))
+        for last in chosen.tolist()
+    ]
     framed = {name: _framed(one) for name, one in looks.items()}
     pictures = list(_render(recording.skeleton, framed, look, moments))
     pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % COLUMNS)

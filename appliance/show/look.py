@@ -70,6 +70,13 @@ class CameraConfig(Section):
     period_s: float = key("Seconds for one sway of drift or one circle of orbit.", 70.0, within=(10, 3600))
 
 
+class HeldConfig(Section):
+    """How the joint is marked that a hand holds: it grows and fades as the hand takes and releases it."""
+
+    colour: Colour = key("What the held limb turns to; left out: the style's own.", None)
+    strength: float = key("How clearly; 0: not at all.", 1.0, within=(0, 1))
+
+
 class LookConfig(Section):
     """One look of the projection. A colour that is left out is the style's own."""
 
@@ -96,6 +103,7 @@ class LookConfig(Section):
         0.7,
         within=(0.25, 1),
     )
+    held: HeldConfig = part(HeldConfig)
     camera: CameraConfig = part(CameraConfig)
 
 

@@ -45,7 +45,6 @@ class Tick:
         self.frame = JointFrame(len(parts.skeleton))
         self._whole, self._roots = parts.motion.window(), parts.motion.roots()
         self._danced = self._whole[0].copy()  # (J, 4), not yet grounded
-        self._held = np.zeros(len(parts.skeleton), np.float32)  # weights of the hands
         self.network_failed = False
         self.readings: Sequence[SensorReading] = ()
         self.live_heard: LivePose | None = None
@@ -156,13 +155,13 @@ class Tick:
     def _stand(self) -> None:
         """Put the danced pose on the floor and into the world."""
         parts, frame, motion = self.parts, self.frame, self.parts.motion
-        parts.puppet.restore(parts.hands.weights, self._held)
+        parts.puppet.restore(parts.hands.weights, frame.holds)
         figure = parts.grounding.ground_pose(
             self._danced,
             self._roots[0],
             parts.lift,
             motion.rest_heights,
-            self._held,
+            frame.holds,
         )
         frame.pose[:] = parts.grounding.pose
         frame.world[:] = figure.world

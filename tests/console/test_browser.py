@@ -140,6 +140,7 @@ def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page
     press(tab, '[data-page="dance"]')
     await_true(tab, "Number(document.body.dataset.tick) > 0")
     expect(tab.locator("#held")).to_contain_text("Held:")
+    await_true(tab, "/^lShldr [01][.][0-9]{2}$/.test(document.body.dataset.held)")
     before = tab.locator("#stage").screenshot()
     drawn = tab.evaluate("[document.body.dataset.tick, document.body.dataset.root]")
     seen = {frame.tick: frame.root for frame in reader.frames(60, time.monotonic())}

@@ -70,11 +70,12 @@ def test_a_browser_gets_the_pose_that_leaves_the_box(venue: tuple[Box, Page]) ->
                 frame = await next_frame(browser)
                 tick, _, joints = FRAME.unpack_from(frame)
                 numbers = np.frombuffer(frame, "<f4", -1, FRAME.size)
-                assert len(numbers) == 7 * joints
+                assert len(numbers) == 8 * joints
                 for seen in reader.frames(10, time.monotonic()):
                     if seen.tick == tick:
                         assert np.array_equal(numbers[: 4 * joints], seen.world.ravel())
-                        assert np.array_equal(numbers[4 * joints :], seen.positions.ravel())
+                        assert np.array_equal(numbers[4 * joints : 7 * joints], seen.positions.ravel())
+                        assert np.array_equal(numbers[7 * joints :], seen.holds)
                         equal += 1
         return equal
 

@@ -38,6 +38,7 @@ def frame(
         world=world,
         positions=np.array([hip, hand], np.float32),
         root=np.array(hip, np.float32),
+        holds=np.zeros(2, np.float32),
     )
 
 

@@ -50,6 +50,7 @@ def fill(frame: JointFrame, skeleton: Skeleton, seed: int) -> JointFrame:
     frame.pose[:] = pose / np.linalg.norm(pose, axis=-1, keepdims=True)
     frame.root[:] = random.uniform(-3, 3, 3)
     frame.positions[:], frame.world[:] = skeleton.forward_kinematics(frame.pose, frame.root)
+    frame.holds[:] = random.uniform(0, 1, len(skeleton))
     frame.tick, frame.frame_time = seed, 1000.0 + 0.02 * seed
     return frame
 

@@ -36,7 +36,7 @@ pause_s = float(sys.argv[3])
 while True:
     frame.tick += 1
     frame.frame_time = 1e-6 * frame.tick
-    for numbers in (frame.pose, frame.world, frame.positions, frame.root):
+    for numbers in (frame.pose, frame.world, frame.positions, frame.root, frame.holds):
         numbers.fill(frame.tick % 65536)
     writer.write(frame)
     if frame.tick == 1:
@@ -57,7 +57,7 @@ while (now := time.monotonic()) < until or ((seen <= 1000 or not oldest) and now
     oldest += len(frames) < 64
     for frame in (*frames, newest):
         seen += 1
-        for numbers in (frame.pose, frame.world, frame.positions, frame.root):
+        for numbers in (frame.pose, frame.world, frame.positions, frame.root, frame.holds):
             torn += not (numbers == frame.tick % 65536).all()
         torn += frame.frame_time != 1e-6 * frame.tick
     torn += newest.tick < last
@@ -114,7 +114,7 @@ def assert_same(seen: SeenFrame | None, frame: JointFrame) -> None:
     assert seen is not None
     for name in ("tick", "frame_time", "late", "sensor_sequence", "sensor_arrival"):
         assert getattr(seen, name) == getattr(frame, name)
-    for name in ("pose", "world", "positions", "root"):
+    for name in ("pose", "world", "positions", "root", "holds"):
         np.testing.assert_array_equal(getattr(seen, name), getattr(frame, name))
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from appliance.pictures.figure import Frame, floor_shadow, render
-from appliance.pictures.filmstrip import VERMILION, Strip, draw_filmstrip, draw_strips
+from appliance.pictures.filmstrip import VERMILION, Strip, draw_filmstrip, draw_strips, held_throughout
+from appliance.pictures.filmstrip_stage import Row, Stage
 from appliance.pose import quaternion
 from appliance.pose.body import Body, Cones
 from appliance.pose.skeleton import Skeleton
@@ -119,11 +120,42 @@ def accent_pixels(path: Path) -> int:
 def test_held_joints_are_in_colour_and_nothing_else_is(tmp_path: Path) -> None:
     poses, roots = dance(FIGURE)
     plain = draw_filmstrip(tmp_path / "deep" / "plain.png", FIGURE, poses, roots, 50, columns=3, rows=1)
-    held = draw_filmstrip(tmp_path / "held.png", FIGURE, poses, roots, 50, held=[3], columns=3, rows=1)
+    holds = held_throughout(poses, [3])
+    held = draw_filmstrip(tmp_path / "held.png", FIGURE, poses, roots, 50, holds, columns=3, rows=1)
     assert plain == tmp_path / "deep" / "plain.png"
     assert plain.read_bytes().startswith(b"\x89PNG")
     assert accent_pixels(plain) == 0
     assert accent_pixels(held) > 500
+
+
+def test_the_colour_follows_how_firmly_a_joint_is_held(tmp_path: Path) -> None:
+    poses, roots = dance(FIGURE)
+    nobody = held_throughout(poses, [])
+    pictures = {
+        weight: draw_filmstrip(
+            tmp_path / f"{weight}.png",
+            FIGURE,
+            poses,
+            roots,
+            50,
+            weight * held_throughout(poses, [3]),
+            columns=3,
+        )
+        for weight in (0.0, 0.3, 1.0)
+    }
+    unheld = draw_filmstrip(tmp_path / "nobody.png", FIGURE, poses, roots, 50, nobody, columns=3)
+    assert pictures[0.0].read_bytes() == unheld.read_bytes()
+    assert accent_pixels(pictures[0.0]) == 0, "no figure, trail or legend in the colour of hands"
+    assert accent_pixels(pictures[0.3]) < 0.5 * accent_pixels(pictures[1.0])
+
+
+def test_a_trail_begins_and_ends_with_the_hold(tmp_path: Path) -> None:
+    poses, roots = dance(FIGURE)
+    holds = held_throughout(poses, [3])
+    holds[:40] = 0.0
+    stage = Stage(FIGURE, [Row(poses, roots, np.array([20, 59]), holds=holds)], 50)
+    ((_, weights),) = stage.trails
+    assert weights.tolist() == holds[29:60, 3].tolist()
 
 
 def size(path: Path) -> tuple[int, int]:
@@ -166,7 +198,8 @@ def test_strips_stand_under_each_other_with_ghosts_behind_them(tmp_path: Path) -
 @pytest.mark.parametrize("frames", [1, 2, 7])
 def test_short_dances_have_as_many_figures_as_poses(tmp_path: Path, frames: int) -> None:
     poses, roots = dance(FIGURE, frames)
-    assert draw_filmstrip(tmp_path / "short.png", FIGURE, poses, roots, 50, held=[3], columns=8).is_file()
+    holds = held_throughout(poses, [3])
+    assert draw_filmstrip(tmp_path / "short.png", FIGURE, poses, roots, 50, holds, columns=8).is_file()
 
 
 def test_no_poses_are_no_picture(tmp_path: Path) -> None:

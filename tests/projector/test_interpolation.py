@@ -20,7 +20,8 @@ def frame(tick: int, frame_time: float, left: float) -> SeenFrame:
     """Everything moves evenly with time, so that the right pose at any time is known."""
     world = quaternion.from_axis_angle([0, 1, 0], np.array([TURN * frame_time] * 2)).astype(np.float32)
     positions = np.full((2, 3), SPEED * frame_time, np.float32)
-    return SeenFrame(tick, frame_time, left, False, -1, 0.0, world, world, positions, positions[0])
+    holds = np.array([0.0, tick % 2], np.float32)
+    return SeenFrame(tick, frame_time, left, False, -1, 0.0, world, world, positions, positions[0], holds)
 
 
 @dataclass
@@ -39,7 +40,7 @@ def stage(ticks: range | list[int], way_s: float = WAY_S, start: float = 10.0) -
 
 
 def following(ring: Ring) -> Interpolation:
-    return Interpolation(ring, (1,))  # type: ignore[arg-type]
+    return Interpolation(ring)  # type: ignore[arg-type]
 
 
 def shown_times(poses: Interpolation, times: np.ndarray) -> np.ndarray:
@@ -71,7 +72,7 @@ def test_nothing_before_the_first_frame_and_the_first_one_alone() -> None:
     poses.take(10.01)
     moment = poses.moment(10.01)
     assert moment is not None and moment.positions[0, 0] / SPEED == pytest.approx(10.0, abs=1e-5)
-    assert moment.time_s == 10.0 and moment.trail_times == [10.0] and moment.held == (1,)
+    assert moment.time_s == 10.0 and moment.trail_times == [10.0]
 
 
 def test_a_late_frame_is_waited_for_not_guessed() -> None:
@@ -138,3 +139,16 @@ def test_age_counts_from_when_it_left_the_stage() -> None:
     moment = poses.moment(12.0)
     assert moment is not None
     assert 12.0 - poses.left_stage(moment) == pytest.approx(TICK_S, abs=1e-6)
+
+
+def test_holds_grow_evenly_between_two_frames() -> None:
+    poses = following(stage(range(20)))
+    held = []
+    for now in 10.2 + np.arange(0.0, 0.04, 0.001):
+        poses.take(now)
+        moment = poses.moment(now)
+        assert moment is not None and moment.holds is not None
+        assert moment.holds[0] == 0.0
+        held.append(float(moment.holds[1]))
+    assert min(held) < 0.1 and max(held) > 0.9
+    assert np.abs(np.diff(held)).max() < 0.06

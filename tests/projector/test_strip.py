@@ -11,7 +11,9 @@ from PIL import Image
 
 from appliance.cli.pictures import load_dance, render_dance
 from appliance.cli.rehearsal import has_display, rehearsal_picture
+from appliance.pictures.filmstrip import held_throughout
 from appliance.projector.strip import COLUMNS, PICTURE, ROWS, render_strip
+from appliance.recorder.reading import read_journal
 from appliance.show.look import looks_by_name
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError
@@ -39,7 +41,9 @@ def write_journal(path: Path, ticks: int = 100) -> Path:
 @pytest.mark.parametrize("look", ["plaster", "lines"])
 def test_ten_instants_side_by_side(tmp_path: Path, look: str) -> None:
     dance = swaying_phrase()
-    out = render_strip(tmp_path / "deep" / "strip.png", dance, looks_by_name(()), look, [2])
+    out = render_strip(
+        tmp_path / "deep" / "strip.png", dance, looks_by_name(()), look, held_throughout(dance.poses, [2])
+    )
     assert Image.open(out).size == (COLUMNS * WIDTH, ROWS * HEIGHT)
     assert out.stat().st_size < LARGEST_BYTES
     pictures = pictures_of(out)
@@ -107,7 +111,9 @@ def test_without_opengl_a_rehearsal_ends_with_a_filmstrip_and_says_why(
 
 def test_a_part_of_a_dance_counts_from_either_end(tmp_path: Path) -> None:
     dance = load_dance(write_journal(tmp_path / "run.journal"))
-    assert dance.held == (FIGURE.index("lShldr"),)
+    assert dance.holds is not None and dance.holds.shape == (len(dance.recording), len(FIGURE))
+    weights = read_journal(tmp_path / "run.journal").ticks["weights"][:, 0]
+    assert np.array_equal(dance.holds[:, FIGURE.index("lShldr")], weights), "as the ticks say"
     assert len(dance.part(-1.0, 10.0).recording) == 50
     assert len(dance.part(-100.0, 10.0).recording) == 100
     assert len(dance.part(0.5, 0.5).recording) == 25

@@ -103,6 +103,21 @@ def test_a_worn_sensor_turns_its_joint_and_the_frame_names_the_reading(
     assert frames(receiver)[-1][2] == 59
 
 
+def test_a_frame_says_how_firmly_each_joint_is_held(stage: Callable[..., Tick]) -> None:
+    tick = stage()
+    held = []
+    for number in range(180):
+        dance(tick, range(number, number + 1), heard=TURNED if 20 <= number < 80 else None)
+        held.append(tick.frame.holds.copy())
+    weights = np.array(held)
+    assert not np.delete(weights, SHOULDER, axis=1).any()
+    of_hand = weights[:, SHOULDER]
+    assert not of_hand[:20].any(), "before the first message nothing is held"
+    assert np.all(np.diff(of_hand[20:80]) >= 0) and of_hand[79] == 1.0
+    assert np.all(np.diff(of_hand[86:]) <= 0) and of_hand[-1] == 0.0, "released, it is free"
+    assert ((of_hand > 0.1) & (of_hand < 0.9)).sum() > 20, "it grows and fades"
+
+
 def test_the_neutral_orientation_of_a_sensor_means_the_rest_pose(stage: Callable[..., Tick]) -> None:
     tick = stage(hands=[{"sensor": "left-wrist", "joint": "lShldr", "neutral": list(TURNED)}])
     dance(tick, range(60), heard=TURNED)

@@ -1,6 +1,7 @@
 // The dance in 3D, drawn on a plain canvas: a body of capsules, its shadow, a floor. No library, no graphics card.
 const HEAD_BYTES = 16; // tick (float64), flags, joints (uint32): stage_view.py
 const GRID_M = 3;
+const HELD = 0.01; // less is not seen
 const INK = { body: [238, 226, 206], hand: [255, 138, 92], floor: "#2a2f36", shadow: "#000000" };
 
 export class Dance {
@@ -27,7 +28,6 @@ export class Dance {
 
   // A new stage may dance another skeleton.
   async follow(value) {
-    this.holds = new Set(value.hands.filter((one) => one.holds).map((one) => one.joint));
     if (value.generation === this.generation || value.generation === 0) return;
     try {
       const show = await (await fetch("/api/show")).json();
@@ -38,9 +38,9 @@ export class Dance {
 
   take(buffer) {
     const head = new DataView(buffer), joints = head.getUint32(12, true);
-    if (buffer.byteLength !== HEAD_BYTES + 28 * joints) return;
+    if (buffer.byteLength !== HEAD_BYTES + 32 * joints) return;
     const numbers = new Float32Array(buffer, HEAD_BYTES);
-    this.frame = { tick: head.getFloat64(0, true), world: numbers.subarray(0, 4 * joints), positions: numbers.subarray(4 * joints) };
+    this.frame = { tick: head.getFloat64(0, true), world: numbers.subarray(0, 4 * joints), positions: numbers.subarray(4 * joints, 7 * joints), holds: numbers.subarray(7 * joints) };
     this.takenAt = performance.now();
     document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
   }
@@ -112,7 +112,8 @@ export class Dance {
     const seen = bones.map((bone) => ({ ...bone, a: eye(bone.from), b: eye(bone.to) }));
     seen.sort((one, other) => other.a.away + other.b.away - one.a.away - one.b.away);
     for (const { a, b, radius, held } of seen) this.drawBone(ink, a, b, radius, held);
-    for (const joint of this.heldJoints()) this.drawRing(ink, eye(point(joint)), ratio);
+    for (const joint of this.heldJoints()) this.drawRing(ink, eye(point(joint)), ratio, frame.holds[joint]);
+    document.body.dataset.held = this.heldJoints().map((joint) => `${show.joints[joint]} ${frame.holds[joint].toFixed(2)}`).join(", ");
     document.body.dataset.tick = frame.tick;
     document.body.dataset.root = Array.from(root, (value) => value.toFixed(3)).join(" ");
     const isOld = performance.now() - this.takenAt > 1500;
@@ -121,7 +122,7 @@ export class Dance {
   }
 
   heldJoints() {
-    return this.show.held.filter((name) => this.holds?.has(name)).map((name) => this.show.joints.indexOf(name));
+    return this.show.joints.map((_, joint) => joint).filter((joint) => this.frame.holds[joint] > HELD);
   }
 
   tell(sentence) {
@@ -140,13 +141,13 @@ export class Dance {
   }
 
   bones(point) {
-    const { show, frame } = this, held = new Set(this.heldJoints());
+    const { show, frame } = this;
     const bones = [];
     const add = (joint, from, to) => {
       const name = show.joints[joint].toLowerCase(), length = Math.hypot(...from.map((v, axis) => to[axis] - v));
       const trunk = /hip|pelvis|root|spine|torso|chest|back/.test(name);
       const radius = /head/.test(name) ? 0.085 : Math.min(trunk ? 0.085 : 0.055, Math.max(0.022, 0.2 * length));
-      if (length > 0.005) bones.push({ from: [...from], to: [...to], radius, held: held.has(joint) });
+      if (length > 0.005) bones.push({ from: [...from], to: [...to], radius, held: frame.holds[joint] });
     };
     show.parents.forEach((parent, joint) => { if (parent >= 0) add(parent, point(parent), point(joint)); });
     for (const [joint, offset] of show.ends) {
@@ -158,7 +159,7 @@ export class Dance {
 
   drawBone(ink, a, b, radius, held) {
     const light = Math.min(1, Math.max(0.45, 1.25 - 0.16 * ((a.away + b.away) / 2 - 3)));
-    const colour = held ? INK.hand : INK.body;
+    const colour = INK.body.map((value, part) => value + held * (INK.hand[part] - value)); // as firmly as it is held
     const shade = (part) => `rgb(${colour.map((value) => Math.round(value * light * part)).join(" ")})`;
     ink.strokeStyle = "#0d0f11";
     this.stroke(ink, a, b, radius * 1.22);
@@ -178,12 +179,14 @@ export class Dance {
     ink.stroke();
   }
 
-  drawRing(ink, at, ratio) {
+  drawRing(ink, at, ratio, held) {
+    ink.globalAlpha = held;
     ink.strokeStyle = `rgb(${INK.hand.join(" ")})`;
     ink.lineWidth = 3 * ratio;
     ink.beginPath();
     ink.arc(at.x, at.y, Math.max(12 * ratio, 0.12 * at.scale), 0, 7);
     ink.stroke();
+    ink.globalAlpha = 1;
   }
 
   drawFloor(ink, eye, ratio) {

@@ -55,6 +55,24 @@ def _floor(positions: Floats, height: float, sole: float) -> float:
     return lowest * float(np.clip((abs(lowest) / height - 0.12) / 0.12, 0.0, 1.0))
 
 
+class HoldTexture:
+    """How firmly hands hold each joint now: one texel a joint, red, 0..1."""
+
+    def __init__(self, ctx: moderngl.Context, joints: int) -> None:
+        self.most = 0.0  # what the most firmly held joint has
+        self.texture = ctx.texture((joints, 1), 1, dtype="f4")
+        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+
+    def write(self, holds: Floats | None) -> None:
+        """Bring the weights (J,) onto the GPU; None: no joint is held."""
+        self.most = 0.0 if holds is None else float(np.max(holds, initial=0.0))
+        if holds is not None and self.most > 0.0:
+            self.texture.write(np.ascontiguousarray(holds, np.float32))
+
+    def release(self) -> None:
+        self.texture.release()
+
+
 class PoseTexture:
     """Dual quaternions of all joints in all rows: joint j in texels 2j (rotation) and 2j + 1 (dual part)."""
 

@@ -76,6 +76,7 @@ class Renderer:
         seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect)
         scene = Scene(moment.time_s, seen, poses, wall.aspect)
         easel.poses.write(poses)
+        easel.holds.write(moment.holds)
         layers = [(before, 1.0), (now, mix)] if 0.0 < mix < 1.0 else [(now if mix > 0 else before, 1.0)]
         for layer, opacity in layers:
             self._styles[layer.style].draw(scene, layer, opacity, wall)

@@ -18,11 +18,12 @@ from appliance.projector.picture.body_buffers import BodyBuffers
 from appliance.projector.picture.camera import View
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.noise import SIDE, noise_pixels
-from appliance.projector.picture.poses import Poses, PoseTexture
+from appliance.projector.picture.poses import HoldTexture, Poses, PoseTexture
 from appliance.projector.picture.tally import Tally
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.vertices import layout, packed
 from appliance.projector.picture.wall import Wall
+from appliance.show.look import LookConfig
 
 BODY_AREA = 0.16  # of a figure height squared that the figure covers, about
 Box = tuple[float, float, float, float]
@@ -93,6 +94,7 @@ class Easel:
         self.bind_positions = mesh.bind_positions / mesh.height
         self.body = BodyBuffers(ctx, mesh)
         self.poses = PoseTexture(ctx, mesh, len(skeleton))
+        self.holds = HoldTexture(ctx, len(skeleton))
         self.noise = ctx.texture((SIDE, SIDE), 4, noise_pixels())
         self.noise.build_mipmaps()
         self.noise.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
@@ -120,6 +122,10 @@ class Easel:
                 known.release()
             known = self._canvases[name] = Target(self.ctx, self.tally, size, depth)
         return known
+
+    def held(self, look: LookConfig) -> dict[str, Any]:
+        """The inputs of shaders that mark held joints; `held` 0 switches that off."""
+        return {"holds": self.holds.texture, "held": look.held.strength if self.holds.most > 0.0 else 0.0}
 
     def picture(self, wall: Wall, scale: float) -> Target:
         """The canvas for the figure, with depth, at a share of the picture's resolution."""
@@ -196,7 +202,7 @@ class Easel:
         return canvases + buffers + self.body.gpu_bytes + self.poses.gpu_bytes + SIDE * SIDE * 16 // 3
 
     def release(self) -> None:
-        shared: list[Any] = [self.body, self.poses, self.noise]
+        shared: list[Any] = [self.body, self.poses, self.holds, self.noise]
         for owned in (*self._drawings, *self._buffers, *self._canvases.values(), *shared):
             owned.release()
 

@@ -34,7 +34,7 @@ class Shadow:
         depth = easel.canvas("lamp depth", (DEPTH_SIDE, DEPTH_SIDE), depth=True)
         depth.start((1.0, 1.0, 1.0, 1.0))
         ctx.enable_only(moderngl.DEPTH_TEST)
-        poses = {"poses": easel.poses.texture, "row": 0}
+        poses = {"poses": easel.poses.texture, "row": 0, "holds": easel.holds.texture, "held": 0.0}
         seen = BODY_SHARE * depth.pixels
         self._depth.draw(easel.tally, seen, poses | {"projection": lamp_projection})
         depth.forget_depth()

@@ -1,5 +1,6 @@
 // The body's surface in the pose of one row.
 #include skin
+#include held
 in vec3 in_position;
 in vec4 in_normal;  // w: how much light comes near
 in uvec4 in_joints;
@@ -10,12 +11,14 @@ out vec3 place;
 out vec3 normal;
 out vec3 skin;
 out float open;
+out float mark;
 
 void main() {
     mat2x4 by = blended(in_joints, in_weights, row);
     place = moved(by, in_position);
     normal = turned(by, 2.0 * in_normal.xyz - 1.0);
     skin = in_position;
+    mark = held_at(in_joints, in_weights);
     open = 2.0 * in_normal.w - 1.0;
     gl_Position = projection * vec4(place, 1.0);
 }

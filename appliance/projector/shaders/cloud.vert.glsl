@@ -1,5 +1,6 @@
 // A grain of the cloud: on the body, or on its way off it since it was left behind by a movement.
 #include skin
+#include held
 in vec3 in_position;
 in vec4 in_normal;
 in vec4 in_chance;
@@ -19,6 +20,7 @@ uniform sampler2D noise;
 uniform vec3 figure_colour;
 uniform vec3 light_colour;
 uniform vec3 accent_colour;
+uniform vec3 held_colour;
 out vec4 grain_colour;
 
 vec3 place_at(float back) {
@@ -50,6 +52,9 @@ void main() {
     float spark = 0.35 + 0.5 * in_chance.w + 1.4 * pow(in_chance.y, 12.0);
     vec3 on_body = figure_colour * (0.05 + 0.95 * key * key) + accent_colour * (0.16 + 1.2 * rim);
     vec3 in_air = mix(light_colour, accent_colour, smoothstep(0.1, 0.8, age));
+    float mark = held_at(in_joints, in_weights);
+    on_body = mix(on_body, held_colour * (0.7 + 0.5 * key + 0.5 * rim), mark);
+    in_air = mix(in_air, held_colour, mark * (1.0 - age));
     float shown = loose ? smoothstep(0.30, 1.5, speed) * pow(1.0 - age, 1.5) : smoothstep(-0.1, 0.3, facing);
     grain_colour = vec4((loose ? in_air * 1.3 : on_body) * spark * shown * deep, 1.0);
     gl_Position = projection * vec4(place + 0.012 * way / distance, 1.0);

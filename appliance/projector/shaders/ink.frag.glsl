@@ -1,8 +1,10 @@
-// How much ink lies where the body is: little where it turns to the eye, more along its outline.
+// How much ink lies where the body is: little where it turns to the eye, more along its outline. Alpha: how much
+// of it is the colour of what a hand holds.
 in vec3 place;
 in vec3 normal;
 in vec3 skin;
 in float open;
+in float mark;
 uniform vec3 eye;
 uniform float level;
 uniform float hollow;
@@ -14,5 +16,5 @@ void main() {
     float wash = texture(noise, skin.xy * 1.3 + skin.z).r;
     float outline = pow(1.0 - facing, 1.6);
     float full = mix(1.0, 0.66 + 0.45 * outline + 0.35 * (wash - 0.5) + 0.25 * (1.0 - open), hollow);
-    colour = vec4(level * full);
+    colour = vec4(vec3(level * full), mark * level * full);
 }

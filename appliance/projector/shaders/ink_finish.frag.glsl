@@ -9,6 +9,7 @@ uniform vec3 figure_colour;
 uniform vec3 light_colour;
 uniform vec3 accent_colour;
 uniform vec3 air_colour;
+uniform vec3 held_colour;
 uniform float fog;
 #include wall
 
@@ -18,9 +19,9 @@ void main() {
     vec3 blank = air_colour * (0.95 + 0.10 * (sheet.r - 0.5) + 0.12 * rough), shown = blank;
 #ifndef FRAME
     vec2 at = uv + (sheet.rg - 0.5) * reach;
-    vec3 wet = texture(wet_picture, at).rgb;
+    vec4 wet = texture(wet_picture, at);
     if (wet.r + wet.g + wet.b > 0.004) {
-        vec3 ink = texture(picture, at).rgb;
+        vec4 ink = texture(picture, at);
         float body = smoothstep(0.30, 0.42, 0.6 * wet.r + 0.4 * ink.r + 0.25 * rough);
         float dried = 1.0 - smoothstep(0.45, 0.8, wet.r);
         float covers = clamp(body * (ink.r + 0.15 * dried + 0.40 * rough + 0.04), 0.0, 1.0);
@@ -29,7 +30,8 @@ void main() {
         shown = mix(shown, light_colour, 0.35 * fog * wet.r * (1.0 - body));
         shown = mix(shown, mix(light_colour, blank, 0.35), clamp(echo, 0.0, 1.0));
         shown = mix(shown, accent_colour, clamp(stroke, 0.0, 1.0));
-        shown = mix(shown, figure_colour, covers);
+        float mark = clamp((wet.a + ink.a) / max(wet.r + ink.r, 0.01), 0.0, 1.0);
+        shown = mix(shown, mix(figure_colour, held_colour, mark), covers);
     }
 #endif
     show(sheet.a * min(shown, 1.0));

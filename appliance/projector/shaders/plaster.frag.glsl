@@ -3,12 +3,14 @@ in vec3 place;
 in vec3 normal;
 in vec3 skin;
 in float open;
+in float mark;
 uniform vec3 eye;
 uniform vec3 lamp;
 uniform vec3 back_lamp;
 uniform vec3 figure_colour;
 uniform vec3 light_colour;
 uniform vec3 accent_colour;
+uniform vec3 held_colour;
 uniform float shadow;
 uniform float exposure;
 uniform mat4 lamp_projection;
@@ -35,7 +37,7 @@ void main() {
     float shaded = pow(clamp((dot(n, lamp) + 0.06) / 1.06, 0.0, 1.0), 1.3) * mix(1.0, lit(n), shadow);
     n = normalize(n + 0.17 * rough.rgr);
     float facing = clamp(dot(n, to_eye), 0.0, 1.0);
-    vec3 albedo = figure_colour * (0.90 + 0.24 * rough.g);
+    vec3 albedo = mix(figure_colour, held_colour, mark) * (0.90 + 0.24 * rough.g);
     float key = min(shaded, 1.0) * clamp(0.35 + 0.65 * dot(n, lamp) / max(dot(normalize(normal), lamp), 0.2), 0.4, 1.3);
     float cavity = mix(1.0, open * open, 0.9);
     float sky = 0.5 + 0.5 * n.y;
@@ -47,5 +49,6 @@ void main() {
     vec3 glance = vec3(0.10, 0.03, 0.0) * warm;
     float sheen = 0.07 * pow(clamp(dot(n, normalize(lamp + to_eye)), 0.0, 1.0), 14.0) * shaded;
     vec3 light = albedo * (light_colour * (key * 1.75 * mix(1.0, open, 0.35)) + glance + ambient + rim) + light_colour * sheen;
+    light += held_colour * mark * (0.16 + 0.30 * facing) * cavity;
     colour = vec4(dithered(toned(exposure * light), gl_FragCoord.xy), 1.0);
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from appliance.pictures.filmstrip import Strip, draw_strips
+from appliance.pictures.filmstrip import Strip, draw_strips, held_throughout
 from appliance.studio.data.dataset import FPS
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.evaluation.measurement import Iterations, Measurement
@@ -24,22 +24,20 @@ def draw_answer(path: Path, measurement: Measurement, joint: str, iterations: It
     pasted = rehearsal.phrase.copy()
     pasted[:, rehearsal.coder.joints.index(joint)] = turns
     free, pair = rehearsal.free(iterations[0]), measurement.pair
+    skeleton = rehearsal.recording.skeleton
 
     def strip(poses: Poses, label: str, behind: Poses | None = None) -> Strip:
-        return Strip(
-            *body.grounded(rehearsal.whole(poses), joint),
-            label,
-            None if behind is None else strip(behind, ""),
-        )
+        whole, roots = body.grounded(rehearsal.whole(poses), joint)
+        holds = None if behind is None else held_throughout(whole, [skeleton.index(joint)])
+        return Strip(whole, roots, label, None if behind is None else strip(behind, ""), holds)
 
     strips = (
         strip(rehearsal.phrase, f"The phrase: {pair.phrase_name}"),
         strip(pasted, f"Pasted on: {joint} as in {pair.hand_name}; all else is the phrase", rehearsal.phrase),
         strip(danced, "The dancer's answer; behind it, in grey, the same dance without a hand", free),
     )
-    skeleton = rehearsal.recording.skeleton
     answer = measurement.answer(joint, danced, free)
     title = (
         f"A hand on {joint} at {iterations[0]}/{iterations[1]} moves the other joints by {answer:.1f} degrees"
     )
-    return draw_strips(path, skeleton, strips, FPS, [skeleton.index(joint)], title, COLUMNS)
+    return draw_strips(path, skeleton, strips, FPS, title, COLUMNS)

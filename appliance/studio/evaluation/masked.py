@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from appliance.pictures.filmstrip import draw_rows
+from appliance.pictures.filmstrip import draw_rows, held_throughout
 from appliance.pictures.filmstrip_stage import Row
 from appliance.studio.data.capture_errors import REASONS, CaptureError
 from appliance.studio.data.takes import FPS, Take
@@ -90,6 +90,6 @@ def _row(stretch: MaskedStretch) -> Row:
         recording.roots,
         np.minimum(chosen, len(recording) - 1),
         stretch.sentence(),
-        held=tuple(recording.skeleton.index(name) for name in sorted(names)),
+        holds=held_throughout(recording.poses, [recording.skeleton.index(name) for name in names]),
         stamps=tuple(f"{word}{stretch.take.begins_s + at:.2f} s" for at, word in there),
     )

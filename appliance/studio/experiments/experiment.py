@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from appliance.pictures.filmstrip import Strip, draw_strips
+from appliance.pictures.filmstrip import Strip, draw_strips, held_throughout
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.quaternion import Array
@@ -220,18 +220,19 @@ def _write_dances(trial: Trial, folder: Path) -> None:
 def _pictures(trial: Trial, folder: Path, network: str) -> list[tuple[Any, ...]]:
     """What draw_strips needs for each of the FIGURES: the recording, and the conditions under it."""
     skeleton = trial.excerpt.recording.skeleton
-    held, wanted = [skeleton.index(trial.joint)], []
+    wanted: list[tuple[Any, ...]] = []
     for number, (words, base, conditions) in enumerate(FIGURES, 1):
         rehearsal = trial.once if base == "once" else trial.looped
         recorded = rehearsal.recording
+        held = () if conditions[0].family == "coding" else (skeleton.index(trial.joint),)
         strips = [Strip(recorded.poses, recorded.roots, "recorded")]
         for condition in conditions:
             danced = trial.whole(trial.dances[condition])
-            strips.append(Strip(danced.poses, danced.roots, condition.label))
+            holds = held_throughout(danced.poses, held)
+            strips.append(Strip(danced.poses, danced.roots, condition.label, holds=holds))
         path = folder / f"{number}_{conditions[0].family}.png"
         title = f"{trial.excerpt.name}: {words} ({network})"
-        marked = [] if conditions[0].family == "coding" else held
-        wanted.append((path, skeleton, strips, FPS, marked, title, COLUMNS))
+        wanted.append((path, skeleton, strips, FPS, title, COLUMNS))
     return wanted
 
 

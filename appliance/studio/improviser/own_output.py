@@ -81,7 +81,7 @@ def report(training: PoseMixturesTraining, checkpoint: Path, console: Console) -
         },
     )
     title = f"{SECONDS:g} s on its own output after a held-out start"
-    draw_strips(checkpoint.with_name("dances.png"), dataset.skeleton, strips, FPS, (), title, columns=COLUMNS)
+    draw_strips(checkpoint.with_name("dances.png"), dataset.skeleton, strips, FPS, title, columns=COLUMNS)
     Console().print(_table(rows, yardstick, title))
     if found:
         console.print(

@@ -70,7 +70,7 @@ def run(options: PathOptions) -> None:
         strips.insert(0, Strip(given.poses, given.roots, "phrase"))
         strips[1] = Strip(whole.poses, whole.roots, _words(options), behind=strips[0])
     draw_strips(
-        options.out.with_suffix(".png"), dataset.skeleton, strips, FPS, (), options.out.stem, columns=COLUMNS
+        options.out.with_suffix(".png"), dataset.skeleton, strips, FPS, options.out.stem, columns=COLUMNS
     )
     natural = measure(whole, Yardstick.of(dataset.training, dataset.moving), endless=False)
     report = {"options": asdict(options), "figures": figures, "naturalness": natural.as_json()}

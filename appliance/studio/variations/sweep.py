@@ -161,7 +161,7 @@ def _draw(path: Path, autoencoder: Autoencoder, dataset: Dataset, takes: Sequenc
         made = standing(varied(autoencoder, phrase, sigma, 1), None, dataset)
         strips.append(Strip(made.poses, made.roots, f"{sigma:g} sigma", behind=strips[0]))
     title = "One phrase, moved by noise in the latents"
-    draw_strips(path, dataset.skeleton, strips, FPS, (), title, columns=COLUMNS)
+    draw_strips(path, dataset.skeleton, strips, FPS, title, columns=COLUMNS)
 
 
 def _nearest(reference: Reference, dances: Sequence[Poses]) -> float:

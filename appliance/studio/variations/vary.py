@@ -94,7 +94,7 @@ def run(options: VaryOptions) -> None:
     if options.on_map is not None:
         _draw_on_map(options, given, danced, console)
     title = _words(options)
-    draw_strips(options.out / "variations.png", dataset.skeleton, strips, FPS, (), title, columns=COLUMNS)
+    draw_strips(options.out / "variations.png", dataset.skeleton, strips, FPS, title, columns=COLUMNS)
     report = {
         "options": asdict(options),
         "figures": {name: asdict(one) for name, one in figures.items()},

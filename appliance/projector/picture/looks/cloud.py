@@ -47,6 +47,8 @@ class Cloud:
             "figure_colour": stored(colours.figure),
             "light_colour": stored(colours.light),
             "accent_colour": stored(colours.accent),
+            "held_colour": stored(colours.held),
+            **easel.held(look),
         }
         picture.start()
         picture.keep("")

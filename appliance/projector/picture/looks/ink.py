@@ -41,9 +41,14 @@ class Ink:
         """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, colours = self._easel, palette(look)
         picture = easel.picture(wall, look.render_scale)
-        inputs: dict[str, Any] = {**scene.inputs, "poses": easel.poses.texture, "noise": easel.noise}
+        inputs: dict[str, Any] = {
+            **scene.inputs,
+            **easel.held(look),
+            "poses": easel.poses.texture,
+            "noise": easel.noise,
+        }
         picture.start()
-        picture.keep("r")
+        picture.keep("ra")
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._figure.draw(
             easel.tally, scene.body_pixels(picture.size), inputs | {"row": 0, "level": 1.0, "hollow": 1.0}
@@ -59,6 +64,7 @@ class Ink:
             "figure_colour": np.sqrt(colours.figure),
             "light_colour": np.sqrt(colours.light),
             "accent_colour": np.sqrt(colours.accent),
+            "held_colour": np.sqrt(colours.held),
             "air_colour": np.sqrt(look.exposure * colours.background),
             "paper": self._paper(look, scene.aspect).texture,
             "reach": (PULL / scene.aspect, PULL),
@@ -90,6 +96,7 @@ class Ink:
                 "row": round((rows - 1) * echo / ECHOES),
                 "level": 0.85 * (1 - echo / (ECHOES + 1)) ** 1.2,
                 "hollow": 0.0,
+                "held": 0.0,
             }
             self._echo.draw(easel.tally, 1.6 * scene.body_pixels(picture.size), inputs)
         picture.keep("b")

@@ -60,10 +60,14 @@ class Lines:
             "floor_side": side,
             "width": width,
             "far_colour": stored(colours.accent),
+            "held_colour": stored(colours.held),
+            "holds": self._easel.holds.texture,
+            "held": 0.0,
         }
         if look.trail_s > 0:
             self._leave_traces(scene, look, colours, picture, inputs, share)
         inputs |= {"row": 0, "near_colour": stored(colours.figure), "brightness": 1.2 * share}
+        inputs |= self._easel.held(look)
         self._draw_strands(scene, picture, inputs, look.density)
 
     def _leave_traces(

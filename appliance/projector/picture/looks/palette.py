@@ -9,12 +9,12 @@ import numpy as np
 from appliance.pose.quaternion import Array
 from appliance.show.look import LookConfig
 
-_OWN = {  # figure, light, accent, background
-    "plaster": ("#f3ede4", "#ffe4c4", "#86b2f2", "#6f675f"),
-    "lines": ("#ffd7a1", "#fff4e0", "#3d7bff", "#10141f"),
-    "ink": ("#14110f", "#2a2320", "#8c2f1f", "#e9dfcb"),
-    "cloud": ("#cfe0ff", "#ffe3c2", "#3b63d8", "#0d1220"),
-    "veil": ("#bfe6e0", "#ffffff", "#c04a7a", "#0c1016"),
+_OWN = {  # figure, light, accent, background, held
+    "plaster": ("#f3ede4", "#ffe4c4", "#86b2f2", "#6f675f", "#ff6a3c"),
+    "lines": ("#ffd7a1", "#fff4e0", "#3d7bff", "#10141f", "#ff3b1f"),
+    "ink": ("#14110f", "#2a2320", "#8c2f1f", "#e9dfcb", "#d8401c"),
+    "cloud": ("#cfe0ff", "#ffe3c2", "#3b63d8", "#0d1220", "#ff7a2e"),
+    "veil": ("#bfe6e0", "#ffffff", "#c04a7a", "#0c1016", "#ff7a2e"),
 }
 
 
@@ -26,11 +26,12 @@ class Palette:
     light: Array
     accent: Array
     background: Array
+    held: Array
 
 
 def palette(look: LookConfig) -> Palette:
     """A look's colours, its style's own where it says none."""
-    chosen = (look.figure, look.light, look.accent, look.background)
+    chosen = (look.figure, look.light, look.accent, look.background, look.held.colour)
     return Palette(*(linear(own or given) for own, given in zip(chosen, _OWN[look.style], strict=True)))
 
 

@@ -41,6 +41,8 @@ class Plaster:
             "figure_colour": colours.figure,
             "light_colour": colours.light,
             "accent_colour": colours.accent,
+            "held_colour": colours.held,
+            **easel.held(look),
             "air_colour": colours.background,
             "shadow": look.shadow,
             "fog": look.fog,

@@ -36,7 +36,10 @@ class Veil:
             "poses": easel.poses.texture,
             "lamp": direction(scene.view.azimuth + KEY_FROM, KEY_ABOVE),
             "light_colour": stored(colours.light),
+            "held_colour": stored(colours.held),
+            "holds": easel.holds.texture,
         }
+        held = easel.held(look)["held"]
         echoes = round(ECHOES * look.density) if look.trail_s > 0 else 0
         rows = min(ROWS - 1, round(look.trail_s / ROW_S))
         for echo in range(echoes, -1, -1):
@@ -44,6 +47,7 @@ class Veil:
             inputs |= {
                 "row": round(rows * echo / max(echoes, 1)),
                 "figure_colour": stored(colours.figure * (1 - share) + colours.accent * share),
+                "held": held if echo == 0 else 0.0,
                 "brightness": 1.5 if echo == 0 else 0.75 * (1 - share) ** 1.3,
             }
             body = self._figure if echo == 0 else self._echo
