@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from appliance.cli.network_proof import proved
+from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import BoxFile
 from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
@@ -20,7 +20,7 @@ from appliance.show.bundle import (
     default_show_path,
     write_checksums,
 )
-from appliance.show.check import verify_bundle
+from appliance.show.check import not_as_packed, verify_bundle
 from appliance.show.config_error import ConfigError
 from appliance.show.cues import too_much
 from appliance.show.posistagenet import misfits
@@ -109,9 +109,10 @@ def _refuse_damage(directory: Path) -> None:
     findings = verify_bundle(directory)
     for warning in (finding for finding in findings if finding.level == "warning"):
         print(warning)
-    errors = [str(finding) for finding in findings if finding.level == "error"]
-    if errors:
-        raise StageError("\n".join(["This show cannot be danced.", *errors]))
+    require_danceable(findings)
+    changed = [str(finding) for finding in findings if finding.level == "error"]
+    if changed:
+        raise StageError("\n".join([not_as_packed(directory), *changed]))
 
 
 def _refuse_misfits(show: Show, box: BoxConfig) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +14,12 @@ from appliance.box.runtime_folder import RuntimeFolderError
 from appliance.cli.run_with_timeout import CHECK_S, TimedOutError, limit_memory, run_with_timeout
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.pose.bvh import BvhError
+from appliance.show.check import Finding, not_as_packed, verify_bundle
 from appliance.show.config_error import ConfigError
 from appliance.show.show import Show
 from appliance.stage.stage_error import StageError
 
-_ONE_RUN_S = 10.0
+_ONE_RUN_S = 20.0
 _FOR_PEOPLE = (BvhError, ConfigError, PuppetError, RuntimeFolderError, StageError)
 
 
@@ -49,10 +50,22 @@ def proved(network: Path, do: Callable[[], None], seconds: float = CHECK_S) -> s
     return str(words)
 
 
-def prove_network(show: Show) -> None:
-    """Run it once, at the show's iterations. Raises StageError if that fails or does not end."""
+def require_danceable(findings: Sequence[Finding]) -> None:
+    """The rule of `play` and `check`. Raises StageError with all that is wrong."""
+    errors = [str(finding) for finding in findings if finding.forbids_dancing]
+    if errors:
+        raise StageError("\n".join(["This show cannot be danced.", *errors]))
+
+
+def prove_network(show: Show) -> str:
+    """Check the bundle, and run its network once, at the show's iterations; what the user should know of it.
+
+    Raises StageError if it cannot be danced, or the run fails or does not end.
+    """
 
     def run() -> None:
+        require_danceable(verify_bundle(show.directory))
+        print(not_as_packed(show.directory))
         puppet, dancer = Puppet(show.network, show.skeleton), show.config.dancer
         window = np.tile(puppet.rest, (puppet.window, 1, 1))
         held = np.isin(puppet.joints, [hand.joint for hand in show.config.hands])
@@ -65,4 +78,4 @@ def prove_network(show: Show) -> None:
                 "Export the show again, or copy the bundle again."
             ) from None
 
-    proved(show.network, run, _ONE_RUN_S)
+    return proved(show.network, run, _ONE_RUN_S).strip()

@@ -66,10 +66,11 @@ def play_show(
     if chosen is not None:
         directory, box_file = _pair_to_dance(chosen, directory, box_file)
     show, box = load_show(directory or default_show_path()), load_box(box_file)
+    words = ""
     if directory is not None and chosen is None:  # a network that never ends would block every signal
         from appliance.cli.network_proof import prove_network
 
-        prove_network(show)
+        words = prove_network(show)
     with ExitStack() as opened:
         stopped = opened.enter_context(stop_signals())
         scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
@@ -96,7 +97,7 @@ def play_show(
         with closing(stage):
             keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
             keeper = _keeper(keepers_box, journal, minutes) if keeps else None
-            for line in _introduction(stage, emulate, control):
+            for line in (*words.splitlines(), *_introduction(stage, emulate, control)):
                 speaker.say(line)
             companions = () if alone else tuple(_companions(show, box, control, window or shown))
             if page is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,21 @@ class Finding(Problem):
 
     def __str__(self) -> str:
         return super().__str__() if self.level == "error" else f"{super().__str__()} (a warning)"
+
+    @property
+    def forbids_dancing(self) -> bool:
+        """A show that was changed after it was packed can be danced; a box takes it from no stick."""
+        return self.level == "error" and self.file.name != CHECKSUMS
+
+
+def not_as_packed(directory: Path) -> str:
+    """What to say of a show that is not what its checksums vouch for; '' for one that is."""
+    if not checksum_problems(directory):
+        return ""
+    return (
+        f"{directory} is not as it was packed. It is danced as it is; a box takes it from no stick. If you "
+        f"changed it: bunraku pack {shlex.quote(str(directory))}. If not: copy the whole show again."
+    )
 
 
 def verify_bundle(directory: Path | str) -> list[Finding]:

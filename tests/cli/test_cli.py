@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
@@ -57,7 +58,7 @@ def test_help_names_the_commands(bunraku: Command) -> None:
         ),
         ("show.yaml", "name: x\nhands: [{sensor: a, joint: lShlder}]\n", "lShldr"),
         ("show.yaml", "name: x\ndancer: {network: other.onnx}\n", "no file 'other.onnx'"),
-        ("puppet.onnx", "nonsense", "puppet.onnx.*cannot read this network"),
+        ("puppet.onnx", "nonsense", "puppet.onnx.*cannot be read as a network"),
         ("phrase.bvh", "HIERARCHY\n", "phrase.bvh"),
     ],
 )
@@ -105,6 +106,29 @@ def test_check_refuses_a_changed_file(tmp_path: Path, bunraku: Command) -> None:
     show = packed_show(tmp_path)
     (show / "phrase.bvh").write_text((show / "phrase.bvh").read_text() + "\n")
     assert "phrase.bvh" in bunraku("check", show, status=2).err
+
+
+def test_check_and_play_say_the_same_of_a_changed_show(tmp_path: Path, bunraku: Command) -> None:
+    show, box = packed_show(tmp_path), write_box(tmp_path)
+    play = ("play", "--alone", "--show", show, "--box", box, "--seconds", "0.2")
+    assert "as it was packed" not in bunraku(*play).out
+    (show / "phrase.bvh").write_text((show / "phrase.bvh").read_text() + "\n")
+    words = f"{show} is not as it was packed. It is danced as it is; a box takes it from no stick."
+    assert words in bunraku("check", show, status=2).err
+    assert words in bunraku(*play).out
+    bunraku("pack", show)
+    assert "as it was packed" not in bunraku(*play).out
+
+
+def test_check_and_play_refuse_the_same_show(tmp_path: Path, bunraku: Command) -> None:
+    show, box = packed_show(tmp_path), write_box(tmp_path)
+    longer = swaying_phrase()
+    longer = replace(longer, skeleton=replace(longer.skeleton, offsets=1.5 * longer.skeleton.offsets))
+    write_bvh(show / "phrase.bvh", longer)
+    for command in (("check", show), ("play", "--alone", "--show", show, "--box", box, "--seconds", "0.2")):
+        said = bunraku(*command, status=2).err
+        assert "This show cannot be danced." in said
+        assert "bones are not as long" in said
 
 
 def test_check_refuses_iterations_that_the_budget_cannot_hold(tmp_path: Path, bunraku: Command) -> None:
