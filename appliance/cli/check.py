@@ -23,6 +23,7 @@ from appliance.show.bundle import (
 from appliance.show.check import not_as_packed, verify_bundle
 from appliance.show.config_error import ConfigError
 from appliance.show.cues import too_much
+from appliance.show.osc import osc_misfits
 from appliance.show.posistagenet import misfits
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import misplaced, unwired
@@ -117,7 +118,12 @@ def _refuse_damage(directory: Path) -> None:
 
 def _refuse_misfits(show: Show, box: BoxConfig) -> None:
     """Raises ConfigError where the box file names joints or fixtures that do not fit this show."""
-    problems = [*misfits(box.outputs.posistagenet, show.skeleton.names, box.file), *misplaced(show, box)]
+    names = show.skeleton.names
+    problems = [
+        *misfits(box.outputs.posistagenet, names, box.file),
+        *osc_misfits(box.outputs.osc, names, box.file),
+        *misplaced(show, box),
+    ]
     if problems:
         raise ConfigError(problems)
 

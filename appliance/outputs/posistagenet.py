@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.outputs.axes import turn_of
 from appliance.outputs.datagram_sender import DatagramPath, DatagramSender
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.posistagenet_packets import DataPackets, InfoPackets
@@ -15,7 +16,6 @@ from appliance.pose.skeleton import Skeleton
 from appliance.show.posistagenet import PosiStageNetConfig
 
 INFO_PERIOD_S = 1.0
-_AXES = {"x": 0, "y": 1, "z": 2}
 
 
 class PosiStageNet(DatagramSender):
@@ -34,7 +34,7 @@ class PosiStageNet(DatagramSender):
         numbers = range(config.first_tracker, config.first_tracker + len(names))
         self._data = DataPackets(numbers, config.speed)
         self._info = InfoPackets(config.system_name, dict(zip(numbers, names, strict=True)))
-        self._turn = _turn(config.axes) * np.float32(config.scale)
+        self._turn = turn_of(config.axes) * np.float32(config.scale)
         self._offset = np.array(config.offset, np.float32)
         self._taken, self._positions, self._before, self._speeds = np.zeros((4, len(names), 3), np.float32)
         self._with_speed = config.speed
@@ -79,11 +79,3 @@ class PosiStageNet(DatagramSender):
         np.divide(self._speeds, passed_s, out=self._speeds)
         self._before[...] = self._positions
         self._time_before = frame.frame_time
-
-
-def _turn(axes: Sequence[str]) -> NDArray[np.float32]:
-    """(3, 3): a row of the box's x, y, z times this is a row of the receiver's."""
-    turn = np.zeros((3, 3), np.float32)
-    for column, axis in enumerate(axes):
-        turn[_AXES[axis[-1]], column] = -1.0 if axis.startswith("-") else 1.0
-    return turn

@@ -9,11 +9,11 @@ from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.osc.dialects import DIALECTS
 from appliance.outputs.osc.frame_message import FrameMessage
 from appliance.pose.skeleton import Skeleton
-from appliance.show.box import OscConfig
+from appliance.show.osc import OscConfig
 
 
 class OscOutputs:
-    """All OSC receivers of a box. Each dialect is encoded once a frame, for all receivers that speak it."""
+    """All OSC receivers of a box. Encoded once a frame for all receivers that want the same."""
 
     def __init__(self, configs: Sequence[OscConfig], skeleton: Skeleton) -> None:
         self.receivers = tuple(
@@ -24,17 +24,19 @@ class OscOutputs:
             for config in configs
         )
         self._frame_message = FrameMessage()
+        forms = [config.model_dump_json(exclude={"host", "port", "frame_message"}) for config in configs]
         self._encoders = {
-            dialect: DIALECTS[dialect](skeleton) for dialect in {one.dialect for one in configs}
+            form: DIALECTS[config.dialect](skeleton, config)
+            for form, config in dict(zip(forms, configs, strict=True)).items()
         }
-        self._audience = list(zip(configs, self.receivers, strict=True))
+        self._audience = list(zip(configs, forms, self.receivers, strict=True))
 
     def send_frame(self, frame: JointFrame) -> None:
         """Send one frame to every receiver. Never waits, never raises."""
         mark = self._frame_message.encode(frame)
-        encoded = {dialect: encoder.encode(frame) for dialect, encoder in self._encoders.items()}
-        for config, receiver in self._audience:
-            datagrams = encoded[config.dialect]
+        encoded = {form: encoder.encode(frame) for form, encoder in self._encoders.items()}
+        for config, form, receiver in self._audience:
+            datagrams = encoded[form]
             marked = (*mark, *datagrams) if config.frame_message else datagrams
             receiver.send_datagrams(marked, frame.frame_time)
 

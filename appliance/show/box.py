@@ -11,13 +11,13 @@ from appliance.show.console import ConsoleConfig
 from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
 from appliance.show.lights import VenueLightsConfig
+from appliance.show.osc import OscConfig
 from appliance.show.posistagenet import PosiStageNetConfig
 from appliance.show.projector import ProjectorConfig
 from appliance.show.section import Ipv4, LocalFile, Section, key, part, refusal, refuse_repeats
 from appliance.show.validation import validated
 from appliance.show.yaml_file import YamlFile, read_yaml
 
-Dialect = Literal["ai-toolbox", "joint", "vmc"]
 Resume = Literal["always", "after_crash", "never"]
 
 
@@ -70,15 +70,6 @@ def out_of_reach(sensors: SensorsConfig) -> str | None:
         f"No wearable on Wi-Fi reaches the box: it listens {where}. "
         f"Write `udp: {{host: 0.0.0.0, port: {port}}}` under sensors in the box file."
     )
-
-
-class OscConfig(Section):
-    """One receiver of the dancer's joints."""
-
-    host: Ipv4 = key("The receiver's address in numbers.", "127.0.0.1")
-    port: int = key("The receiver's UDP port; VMC: usually 39539.", 9004, within=(1, 65535))
-    dialect: Dialect = key("The messages that it understands; docs/osc.md shows them.", "ai-toolbox")
-    frame_message: bool = key("Send /bunraku/frame (tick, time, sequence, late) before the joints.", False)
 
 
 class OutputsConfig(Section):

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, field_validator
 
 from appliance.show.config_error import Problem, did_you_mean
-from appliance.show.section import Ipv4, Section, key, refusal, refuse_repeats
+from appliance.show.section import Axes, Ipv4, Section, each_axis_once, key, refuse_repeats
 from appliance.show.yaml_file import Location, YamlFile
 
 LAST_TRACKER = 65535
 
-Direction = Literal["x", "-x", "y", "-y", "z", "-z"]
-Axes = Annotated[tuple[Direction, Direction, Direction], Field(strict=False)]
 Offset = Annotated[tuple[float, float, float], Field(strict=False)]
 
 
@@ -58,10 +56,8 @@ class PosiStageNetConfig(Section):
 
     @field_validator("axes")
     @classmethod
-    def _each_axis_once(cls, axes: tuple[Direction, Direction, Direction]) -> tuple[Direction, ...]:
-        if sorted(axis[-1] for axis in axes) != ["x", "y", "z"]:
-            raise refusal("Each of x, y and z is needed once.", "Write for instance [x, -z, y].")
-        return axes
+    def _each_axis_once(cls, axes: Axes) -> Axes:
+        return each_axis_once(axes)
 
 
 def misfits(outputs: Sequence[PosiStageNetConfig], joints: Sequence[str], file: YamlFile) -> list[Problem]:

@@ -6,7 +6,7 @@ import ipaddress
 import math
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
@@ -86,6 +86,17 @@ def _axis(axis: tuple[float, float, float]) -> tuple[float, float, float]:
         raise refusal("An axis needs a direction.", "Write for instance [0, 1, 0], which points upwards.")
     x, y, z = (part / length for part in axis)
     return x, y, z
+
+
+Direction = Literal["x", "-x", "y", "-y", "z", "-z"]
+Axes = Annotated[tuple[Direction, Direction, Direction], Field(strict=False)]
+
+
+def each_axis_once(axes: Axes) -> Axes:
+    """The receiver's axes, of which each of the box's is one."""
+    if sorted(axis[-1] for axis in axes) != ["x", "y", "z"]:
+        raise refusal("Each of x, y and z is needed once.", "Write for instance [x, -z, y].")
+    return axes
 
 
 def _ipv4(host: str) -> str:

@@ -30,6 +30,7 @@ from appliance.sensor.neutral import Mounting, joint_from_reading
 from appliance.sensor.state import restored_reading
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import ConfigError
+from appliance.show.osc import osc_misfits
 from appliance.show.posistagenet import misfits
 from appliance.show.show import HandConfig, Show
 from appliance.show.sources import LIVE
@@ -276,7 +277,11 @@ def _phrase(show: Show, path: Path, preparations: PhraseCache) -> tuple[Recordin
 
 
 def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:
-    problems = misfits(box.outputs.posistagenet, show.skeleton.names, box.file)
+    names = show.skeleton.names
+    problems = [
+        *misfits(box.outputs.posistagenet, names, box.file),
+        *osc_misfits(box.outputs.osc, names, box.file),
+    ]
     if problems:
         raise ConfigError(problems)
     return Outputs(box.outputs, show.skeleton)

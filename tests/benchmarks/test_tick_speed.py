@@ -12,8 +12,9 @@ import pytest
 from appliance.box.clock import TICK_S, Slot
 from appliance.sensor.keys import SensorKey, create_keys
 from appliance.sensor.transports.udp import UdpIntake
-from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig, UdpConfig
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, UdpConfig
 from appliance.show.bundle import default_show_path
+from appliance.show.osc import OscConfig
 from appliance.show.show import load_show
 from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit

@@ -18,7 +18,7 @@ from appliance.outputs.datagram_sender import LONGEST_PAUSE_S
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.receivers import OscOutputs
 from appliance.pose.skeleton import Skeleton
-from appliance.show.box import OscConfig
+from appliance.show.osc import OscConfig
 from hw_sim.osc_receiver import OscReceiver, Received
 from tests.outputs.conftest import fill
 
@@ -157,7 +157,7 @@ import numpy as np
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.receivers import OscOutputs
 from appliance.pose.skeleton import Skeleton
-from appliance.show.box import OscConfig
+from appliance.show.osc import OscConfig
 from hw_sim.osc_receiver import OscReceiver
 def ip(*commands):
     for command in commands:

@@ -16,7 +16,8 @@ from appliance.keeper.fallback import OF_THE_KEEPER
 from appliance.lights.fallback import OF_THE_LIGHTS
 from appliance.projector.fallback import OF_THE_PROJECTOR
 from appliance.sensor.link import SensorReading
-from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig, SerialConfig
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, SerialConfig
+from appliance.show.osc import OscConfig
 from appliance.show.show import load_show
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission

@@ -12,7 +12,8 @@ import pytest
 from appliance.box.clock import TICK_S, Slot
 from appliance.pose import quaternion
 from appliance.sensor.link import SensorReading
-from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.osc import OscConfig
 from appliance.show.show import load_show
 from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit

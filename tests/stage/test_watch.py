@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from appliance.sensor.link import SensorReading, SensorState
-from appliance.show.box import BoxConfig, OscConfig, OutputsConfig, SensorsConfig
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.osc import OscConfig
 from appliance.show.show import load_show
 from appliance.stage.admission import Admission
 from appliance.stage.health import Health

@@ -4,35 +4,116 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.outputs.axes import turn_of
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.osc.template import message, single
+from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
+from appliance.show.osc import OscConfig
+
+Floats = NDArray[np.float32]
 
 
 class AiToolbox:
-    """rot_local and rot_world (J x w, x, y, z) and pos_world (J x x, y, z in metres), a datagram each.
+    """rot_local and rot_world (J x w, x, y, z), pos_world and pos_local (J x x, y, z), a datagram each.
 
-    Axes are the box's own: right-handed, Y up. A list cannot be split: above 86 joints a rotation
-    message outgrows an Ethernet frame and travels in IP fragments.
+    Axes and units are the box's own (right-handed, Y up, metres) unless the receiver wants others. Local
+    positions are relative to the parent joint, in its axes; the root's is its place in the world. A list
+    cannot be split: above 86 joints a rotation message outgrows an Ethernet frame and travels in fragments.
     """
 
-    def __init__(self, skeleton: Skeleton) -> None:
-        joints = len(skeleton)
+    def __init__(self, skeleton: Skeleton, config: OscConfig | None = None) -> None:
+        config = config or OscConfig()
+        self._layout = _Layout(skeleton, config)
+        count, self._is_euler = len(self._layout.rows), config.rotations == "euler"
+        turns = 3 if self._is_euler else 4
         self._template = single(
             [
-                message("/mocap/0/joint/rot_local", floats=4 * joints),
-                message("/mocap/0/joint/pos_world", floats=3 * joints),
-                message("/mocap/0/joint/rot_world", floats=4 * joints),
+                message(f"{config.prefix}/{name}", floats=count * (3 if name.startswith("pos") else turns))
+                for name in config.messages
             ]
         )
-        numbers, places = self._template.numbers, self._template.places
-        self._rot_local, self._pos_world, self._rot_world = (
-            numbers[place[0] : place[-1] + 1].reshape(joints, -1) for place in places
-        )
+        numbers = self._template.numbers
+        self._lists: list[tuple[str, Floats]] = [
+            (name, numbers[place[0] : place[-1] + 1].reshape(count, -1))
+            for name, place in zip(config.messages, self._template.places, strict=True)
+        ]
 
     def encode(self, frame: JointFrame) -> Sequence[memoryview]:
         """Datagrams of this frame; the same buffers each time."""
-        self._rot_local[...] = frame.pose
-        self._pos_world[...] = frame.positions
-        self._rot_world[...] = frame.world
+        layout = self._layout
+        for name, numbers in self._lists:
+            if name.startswith("pos"):
+                numbers[...] = layout.positions(frame) if name == "pos_world" else layout.offsets(frame)
+            else:
+                turned = layout.rotations(frame.pose if name == "rot_local" else frame.world, name)
+                numbers[...] = _degrees(turned) if self._is_euler else turned
         return self._template.datagrams
+
+
+class _Layout:
+    """Which rows a receiver's lists have, and in which axes and units.
+
+    rows: the joint of each row, or the one whose bone ends there.
+    """
+
+    def __init__(self, skeleton: Skeleton, config: OscConfig) -> None:
+        names = list(skeleton.names)
+        wanted = [names.index(name) for name in config.joints] or list(range(len(names)))
+        tips: dict[int, list[tuple[float, float, float]]] = {}
+        for joint, offset in skeleton.ends if config.ends else ():
+            tips.setdefault(joint, []).append(offset)
+        rows = [(joint, tip) for joint in wanted for tip in (None, *tips.get(joint, ()))]
+        self.rows = np.array([joint for joint, _ in rows])
+        self._is_end = np.array([tip is not None for _, tip in rows])
+        self._tips = np.array([tip for _, tip in rows if tip is not None], np.float32).reshape(-1, 3)
+        self._roots = np.array([skeleton.parents[joint] < 0 and tip is None for joint, tip in rows])
+        self._offsets = skeleton.offsets[self.rows].astype(np.float32)
+        self._offsets[self._is_end] = self._tips
+        self._is_plain = not config.joints and not self._is_end.any()
+        turn = turn_of(config.axes)
+        self._turn = None if np.array_equal(turn, np.eye(3)) else turn
+        self._spin = turn * np.float32(round(float(np.linalg.det(turn))))  # an axis turns back in a mirror
+        self._scale = np.float32(config.scale)
+
+    def positions(self, frame: JointFrame) -> Floats:
+        """(R, 3): in the world."""
+        found = frame.positions if self._is_plain else frame.positions[self.rows]
+        if len(self._tips):
+            found[self._is_end] += quaternion.rotate(frame.world[self.rows[self._is_end]], self._tips)
+        return self._placed(found)
+
+    def offsets(self, frame: JointFrame) -> Floats:
+        """(R, 3): relative to the parent joint."""
+        found = self._offsets.copy()
+        found[self._roots] = frame.positions[self.rows[self._roots]]
+        return self._placed(found)
+
+    def rotations(self, turned: Floats, name: str) -> Floats:
+        """(R, 4): of all joints' rotations (J, 4); an end turns with its bone."""
+        found = turned if self._is_plain else turned[self.rows]
+        if name == "rot_local" and len(self._tips):
+            found[self._is_end] = quaternion.IDENTITY
+        if self._turn is None:
+            return found
+        seen = np.empty_like(found)
+        seen[:, 0], seen[:, 1:] = found[:, 0], found[:, 1:] @ self._spin
+        return seen
+
+    def _placed(self, found: Floats) -> Floats:
+        if self._turn is not None:
+            found = found @ self._turn
+        return found if self._scale == 1.0 else found * self._scale
+
+
+def _degrees(turned: Floats) -> Floats:
+    """(R, 3): degrees about the fixed axes x, then y, then z, of rotations (R, 4)."""
+    w, x, y, z = turned.T
+    about_x = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    about_y = np.arcsin(np.clip(2 * (w * y - z * x), -1, 1))
+    about_z = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    degrees: Floats = np.degrees(np.stack([about_x, about_y, about_z], axis=-1))
+    return degrees

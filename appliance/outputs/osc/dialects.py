@@ -10,6 +10,7 @@ from appliance.outputs.osc.ai_toolbox import AiToolbox
 from appliance.outputs.osc.joint import Joint
 from appliance.outputs.osc.vmc import Vmc
 from appliance.pose.skeleton import Skeleton
+from appliance.show.osc import OscConfig
 
 
 class Encoder(Protocol):
@@ -20,4 +21,8 @@ class Encoder(Protocol):
         ...
 
 
-DIALECTS: dict[str, Callable[[Skeleton], Encoder]] = {"ai-toolbox": AiToolbox, "joint": Joint, "vmc": Vmc}
+DIALECTS: dict[str, Callable[[Skeleton, OscConfig], Encoder]] = {
+    "ai-toolbox": AiToolbox,
+    "joint": lambda skeleton, _: Joint(skeleton),
+    "vmc": lambda skeleton, _: Vmc(skeleton),
+}

@@ -1,0 +1,112 @@
+"""box.yaml's OSC receivers: where joints go, and how the program that hears them wants them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from appliance.show.config_error import Problem, did_you_mean
+from appliance.show.section import Axes, Ipv4, Section, each_axis_once, key, refusal, refuse_repeats
+from appliance.show.yaml_file import Location, YamlFile
+
+Dialect = Literal["ai-toolbox", "joint", "vmc"]
+Message = Literal["pos_local", "pos_world", "rot_local", "rot_world"]
+Program = Literal["mocap-analysis", "clustering", "classifier", "vae-rnn", "ray-marching", "supercollider"]
+Prefix = Annotated[str, Field(pattern=r"^(/[A-Za-z0-9_.-]+)+$")]
+
+_Z_UP = ("z", "x", "y")  # the front along x, height along z, as his motion capture has them
+PROGRAMS: Mapping[str, Mapping[str, Any]] = {
+    "mocap-analysis": {"port": 9007, "messages": ["pos_world"], "scale": 100.0},
+    "clustering": {"port": 9007, "messages": ["rot_local", "rot_world", "pos_world"], "scale": 100.0},
+    "classifier": {"port": 9007, "messages": ["pos_local", "rot_local"], "scale": 100.0},
+    "vae-rnn": {"port": 9002, "messages": ["rot_local"], "ends": True},
+    "ray-marching": {"port": 9004, "messages": ["pos_world", "rot_world"], "scale": 100.0, "axes": _Z_UP},
+    "supercollider": {"port": 9005, "messages": ["pos_world"], "prefix": "/mocap/joint", "axes": _Z_UP},
+}
+_OF_ONE_DIALECT = ("messages", "prefix", "joints", "ends", "scale", "axes", "rotations")
+
+
+class OscConfig(Section):
+    """One receiver of the dancer's joints."""
+
+    host: Ipv4 = key("The receiver's address in numbers.", "127.0.0.1")
+    port: int = key("The receiver's UDP port; VMC: usually 39539.", 9004, within=(1, 65535))
+    program: Program | None = key(
+        "The AI-Toolbox program that listens: sets port and the keys below as it wants them; a key that "
+        "stands here too counts more. docs/osc.md has the table.",
+        None,
+    )
+    dialect: Dialect = key("The messages that it understands; docs/osc.md shows them.", "ai-toolbox")
+    frame_message: bool = key("Send /bunraku/frame (tick, time, sequence, late) before the joints.", False)
+    messages: list[Message] = key(
+        "ai-toolbox: which lists it gets, in this order.",
+        ["rot_local", "pos_world", "rot_world"],
+        length=(1, 4),
+    )
+    prefix: Prefix = key(
+        "ai-toolbox: the address before a list's name; /mocap/joint for older programs, /mocap/1/joint for "
+        "a second dancer.",
+        "/mocap/0/joint",
+    )
+    joints: list[str] = key(
+        "ai-toolbox: the joints of each list, in this order; [] for all of the show.", [], length=(0, 256)
+    )
+    ends: bool = key(
+        "ai-toolbox: count the ends of bones as joints, each behind its joint, as BVH loaders do.", False
+    )
+    scale: float = key(
+        "ai-toolbox: the receiver's units in a metre; 100: centimetres.", 1.0, within=(0.001, 1000)
+    )
+    axes: Axes = key(
+        "ai-toolbox: which of the box's axes (right-handed, Y up) become the receiver's x, y and z; "
+        "[z, x, y] for Z up.",
+        ("x", "y", "z"),
+    )
+    rotations: Literal["quaternion", "euler"] = key(
+        "ai-toolbox: w, x, y, z of a unit quaternion; or degrees about x, then y, then z (fixed axes).",
+        "quaternion",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_its_program_wants(cls, values: Any) -> Any:
+        wanted = PROGRAMS.get(str(values.get("program"))) if isinstance(values, dict) else None
+        return values if wanted is None else {**wanted, **values}
+
+    @field_validator("messages", "joints")
+    @classmethod
+    def _each_once(cls, names: list[str]) -> list[str]:
+        refuse_repeats(names, "'{value}' stands here twice.", "Remove one.")
+        return names
+
+    @field_validator("axes")
+    @classmethod
+    def _each_axis_once(cls, axes: Axes) -> Axes:
+        return each_axis_once(axes)
+
+    @model_validator(mode="after")
+    def _keys_of_its_dialect(self) -> OscConfig:
+        if self.dialect != "ai-toolbox":
+            foreign = [name for name in _OF_ONE_DIALECT if name in self.model_fields_set]
+            if self.program is not None or foreign:
+                name = "program" if self.program is not None else foreign[0]
+                raise refusal(
+                    f"'{name}' belongs to the dialect ai-toolbox, and this receiver gets {self.dialect}.",
+                    "Remove it, or write `dialect: ai-toolbox`.",
+                    at=name,
+                )
+        return self
+
+
+def osc_misfits(receivers: Sequence[OscConfig], joints: Sequence[str], file: YamlFile) -> list[Problem]:
+    """Joints that a skeleton with these `joints` does not have; file: the box file of the receivers."""
+    problems = []
+    for place, receiver in enumerate(receivers):
+        for number, joint in enumerate(receiver.joints):
+            if joint not in joints:
+                here: Location = ("outputs", "osc", place, "joints", number)
+                message = f"The show's skeleton has no joint '{joint}'."
+                problems.append(file.problem(here, message, did_you_mean(joint, joints)))
+    return problems
