@@ -84,6 +84,7 @@ def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:
         senders=tuple(control.senders),
         heartbeat=tuple((one.host, one.port) for one in control.heartbeat),
         key_file=str(box.sensors.keys or ""),
+        replies=tuple((one.host, one.port) for one in control.replies),
     )
     return sys.executable, "-m", "appliance.show_control", settings.packed()
 

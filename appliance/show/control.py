@@ -30,6 +30,13 @@ class HeartbeatConfig(Section):
     port: int = key("The listener's UDP port.", 9003, within=(1, 65535))
 
 
+class ReplyConfig(Section):
+    """A receiver of the box's replies."""
+
+    host: Ipv4 = key("The listener's address in numbers.", "127.0.0.1")
+    port: int = key("The listener's UDP port.", 9001, within=(1, 65535))
+
+
 class ControlConfig(Section):
     """Where commands by OSC arrive, and from whom."""
 
@@ -45,6 +52,13 @@ class ControlConfig(Section):
     )
     heartbeat: list[HeartbeatConfig] = key(
         "Receivers of /bunraku/status, once a second; docs/osc.md explains it.", [], length=(0, 16)
+    )
+
+    replies: list[ReplyConfig] = key(
+        "Receivers of each answer beside the sender of its command: desks often listen on another port than "
+        "they send from.",
+        [],
+        length=(0, 16),
     )
 
     @model_validator(mode="after")

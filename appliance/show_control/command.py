@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from appliance.show.config_error import nearest
-from appliance.show_control.packet import is_readable
+from appliance.show_control.packet import Unread, is_readable
 
 REPLY, SENSORS_REPLY, PONG = "/reply", "/sensors/reply", "/pong"  # what the box answers with
 STREAMS = ("/player/", "/mocap/")  # answered only when refused or not carried out
@@ -126,10 +126,22 @@ def command(address: str, arguments: Sequence[object]) -> Command:
         near = nearest(address, list(FORMS))
         meant = f"Did you mean {near}?" if near else "docs/osc.md lists what it takes."
         raise ValueError(f"{address[:LONGEST_NAME]} is no command of this box. {meant}")
+    require_read(address, arguments)
     text, numbers = _text(form, arguments)
     if text is None or not _fit(form, numbers):
         raise ValueError(f"{address} takes {form.words()}.")
     return Command(address, tuple(float(number) for number in numbers), text)
+
+
+def require_read(address: str, arguments: Sequence[object]) -> None:
+    """Refuse a message that was not read whole. Raises ValueError with one clear sentence."""
+    for one in arguments:
+        if isinstance(one, Unread):
+            tag = f"of the OSC type {one.tag}" if one.tag.isalnum() else "that cannot be read"
+            raise ValueError(
+                f"{address} came with an argument {tag}: nothing is changed. Send numbers as i or f, and "
+                "texts as s."
+            )
 
 
 def _text(form: Form, arguments: Sequence[object]) -> tuple[str | int | None, list[int | float]]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-import socket
 from collections.abc import Sequence
 
-from appliance.show_control.packet import datagram
+from appliance.show_control.listeners import Listeners
 from appliance.show_control.settings import Listener
 from appliance.show_control.status_messages import STATUS, Status
 
@@ -17,20 +15,14 @@ class Heartbeat:
     """Beats on a grid of its own, whatever the stage does; a listener that is away delays no other."""
 
     def __init__(self, listeners: Sequence[Listener], now: float) -> None:
-        self._listeners = tuple(listeners)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        self._socket.setblocking(False)
+        self._listeners = Listeners(listeners)
         self.due = now if listeners else float("inf")  # monotonic seconds
 
     def beat(self, status: Status, now: float) -> None:
         """Send it; after a stall the grid starts over, and nothing is sent twice."""
         self.due = self.due + EVERY_S if self.due + EVERY_S > now else now + EVERY_S
-        message = datagram((STATUS, *status))
-        for listener in self._listeners:
-            with contextlib.suppress(OSError):
-                self._socket.sendto(message, listener)
+        self._listeners.send((STATUS, *status))
 
     def close(self) -> None:
         """Send no more."""
-        self._socket.close()
+        self._listeners.close()

@@ -9,6 +9,7 @@ from pathlib import Path
 from appliance.box.live_pose import MOST_JOINTS, LivePoseWriter
 from appliance.outputs.shared_frame import Facts
 from appliance.show.sources import LIVE
+from appliance.show_control.command import require_read
 
 ROTATIONS, POSITIONS = "/mocap/0/joint/rot_local", "/mocap/0/joint/pos_world"
 HEARD = (ROTATIONS, POSITIONS, "/mocap/0/joint/rot_world")  # the last one says nothing new
@@ -28,6 +29,7 @@ class LiveInput:
                 "No show on this box takes a live dancer: nothing is changed. Write `live: true` under "
                 "`motion` in its show.yaml."
             )
+        require_read(address, arguments)
         joints = len(facts.skeleton)
         wanted = {ROTATIONS: 4, POSITIONS: 3}.get(address)
         if wanted is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from pythonosc.osc_message_builder import BuildError, OscMessageBuilder
 from pythonosc.parsing import osc_types
@@ -16,8 +17,13 @@ BUNDLE = b"#bundle\0"  # how a bundle begins
 _HEAD_BYTES = 16  # of a bundle: BUNDLE, then the time tag
 _NUMBERS = {tag: struct.Struct(f">{packed}") for tag, packed in zip("ifhd", "ifqd", strict=True)}
 _CONSTANTS = {"T": True, "F": False, "N": None}
-_BANG = "I"  # a type tag without a value
 _NO_OSC = "This is no OSC."
+
+
+class Unread(NamedTuple):
+    """Stands for the first argument that was not read; tag: its type, empty where the message is damaged."""
+
+    tag: str = ""
 
 
 def messages_in(received: bytes) -> list[tuple[str, list[object]]]:
@@ -25,7 +31,7 @@ def messages_in(received: bytes) -> list[tuple[str, list[object]]]:
 
     Each step goes forward in the datagram, so its length bounds time and memory. (python-osc's parser turns
     for ever at an element of -4 bytes.) An argument of a type that no command takes, or that cannot be read,
-    is None, and the last one: /panic is heard whatever comes with it. Raises ValueError for what is no OSC,
+    is Unread, and the last one: /panic is heard whatever comes with it. Raises ValueError for what is no OSC,
     and for bundles of more than MOST_MESSAGES or deeper than DEEPEST_BUNDLE.
     """
     messages: list[tuple[str, list[object]]] = []
@@ -85,6 +91,7 @@ def _message(packet: bytes) -> tuple[str, list[object]]:
 
 
 def _arguments(packet: bytes, at: int) -> Iterator[object]:
+    tag = ""
     if at == len(packet):  # some senders leave the type tags out where there are no arguments
         return
     try:
@@ -94,11 +101,13 @@ def _arguments(packet: bytes, at: int) -> Iterator[object]:
         for tag in tags[1:]:
             if tag in _CONSTANTS:
                 yield _CONSTANTS[tag]
-            elif tag != _BANG:
+            else:
                 value, at = _value(packet, at, tag)
                 yield value
-    except (ValueError, KeyError, struct.error):
-        yield None
+    except (ValueError, struct.error):
+        yield Unread()
+    except KeyError:
+        yield Unread(tag)
 
 
 def _value(packet: bytes, at: int, tag: str) -> tuple[object, int]:

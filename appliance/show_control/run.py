@@ -19,10 +19,12 @@ from appliance.show_control.console_messages import ConsoleMessages, held_back
 from appliance.show_control.heartbeat import Heartbeat
 from appliance.show_control.intake import Intake
 from appliance.show_control.key_file import KeyFile
+from appliance.show_control.listeners import Listeners
 from appliance.show_control.live_input import LiveInput
 from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.orders import OrderSender
-from appliance.show_control.port import Port
+from appliance.show_control.packet import Message
+from appliance.show_control.port import Address, Port
 from appliance.show_control.settings import Settings
 from appliance.show_control.stage_observer import StageObserver
 
@@ -53,11 +55,13 @@ class ControlProcess:
             self._dispatch = OrderDispatch(sender)
             self._heartbeat = Heartbeat(settings.heartbeat, now)
             opened.callback(self._heartbeat.close)
+            self._replies = Listeners(settings.replies)
+            opened.callback(self._replies.close)
             keys = KeyFile(Path(settings.key_file) if settings.key_file else None)
             live = LiveInput(folder)
             opened.callback(live.close)
             self.handler = CommandHandler(
-                show_state, self.observer, self._dispatch, keys, self.port.send, writer.write, live
+                show_state, self.observer, self._dispatch, keys, self._answer, writer.write, live
             )
             self._poll = select.poll()
             for one in (self.port, sender):
@@ -98,6 +102,11 @@ class ControlProcess:
                 self._say(words)
         if taken == _AT_ONCE:
             time.sleep(_REST_S)
+
+    def _answer(self, asker: Address, message: Message) -> None:
+        """To the sender of a command, and to every listener that waits for replies elsewhere."""
+        self.port.send(asker, message)
+        self._replies.send(message, but=asker)
 
     def conclusion(self) -> str:
         """How many commands were refused, in a sentence; empty when none was."""

@@ -17,6 +17,7 @@ class Settings:
     senders: tuple[str, ...] = ()
     heartbeat: tuple[Listener, ...] = ()
     key_file: str = ""
+    replies: tuple[Listener, ...] = ()
 
     def packed(self) -> str:
         """As one argument of a command line; there are no secrets in it."""
@@ -26,5 +27,8 @@ class Settings:
     def unpacked(cls, text: str) -> Settings:
         """From that argument."""
         values = json.loads(text)
-        listeners = tuple((str(host), int(port)) for host, port in values["heartbeat"])
-        return cls(**values | {"senders": tuple(values["senders"]), "heartbeat": listeners})
+        heartbeat, replies = (
+            tuple((str(host), int(port)) for host, port in values[name]) for name in ("heartbeat", "replies")
+        )
+        changed = {"senders": tuple(values["senders"]), "heartbeat": heartbeat, "replies": replies}
+        return cls(**values | changed)

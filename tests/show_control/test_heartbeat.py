@@ -14,6 +14,7 @@ from pythonosc.osc_message import OscMessage
 
 from appliance.box.show_state import ShowState
 from appliance.show_control.heartbeat import Heartbeat
+from appliance.show_control.packet import datagram
 from appliance.show_control.stage_observer import StageObserver
 from appliance.show_control.status_messages import Status, status
 from tests.show_control.doubles import HOST, Asker, ControlInThread, StageDouble, until
@@ -114,3 +115,26 @@ def test_the_documentation_explains_every_argument_in_its_order() -> None:
     assert names == [(name, kinds[kind]) for name, kind in get_type_hints(Status).items()]
     places = [int(number) for number in re.findall(r"^\| (\d+) \|", table, re.MULTILINE)]
     assert places == list(range(1, len(names) + 1))
+
+
+def test_replies_reach_a_desk_that_listens_elsewhere_once(folder: Path, listener: socket.socket) -> None:
+    with StageDouble(folder):
+        gone = ("240.0.0.1", 9)
+        control = ControlInThread(folder, replies=[gone, listener.getsockname()])
+        asker = Asker(control.port)
+        until(lambda: asker.ask("/look", "ink")[2] == 1)
+        assert asker.ask("/ping") == ["/pong"]
+        asker.tell("/blackout", 7)
+        heard: list[OscMessage] = []
+        while not heard or heard[-1].params[:1] != ["/blackout"]:
+            heard.append(OscMessage(listener.recv(4096)))
+        assert ["/look", 1] in [one.params[:2] for one in heard]
+        assert [one.address for one in heard].count("/pong") == 1
+
+        listener.connect((HOST, control.port))  # what the listener asks for itself comes once
+        listener.send(datagram(("/ping",)))
+        listener.send(datagram(("/status",)))
+        addresses = [OscMessage(listener.recv(4096)).address for _ in range(2)]
+        assert addresses == ["/pong", "/bunraku/status"]
+        asker.close()
+        control.close()

@@ -19,8 +19,9 @@ from pythonosc.osc_bundle_builder import OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 from pythonosc.osc_packet import OscPacket
 
+from appliance.outputs.osc.template import osc_string
 from appliance.show_control.command import command
-from appliance.show_control.packet import DEEPEST_BUNDLE, MOST_MESSAGES, messages_in
+from appliance.show_control.packet import DEEPEST_BUNDLE, MOST_MESSAGES, Unread, messages_in
 from tests.show_control.doubles import Asker, control_process
 from tests.show_control.fuzz import bundle, message
 
@@ -144,27 +145,41 @@ def test_what_is_well_formed_is_read_as_python_osc_reads_it(
     [
         (b"", []),
         (b",\0\0\0", []),
-        (b",I\0\0", []),
-        (b",fi\0" + struct.pack(">f", 0.5), [0.5, None]),
+        (b",I\0\0", [Unread("I")]),
+        (b",c\0\0\0\0\0A", [Unread("c")]),
+        (b",fi\0" + struct.pack(">f", 0.5), [0.5, Unread()]),
         (b",f\0\0\x3f", [0.5]),  # the last zeros left out
-        (b",b\0\0" + struct.pack(">i", -4), [None]),
-        (b",ib\0" + struct.pack(">iii", 7, 4, 1), [7, None]),
-        (b",[i]\0\0\0\0" + struct.pack(">i", 0), [None]),
-        (b",s\0\0no end", [None]),
-        (b",s\0\0\xff\xfe\0\0", [None]),
-        (b"no comma\0\0\0\0", [None]),
-        (b"no end", [None]),
-        (b",isx\0\0\0\0" + struct.pack(">i", 3), [3, None]),
+        (b",b\0\0" + struct.pack(">i", -4), [Unread("b")]),
+        (b",ib\0" + struct.pack(">iii", 7, 4, 1), [7, Unread("b")]),
+        (b",[i]\0\0\0\0" + struct.pack(">i", 0), [Unread("[")]),
+        (b",s\0\0no end", [Unread()]),
+        (b",s\0\0\xff\xfe\0\0", [Unread()]),
+        (b"no comma\0\0\0\0", [Unread()]),
+        (b"no end", [Unread()]),
+        (b",isx\0\0\0\0" + struct.pack(">i", 3), [3, Unread()]),
     ],
 )  # fmt: skip
-def test_an_argument_that_cannot_be_read_is_none_and_panic_is_panic_whatever_it_is(
+def test_an_argument_that_cannot_be_read_is_marked_and_panic_is_panic_whatever_it_is(
     behind: bytes, arguments: list[object]
 ) -> None:
     assert messages_in(b"/panic\0\0" + behind) == [("/panic", arguments)]
     assert command("/panic", arguments).values == ()
-    if None in arguments:
-        with pytest.raises(ValueError, match=r"/blackout takes 0 or 1\."):
+    if any(isinstance(one, Unread) for one in arguments):
+        with pytest.raises(ValueError, match=r"^/blackout came with an argument .*: nothing is changed\."):
             command("/blackout", arguments)
+
+
+@pytest.mark.parametrize("address", ["/cue", "/sensors/neutral", "/go", "/stop"])
+@pytest.mark.parametrize("tag", "IcbrmtX")
+def test_a_command_that_was_not_read_whole_is_refused_by_its_type(address: str, tag: str) -> None:
+    [(address, arguments)] = messages_in(osc_string(address) + osc_string(f",{tag}") + bytes(8))
+    with pytest.raises(ValueError, match=f"^{address} came with an argument of the OSC type {tag}: nothing"):
+        command(address, arguments)
+
+
+def test_a_symbol_is_a_text() -> None:
+    [(address, arguments)] = messages_in(osc_string("/cue") + osc_string(",S") + osc_string("threads"))
+    assert command(address, arguments).text == "threads"
 
 
 @pytest.mark.parametrize(
