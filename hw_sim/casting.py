@@ -11,6 +11,7 @@ from appliance.sensor.keys import SensorKey, create_keys, exposure, load_keys, u
 from hw_sim import motions
 from hw_sim.device import Device, DeviceMaker
 from hw_sim.emulated_sensor import PERIOD_US, EmulatedSensor
+from hw_sim.status import sensors
 from hw_sim.wearer import Wearer
 
 DEFAULT_SENSOR = "left-wrist"
@@ -51,8 +52,7 @@ def choose_keys(
             raise ValueError(f"{path}: {unknown_sensor(name, keys)}")
     wanted = count or min(max(len(keys), 1), MOST_SENSORS)
     if not names and len(keys) < wanted:
-        has = "1 sensor" if len(keys) == 1 else f"{len(keys) or 'no'} sensors"
-        raise ValueError(f"{path} has {has}, not {wanted}. Add some, or give another --keys")
+        raise ValueError(f"{path} has {sensors(len(keys))}, not {wanted}. Add some, or give another --keys")
     return [keys[name] for name in names or list(keys)[:wanted]]
 
 

@@ -107,17 +107,8 @@ def emulate(
 ) -> None:
     """Emulate one to eight wearable sensors: they pair with the box, then send signed readings at 50 Hz each.
 
-    Packets cross a lifelike network in both directions, each sensor from an address of its own.
-
-    \b
-    Try the box without a sensor (it must read the same key file):
-      bunraku emulate --sensor left-wrist --seconds-per-turn 5
-    Two dancers on a network that misbehaves:
-      bunraku emulate --sensor left-wrist=dance --sensor head=still --network bad
-    A recorded arm, over a cable:
-      bunraku emulate --motion trace --trace dance.bvh --joint lShldr --serial /dev/ttyUSB0
-    The wearables' own firmware, compiled for this computer:
-      bunraku emulate --firmware --motion dance
+    Packets cross a lifelike network in both directions, each sensor from an address of its own. The box must
+    read the same key file.
     """
 
     def motion_of(number: int, name: str) -> motions.Motion:

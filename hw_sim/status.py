@@ -50,7 +50,7 @@ class StatusLine:
         """Print what was sent; when nothing was, what to check."""
         self._live.stop()
         self._console.print(
-            f"{len(emulator.devices)} sensor(s) -> {self._where}: {_totals(emulator)}", soft_wrap=True
+            f"{sensors(len(emulator.devices))} -> {self._where}: {_totals(emulator)}", soft_wrap=True
         )
         if not emulator.counts["sent"]:
             self._console.print(
@@ -63,6 +63,11 @@ class StatusLine:
                 "Is it running, and does it read the same key file?",
                 soft_wrap=True,
             )
+
+
+def sensors(count: int) -> str:
+    """A number of sensors in words."""
+    return "1 sensor" if count == 1 else f"{count or 'no'} sensors"
 
 
 def _totals(emulator: Emulator) -> str:

@@ -20,13 +20,16 @@ prepare_environment()
 
 import typer  # noqa: E402  (numpy, which commands import, must find the environment prepared)
 
+from appliance.cli.examples import ORDER, OTHER_WORDS  # noqa: E402
+from appliance.cli.help_page import give_help  # noqa: E402
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
 from appliance.pose.file_trouble import sentence  # noqa: E402
+from appliance.show.config_error import nearest  # noqa: E402
 
 PLUG_INS = "bunraku.commands"
 REFUSED = 2
 _HERE = __name__
-_MODULES = {  # in the order of `bunraku --help`; in each a function or a group of the command's name
+_MODULES = {  # in each a function or a group of the command's name
     "play": _HERE,
     "project": "appliance.cli.project",
     "control": "appliance.cli.control",
@@ -56,6 +59,8 @@ def command_line(name: str | None = None) -> typer.Typer:
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(_bunraku)  # a parser of one command expects its name too
     for command, module in _MODULES.items():
@@ -134,14 +139,33 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command; an error that the user can correct ends it with one clear line and exit status 2."""
     end_with_parent()
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if "--version" in given:
+        given = ["version"]
     own = given[0] if given and given[0] in _MODULES else None
     app = command_line(own)
     if own is None:
         plug_in(app, entry_points(group=PLUG_INS), lambda words: print(words, file=sys.stderr))
+    command: Any = typer.main.get_command(app)
+    give_help(command, order=ORDER)
+    _require_known(given, list(command.commands))
     try:
-        app(given, prog_name="bunraku")
+        command(given, prog_name="bunraku")
     except Exception as error:
         refuse(error)
+
+
+def _require_known(given: Sequence[str], commands: Sequence[str]) -> None:
+    """End with the nearest command, by spelling or by meaning, where there is none of this name."""
+    word = given[0] if given else ""
+    if not word or word.startswith("-") or word in commands:
+        return
+    known = {name: name for name in commands}
+    meant = {other: name for name, others in OTHER_WORDS.items() if name in known for other in others}
+    near = nearest(word, list(known | meant)) if word.casefold() not in meant else word.casefold()
+    found = known.get(near or "") or meant.get(near or "")
+    cure = f"Did you mean '{found}'?" if found else "bunraku -h lists all."
+    print(f"bunraku: There is no command '{word}'. {cure}", file=sys.stderr)
+    sys.exit(REFUSED)
 
 
 def refuse(error: Exception) -> NoReturn:

@@ -41,7 +41,7 @@ def check(
     ] = None,
     box: BoxFile = None,
 ) -> None:
-    """Verify a show bundle and a box file, and measure whether the iterations fit this machine."""
+    """Check a show and a box file, and measure whether the iterations fit this machine."""
     check_show(show, box)
 
 
@@ -89,7 +89,7 @@ def verified_parts(directory: Path, box_file: Path | None) -> tuple[StageParts, 
 
 
 def pack(show: Annotated[Path, typer.Argument(help="The show bundle that you changed.")]) -> None:
-    """Verify a changed show bundle and vouch for its files with new checksums."""
+    """Check a show that you changed, and write its checksums anew."""
     network = load_show(show).network
     checksums = show / CHECKSUMS
     try:

@@ -265,10 +265,10 @@ def improvise(
 ) -> None:
     """Train an improviser on a dancer's recordings and let it make an endless phrase.
 
-    The improviser is stored beside the phrase. The same command again continues its training; once trained,
-    it only dances, and another --seed gives another phrase. With --prompt it goes on where a recording ends.
-    The published network (--model, lstm-mixtures) makes no endless phrase: it goes on from the prompt, or
-    from a recorded moment that --seed chooses.
+    The improviser is stored beside the phrase. If its training was stopped, the same command continues it.
+    A trained one dances at once, and another --seed gives another phrase. With --prompt it continues a
+    recording. The published network (--model, lstm-mixtures) makes no endless phrase: it continues the
+    prompt, or a recorded moment that --seed chooses.
     """
     with clear_errors("improvise"):
         from appliance.studio.improviser import improvisation

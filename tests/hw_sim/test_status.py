@@ -43,7 +43,7 @@ def test_elsewhere_only_the_last_word() -> None:
         status.show(emulator, 100.0)
         assert out.getvalue() == ""
         status.end(emulator)
-    assert out.getvalue() == "1 sensor(s) -> box:9750: 50 readings sent\n"
+    assert out.getvalue() == "1 sensor -> box:9750: 50 readings sent\n"
 
 
 def test_when_nothing_got_out_it_says_what_to_look_at() -> None:

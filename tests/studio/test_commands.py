@@ -44,7 +44,7 @@ def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:
     for expected in (
         "3 recordings of 3 takes",
         "17 of 20 joints move",
-        "Still everywhere, kept as they stand",
+        "The others never turn and stay as they are",
         "Kept apart to measure on, by take: sway_2",
         "60 steps on the CPU (1 threads)",
         "degrees on held-out takes",

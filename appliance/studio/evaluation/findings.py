@@ -25,7 +25,7 @@ def findings(dataset: Dataset) -> list[str]:
         f"{_count(files, 'recording')} of {_count(performances, 'take')}, "
         f"{_minutes(takes):.1f} minutes, resampled to {FPS:g} poses a second.",
         f"{len(moving)} of {len(names)} joints move: {', '.join(moving)}."
-        + (f" Still everywhere, kept as they stand: {', '.join(still)}." if still else ""),
+        + (f" The others never turn and stay as they are: {', '.join(still)}." if still else ""),
         *_rates(takes),
         *_notes(takes),
         *_masked(takes),

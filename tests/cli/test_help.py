@@ -1,0 +1,93 @@
+"""Help: a page for each command, with examples that parse; the nearest command for a word that is none."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from importlib.metadata import entry_points
+from typing import Any
+
+import pytest
+import typer
+
+from appliance.cli.app import PLUG_INS, command_line, plug_in
+from appliance.cli.examples import EXAMPLES, ORDER, OTHER_WORDS
+from appliance.cli.help_page import MACHINERY
+from tests.command import Command
+
+
+def whole() -> Any:
+    """The parser of all commands."""
+    app = command_line()
+    plug_in(app, entry_points(group=PLUG_INS), print)
+    return typer.main.get_command(app)
+
+
+def paths(command: Any, words: tuple[str, ...] = ()) -> Iterator[str]:
+    yield " ".join(words)
+    for name, below in getattr(command, "commands", {}).items():
+        yield from paths(below, (*words, name))
+
+
+ALL = sorted(paths(whole()))
+
+
+def test_every_command_has_an_example_and_its_place() -> None:
+    assert sorted(EXAMPLES) == ALL
+    assert set(OTHER_WORDS) == set(ORDER)
+
+
+@pytest.mark.parametrize("path", [path for path in ALL if path != "preflight"])
+def test_a_page_of_help(path: str, bunraku: Command) -> None:
+    page = bunraku(*path.split(), "-h").out
+    assert page == bunraku(*path.split(), "--help").out
+    assert page.startswith(f"Usage: bunraku {path}".rstrip())
+    assert not any(option in page for option in MACHINERY)
+    assert not any(sign in page for sign in ("<bool>", "{network", "<path>", "None", "\b"))
+    assert all(example in page for example in EXAMPLES[path])
+    assert max(map(len, page.partition("Example")[0].splitlines())) <= 80
+
+
+@pytest.mark.parametrize("example", sorted({one for examples in EXAMPLES.values() for one in examples}))
+def test_an_example_parses(example: str) -> None:
+    words = shlex.split(example.partition(" > ")[0])[1:]
+    command, context = whole(), None
+    while getattr(command, "commands", None) and words and not words[0].startswith("-"):
+        command = command.commands[words.pop(0)]
+    context = command.make_context("bunraku", words)
+    assert context.params is not None
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("plai", "play"),
+        ("strat", "play"),
+        ("Doctor", "doctor"),
+        ("dmx", "lights"),
+        ("latency", "measure"),
+        ("gltf", "convert"),
+    ],
+)
+def test_the_nearest_command_by_spelling_or_meaning(word: str, meant: str, bunraku: Command) -> None:
+    words = bunraku(word, status=2).err
+    assert words == f"bunraku: There is no command '{word}'. Did you mean '{meant}'?\n"
+
+
+def test_a_word_that_is_near_to_none(bunraku: Command) -> None:
+    assert "bunraku -h lists all" in bunraku("qqqq", status=2).err
+
+
+@pytest.mark.parametrize("words", ["--version", "play --version", "sensors --version"])
+def test_the_version_by_any_command(words: str, bunraku: Command) -> None:
+    assert bunraku(*words.split()).out == bunraku("version").out
+
+
+def test_flags_take_no_value_and_required_options_stand_in_the_usage(bunraku: Command) -> None:
+    assert re.search(r"^  --window +Show", bunraku("play", "-h").out, re.MULTILINE)
+    assert bunraku("evaluate", "-h").out.startswith(
+        "Usage: bunraku evaluate NETWORK RECORDING... [OPTIONS]\n"
+    )
+    assert bunraku("train", "-h").out.startswith("Usage: bunraku train --out FOLDER [OPTIONS]\n")
+    assert "[SPARE]" in bunraku("sensors", "replace", "-h").out
