@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.reading_options import ReadingOptions, reading_options
+
 
 class Unit(StrEnum):
     """Of the points in a file."""
@@ -25,27 +27,29 @@ class Up(StrEnum):
     z = "z"
 
 
-MetresPerUnit = Annotated[float, typer.Option(min=1e-6, help="Unit of BVH files, in metres.")]
-
-
+@reading_options
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A recording: .bvh, .glb, .npz or .csv.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The file; its ending says the format.")],
-    metres_per_unit: MetresPerUnit = 0.01,
     fps: Annotated[float | None, typer.Option(min=1.0, max=1000.0, help="Another rate.")] = None,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Turn a recording into another format: .bvh, .glb (Blender, three.js, TouchDesigner), .npz, .csv.
 
-    The dance stays the same: the same joints, the same rotations, metres (BVH: centimetres). A .glb has a
+    The dance stays the same: the same joints, the same rotations, metres (BVH: centimetres); files in other
+    units or with Z up come out in metres, Y up, and a message says so. A .glb has a
     body around the skeleton, so that it can be looked at as it is.
     """
-    from appliance.exchange.formats import read_recording, require_known_ending, write_recording
+    from appliance.exchange.formats import read_as_told, require_known_ending, write_recording
 
     require_known_ending(out)
-    recording = read_recording(source, metres_per_unit)
+    recording, guesses = read_as_told(source, reading)
+    for guess in guesses:
+        print(f"{source.name}: {guess.sentence()}.", file=sys.stderr)
     if fps is not None:
         recording = recording.resampled(fps)
-    write_recording(out, recording, metres_per_unit)
+    write_recording(out, recording)
     joints, rate = len(recording.skeleton), recording.fps
     print(f"{out}: {recording.seconds:.1f} s, {len(recording)} poses at {rate:g} a second, {joints} joints.")
 

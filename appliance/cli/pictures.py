@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -11,9 +12,9 @@ import typer
 
 from appliance.box.clock import TICK_S
 from appliance.pictures.filmstrip import MissingPicturesError, draw_filmstrip
-from appliance.pose.bvh import read_bvh
 from appliance.pose.file_trouble import sentence
 from appliance.pose.quaternion import Array
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions, read_upright, reading_options
 from appliance.pose.recording import Recording
 from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal
@@ -44,6 +45,7 @@ class RecordedDance:
         return replace(self, recording=part, holds=holds)
 
 
+@reading_options
 def filmstrip(
     recording: Annotated[Path, typer.Argument(help="A BVH recording, or the journal of a run.")],
     out: Annotated[Path | None, typer.Option(help="The PNG; left out: beside the recording.")] = None,
@@ -51,22 +53,29 @@ def filmstrip(
         float, typer.Option(help="Second at which the pictures begin; negative: counted from the end.")
     ] = 0.0,
     seconds: Annotated[float, typer.Option(min=0.1, help="How many seconds they cover.")] = 10.0,
-    metres_per_unit: Annotated[float, typer.Option(min=1e-6, help="Unit of a BVH file, in metres.")] = 0.01,
     look: Annotated[
         str | None, typer.Option(help="Render in this look, as the projector shows it: plaster, lines ...")
     ] = None,
     show: Annotated[Path | None, typer.Option(help="Show bundle that the look belongs to.")] = None,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Draw a recording or a journal as a row of poses; held joints are highlighted."""
     out = out or recording.with_suffix(".png")
-    dance = load_dance(recording, metres_per_unit).part(start, seconds)
+    dance = load_dance(recording, reading).part(start, seconds)
     print(draw_dance(dance, out) if look is None else render_dance(dance, out, look, show))
 
 
-def load_dance(source: Path, metres_per_unit: float = 0.01) -> RecordedDance:
-    """All of a BVH recording or of a journal. Raises BvhError or JournalError."""
+def load_dance(source: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> RecordedDance:
+    """All of a BVH recording, upright and in metres, or of a journal. Raises BvhError or JournalError.
+
+    What had to be guessed about a recording is said on standard error.
+    """
     if source.suffix.lower() == ".bvh":
-        return RecordedDance(read_bvh(source, metres_per_unit=metres_per_unit), None, source.stem)
+        recording, guesses = read_upright(source, reading)
+        for guess in guesses:
+            print(f"{source.name}: {guess.sentence()}.", file=sys.stderr)
+        return RecordedDance(recording, None, source.stem)
     journal = read_journal(source)
     held = [journal.skeleton.index(hand["joint"]) for hand in journal.header["hands"]]
     ticks = journal.ticks

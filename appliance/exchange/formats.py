@@ -9,8 +9,10 @@ from appliance.exchange.exchange_error import ExchangeError
 from appliance.exchange.glb_reading import read_glb
 from appliance.exchange.glb_writing import write_glb
 from appliance.exchange.tables import read_csv, read_npz, write_csv, write_npz
-from appliance.pose.bvh import read_bvh, write_bvh
+from appliance.pose.bvh import write_bvh
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions, read_upright
 from appliance.pose.recording import Recording
+from appliance.pose.stage_frame import Guess
 
 _WRITERS: dict[str, Callable[[Path, Recording], None]] = {
     ".glb": write_glb,
@@ -21,21 +23,26 @@ _READERS: dict[str, Callable[[Path], Recording]] = {".glb": read_glb, ".npz": re
 ENDINGS = (".bvh", *_WRITERS)
 
 
-def read_recording(path: Path, metres_per_unit: float = 0.01) -> Recording:
-    """All of a recording. metres_per_unit: of a BVH file; the others are in metres.
+def read_recording(path: Path) -> Recording:
+    """All of a recording, in the stage's frame. Raises ExchangeError or BvhError, which name the file."""
+    return read_as_told(path, AS_THE_FILES_SAY)[0]
+
+
+def read_as_told(path: Path, reading: ReadingOptions) -> tuple[Recording, list[Guess]]:
+    """All of a recording, and what was changed. reading: of a BVH file; the others are in metres, Y up.
 
     Raises ExchangeError or BvhError, which name the file.
     """
     ending = _ending(path)
     try:
         if ending == ".bvh":
-            return read_bvh(path, metres_per_unit=metres_per_unit)
-        return _READERS[ending](path)
+            return read_upright(path, reading)
+        return _READERS[ending](path), []
     except OSError as error:
         raise ExchangeError(path, f"The file cannot be read ({error.strerror or error}).") from error
 
 
-def write_recording(path: Path, recording: Recording, metres_per_unit: float = 0.01) -> None:
+def write_recording(path: Path, recording: Recording) -> None:
     """Write a recording whole, or leave what was there. Raises ExchangeError."""
     ending = _ending(path)
     if not len(recording):
@@ -45,7 +52,7 @@ def write_recording(path: Path, recording: Recording, metres_per_unit: float = 0
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             if ending == ".bvh":
-                write_bvh(beside, recording, metres_per_unit)
+                write_bvh(beside, recording)
             else:
                 _WRITERS[ending](beside, recording)
             beside.replace(path)

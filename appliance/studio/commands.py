@@ -11,7 +11,8 @@ from typing import Annotated
 
 import typer
 
-from appliance.studio import experiment_command, granular_command, path_command, vary_command
+from appliance.pose.reading_options import ReadingOptions, reading_options
+from appliance.studio import experiment_command, granular_command, inspect_command, path_command, vary_command
 from appliance.studio.clear_errors import INTERRUPTED, clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -57,6 +58,7 @@ Phrase = Annotated[
 
 
 @app.command()
+@reading_options
 def train(
     out: Annotated[Path, typer.Option(help="Folder for the show.")],
     recordings: Recordings = None,
@@ -118,15 +120,17 @@ def train(
     held_out: Annotated[
         list[str] | None, typer.Option(help="Files to measure on, not to train on ('solo_*'); repeatable.")
     ] = None,
-    true_fps: Annotated[
-        list[str] | None, typer.Option(help="PATTERN=FPS if the header is wrong ('salsa_*=60'); repeatable.")
-    ] = None,
     keep: Annotated[
         list[str] | None,
         typer.Option(help="Files without capture errors, whatever they look like ('solo_*'); repeatable."),
     ] = None,
     phrase: Phrase = None,
     name: Annotated[str | None, typer.Option(help="Name of the show. Default: the folder's name.")] = None,
+    hand: Annotated[
+        str | None, typer.Option(help="Joint of the first hand. Default: left upper arm.")
+    ] = None,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Train a dancer on recordings and write a show that can be played to --out.
 
@@ -159,10 +163,11 @@ def train(
                 device=device.value,
                 catalogue=catalogue,
                 held_out=tuple(held_out or ()),
-                true_fps=tuple(true_fps or ()),
+                reading=reading,
                 keep=tuple(keep or ()),
                 phrase=phrase,
                 name=name,
+                hand=hand,
             )
         )
     if not done:
@@ -170,14 +175,11 @@ def train(
 
 
 @app.command()
+@reading_options
 def evaluate(
     network: Annotated[Path, typer.Argument(help="Show folder, puppet.onnx or checkpoint.pt.")],
     recordings: Annotated[list[Path], typer.Argument(help="BVH recordings with the same joint names.")],
-    true_fps: Annotated[
-        float | None, typer.Option(min=1, help="Rate of the recordings if their headers are wrong.")
-    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
-    all_frames: Annotated[bool, typer.Option("--all-frames", help="Measure on capture errors too.")] = False,
     hands: Annotated[
         list[Path] | None,
         typer.Option(help="BVH of another take, whose joints hold the puppet's one by one; repeatable."),
@@ -193,9 +195,9 @@ def evaluate(
         list[str] | None,
         typer.Option(help="K/J, coding and interaction iterations; repeatable. Default: 1/1 to 30/29."),
     ] = None,
-    picture: Annotated[
-        Path | None, typer.Option(help="PNG to draw: the phrase, the arm pasted on, the dancer's answer.")
-    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="PNG: phrase, pasted arm, dancer's answer.")] = None,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Measure how well a network reproduces a dance and, with --hands, whether its body answers a hand."""
     with clear_errors("evaluate"):
@@ -205,9 +207,8 @@ def evaluate(
             evaluate_command.EvaluateOptions(
                 network=network,
                 recordings=recordings,
-                true_fps=true_fps,
+                reading=reading,
                 as_json=json,
-                all_frames=all_frames,
                 hands=tuple(hands or ()),
                 reference=reference,
                 joints=tuple(joint or ()),
@@ -292,6 +293,7 @@ def improvise(
         raise typer.Exit(INTERRUPTED)
 
 
+app.add_typer(inspect_command.app)
 app.add_typer(experiment_command.app)
 app.add_typer(granular_command.app)
 app.add_typer(vary_command.app)

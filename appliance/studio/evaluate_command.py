@@ -12,8 +12,10 @@ from rich.console import Console
 from rich.progress import Progress, track
 from rich.table import Table
 
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.roles import held_joints
 from appliance.studio.data.dataset import Take, load_dataset
+from appliance.studio.data.remembered import remembered_reading
 from appliance.studio.evaluation import puppetry, puppetry_report
 from appliance.studio.evaluation.answer_picture import draw_answer
 from appliance.studio.evaluation.coders import Coder, open_coder
@@ -30,9 +32,8 @@ class EvaluateOptions:
 
     network: Path
     recordings: Sequence[Path]
-    true_fps: float | None = None
+    reading: ReadingOptions = AS_THE_FILES_SAY
     as_json: bool = False
-    all_frames: bool = False
     hands: Sequence[Path] = ()
     reference: Path | None = None
     joints: Sequence[str] = ()
@@ -45,9 +46,10 @@ def run(options: EvaluateOptions) -> None:
     console = Console(stderr=True)
     iterations = _checked(options)
     coder = open_coder(options.network)
+    reading = options.reading.over(remembered_reading(options.network))
     joints = _held_joints(coder, options.joints) if options.hands else []
-    takes = load_takes(options.recordings, coder, options.true_fps, options.all_frames)
-    hands = load_takes(options.hands, coder, options.true_fps, options.all_frames)
+    takes = load_takes(options.recordings, coder, reading)
+    hands = load_takes(options.hands, coder, reading)
     for take in (*takes, *hands):
         console.print(_about(take), highlight=False)
 

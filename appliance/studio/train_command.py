@@ -11,6 +11,7 @@ import torch
 from rich.console import Console
 from torch import nn
 
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.autoencoder.models import MODELS, AnySettings, settings_for, settings_from
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.autoencoder.training_run import TrainingRun, parameters
@@ -57,10 +58,11 @@ class TrainOptions:
     device: str = "auto"
     catalogue: Path | None = None
     held_out: tuple[str, ...] = ()
-    true_fps: tuple[str, ...] = ()
+    reading: ReadingOptions = AS_THE_FILES_SAY
     keep: tuple[str, ...] = ()
     phrase: Path | None = None
     name: str | None = None
+    hand: str | None = None
 
 
 def run(options: TrainOptions) -> bool:
@@ -132,7 +134,7 @@ def _finish(
             f"phrase.bvh. It is no show: the box dances windows of {WINDOW} poses."
         )
     else:
-        request = Request(checkpoint, source, options.out, options.name or "", options.phrase)
+        request = Request(checkpoint, source, options.out, options.name or "", options.phrase, options.hand)
         release(request, training.dataset, console)
         show = shlex.quote(str(options.out))
         console.print(f"{options.out} is a show. Dance it: bunraku play --show {show} --emulate")
@@ -179,7 +181,7 @@ def _settings_and_source(
         source = sources.remembered(load_state(options.puppet), None, options.puppet)
         return _paced(settings, options), source, None
     source = sources.given(
-        options.recordings, options.catalogue, options.held_out, options.true_fps, options.keep
+        options.recordings, options.catalogue, options.held_out, options.reading, options.keep
     )
     return _paced(settings, options), source, None
 

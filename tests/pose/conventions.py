@@ -5,10 +5,13 @@ Everything here is made by this script after the systems' documentation; nothing
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 
 Bone = tuple[
@@ -158,3 +161,141 @@ def skeleton_of(convention: str) -> Skeleton:
         names, parents = [system.floor_root, *names], [-1, *(parent + 1 for parent in parents)]
         offsets, ends = [(0, 0, 0), *offsets], [(joint + 1, tip) for joint, tip in ends]
     return Skeleton(tuple(names), tuple(parents), np.array(offsets, float), tuple(ends))
+
+
+def dance_of(convention: str, seconds: float = 12.0, fps: float = 50.0, seed: int = 0) -> Recording:
+    """A dance in metres, Y up, to the audience: arms that hang and swing, knees that bend, a body that sways.
+
+    A root on the floor follows the hips over it.
+    """
+    skeleton, time = skeleton_of(convention), np.arange(round(seconds * fps)) / fps
+    chance = np.random.default_rng(seed)
+    system = CONVENTIONS[convention]
+    poses = np.tile(quaternion.IDENTITY.astype(float), (len(time), len(skeleton), 1))
+
+    def swing(size: float) -> Array:
+        slow = np.minimum(time / 2.0, 1.0)  # the dancer begins standing
+        return size * slow * np.sin(time * chance.uniform(1.5, 4.0) + chance.uniform(0, 6))
+
+    for role in system.roles():
+        joint = skeleton.index(system.name(role))
+        part = role.rpartition(" ")[2] if role.startswith(("left", "right")) else role
+        axis = chance.normal(size=3)
+        turn = quaternion.from_axis_angle(axis, swing(0.05 if part in ("hips", "foot") else 0.25))
+        if role.endswith("upper arm"):
+            hanging = np.radians(-75.0 if role.startswith("left") else 75.0)
+            turn = quaternion.multiply(
+                quaternion.from_axis_angle([0.0, 0.0, 1.0], np.full(len(time), hanging)), turn
+            )
+        if part in ("thigh", "shin"):
+            turn = quaternion.from_axis_angle([1.0, 0.0, 0.0], swing(0.12))
+        poses[:, joint] = turn
+    hips = np.stack([0.3 * np.sin(time), np.full(len(time), 0.95), 0.2 * np.cos(time)], axis=-1)
+    hips_joint = skeleton.index(system.name("hips"))
+    flat, _ = skeleton.forward_kinematics(poses, np.zeros((len(time), 3)))
+    feet = [j for foot in skeleton.feet for j in skeleton.descendants(foot)]
+    hips[:, 1] = 0.005 - (flat[:, feet, 1] - flat[:, [hips_joint], 1]).min(axis=1)
+    if hips_joint == 0:
+        return Recording(skeleton, quaternion.continuous(poses), hips, fps)
+    places = np.tile(skeleton.offsets, (len(time), 1, 1))
+    floor = hips * [1.0, 0.0, 1.0]
+    places[:, hips_joint] = hips - floor
+    return Recording(skeleton, quaternion.continuous(poses), floor, fps, places)
+
+
+def as_the_system_writes(dance: Recording, convention: str) -> Recording:
+    """The same dance in the system's zero pose, axes and units, as if read in centimetres."""
+    system = CONVENTIONS[convention]
+    given = rezeroed(dance, _zero_world(dance.skeleton, convention))
+    turn = quaternion.from_axis_angle([0.0, 1.0, 0.0], np.radians(system.turned_degrees))
+    if system.up == "z":
+        turn = quaternion.multiply(quaternion.from_axis_angle([1.0, 0.0, 0.0], np.pi / 2), turn)
+    return scaled(axes_turned(given, turn), 0.01 / system.metres)
+
+
+def rezeroed(dance: Recording, zero: Array) -> Recording:
+    """The same motion from another zero pose: the joints' world rotations in it, (J, 4)."""
+    skeleton = dance.skeleton
+    above = [
+        zero[parent] if parent >= 0 else quaternion.IDENTITY.astype(float) for parent in skeleton.parents
+    ]
+    back = quaternion.inverse(zero)
+    poses = np.empty_like(dance.poses)
+    for joint in range(len(skeleton)):
+        poses[:, joint] = quaternion.multiply(
+            quaternion.multiply(above[joint], dance.poses[:, joint]), back[joint]
+        )
+    offsets = np.stack([quaternion.rotate(above[j], skeleton.offsets[j]) for j in range(len(skeleton))])
+    ends = tuple((j, tuple(quaternion.rotate(zero[j], np.array(end)).tolist())) for j, end in skeleton.ends)
+    moved = dance.translations
+    if moved is not None:
+        moved = np.stack(
+            [
+                quaternion.rotate(np.broadcast_to(above[j], (len(moved), 4)), moved[:, j])
+                for j in range(len(skeleton))
+            ],
+            axis=1,
+        )
+    return Recording(
+        replace(skeleton, offsets=offsets, ends=ends),
+        quaternion.continuous(poses),
+        dance.roots,
+        dance.fps,
+        moved,
+    )
+
+
+def _zero_world(skeleton: Skeleton, convention: str) -> Array:
+    """World rotations (J, 4) from the T-pose to the system's zero pose."""
+    zero = np.tile(quaternion.IDENTITY.astype(float), (len(skeleton), 1))
+    kind = CONVENTIONS[convention].zero
+    for joint in range(len(skeleton)):
+        role = next((r for r, j in skeleton.roles.items() if j == joint), "")
+        if kind == "A" and role.endswith(("upper arm", "forearm", "hand")):
+            angle = np.radians(-45.0 if role.startswith("left") else 45.0)
+            zero[joint] = quaternion.from_axis_angle([0.0, 0.0, 1.0], angle)
+        if kind == "x":
+            children = [c for c, parent in enumerate(skeleton.parents) if parent == joint]
+            tips = [np.array(end) for j, end in skeleton.ends if j == joint]
+            bone = (
+                skeleton.offsets[children[0]] if len(children) == 1 else tips[0] if tips else [0.0, 1.0, 0.0]
+            )
+            zero[joint] = _turn_to_x(np.asarray(bone, float))
+    return zero
+
+
+def _turn_to_x(bone: Array) -> Array:
+    direction = bone / np.linalg.norm(bone)
+    axis, cosine = np.cross(direction, [1.0, 0.0, 0.0]), float(direction[0])
+    if np.linalg.norm(axis) < 1e-9:
+        axis = np.array([0.0, 1.0, 0.0])
+    return quaternion.from_axis_angle(axis, np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def scaled(dance: Recording, factor: float) -> Recording:
+    skeleton = dance.skeleton
+    ends = tuple((j, (x * factor, y * factor, z * factor)) for j, (x, y, z) in skeleton.ends)
+    return replace(
+        dance,
+        skeleton=replace(skeleton, offsets=skeleton.offsets * factor, ends=ends),
+        roots=dance.roots * factor,
+        translations=None if dance.translations is None else dance.translations * factor,
+    )
+
+
+def axes_turned(dance: Recording, turn: Array) -> Recording:
+    """The same motion with the axes of the room and of every joint turned."""
+
+    def turned(vectors: Array) -> Array:
+        return quaternion.rotate(np.broadcast_to(turn, (*vectors.shape[:-1], 4)), vectors)
+
+    skeleton, poses = dance.skeleton, dance.poses.copy()
+    poses[..., 1:] = turned(poses[..., 1:])
+    ends = tuple((j, tuple(turned(np.array(end)).tolist())) for j, end in skeleton.ends)
+    return replace(
+        dance,
+        skeleton=replace(skeleton, offsets=turned(skeleton.offsets), ends=ends),
+        poses=poses,
+        roots=turned(dance.roots),
+        translations=None if dance.translations is None else turned(dance.translations),
+    )

@@ -10,6 +10,7 @@ import pytest
 
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
+from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.evaluation import evaluation
@@ -63,7 +64,7 @@ def reordered(recording: Recording) -> Recording:
 
 def measured(folder: Path, recording: Recording, coder: Turning, all_frames: bool = False) -> Evaluation:
     write_bvh(folder / "dance.bvh", recording)
-    return evaluate(coder, load_takes([folder / "dance.bvh"], coder, all_frames=all_frames))
+    return evaluate(coder, load_takes([folder / "dance.bvh"], coder, ReadingOptions(all_frames=all_frames)))
 
 
 def test_one_turned_joint_is_the_whole_error(tmp_path: Path) -> None:
@@ -104,7 +105,7 @@ def test_a_glitch_is_not_counted_unless_asked_for(tmp_path: Path) -> None:
 def test_the_true_rate_is_taken_at_its_word(tmp_path: Path) -> None:
     coder = Turning("head", 1.0)
     write_bvh(tmp_path / "dance.bvh", swaying(2.0))
-    half = load_takes([tmp_path / "dance.bvh"], coder, true_fps=25.0)
+    half = load_takes([tmp_path / "dance.bvh"], coder, ReadingOptions(true_fps={"*": 25.0}))
     assert half[0].recording.seconds == pytest.approx(4.0, abs=0.1)
     (tmp_path / "catalogue.yaml").write_text("true_fps: {'*': 100}\n")
     known = load_takes([tmp_path / "dance.bvh"], coder)

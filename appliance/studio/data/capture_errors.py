@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.pose.bones import limb_ends, small_parts
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
-from appliance.studio.data.bones import limb_ends, small_parts
 from appliance.studio.data.jumps import Runs, bend_limits, bends, jumps, runs, visible
 
 SNAP = 0.5  # of a jump's limit: no error by itself, but it can put a joint into a wrong place

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from appliance.pose.reading_options import ReadingOptions, first_fit
+from appliance.pose.stage_frame import Reading
 from appliance.show.section import Section, refusal
 from appliance.show.validation import validated
 from appliance.show.yaml_file import read_yaml
 
 CATALOGUES = Path(__file__).parent / "catalogues"
 ALWAYS = (0.0, 1e9)  # seconds
+READ_FROM_FILES = ("true_fps", "metres_per_unit", "up", "facing", "root")
 Rate = Annotated[float, Field(ge=1, le=1000)]
 Unit = Annotated[float, Field(gt=0, le=10)]
 Second = Annotated[float, Field(ge=0)]
@@ -37,13 +40,28 @@ class Catalogue:
     keep: dict[str, Spans] = field(default_factory=dict)
     mask: dict[str, Spans] = field(default_factory=dict)
     metres_per_unit: dict[str, float] = field(default_factory=dict)
+    up: dict[str, str] = field(default_factory=dict)
+    facing: dict[str, str] = field(default_factory=dict)
+    root: dict[str, str] = field(default_factory=dict)
 
     def fps_of(self, name: str) -> float | None:
-        return _first(self.true_fps, name)
+        rate: float | None = first_fit(self.true_fps, name)
+        return rate
 
-    def unit_of(self, name: str) -> float | None:
-        """Metres in a unit of length of a recording."""
-        return _first(self.metres_per_unit, name)
+    def reading_of(self, name: str) -> Reading:
+        """Unit, axes and root of a recording, as far as they are known."""
+        found = (first_fit(one, name) for one in (self.metres_per_unit, self.up, self.facing, self.root))
+        return Reading(*found)
+
+    def with_options(self, options: ReadingOptions) -> Catalogue:
+        """With what the command line says, which comes first."""
+        own = ReadingOptions(**{name: getattr(self, name) for name in READ_FROM_FILES})
+        all_of_it = options.over(own)
+        return replace(
+            self,
+            **{name: getattr(all_of_it, name) for name in READ_FROM_FILES},
+            keep={"*": (ALWAYS,), **self.keep} if options.all_frames else self.keep,
+        )
 
     def take_of(self, name: str) -> str:
         return self.take.get(name, name)
@@ -87,6 +105,9 @@ def read_catalogue(path: Path) -> Catalogue:
         {pattern: tuple(spans) for pattern, spans in file.keep.items()},
         {pattern: tuple(spans) for pattern, spans in file.mask.items()},
         file.metres_per_unit,
+        dict(file.up),
+        dict(file.facing),
+        file.root,
     )
 
 
@@ -94,16 +115,14 @@ def _joined(catalogues: Sequence[Catalogue]) -> Catalogue:
     """Several catalogues as one; each acknowledgement once."""
     rates: dict[str, float] = {}
     takes: dict[str, str] = {}
+    facing: dict[str, str] = {}
     for one in catalogues:
         rates |= one.true_fps
         takes |= one.take
+        facing |= one.facing
     held = tuple(pattern for one in catalogues for pattern in one.held_out)
     thanks = dict.fromkeys(one.acknowledgement for one in catalogues if one.acknowledgement)
-    return Catalogue(rates, takes, held, " ".join(thanks))
-
-
-def _first(by_pattern: Mapping[str, float], name: str) -> float | None:
-    return next((value for pattern, value in by_pattern.items() if fnmatch.fnmatch(name, pattern)), None)
+    return Catalogue(rates, takes, held, " ".join(thanks), facing=facing)
 
 
 def _spans(by_pattern: Mapping[str, Spans], name: str) -> Spans:
@@ -132,6 +151,15 @@ class CatalogueFile(Section):
     )
     metres_per_unit: dict[str, Unit] = Field(
         default={}, description="Metres in a unit of length, by pattern: {solo_*: 0.0254} for inches."
+    )
+    up: dict[str, Literal["y", "z"]] = Field(
+        default={}, description="Vertical axis, by pattern: {solo_*: z}."
+    )
+    facing: dict[str, Literal["z", "x", "-z", "-x"]] = Field(
+        default={}, description="Where the dancer faces, once upright, by pattern: {solo_*: -z}."
+    )
+    root: dict[str, Name] = Field(
+        default={}, description="Joint that carries the body, by pattern: {solo_*: Hips}."
     )
     acknowledgement: str = Field(default="", description="Acknowledgement in every show made of them.")
     bytes: dict[str, int] = Field(default={}, description="File sizes that identify recordings.")

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.pose.bones import span_m
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.studio.data.bones import span_m
 
 UNEQUAL = 0.03  # of the body's span: tolerance between the two sides (a dancer's head sits 5 mm off)
 OPPOSITE_DEGREES = 120.0  # a joint usually this far from its counterpart's image has other axes

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.data.catalogue import ALWAYS, Catalogue, find_catalogue, read_catalogue
 from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.studio_error import StudioError
@@ -33,7 +34,7 @@ def given(
     recordings: Path,
     catalogue: Path | None = None,
     held_out: Sequence[str] = (),
-    true_fps: Sequence[str] = (),
+    reading: ReadingOptions = AS_THE_FILES_SAY,
     keep: Sequence[str] = (),
 ) -> Sources:
     """Sources from options; options override the catalogue."""
@@ -41,15 +42,14 @@ def given(
     if not files:
         raise StudioError(f"{recordings} has no .bvh files. Give the folder that holds your recordings.")
     known = read_catalogue(catalogue) if catalogue else find_catalogue(recordings, files)
-    rates = dict(_rate(words) for words in true_fps)
-    kept = {**known.keep, **dict.fromkeys(keep, (ALWAYS,))}
-    known = replace(known, true_fps={**rates, **known.true_fps}, keep=kept)
+    known = replace(known, keep={**known.keep, **dict.fromkeys(keep, (ALWAYS,))})
     for pattern in (*known.keep, *known.mask):
         if not any(fnmatch.fnmatch(file.stem, pattern) for file in files):
             raise StudioError(
                 f"'{pattern}' is to be kept or masked, but no recording in {recordings} has that name. "
                 "Give the name of a file without .bvh, or a pattern such as 'solo_*'."
             )
+    known = known.with_options(reading)
     return Sources(recordings, replace(known, held_out=tuple(held_out)) if held_out else known)
 
 
@@ -63,16 +63,5 @@ def remembered(state: dict[str, Any], recordings: Path | None, checkpoint: Path)
         raise StudioError(f"The recordings are no longer in {folder}. Give their folder with --recordings.")
     if "catalogue" not in origin:
         return given(folder)
-    known = origin["catalogue"]
+    known = {"facing": {"*": "z"}, **origin["catalogue"]}  # trainings of before turned no recording
     return Sources(folder, Catalogue(**{**known, "held_out": tuple(known["held_out"])}))
-
-
-def _rate(words: str) -> tuple[str, float]:
-    pattern, separator, fps = words.partition("=")
-    try:
-        rate = float(fps)
-    except ValueError:
-        rate = 0.0
-    if not separator or not 1 <= rate <= 1000:
-        raise StudioError(f"'{words}' is no rate: write PATTERN=FPS, for example 'salsa_*=60'.")
-    return pattern, rate

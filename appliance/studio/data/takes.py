@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.bvh import leading_tpose_frames, read_bvh
 from appliance.pose.recording import Recording
+from appliance.pose.stage_frame import in_stage_frame
 from appliance.studio.data.capture_errors import (
     MARKED,
     CaptureError,
@@ -22,7 +23,6 @@ from appliance.studio.data.capture_errors import (
 )
 from appliance.studio.data.catalogue import Catalogue
 from appliance.studio.data.jumps import Runs, runs
-from appliance.studio.data.stage_frame import in_stage_frame
 
 FPS = 50.0
 MOVING_DEGREES = 1.0  # joints that turn less than this in every recording are still
@@ -98,11 +98,12 @@ def read_take(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
         recording = recording.without_first(TPOSE_FRAMES)
     if not len(recording):
         raise DatasetError(f"{file.name} has no pose but its T-pose. Remove the file.")
-    recording, notes = in_stage_frame(recording, catalogue.unit_of(file.stem))
+    recording, guesses = in_stage_frame(recording, catalogue.reading_of(file.stem))
     resampled = recording.resampled(FPS)
     sound = np.ones(len(resampled), dtype=bool)
     take = catalogue.take_of(file.stem)
-    return Take(file.stem, take, resampled, sound, header.fps, fps, notes=tuple(notes)), recording
+    notes = tuple(guess.sentence() for guess in guesses)
+    return Take(file.stem, take, resampled, sound, header.fps, fps, notes=notes), recording
 
 
 def masked_take(take: Take, found: Sequence[CaptureError], catalogue: Catalogue) -> Take:

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.skeleton import UnknownJointError
 from appliance.studio.data.dataset import (
     WINDOW,
-    Catalogue,
     Take,
     find_catalogue,
     load_take,
@@ -72,19 +72,16 @@ class Evaluation:
 
 
 def load_takes(
-    files: Sequence[Path], coder: MovedJoints, true_fps: float | None = None, all_frames: bool = False
+    files: Sequence[Path], coder: MovedJoints, reading: ReadingOptions = AS_THE_FILES_SAY
 ) -> list[Take]:
     """Recordings as training reads them: at their true rate, T-pose dropped, capture errors masked, 50 Hz.
 
-    Without true_fps, the rate is that of a catalogue that lists the file, else of its header.
+    What reading says comes before a catalogue that lists the file.
     """
     takes = []
     for file in files:
-        known = Catalogue({"*": true_fps}) if true_fps else find_catalogue(file.parent, [file])
-        take = load_take(file, known, dict(zip(coder.joints, coder.rest, strict=True)))
-        if all_frames:
-            take.sound[:] = True
-        takes.append(take)
+        known = find_catalogue(file.parent, [file]).with_options(reading)
+        takes.append(load_take(file, known, dict(zip(coder.joints, coder.rest, strict=True))))
     return takes
 
 

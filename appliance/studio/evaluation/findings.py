@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from appliance.pose.body_facts import height_m, sampled_positions
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset, DatasetError, Take, window_starts
+from appliance.studio.inspection import doubts, zero_pose
 
 MASKED_PICTURE = "pictures/masked.png"
 FEW_S = 120.0  # of sound dance to learn from
@@ -26,6 +28,7 @@ def findings(dataset: Dataset) -> list[str]:
         f"{_minutes(takes):.1f} minutes, resampled to {FPS:g} poses a second.",
         f"{len(moving)} of {len(names)} joints move: {', '.join(moving)}."
         + (f" The others never turn and stay as they are: {', '.join(still)}." if still else ""),
+        *_body(dataset),
         *_rates(takes),
         *_notes(takes),
         *_masked(takes),
@@ -72,6 +75,18 @@ def _few_data(dataset: Dataset) -> list[str]:
         f"{seconds:.0f} s are little to learn from: expect a dancer that knows these few moves, and that "
         "answers a hand far from all of them with the nearest one. The show that comes along learned from 11 "
         "minutes."
+    ]
+
+
+def _body(dataset: Dataset) -> list[str]:
+    """The body's height, what its joints are taken for, and what has to be asked."""
+    take = max(dataset.takes, key=lambda take: len(take.recording))
+    height = height_m(dataset.skeleton, sampled_positions(take.recording))
+    taken = [f"{role} {dataset.skeleton.names[joint]}" for role, joint in dataset.skeleton.roles.items()]
+    return [
+        f"A body {height:.2f} m tall, {zero_pose(dataset.skeleton)} at rest. Taken for: {', '.join(taken)}. "
+        "More: bunraku inspect.",
+        *doubts(dataset.skeleton, height),
     ]
 
 

@@ -18,6 +18,7 @@ from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import Dataset, Take, find_catalogue, load_take
+from appliance.studio.data.remembered import KEY, reading_facts
 from appliance.studio.data.sources import Sources
 from appliance.studio.evaluation.coders import OnnxCoder, Poses, TorchCoder, load_puppet
 from appliance.studio.evaluation.evaluation import evaluate, fitting_hop
@@ -41,13 +42,16 @@ FIRST_HANDS = ("left upper arm", "left forearm", "left hand", "right upper arm",
 
 @dataclass(frozen=True)
 class Request:
-    """What to make a show of. name '': the folder's; phrase None: the bundle's own, or an excerpt."""
+    """What to make a show of. name '': the folder's; phrase None: the bundle's own, or an excerpt; hand: the
+    joint that the first sensor holds, None: the left upper arm.
+    """
 
     checkpoint: Path
     source: Sources
     out: Path
     name: str = ""
     phrase: Path | None = None
+    hand: str | None = None
 
 
 def release(request: Request, dataset: Dataset, console: Console) -> dict[str, Any]:
@@ -80,6 +84,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     evaluation = evaluate(coder, judged_on, fitting_hop(coder, judged_on))
     names = sorted(take.name for take in judged_on)
     report = write_up(coder, state, dataset, evaluation, names, verdict, difference, times)
+    report[KEY] = reading_facts(request.source.catalogue)
     say("Measuring whether the body answers a hand.")
     report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png")
     packing.write_skeleton(request.out, dataset.skeleton, dataset.still_pose())
@@ -92,7 +97,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
             f"phrase.bvh is {phrase.seconds:.0f} s of the recording {take}: the bundle contains a recording. "
             "Give your own with --phrase, or replace the file and run bunraku export again."
         )
-    joint, doubt = first_hand(dataset.skeleton, coder.joints)
+    joint, doubt = first_hand(dataset.skeleton, coder.joints, request.hand)
     if doubt:
         say(doubt)
     hand: dict[str, Any] = {"sensor": "left-wrist", "joint": joint}
@@ -108,21 +113,26 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     return report
 
 
-def first_hand(skeleton: Skeleton, joints: Sequence[str]) -> tuple[str, str]:
+def first_hand(skeleton: Skeleton, joints: Sequence[str], wanted: str | None = None) -> tuple[str, str]:
     """The joint that a new show gives to its sensor, and what is doubtful about it, in words ('': nothing).
 
-    The left upper arm by the names, else by the skeleton's shape. joints: those that the network moves.
+    The wanted one; else the left upper arm by the names; else by the skeleton's shape. joints: those that the
+    network moves. Raises StudioError where it does not move the wanted one.
     """
+    if wanted is not None:
+        if wanted not in joints:
+            raise StudioError(f"No hand can hold '{wanted}': the network moves {', '.join(joints)}.")
+        return wanted, ""
     called = {role: skeleton.names[joint] for role, joint in skeleton.roles.items()}
     named = next((called[role] for role in FIRST_HANDS if called.get(role) in joints), None)
     if named is not None:
         meant = called.get("left upper arm") == named
         why = f"The left upper arm does not move or has no known name: the first hand holds {named}."
-        return named, "" if meant else f"{why} Another: hands: in show.yaml."
+        return named, "" if meant else f"{why} Another: --hand JOINT, or hands: in show.yaml."
     chosen = _arm_by_shape(skeleton, joints) or joints[-1]
     return chosen, (
         f"No joint has a name that is known for an arm (bunraku inspect lists them). The first hand holds "
-        f"{chosen}, by the skeleton's shape. Another: hands: in show.yaml."
+        f"{chosen}, by the skeleton's shape. Another: --hand JOINT, or hands: in show.yaml."
     )
 
 

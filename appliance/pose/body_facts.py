@@ -1,0 +1,84 @@
+"""What a recording says of its dancer: height, floor, where the head is, where the front is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+
+SMALLEST_M, TALLEST_M = 1.2, 2.2  # a body outside is asked about
+UPRIGHT = 0.6  # of the way from hips to head lies along an axis
+SAMPLES_A_SECOND = 5.0
+STANDING_PERCENTILE = (
+    90.0  # of the heights from sole to crown: the dancer stands upright in a tenth of the time
+)
+PLANTED_PERCENTILE = 5.0  # of the heights of the lowest sole: the floor
+
+
+def sampled_positions(recording: Recording) -> Array:
+    """World positions (N, J, 3) in metres, five instants a second."""
+    every = slice(None, None, max(1, round(recording.fps / SAMPLES_A_SECOND)))
+    moved = None if recording.translations is None else recording.translations[every]
+    return recording.skeleton.forward_kinematics(recording.poses[every], recording.roots[every], moved)[0]
+
+
+def rest_positions(skeleton: Skeleton) -> Array:
+    """(1, J, 3): where the joints are in the zero pose."""
+    rest = np.tile(quaternion.IDENTITY.astype(float), (1, len(skeleton), 1))
+    return skeleton.forward_kinematics(rest, np.zeros((1, 3)))[0]
+
+
+def head_way(skeleton: Skeleton, positions: Array) -> Array | None:
+    """(3,): mean direction from the root to the head, of positions (N, J, 3); None without a head."""
+    head = skeleton.head
+    if not head:
+        return None
+    ways = positions[:, head] - positions[:, 0]
+    way: Array = (ways / np.maximum(np.linalg.norm(ways, axis=-1, keepdims=True), 1e-12)).mean(axis=0)
+    return way
+
+
+def fronts(skeleton: Skeleton, positions: Array) -> Array | None:
+    """(N, 2): unit vectors along x and z to the dancer's front; None where no name says the sides."""
+    across = np.zeros((len(positions), 3))
+    for part in ("thigh", "upper arm"):
+        sides = [skeleton.roles.get(f"{side} {part}") for side in ("left", "right")]
+        if None not in sides:
+            across = across + positions[:, sides[0]] - positions[:, sides[1]]
+    front = np.stack([-across[:, 2], across[:, 0]], axis=-1)  # across x (0, 1, 0), its x and z
+    lengths = np.linalg.norm(front, axis=-1, keepdims=True)
+    return front / np.maximum(lengths, 1e-12) if (lengths > 1e-6).any() else None
+
+
+def stands(skeleton: Skeleton, positions: Array) -> bool:
+    """Whether the head is above the root and the feet are below it: a zero pose that is a figure."""
+    way, feet = head_way(skeleton, positions), list(skeleton.feet)
+    if way is None or not feet:
+        return False
+    below = positions[:, 0, 1] - positions[:, feet, 1].mean(axis=-1)
+    return bool(way[1] > UPRIGHT and (below > 0.2 * skeleton.reaches[0]).all())
+
+
+def lowest_soles(skeleton: Skeleton, positions: Array) -> Array:
+    """(N,): height in metres of the lowest joint of the feet or below; without feet of the lowest joint."""
+    feet = sorted({joint for foot in skeleton.feet for joint in skeleton.descendants(foot)})
+    heights = positions[:, feet or range(len(skeleton)), 1]
+    lowest: Array = heights.min(axis=-1)
+    return lowest
+
+
+def floor_m(skeleton: Skeleton, positions: Array) -> float:
+    """Height of the floor, from where the lowest sole mostly is."""
+    return float(np.percentile(lowest_soles(skeleton, positions), PLANTED_PERCENTILE))
+
+
+def height_m(skeleton: Skeleton, positions: Array) -> float:
+    """Height of the standing dancer from the soles to the crown, metres."""
+    head = skeleton.head
+    top = positions[..., 1].max(axis=-1) if head is None else positions[:, head, 1]
+    crown = max((float(np.linalg.norm(end)) for joint, end in skeleton.ends if joint == head), default=0.0)
+    tall = float(np.percentile(top - lowest_soles(skeleton, positions), STANDING_PERCENTILE))
+    return tall + (crown or 0.12 * tall)
