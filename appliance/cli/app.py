@@ -116,11 +116,12 @@ def play(
         ),
     ] = None,
     chosen: ChosenFile = None,
+    cue: Annotated[str | None, typer.Option(help="Begin in this cue of the show.")] = None,
 ) -> int:
     """Dance: sensors in, joints out, 50 times a second, until Ctrl-C."""
     from appliance.cli.play import play_show
 
-    return play_show(show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse, chosen)
+    return play_show(show, box, seconds, emulate, journal, filmstrip, alone, window, rehearse, chosen, cue)
 
 
 def preflight(context: typer.Context) -> int:

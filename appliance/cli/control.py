@@ -15,8 +15,10 @@ from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.release.choice import box_of
 from appliance.show.box import BoxConfig, load_box
-from appliance.show.config_error import NotAskedForError, Problem
+from appliance.show.config_error import NotAskedForError, Problem, did_you_mean
 from appliance.show.control import ControlConfig
+from appliance.show.show import Show
+from appliance.show_control.packet import datagram
 from appliance.show_control.port import open_port
 from appliance.show_control.settings import Settings
 from appliance.stage.stage_error import StageError
@@ -69,6 +71,21 @@ def _taken(control: ControlConfig, error: OSError) -> StageError:
         "Commands could not arrive, so nothing is started. Is a second bunraku running? Stop it, or "
         "give another port under control: in the box file, or `control: null` for none."
     )
+
+
+def begin_in(cue: str, show: Show, control: socket.socket | None) -> None:
+    """Have the show begin in a cue: the command waits in the control port until show control reads it.
+
+    Raises StageError where the show has no such cue, or no show control runs with it.
+    """
+    names = [one.name for one in show.config.cues]
+    if cue not in names:
+        raise StageError(f"{show.config.name} has no cue '{cue}'. {did_you_mean(cue, names)}")
+    if control is None:
+        raise StageError("--cue needs show control beside the stage: leave --alone and `control: null` out.")
+    host, port = control.getsockname()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        asking.sendto(datagram(("/cue", cue)), ("127.0.0.1" if host == "0.0.0.0" else host, port))
 
 
 def control_command(box: BoxConfig, descriptor: int) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from appliance.box.live_pose import forget_live_pose
 from appliance.box.log_writer import LogWriter
 from appliance.box.show_state import forget_show_state
 from appliance.box.stop_signals import stop_signals
+from appliance.cli.readings import readings_line
 from appliance.sensor.memory import forget_memory
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
@@ -31,17 +32,6 @@ PICTURED_MINUTES = 0.5  # a journal for the picture at the end keeps little more
 _REHEARSAL = (
     "A rehearsal with emulated sensors: the box's own place, journal and sensor memory stay as they are."
 )
-_NO_REFUSAL = ("accepted", "hello", "profile", "lost", "reboot", "drain_limit")
-# In a technician's words; a reason that is missing here keeps its name from docs/wire.md.
-_REFUSALS = {
-    "no packets of ours": ("length", "magic", "version", "kind"),
-    "from sensors without a key": ("device",),
-    "forged or damaged": ("tag",),
-    "of an earlier link": ("old_session", "old_hello"),
-    "doubled or too late": ("duplicate", "reordered", "old"),
-    "without an orientation": ("norm",),
-    "damaged on the cable": ("frame_length", "frame_stuffing", "frame_crc"),
-}
 
 
 def play_show(
@@ -55,11 +45,13 @@ def play_show(
     window: bool = False,
     rehearse: Path | None = None,
     chosen: Path | None = None,
+    cue: str | None = None,
 ) -> int:
     """Dance until the seconds are over or a signal comes; returns the exit status.
 
     alone: start no companions. window: show the projection in a window. rehearse: the same if there is a
     display, and a picture of the projection at the end. chosen: dance what the preflight chose and proved.
+    cue: begin in this one.
 
     Raises ConfigError, StageError.
     """
@@ -88,6 +80,10 @@ def play_show(
         opened.callback(speaker.close)
         shown = rehearse is not None and _has_display()
         control = None if alone or box.control is None else _opened(box.control, opened)
+        if cue is not None:
+            from appliance.cli.control import begin_in
+
+            begin_in(cue, show, control)
         page = None
         if box.console is not None and not alone:
             from appliance.cli.console import open_console_port, page_companion
@@ -247,7 +243,10 @@ def _new_folder(journal: Path) -> Path:
 
 def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) -> list[str]:
     show = stage.show
-    hands = ", ".join(f"{hand.sensor or hand.kind} holds {hand.joint}" for hand in show.config.hands)
+    hands = ", ".join(
+        f"{hand.sensor or hand.kind} hold{'' if hand.springs else 's'} {hand.joint}"
+        for hand in show.config.hands
+    )
     receivers = ", ".join(receiver.name for receiver in stage.parts.outputs.receivers) or "no receiver"
     lines = [
         f"{show.config.name}: {hands or 'no hands, the dancer moves freely'}.",
@@ -281,18 +280,5 @@ def _conclusion(stage: Stage) -> list[str]:
         f"Danced {health.ticks} ticks: late {health.late}, longest tick {health.worst_ms:.1f} ms{trouble}."
     ]
     if stage.parts.worn:
-        lines.append(_readings(stage.parts.link.counts))
+        lines.append(readings_line(stage.parts.link.counts))
     return lines
-
-
-def _readings(counts: dict[str, int]) -> str:
-    """Counts of the sensors' packets: accepted, lost, refused by reason."""
-    words = {reason: words for words, reasons in _REFUSALS.items() for reason in reasons}
-    refused: dict[str, int] = {}
-    for reason, count in counts.items():
-        if count and reason not in _NO_REFUSAL:
-            said = words.get(reason, reason)
-            refused[said] = refused.get(said, 0) + count
-    lost = f", {counts['lost']} lost on the way" if counts["lost"] else ""
-    reasons = ", ".join(f"{count} {said}" for said, count in refused.items())
-    return f"Readings: {counts['accepted']} accepted{lost}" + (f"; refused: {reasons}." if refused else ".")

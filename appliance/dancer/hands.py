@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from appliance.dancer.extrapolation import Extrapolation
 from appliance.dancer.puppeteers import Kept, Puppeteer
 from appliance.dancer.slerp import FloatArray
+from appliance.dancer.springs import Springs
 from appliance.pose import quaternion
 from appliance.pose.skeleton import UnknownJointError
 
@@ -29,17 +30,22 @@ class Hands:
     def __init__(self, puppeteers: Sequence[Puppeteer], joints: Sequence[str], window: int = 8) -> None:
         """joints: the M moving joints of the network; window: its T poses. Raises HandError."""
         self.puppeteers = tuple(puppeteers)
-        self._places: list[int] = []
+        places: list[int] = []
+        self._rows: list[slice] = []  # of each puppeteer, in what follows
         for puppeteer in puppeteers:
-            place = _place(puppeteer.joint, joints)
-            if place in self._places:
-                raise HandError(f"Two hands hold '{puppeteer.joint}'. Give each joint to one hand only.")
-            self._places.append(place)
+            held = puppeteer.joints if isinstance(puppeteer, Springs) else (puppeteer.joint,)
+            self._rows.append(slice(len(places), len(places) + len(held)))
+            for joint in held:
+                place = _place(joint, joints)
+                if place in places:
+                    raise HandError(f"Two hands hold '{joint}'. Give each joint to one hand only.")
+                places.append(place)
+        self._places: NDArray[np.intp] = np.array(places, dtype=np.intp)
         self.mask: NDArray[np.bool_] = np.zeros(len(joints), dtype=np.bool_)
         self.targets = np.tile(quaternion.IDENTITY, (window, len(joints), 1))
         self.weights = np.zeros(len(joints), dtype=np.float32)
 
-        count = len(self.puppeteers)
+        count = len(self._places)
         self._present = np.tile(quaternion.IDENTITY, (count, 1))
         self._before = self._present.copy()
         self._signs = np.empty((count, 1), dtype=np.float32)
@@ -57,22 +63,24 @@ class Hands:
         if not self.puppeteers:
             return
         np.copyto(self._before, self._present)
-        for hand, (place, puppeteer) in enumerate(zip(self._places, self.puppeteers, strict=True)):
-            self._is_new[hand] = not puppeteer.is_holding
+        for rows, puppeteer in zip(self._rows, self.puppeteers, strict=True):
+            self._is_new[rows] = not puppeteer.is_holding
             if isinstance(puppeteer, Kept):
-                puppeteer.follow_phrase(window[0, place])
+                puppeteer.follow_phrase(window[0, self._places[rows.start]])
             target = puppeteer.pull(now)
-            self._present[hand] = target.orientation
-            self.weights[place] = target.weight
+            self._present[rows] = (
+                puppeteer.orientations if isinstance(puppeteer, Springs) else target.orientation
+            )
+            self.weights[self._places[rows]] = target.weight
         np.einsum("hk,hk->h", self._present, self._before, out=self._signs[:, 0])
         np.copysign(1.0, self._signs, out=self._signs)
         np.multiply(self._present, self._signs, out=self._present)
         self._extrapolation(self._present, self._is_new, out=self._ahead)
-        for hand, (place, puppeteer) in enumerate(zip(self._places, self.puppeteers, strict=True)):
+        self.targets[:, self._places] = self._ahead
+        for rows, puppeteer in zip(self._rows, self.puppeteers, strict=True):
             if isinstance(puppeteer, Kept):
-                np.multiply(window[:, place], self._signs[hand], out=self.targets[:, place])
-            else:
-                self.targets[:, place] = self._ahead[:, hand]
+                place = self._places[rows.start]
+                np.multiply(window[:, place], self._signs[rows.start], out=self.targets[:, place])
         np.greater(self.weights, 0.0, out=self.mask)
 
     def state(self) -> dict[str, Any]:

@@ -48,6 +48,11 @@ class Puppeteer:
         """Whether the last pull gave the joint any weight."""
         return self._target.weight > 0.0
 
+    @property
+    def orientation(self) -> FloatArray:
+        """Where the last pull pointed the joint, (4,) local; overwritten by the next."""
+        return self._target.orientation
+
     def pull(self, now: float) -> Target:
         """The target at the time `now`; it stands still while the time does.
 

@@ -50,6 +50,7 @@ class Facts:
     most_iterations: int
     pid: int
     started: float  # seconds on the monotonic clock
+    springs: tuple[str, ...] = ()  # names of their settings
     rehearsal: bool = False  # its sensors are emulated: nothing is kept
 
     def packed(self) -> bytes:
@@ -72,7 +73,7 @@ class Facts:
         """From JSON. Raises ValueError, KeyError or TypeError for foreign data."""
         facts = plain_json(packed)
         skeleton, box_file = facts["skeleton"], facts["box_file"]
-        names = ("held", "hands", "phrases", "cues", "looks", "lights")
+        names = ("held", "hands", "phrases", "cues", "looks", "lights", "springs")
         return cls(
             **facts
             | {name: tuple(facts[name]) for name in names}

@@ -33,6 +33,7 @@ class CueConfig(Section):
     hands: list[Name] | None = key(
         "Joints whose hands hold in this cue; the other hands let go. []: all let go.", None, length=(0, 8)
     )
+    springs: Name | None = key("Setting of the springs that are among the hands.", None)
     look: Name | None = key("Name of the look.", None)
     lights: Name | None = key("Name of the set of light mappings.", None)
     master: float | None = key("Brightness of lights and picture, 0 to 1.", None, within=(0, 1))
@@ -61,7 +62,7 @@ def cue_problems(
 ) -> Iterator[Problem]:
     """Names in cues that the show does not have, and cues with the same name, each with its line.
 
-    `known`: which names there are for the keys phrase, hands, look and lights of a cue.
+    `known`: which names there are for the keys phrase, hands, springs, look and lights of a cue.
     """
     names = [cue.name for cue in cues]
     for place, cue in enumerate(cues):
@@ -92,12 +93,13 @@ _UNKNOWN = {
     "hands": "No hand of this show holds the joint '{}'.",
     "look": "This show has no look '{}'.",
     "lights": "This show has no set of light mappings '{}'.",
+    "springs": "This show has no setting of springs '{}'.",
 }
 
 
 def _named(cue: CueConfig, place: int) -> Iterator[tuple[str, Location, str]]:
     """Each name in a cue: its key, where it stands, the name."""
-    for what in ("phrase", "look", "lights"):
+    for what in ("phrase", "look", "lights", "springs"):
         word = getattr(cue, what)
         if word is not None:
             yield what, ("cues", place, what), word

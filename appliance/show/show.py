@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
 
 from pydantic import field_validator, model_validator
 
@@ -16,89 +15,15 @@ from appliance.show.bundle import COPY_AGAIN
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.cues import CueConfig, cue_problems
 from appliance.show.dance import DancerConfig, MotionConfig
+from appliance.show.hand import HandConfig
 from appliance.show.lights import LightsConfig
 from appliance.show.look import LookConfig, looks_by_name
-from appliance.show.section import Axis, Joint, Orientation, Section, key, part, refusal, refuse_repeats
+from appliance.show.section import Section, key, part, refusal, refuse_repeats
+from appliance.show.springs import SpringsConfig, springs_by_name
 from appliance.show.validation import validated
 from appliance.show.yaml_file import YamlFile, read_yaml
 
 MAX_HANDS = 8
-LONGEST_SENSOR_NAME = 24  # as in the key file (appliance/sensor/keys.py) and the wearable's flash
-KINDS = ("sensor", "turning", "fixed", "kept", "osc")
-SENSOR_KEYS = ("facing", "at_neutral", "neutral", "primary")  # of a hand, for a worn sensor alone
-
-
-class TurningConfig(Section):
-    """A hand that turns its joint at a constant rate."""
-
-    axis: Axis = key("Axis (x, y, z) in the parent's frame, any length.", (0.0, 1.0, 0.0))
-    seconds_per_turn: float = key("Seconds for one turn.", 5.0, within=(0.1, 3600))
-
-
-class FixedConfig(Section):
-    """A hand that holds its joint still."""
-
-    orientation: Orientation = key("Local to the parent joint; order w, x, y, z.", (1.0, 0.0, 0.0, 0.0))
-
-
-class HandConfig(Section):
-    """A puppeteer's hold on one joint. Exactly one of sensor, turning, fixed, kept, osc names the holder."""
-
-    sensor: str | None = key(
-        "Name of the worn sensor that holds it, as in the key file.", None, length=(1, LONGEST_SENSOR_NAME)
-    )
-    turning: TurningConfig | None = key("The joint turns at a constant rate.", None)
-    fixed: FixedConfig | None = key("The joint is held still.", None)
-    kept: Literal[True] | None = key(
-        "The joint is kept where the phrase has it, pose by pose; with as many interaction as "
-        "coding iterations it stays there exactly.",
-        None,
-    )
-    osc: Literal[True] | None = key("Messages to the control port hold the joint.", None)
-    joint: Joint = key("Name of the held joint, one that the network moves.", length=(1, None))
-    weight: float = key(
-        "How firmly it is held: 0 not at all, 1 fully overwritten in each interaction.", 1.0, within=(0, 1)
-    )
-    facing: Axis = key(
-        "For sensors: the axis of the sensor (x, y, z; x is the arrow on its case, z comes out "
-        "of its lid) that points to the front while the dancer stands in the neutral pose.",
-        (1.0, 0.0, 0.0),
-    )
-    at_neutral: Orientation = key(
-        "For sensors: the joint's orientation, local to its parent (w, x, y, z), while the "
-        "dancer stands in the neutral pose; [1, 0, 0, 0] is the skeleton's rest pose.",
-        (1.0, 0.0, 0.0, 0.0),
-    )
-    neutral: Orientation = key(
-        "For sensors: the sensor's own orientation (w, x, y, z in its axes: z up) that counts as "
-        "the neutral pose until the dancer has stood still for one.",
-        (1.0, 0.0, 0.0, 0.0),
-    )
-    primary: bool = key("For sensors: the tick's phase follows this one; otherwise the first one.", False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _one_kind(cls, values: Any) -> Any:
-        if not isinstance(values, dict):
-            return values
-        given = [kind for kind in KINDS if values.get(kind) is not None]
-        if len(given) != 1:
-            found = " and ".join(given) if given else "none of them"
-            raise refusal(
-                f"A hand has exactly one of {', '.join(KINDS)}; this one has {found}.",
-                "Name one puppeteer, and write a second hand for a second one.",
-                at=given[1] if given else None,
-            )
-        for name in SENSOR_KEYS:
-            if name in values and given != ["sensor"]:
-                message = f"'{name}' belongs to a sensor, and this hand is {given[0]}."
-                raise refusal(message, "Remove it.", at=name)
-        return values
-
-    @property
-    def kind(self) -> str:
-        """sensor, turning, fixed, kept or osc."""
-        return next(kind for kind in KINDS if getattr(self, kind) is not None)
 
 
 class ShowConfig(Section):
@@ -110,6 +35,11 @@ class ShowConfig(Section):
     motion: MotionConfig = part(MotionConfig)
     hands: list[HandConfig] = key(
         "Which puppeteer holds which joint, each joint at most once.", [], length=(0, MAX_HANDS)
+    )
+    springs: list[SpringsConfig] = key(
+        "Settings of the springs that are among the hands. []: the built-in loose, stiff and storm.",
+        [],
+        length=(0, 32),
     )
     looks: list[LookConfig] = key(
         "How the projection looks; the first one is shown at the start. "
@@ -135,6 +65,37 @@ class ShowConfig(Section):
             )
         return hands
 
+    @field_validator("springs")
+    @classmethod
+    def _each_setting_once(cls, springs: list[SpringsConfig]) -> list[SpringsConfig]:
+        refuse_repeats(
+            [setting.name for setting in springs],
+            "Two settings of springs are called '{value}'.",
+            "Give one another name.",
+        )
+        return springs
+
+    @model_validator(mode="after")
+    def _springs_as_set(self) -> ShowConfig:
+        """At most one hand is springs, and its setting is there."""
+        places = [place for place, hand in enumerate(self.hands) if hand.springs is not None]
+        if len(places) > 1:
+            raise refusal(
+                "Two hands are springs.",
+                "Keep one: it holds all joints below its own.",
+                at=("hands", places[1], "springs"),
+            )
+        names = list(springs_by_name(self.springs))
+        for place in places:
+            setting = self.hands[place].springs or ""
+            if setting not in names:
+                raise refusal(
+                    f"This show has no setting of springs '{setting}'.",
+                    did_you_mean(setting, names),
+                    at=("hands", place, "springs"),
+                )
+        return self
+
     @field_validator("looks")
     @classmethod
     def _each_look_once(cls, looks: list[LookConfig]) -> list[LookConfig]:
@@ -150,11 +111,17 @@ class ShowConfig(Section):
         return sensors[0].sensor if sensors else None
 
     @property
+    def has_springs(self) -> bool:
+        """Whether springs are among the hands."""
+        return any(hand.springs for hand in self.hands)
+
+    @property
     def names(self) -> dict[str, tuple[str, ...]]:
-        """What a cue may name under phrase, hands, look and lights, each first what is in force at start."""
+        """What a cue may name under phrase, hands, springs, look, lights; first what is in force at start."""
         return {
             "phrase": self.motion.sources,
             "hands": tuple(hand.joint for hand in self.hands),
+            "springs": tuple(springs_by_name(self.springs)) if self.has_springs else (),
             "look": tuple(looks_by_name(self.looks)),
             "lights": tuple(mapping.name for mapping in self.lights.mappings),
         }

@@ -60,6 +60,7 @@ _ON = Number("0 or 1", 0, 1, is_whole=True)
 _FADE = Number("fade in seconds", 0, _MOST_FADE_S)
 _SECOND = Number("second", 0, _FAR)
 _ANY = -_FAR, _FAR
+_WIND = tuple(Number(f"{axis}, m/s", -30, 30) for axis in "xyz")
 _CORNER = Number("corner", 1, 4, is_whole=True)
 _PLACE = (Number("x", -0.5, 1.5), Number("y", -0.5, 1.5))  # as far as keys move a corner
 _WAY = (Number("dx", -1, 1), Number("dy", -1, 1))
@@ -74,6 +75,10 @@ FORMS: dict[str, Form] = {
     "/phrase": Form("phrase", (_FADE,), optional=1),
     "/look": Form("look", (_FADE,), optional=1),
     "/lights": Form("light mappings", (_FADE,), optional=1),
+    "/springs": Form("setting"),
+    "/springs/wind": Form(numbers=_WIND),
+    "/springs/gravity": Form(numbers=(Number("downwards, m/s^2", -20, 20),)),
+    "/springs/kick": Form(numbers=_WIND),
     "/iterations": Form(numbers=(Number("coding", 0, 64, True), Number("interaction", 0, 64, True))),
     "/hold": Form("joint", (_ON,)),
     "/ping": Form(),

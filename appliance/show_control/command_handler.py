@@ -41,6 +41,7 @@ _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. St
 ORDERS: Mapping[str, tuple[Place, str]] = {
     "/player/jump": ("stage", "jump"),
     "/player/excerpt": ("stage", "excerpt"),
+    "/springs/kick": ("stage", "kick"),
     "/mocap/setjointrot": ("stage", "hold"),
     "/mocap/releasejoint": ("stage", "release"),
     "/sensors/neutral": ("stage", "neutral"),
@@ -131,7 +132,10 @@ class CommandHandler:
         cue = next((cue for cue in facts.cues if cue["name"] == name), None)
         if cue is not None and not self.show_state.cue:
             parts = [part for part in ("look", "lights") if not getattr(self.show_state, part)]
-            self._publish_changed(in_cue(self.show_state, {**cue, "fade_s": 0.0}, parts, now))
+            adopted = in_cue(self.show_state, {**cue, "fade_s": 0.0}, parts, now)
+            if cue.get("springs"):  # the stage's checkpoint does not hold it
+                adopted = adopted.with_dance(now, {"springs": (cue["springs"], ())})
+            self._publish_changed(adopted)
 
     def _carry_out(self, command: Command, asker: Address, now: float) -> None:
         """Raises ValueError for what cannot be done."""

@@ -84,6 +84,8 @@ def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: floa
         parts["phrase"] = cue["phrase"], (fade_s,)
     if cue.get("hands") is not None:
         parts |= {f"hand {joint}": (joint, (float(joint in cue["hands"]),)) for joint in _held(facts)}
+    if cue.get("springs") is not None:
+        show_state, parts["springs"] = _without_weather(show_state), (cue["springs"], ())
     if cue.get("iterations") is not None:
         parts["iterations"] = "", (*map(float, cue["iterations"]), fade_s)
     return in_cue(show_state, cue, PARTS, now).with_dance(now, parts), f"Cue {name}."
@@ -97,6 +99,24 @@ def _phrase(show_state: ShowState, command: Command, facts: Facts | None, now: f
 def _iterations(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     _danced(facts)
     return show_state.with_dance(now, {"iterations": ("", command.values)}), ""
+
+
+def _springs(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    name = known("setting of springs", command.text, _danced(facts).springs)
+    return _without_weather(show_state).with_dance(now, {"springs": (name, ())}), f"The springs are {name}."
+
+
+def _weather(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    if not _danced(facts).springs:
+        raise ValueError("No hand of this show is springs. Add {springs: loose, joint: ...} to its hands.")
+    part = command.address.removeprefix("/springs/")
+    return show_state.with_dance(now, {part: ("", command.values)}), ""
+
+
+def _without_weather(show_state: ShowState) -> ShowState:
+    """Another setting of the springs brings its own wind and gravity."""
+    dance = {name: part for name, part in show_state.dance.items() if name not in ("wind", "gravity")}
+    return replace(show_state, dance=dance)
 
 
 def _hold(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
@@ -126,6 +146,9 @@ DECLARATIONS: dict[str, Declaration] = {
     "/phrase": _phrase,
     "/iterations": _iterations,
     "/hold": _hold,
+    "/springs": _springs,
+    "/springs/wind": _weather,
+    "/springs/gravity": _weather,
     "/player/start": _rate,
     "/player/stop": _rate,
     "/player/rate": _rate,

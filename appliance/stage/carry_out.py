@@ -12,6 +12,7 @@ from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.stage_parts import StageParts
 
 SENSOR_ORDERS = frozenset(("neutral", "heading", "strobe", "reload"))
+SPRINGS_ORDERS = frozenset(("springs", "wind", "gravity", "kick"))
 STROBE_S = 10.0
 
 Outcome = tuple[bool, str]
@@ -41,6 +42,8 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
                 words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
         elif order.name == "allow":
             iterations.allow(int(order.values[0]))
+        elif order.name in SPRINGS_ORDERS:
+            _spring(order, parts)
         elif order.name == "phrase":
             words = parts.play(order.text, *order.values)
         elif order.name == "rate":
@@ -121,6 +124,23 @@ def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
     elif parent >= 0:
         here = quaternion.multiply(quaternion.inverse(world[parent]), here)
     return here
+
+
+def _spring(order: Order, parts: StageParts) -> None:
+    """Give the springs another setting, wind (m/s), gravity (m/s^2) or a kick (m/s)."""
+    springs = parts.springs
+    if springs is None:
+        raise ValueError("No hand of this show is springs. Add {springs: loose, joint: ...} to its hands.")
+    if order.name == "kick":
+        springs.kick(order.values)
+    elif order.name == "wind":
+        springs.wind[:] = order.values
+    elif order.name == "gravity":
+        springs.gravity = order.values[0]
+    elif str(order.text) in springs.settings:
+        springs.call(str(order.text))
+    else:
+        raise ValueError(f"There is no setting of springs '{order.text}' in this show.")
 
 
 def _turn(order: Order, parts: StageParts) -> None:

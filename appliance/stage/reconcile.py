@@ -8,7 +8,7 @@ from dataclasses import replace
 from appliance.box.show_state import ShowStateReader
 from appliance.show.sources import LIVE
 from appliance.show_control.orders import Order
-from appliance.stage.carry_out import obey
+from appliance.stage.carry_out import SPRINGS_ORDERS, obey
 from appliance.stage.iterations import Iterations
 from appliance.stage.stage_parts import StageParts
 
@@ -25,19 +25,22 @@ class Reconciler:
         self.generation, self.cue, self.words = 0, "", ""
         self.rate = self._usual_rate = parts.motion.rate
         self._show, self._reader = show, reader
+        self._is_first = parts.springs is not None  # a checkpoint knows nothing of the springs' setting
 
     def pending(self, now: float) -> Sequence[Order]:
         """Orders that make the dance follow the show state; none in nearly every tick."""
         orders: list[Order] = []
         show_state = self._reader.read()
-        if show_state.generation != self.generation and show_state.show == self._show:
+        is_news = self._is_first or show_state.generation != self.generation
+        if is_news and show_state.show == self._show:
             before, self.generation = self.generation, show_state.generation
             self.cue = show_state.cue or self.cue
             for name, (number, text, values) in show_state.dance.items():
                 if number > before and name == "rate":
                     self.rate = values[0] if values else self._usual_rate or 1.0
-                elif number > before:
+                elif number > before or (self._is_first and name in SPRINGS_ORDERS):
                     orders.append(Order(name.partition(" ")[0], values, text))
+            self._is_first = False
         wanted, live = show_state.dance.get("phrase"), self.parts.live
         if wanted and wanted[1] == LIVE and live is not None and not (orders or live.is_chosen):
             orders.append(Order("phrase", wanted[2], LIVE))  # after a restart: checkpoints know phrases only

@@ -36,6 +36,7 @@ def facts_of(
         cues=tuple(cue.model_dump(mode="json") for cue in config.cues),
         looks=names["look"],
         lights=names["lights"],
+        springs=names["springs"],
         coding=iterations.coding,
         interaction=iterations.interaction,
         most_iterations=iterations.most,

@@ -19,24 +19,26 @@ from appliance.dancer.live import Live
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
 from appliance.dancer.puppet import Puppet, PuppetError
-from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Remote, TurningAxis, WornSensor
+from appliance.dancer.puppeteers import WornSensor
 from appliance.dancer.slerp import FloatArray
+from appliance.dancer.springs import Springs
 from appliance.outputs.outputs import Outputs
 from appliance.pose.bvh import BvhError
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.sensor.link import SensorLink, SensorReading
-from appliance.sensor.neutral import Mounting, joint_from_reading
+from appliance.sensor.neutral import Mounting
 from appliance.sensor.state import restored_reading
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import ConfigError
 from appliance.show.osc import osc_misfits
 from appliance.show.posistagenet import misfits
-from appliance.show.show import HandConfig, Show
+from appliance.show.show import Show
 from appliance.show.sources import LIVE
 from appliance.stage.admission import Admission, admit
 from appliance.stage.open_sensors import open_sensors
 from appliance.stage.phrase_cache import PhraseCache
+from appliance.stage.puppeteers_of_show import mounting_of, puppeteers_of
 from appliance.stage.stage_error import StageError
 
 
@@ -64,6 +66,7 @@ class StageParts:
     live: Live | None = None  # None: the show has no such source
     live_inbox: LivePoseReader | None = None
     live_refused: int = 0  # poses of another figure, or none
+    springs: Springs | None = None  # those among the hands
     complaints: tuple[str, ...] = ()
     newest_primary: SensorReading | None = field(default=None)
 
@@ -100,7 +103,11 @@ class StageParts:
     def starts_from(self, now: float) -> tuple[FloatArray, FloatArray]:
         """The window (T, J, 4) and the roots (T, 3) of this tick; call it once a tick."""
         window, roots = self.motion.window(), self.motion.roots()
-        return (window, roots) if self.live is None else self.live.lay_over(now, window, roots)
+        if self.live is not None:
+            window, roots = self.live.lay_over(now, window, roots)
+        if self.springs is not None:
+            self.springs.follow_phrase(window[0], roots[0])
+        return window, roots
 
     def play(self, name: str, *fade_s: float) -> str:
         """Switch to a phrase, or to `live`; a sentence where nothing changes. Raises ValueError."""
@@ -159,13 +166,14 @@ def assemble(
         motion, floor = _playback(show, puppet.window, PhraseCache(show.directory, memory))
     except PuppetError as error:
         raise StageError(str(error)) from error
-    puppeteers = [_puppeteer(hand) for hand in show.config.hands]
+    grounding = Grounding(show.skeleton, floor)
+    puppeteers = puppeteers_of(show, puppet, grounding)
     worn: dict[str, list[WornSensor]] = {}
     mountings: dict[str, Mounting] = {}
     for hand, puppeteer in zip(show.config.hands, puppeteers, strict=True):
         if hand.sensor is not None and isinstance(puppeteer, WornSensor):
             worn.setdefault(hand.sensor, []).append(puppeteer)
-            mountings[hand.joint] = _mounting(hand)
+            mountings[hand.joint] = mounting_of(hand)
     link, complaints = open_sensors(box, list(worn), profiles)
     return StageParts(
         skeleton=show.skeleton,
@@ -174,7 +182,7 @@ def assemble(
         blending=Blending(
             len(puppet.joints), puppet.window, show.config.dancer.hop, show.config.dancer.blending
         ),
-        grounding=Grounding(show.skeleton, floor),
+        grounding=grounding,
         hands=Hands(puppeteers, puppet.joints, puppet.window),
         hand_places=[puppet.joints.index(hand.joint) for hand in show.config.hands],
         worn=worn,
@@ -184,6 +192,7 @@ def assemble(
         outputs=_outputs(show, box, box_file),
         live=Live(len(show.skeleton), puppet.window) if show.config.motion.live else None,
         crossfade_s=show.config.motion.crossfade_s,
+        springs=next((one for one in puppeteers if isinstance(one, Springs)), None),
         complaints=complaints,
     )
 
@@ -222,23 +231,6 @@ def _dance(parts: StageParts, network: Path) -> Callable[[int, int], object]:
             ) from None
 
     return dance
-
-
-def _puppeteer(hand: HandConfig) -> Puppeteer:
-    if hand.sensor is not None:
-        mounting = _mounting(hand)
-        return WornSensor(hand.joint, hand.weight, joint_from_reading(mounting.assumed_pose, mounting))
-    if hand.turning is not None:
-        return TurningAxis(hand.joint, hand.turning.axis, hand.turning.seconds_per_turn, hand.weight)
-    if hand.fixed is not None:
-        return FixedOrientation(hand.joint, hand.fixed.orientation, hand.weight)
-    if hand.kept:
-        return Kept(hand.joint, hand.weight)
-    return Remote(hand.joint, hand.weight)
-
-
-def _mounting(hand: HandConfig) -> Mounting:
-    return Mounting(hand.facing, hand.at_neutral, hand.neutral)
 
 
 def _playback(show: Show, window: int, preparations: PhraseCache) -> tuple[Playback, Floor | None]:

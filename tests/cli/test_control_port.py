@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import socket
 import time
+from pathlib import Path
 
 import pytest
 
 from appliance.cli import control
-from appliance.cli.control import open_control_port
+from appliance.cli.control import begin_in, open_control_port
 from appliance.show.control import ControlConfig
+from appliance.show.show import load_show
+from appliance.show_control.packet import messages_in
+from appliance.show_control.port import open_port
 from appliance.stage.stage_error import StageError
 from hw_sim.peers import HOST
+from tests.bundles import write_show
 
 
 @pytest.fixture
@@ -47,3 +52,15 @@ def test_a_port_that_stays_taken_is_reported(taken: socket.socket, monkeypatch: 
     with taken, pytest.raises(StageError, match=r"Address already in use.*second bunraku"):
         open_control_port(ControlConfig(host=HOST, port=taken.getsockname()[1]))
     assert sum(looks) == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_show_begins_in_a_cue_that_waits_in_the_control_port(tmp_path: Path) -> None:
+    show = load_show(write_show(tmp_path / "show", cues=[{"name": "storm"}]))
+    with open_port("127.0.0.1", 0) as port:
+        begin_in("storm", show, port)
+        port.settimeout(20.0)
+        assert messages_in(port.recv(100)) == [("/cue", ["storm"])]
+        with pytest.raises(StageError, match=r"no cue 'strom'.*Did you mean 'storm'"):
+            begin_in("strom", show, port)
+    with pytest.raises(StageError, match="needs show control"):
+        begin_in("storm", show, None)

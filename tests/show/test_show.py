@@ -11,7 +11,8 @@ from pydantic import ValidationError
 from appliance.sensor.keys import KeyFileError, load_keys
 from appliance.show.config_error import ConfigError
 from appliance.show.dance import DancerConfig
-from appliance.show.show import HandConfig, ShowConfig, load_show
+from appliance.show.hand import HandConfig
+from appliance.show.show import ShowConfig, load_show
 from tests.show.conftest import NAMES
 
 ShowYaml = Callable[[str], Path]
@@ -138,6 +139,15 @@ FAULTS = [
     ("hands:\n  - fixed:\n      orientation: [1, 0, 0]\n    joint: hip", 4, ["4 numbers in brackets"]),
     ("hands:\n  - fixed:\n      orientation: [1, 0, 0, a]\n    joint: hip", 4, ["which is not a number"]),
     ("hands:\n  - turning:\n      axis: [0, 0, 0]\n    joint: hip", 4, ["An axis needs a direction"]),
+    ("hands:\n  - {springs: lose, joint: hip}", 3, ["no setting of springs 'lose'", "Did you mean 'loose'?"]),
+    (
+        "hands:\n  - {springs: loose, joint: hip}\n  - {springs: stiff, joint: chest}",
+        4,
+        ["Two hands are springs", "Keep one"],
+    ),
+    ("springs:\n  - {name: a}\n  - {name: a}", 4, ["Two settings of springs are called 'a'"]),
+    ("springs:\n  - {name: a, arms: {mass: 0}}", 3, ["out of range", "Write 0.05 to 50."]),
+    ("cues:\n  - {name: a, springs: loose}", 3, ["no setting of springs 'loose'", "Remove `springs`"]),
     ("hands: {sensor: a, joint: hip}", 2, ["'hands' is a group of keys, which is not a list"]),
     ("name: again", 2, ["'name' stands here twice (first on line 1)"]),
     ("motion: {rate: 1", 2, ["not YAML", "behind the '{' on this line, up to line 3", "Close it"]),

@@ -206,6 +206,16 @@ def test_after_a_power_cut_picture_and_lights_are_those_of_the_stages_cue(folder
         control.close()
 
 
+def test_after_a_power_cut_the_springs_are_those_of_the_stages_cue(folder: Path) -> None:
+    show = facts(cues=({"name": "gale", "springs": "storm", "fade_s": 2.0},), springs=("loose", "storm"))
+    with StageDouble(folder, show) as stage:
+        stage.tell(cue="gale")
+        control = ControlInThread(folder)
+        until(lambda: show_state(folder).cue == "gale")
+        assert show_state(folder).dance["springs"][1] == "storm"
+        control.close()
+
+
 @pytest.mark.parametrize(
     ("left", "cue"),
     [(ShowState(cue="1", look="lines", show="A test"), "storm"), (ShowState(), "of another")],

@@ -120,6 +120,44 @@ def tick(parts: StageParts, iterations: Iterations) -> Tick:
     return Tick(parts, SensorFit(parts, SensorMemory(None, print), print), iterations, 1.0)
 
 
+def test_springs_follow_what_is_declared_also_after_a_restart(tmp_path: Path, declared: Declared) -> None:
+    cues = [{"name": "gale", "springs": "storm"}]
+    show = load_show(write_show(tmp_path / "sprung", [{"springs": "stiff", "joint": "Hips"}], cues=cues))
+    parts, again = assemble(show, BOX), assemble(show, BOX)
+    facts = facts_of(show, None, Iterations(3, 2, most=8), NOW)
+    reconciler = Reconciler("A test", parts, Iterations(3, 2, most=8), declared)  # type: ignore[arg-type]
+    assert parts.springs is not None and again.springs is not None
+
+    def say(address: str, *values: float, text: str = "") -> None:
+        declared.now, _ = DECLARATIONS[address](declared.now, Command(address, values, text), facts, NOW)
+        follow(reconciler)
+
+    say("/springs/wind", 1.0, 2.0, 3.0)
+    say("/cue", text="gale")
+    assert parts.springs.setting == "storm"
+    assert parts.springs.wind.tolist() == list(parts.springs.settings["storm"].wind)  # the older wind is over
+    say("/springs", text="loose")
+    say("/springs/wind", 3.0, 0.0, -1.0)
+    say("/springs/gravity", 5.0)
+    restarted = Reconciler("A test", again, Iterations(3, 2, most=8), declared)  # type: ignore[arg-type]
+    restarted.generation = reconciler.generation  # as its checkpoint says
+    follow(restarted)
+    assert not restarted.pending(NOW)
+    for springs in (parts.springs, again.springs):
+        assert (springs.setting, springs.gravity, springs.wind.tolist()) == ("loose", 5.0, [3.0, 0.0, -1.0])
+    with pytest.raises(ValueError, match="Did you mean 'loose'"):
+        say("/springs", text="lose")
+    parts.close()
+    again.close()
+
+
+def test_springs_of_which_there_are_none_are_refused(command: Commanded, parts: StageParts) -> None:
+    with pytest.raises(ValueError, match="No hand of this show is springs"):
+        command("/springs/wind", 1.0, 0.0, 0.0)
+    done, words = obey(Order("kick", (1.0, 0.0, 0.0)), parts, Iterations(3, 2, 8))
+    assert not done and "No hand of this show is springs" in words
+
+
 def danced(tick: Tick, ticks: int, begin: int = 0) -> np.ndarray:
     """Poses (ticks, J, 4) of so many frames."""
     poses = []

@@ -27,6 +27,7 @@ HANDS: list[dict[str, object]] = [
     {"osc": True, "joint": "Chest"},
     {"turning": {"axis": [0, 1, 0], "seconds_per_turn": 5.0}, "joint": "rThigh", "weight": 0.7},
     {"kept": True, "joint": "lForeArm"},
+    {"springs": "storm", "joint": "Hips"},
 ]
 CUES = [
     {"name": "storm", "phrase": "slow", "iterations": [8, 7], "hands": ["Chest", "lForeArm"], "fade_s": 3.0},
@@ -41,7 +42,7 @@ def show(tmp_path: Path) -> Path:
 
 
 def write_eventful_show(folder: Path) -> Path:
-    """Two phrases, cues, hands of four kinds, a network that fails at seven iterations."""
+    """Two phrases, cues, hands of five kinds, a network that fails at seven iterations."""
     write_show(folder, HANDS, "fragile")
     write_bvh(folder / "slow.bvh", swaying_phrase(7.0))
     config = yaml.safe_load((folder / "show.yaml").read_text())
@@ -57,6 +58,8 @@ def eventful(night: Night) -> Night:
     night.dance(40, reading(STILL))
     night.dance(30, reading(TURNED))
     night.order("hold", 0.0, 0.0, 1.0, 0.7, text="Chest")
+    night.order("kick", 1.0, -2.0, 0.5)
+    night.order("wind", 3.0, 0.0, -3.0)
     night.dance(200, reading(OTHER))
     night.command("/cue", text="storm")
     night.dance(40, reading(TURNED))

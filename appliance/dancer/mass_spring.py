@@ -1,0 +1,110 @@
+"""A mass-spring system: masses on a tree of bones, springs along them and towards their directions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vectors = NDArray[np.float64]  # (N, 3), world frame
+
+SUBSTEPS = 10
+SUBSTEP_S = 0.02 / SUBSTEPS
+FASTEST_M_S = 30.0
+# A substep is stable while the frequency of the stiffest mode is below 2 / SUBSTEP_S. By Gershgorin's theorem
+# a mass at the end of several bones is safe when the stiffness of each is below this share of mass / bones.
+_STABLE = 0.5
+_SHORTEST_M2 = 1e-12  # keeps two masses at one place from dividing by zero
+
+
+class MassSpring:
+    """N masses, each but the first tied to its parent; the first is the anchor, which only `step` moves.
+
+    Forces on a mass at the bone b (its position less its parent's): the spring along it,
+    -stiffness (|b| - length) b/|b|, and the spring towards the rest vector r, -directional (b - r); the
+    parent gets their opposites, so that no momentum arises. Damping draws its velocity towards that of the
+    flow around it. Semi-implicit (symplectic) Euler, the damping integrated exactly.
+
+    positions, velocities (N, 3): metres, metres a second, world frame. rest (N, 3): rest vectors, metres.
+    """
+
+    def __init__(self, parents: Sequence[int], anchored: bool = True) -> None:
+        """parents: of each node, before it in order; the first has none. anchored False: it moves freely."""
+        count = len(parents)
+        self.positions, self.velocities, self.rest = np.zeros((3, count, 3))
+        self._parents, self._anchored = parents, anchored
+        self._bones_of = np.eye(count)  # times positions: the bones; the first has none
+        self._bones_of[0, 0] = 0.0
+        for node, parent in enumerate(parents[1:], 1):
+            self._bones_of[node, parent] = -1.0
+        self._bones, self._push, self._drift = np.empty((3, count, 3))
+        self._squares, self._pull = np.empty((2, count, 1))
+        self.set_parameters(*(np.full(count, value) for value in (1.0, 1000.0, 100.0, 1.0)))
+
+    def set_parameters(self, mass: Any, stiffness: Any, directional: Any, damping: Any) -> None:
+        """All (N,): kilograms, newtons a metre twice, and the share of its velocity that a mass loses in a
+        second, as a rate (1/s). Springs too stiff for the substep are made as stiff as it carries.
+        """
+        self.mass = np.asarray(mass, float)
+        bones = np.count_nonzero(self._bones_of, axis=0)
+        carried = _STABLE * self.mass / np.maximum(bones, 1) / SUBSTEP_S**2
+        if self._anchored:
+            carried[0] = np.inf
+        most = np.minimum(carried, carried[np.maximum(self._parents, 0)])
+        wanted = np.asarray(stiffness, float) + np.asarray(directional, float)
+        share = np.minimum(1.0, most / np.maximum(wanted, 1e-9))
+        self.stiffness, self.directional = stiffness * share, directional * share
+        self.damping = np.asarray(damping, float)
+        self._both = (self.stiffness + self.directional)[:, None]
+        self._kept = np.exp(-self.damping * SUBSTEP_S)[:, None]
+        self._pushes = (SUBSTEP_S**2 / self.mass)[:, None] * self._bones_of.T
+        if self._anchored:
+            self._kept[0], self._pushes[0] = 1.0, 0.0
+
+    def begin(self, positions: Vectors) -> None:
+        """Rest at these positions (N, 3)."""
+        self.positions[:] = positions
+        self.velocities[:] = 0.0
+
+    def step(self, anchor: Vectors, flow: Vectors, acceleration: Vectors) -> None:
+        """One tick of 20 ms: the anchor moves evenly to (3,); flow (N, 3): velocity of what surrounds each
+        mass, metres a second; acceleration (N, 3) or (3,): of gravity. `rest` is in force the whole tick.
+        """
+        positions, moves, bones = self.positions, self.velocities, self._bones
+        lengths = np.sqrt(np.einsum("nk,nk->n", self.rest, self.rest))[:, None]
+        tension, rest_pull = self.stiffness[:, None] * lengths, self.directional[:, None] * self.rest
+        np.multiply(1.0 - self._kept, flow, out=self._drift)
+        self._drift += SUBSTEP_S * acceleration
+        if self._anchored:
+            self._drift[0] = 0.0
+            moves[0] = (anchor - positions[0]) / (SUBSTEPS * SUBSTEP_S)
+        np.maximum(moves, -FASTEST_M_S, out=moves)
+        np.minimum(moves, FASTEST_M_S, out=moves)
+        np.multiply(moves, SUBSTEP_S, out=moves)  # metres a substep: spares an operation in each
+        np.multiply(self._drift, SUBSTEP_S, out=self._drift)
+        for _ in range(SUBSTEPS):
+            np.matmul(self._bones_of, positions, out=bones)
+            np.einsum("nk,nk->n", bones, bones, out=self._squares[:, 0])
+            np.add(self._squares, _SHORTEST_M2, out=self._squares)
+            np.sqrt(self._squares, out=self._squares)
+            np.divide(tension, self._squares, out=self._pull)
+            np.subtract(self._pull, self._both, out=self._pull)
+            np.multiply(bones, self._pull, out=bones)
+            np.add(bones, rest_pull, out=bones)
+            np.matmul(self._pushes, bones, out=self._push)
+            np.multiply(moves, self._kept, out=moves)
+            np.add(moves, self._push, out=moves)
+            np.add(moves, self._drift, out=moves)
+            np.add(positions, moves, out=positions)
+        np.divide(moves, SUBSTEP_S, out=moves)
+
+    def energy(self, gravity: Vectors | None = None) -> float:
+        """Joules: of motion, of both kinds of springs, and in a field of gravity (3,), metres a second^2."""
+        bones = self._bones_of @ self.positions
+        stretch = np.linalg.norm(bones, axis=1) - np.linalg.norm(self.rest, axis=1)
+        aside = np.sum((bones - self.rest) ** 2, axis=1)
+        motion = self.mass @ np.sum(self.velocities**2, axis=1)
+        height = 0.0 if gravity is None else float(self.mass @ (self.positions @ gravity))
+        return float(motion + self.stiffness @ stretch**2 + self.directional @ aside) / 2 - height

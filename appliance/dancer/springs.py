@@ -1,0 +1,267 @@
+"""Springs as a puppeteer: the body below a joint swings as a mass-spring system about the dancer's pose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.dancer.forward_kinematics import Figure
+from appliance.dancer.mass_spring import FASTEST_M_S, MassSpring, Vectors
+from appliance.dancer.puppeteers import Puppeteer, WornSensor
+from appliance.dancer.slerp import FloatArray
+from appliance.pose import quaternion
+from appliance.pose.anatomy import Anatomy
+from appliance.pose.skeleton import Skeleton
+from appliance.show.springs import Region, SpringsConfig
+
+TICK_S = 0.02
+JUMP_M = 0.25  # an anchor that moves further in a tick has jumped: the masses are carried along
+FARTHEST = 2.0  # times the body's reach that a mass may be from the anchor, along each axis
+_FASTEST_PHRASE_M_S = 10.0
+_BRANCHING = 0.3  # of the longest bone: children whose mean is nearer than that turn nothing
+_SUM = np.ones((3, 1))
+_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+_SMALLEST = 1e-6
+
+
+class Springs(Puppeteer):
+    """Holds its joint and those below it that the network moves, as far as no other hand holds them.
+
+    A mass stands at each of these joints, anchored at the first. Springs hold the bones' lengths and draw
+    each bone to a direction between the phrase's and that of the puppet's last pose; targets turn the
+    phrase's bones to where the masses are: so the springs follow the dancer, and the dancer the springs.
+    Swinging is damped towards the phrase's motion. Damped towards the puppet's, the two drove each other
+    to 5 m/s. What is held are joints with a bone below them; joints at the ends are masses only.
+
+    regions: of each mass, and of the bone that leads to it. joints: those that are held; orientations
+    (len(joints), 4): local, written by each pull. setting: the name in force; wind (3,) m/s and gravity
+    m/s^2 stay until another setting is called up.
+    """
+
+    def __init__(
+        self,
+        joint: str,
+        skeleton: Skeleton,
+        figure: Figure,
+        moving: Sequence[str],
+        settings: Mapping[str, SpringsConfig],
+        setting: str,
+        weight: float = 1.0,
+        others: Sequence[Puppeteer] = (),
+    ) -> None:
+        """figure: stands in the puppet's last pose at each pull; moving: joints that the network moves;
+        others: the show's other hands. Raises ValueError where nothing hangs below the joint."""
+        super().__init__(joint, weight)
+        self.settings, self._puppet, self._phrase = settings, figure, Figure(skeleton)
+        below = skeleton.descendants(skeleton.index(joint))
+        nodes = [place for place in sorted(below) if skeleton.names[place] in moving]
+        parents = [_nearest(skeleton, place, nodes) for place in nodes]
+        self._nodes: NDArray[np.intp] = np.array(nodes)
+        self.regions = tuple(_regions(skeleton, nodes, parents))
+        self._body = MassSpring(parents)
+        self._bones_of = np.eye(len(nodes)) - np.eye(len(nodes))[np.maximum(parents, 0)]
+
+        taken = [other.joint for other in others]
+        held = [n for n in range(len(nodes)) if n in parents and skeleton.names[nodes[n]] not in taken]
+        if not held or held[0] != 0:
+            raise ValueError(
+                f"No springs can hang from '{joint}': the network moves no joint below it. Name a joint "
+                "further up, like the first one of the spine."
+            )
+        self.joints = tuple(skeleton.names[nodes[node]] for node in held)
+        self.orientations = np.tile(quaternion.IDENTITY, (len(held), 1))
+        self._held = self._nodes[held]
+        self._above = np.maximum([skeleton.parents[place] for place in self._held], 0)
+        self._has_above = np.array([[skeleton.parents[place] >= 0] for place in self._held])
+        # Place of the arc that turns each held joint's parent; the last one is no turn at all.
+        self._arc_above = np.array([_nearest(skeleton, place, self._held.tolist()) for place in self._held])
+        self._points_to = np.array([_points_to(skeleton, nodes, parents, node) for node in held])
+
+        self._worn = [other for other in others if isinstance(other, WornSensor)]
+        self._turned = np.tile(quaternion.IDENTITY, (len(self._worn), 1))
+        self._before, self._flow = np.zeros((2, len(nodes), 3))
+        self._most = FARTHEST * float(np.sum(np.linalg.norm(skeleton.offsets[nodes], axis=1)) + 0.1)
+        self._pose: FloatArray = np.tile(quaternion.IDENTITY, (len(skeleton), 1))
+        self._root: FloatArray = np.zeros(3, np.float32)
+        self._pulls, self._begun = 0, False
+        self.wind, self.gravity = np.zeros(3), 0.0
+        self.call(setting, kicks=False)
+
+    def call(self, name: str, kicks: bool = True) -> None:
+        """Put a setting in force. Raises KeyError for one that there is not."""
+        self.setting, self._is_of = name, self.settings[name]
+        self.wind[:], self.gravity = self._is_of.wind, self._is_of.gravity
+        self._apply()
+        if kicks:
+            self.kick(self._is_of.kick)
+
+    def kick(self, velocity: Sequence[float]) -> None:
+        """Add a velocity (x, y, z), metres a second, to every mass."""
+        self._body.velocities += np.clip(velocity, -FASTEST_M_S, FASTEST_M_S)
+
+    def follow_phrase(self, pose: FloatArray, root: FloatArray) -> None:
+        """Take the phrase's pose (J, 4) of this tick and its root (3,), metres."""
+        self._pose, self._root = pose, root
+
+    def state(self) -> dict[str, Any]:
+        return super().state() | {
+            "setting": self.setting,
+            "field": [*self.wind.tolist(), self.gravity],
+            "masses": np.stack([self._body.positions, self._body.velocities, self._before]),
+            "turned": self._turned.copy(),
+            "pulls": [self._pulls, self._begun],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        super().restore(state)
+        self.call(state["setting"], kicks=False)
+        *self.wind[:], self.gravity = state["field"]
+        self._body.positions[:], self._body.velocities[:], self._before[:] = state["masses"]
+        self._turned[:] = state["turned"]
+        self._pulls, self._begun = state["pulls"]
+
+    def energy(self) -> float:
+        """Joules in motion and springs."""
+        return self._body.energy()
+
+    def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
+        if not (self.enabled or self.is_holding):
+            self._begun = False  # at rest, and at no cost, until it is to hold again
+            return
+        self._phrase.set_pose(self._pose, self._root)
+        stands = self._phrase.positions[self._nodes].astype(np.float64)
+        body = self._body
+        if not self._begun or not np.isfinite(body.positions).all():
+            self._begun = True
+            body.begin(stands)
+            self._before[:] = stands
+        jumped = stands[0] - self._before[0]
+        if float(jumped @ jumped) > JUMP_M * JUMP_M:
+            body.positions += jumped
+            self._before += jumped
+        self._rest(stands)
+        body.step(stands[0], self._surroundings(stands), np.array((0.0, -self.gravity, 0.0)))
+        np.maximum(body.positions, stands[0] - self._most, out=body.positions)
+        np.minimum(body.positions, stands[0] + self._most, out=body.positions)
+        self._before[:] = stands
+        self._pulls += 1
+        self._turn(stands)
+        orientation[:] = self.orientations[0]
+
+    def _rest(self, stands: Vectors) -> None:
+        """Write where bones are drawn to: in length the phrase's, in direction between it and the puppet."""
+        follow, rest = self._is_of.follow, self._body.rest
+        np.matmul(self._bones_of, stands, out=rest)
+        lengths = np.sqrt((rest * rest) @ _SUM)
+        rest += follow * (self._bones_of @ (self._puppet.positions[self._nodes] - stands))
+        rest *= lengths / np.maximum(np.sqrt((rest * rest) @ _SUM), _SMALLEST)
+
+    def _apply(self) -> None:
+        """Give the masses the numbers of the setting in force."""
+        own = [self._is_of.region(region) for region, _ in self.regions]
+        turning = [self._is_of.region(region) for _, region in self.regions]
+        self._damping = np.array([[region.damping] for region in own])
+        self._drag = self._damping + self._is_of.air
+        self._body.set_parameters(
+            np.array([region.mass for region in own]),
+            np.array([region.stiffness for region in turning]),
+            np.array([region.directional_stiffness for region in turning]),
+            self._drag[:, 0],
+        )
+
+    def _surroundings(self, stands: Vectors) -> Vectors:
+        """Velocity (N, 3) towards which each mass is damped: of the phrase's motion, and of the air."""
+        np.subtract(stands, self._before, out=self._flow)
+        np.multiply(self._flow, 1.0 / TICK_S, out=self._flow)
+        np.maximum(self._flow, -_FASTEST_PHRASE_M_S, out=self._flow)
+        np.minimum(self._flow, _FASTEST_PHRASE_M_S, out=self._flow)
+        np.multiply(self._flow, self._damping, out=self._flow)
+        air = self._is_of.air * (self.wind * _gust(self._pulls * TICK_S, self._is_of.gusts))
+        self._flow += air
+        stirred = self._stirred()
+        if self._is_of.stir:
+            self._flow += self._is_of.air * _cross(stirred[None], self._body.positions - stands[0])
+        self._flow /= np.maximum(self._drag, _SMALLEST)
+        return self._flow
+
+    def _stirred(self) -> Vectors:
+        """Angular velocity (3,) of the air, radians a second: that of the worn sensors' joints together."""
+        total = np.zeros(3)
+        for place, worn in enumerate(self._worn):
+            if worn.is_holding:
+                turn = quaternion.multiply(worn.orientation, quaternion.inverse(self._turned[place]))
+                total += 2.0 * float(np.copysign(1.0, turn[0])) / TICK_S * turn[1:]
+            self._turned[place] = worn.orientation
+        return np.clip(self._is_of.stir * total, -20.0, 20.0)
+
+    def _turn(self, stands: Vectors) -> None:
+        """Write the orientations that turn the phrase's bones to where the masses are.
+
+        The shortest arc a of a joint turns its world rotation W; local to its parent, which the arc b
+        turns, that is W_parent^-1 b^-1 a W.
+        """
+        there, here = self._points_to @ self._body.positions, self._points_to @ stands
+        lengths = np.sqrt((there * there) @ _SUM * ((here * here) @ _SUM))
+        arcs = np.zeros((len(there) + 1, 4))
+        arcs[-1, 0] = 1.0
+        arcs[:-1, :1] = np.maximum((there * here) @ _SUM + lengths, _SMALLEST)
+        arcs[:-1, 1:] = _cross(here, there)
+        arcs /= np.sqrt(np.einsum("hk,hk->h", arcs, arcs))[:, None]
+        world = self._phrase.world
+        above = np.where(self._has_above, world[self._above], quaternion.IDENTITY)
+        above = quaternion.multiply(arcs[self._arc_above], above) * _CONJUGATE
+        local = quaternion.multiply(above, quaternion.multiply(arcs[:-1], world[self._held]))
+        local /= np.sqrt(np.einsum("hk,hk->h", local, local))[:, None]
+        self.orientations[:] = local
+
+
+def _cross(a: Vectors, b: Vectors) -> Vectors:
+    """numpy's own takes four times as long for few vectors."""
+    product: Vectors = a[:, (1, 2, 0)] * b[:, (2, 0, 1)] - a[:, (2, 0, 1)] * b[:, (1, 2, 0)]
+    return product
+
+
+def _gust(seconds: float, share: float) -> float:
+    """Strength of the wind, 0..2: three waves that never meet again."""
+    waves = math.sin(1.1 * seconds) + 0.6 * math.sin(2.7 * seconds + 1.0) + 0.4 * math.sin(6.3 * seconds)
+    return 1.0 + share * waves / 2.0
+
+
+def _nearest(skeleton: Skeleton, place: int, among: Sequence[int]) -> int:
+    """Where in `among` the nearest joint above `place` stands; -1: there is none."""
+    above = skeleton.ancestors(place)[1:]
+    return next((list(among).index(joint) for joint in above if joint in among), -1)
+
+
+def _points_to(skeleton: Skeleton, nodes: Sequence[int], parents: Sequence[int], node: int) -> Vectors:
+    """(N,): times the positions, where a joint's bones point: to the mean of the nodes below it; where these
+    lie around it, to the one that most of the body hangs from."""
+    rest = np.tile(quaternion.IDENTITY.astype(float), (len(skeleton), 1))
+    positions, _ = skeleton.forward_kinematics(rest, np.zeros(3))
+    children = [child for child, parent in enumerate(parents) if parent == node]
+    bones = positions[[nodes[child] for child in children]] - positions[nodes[node]]
+    if np.linalg.norm(bones.mean(axis=0)) < _BRANCHING * np.linalg.norm(bones, axis=1).max():
+        children = [max(children, key=lambda child: len(skeleton.descendants(nodes[child])))]
+    row = np.zeros(len(nodes))
+    row[children] = 1.0 / len(children)
+    row[node] = -1.0
+    return row
+
+
+def _regions(skeleton: Skeleton, nodes: Sequence[int], parents: Sequence[int]) -> list[tuple[Region, Region]]:
+    """The region of each node's mass, and of the bone that leads to it: that of the joint that turns it."""
+    anatomy = Anatomy(skeleton)
+    found: dict[int, Region] = {}
+    for start, first in anatomy.limbs():
+        limb = [first, *anatomy.below(first)]
+        has_foot = any(joint in skeleton.feet for joint in limb)
+        is_leg = has_foot if skeleton.feet else start == anatomy.trunk[0]
+        found |= dict.fromkeys(limb, "legs" if is_leg else "arms")
+    for joint in anatomy.neck:
+        found |= dict.fromkeys([joint, *anatomy.below(joint)], "head")
+    regions = [found.get(place, "trunk") for place in nodes]
+    return [(region, regions[max(parent, 0)]) for region, parent in zip(regions, parents, strict=True)]

@@ -1,0 +1,48 @@
+"""The puppeteers of a show: one for each of its hands."""
+
+from __future__ import annotations
+
+from appliance.dancer.grounding import Grounding
+from appliance.dancer.puppet import Puppet
+from appliance.dancer.puppeteers import FixedOrientation, Kept, Puppeteer, Remote, TurningAxis, WornSensor
+from appliance.dancer.springs import Springs
+from appliance.sensor.neutral import Mounting, joint_from_reading
+from appliance.show.hand import HandConfig
+from appliance.show.show import Show
+from appliance.show.springs import springs_by_name
+from appliance.stage.stage_error import StageError
+
+
+def puppeteers_of(show: Show, puppet: Puppet, grounding: Grounding) -> list[Puppeteer]:
+    """All hands in their order; springs know the others, whose joints they leave alone."""
+    hands = show.config.hands
+    made = {place: _puppeteer(hand) for place, hand in enumerate(hands) if hand.springs is None}
+    others, settings = tuple(made.values()), springs_by_name(show.config.springs)
+    for place, hand in enumerate(hands):
+        if hand.springs is not None:
+            facts = hand.joint, show.skeleton, grounding.figure, puppet.joints, settings
+            try:
+                made[place] = Springs(*facts, hand.springs, hand.weight, others)
+            except ValueError as error:
+                raise StageError(f"{show.file.path}: {error}") from error
+    for place, hand in enumerate(hands):
+        made[place].enabled = hand.from_start
+    return [made[place] for place in range(len(hands))]
+
+
+def _puppeteer(hand: HandConfig) -> Puppeteer:
+    if hand.sensor is not None:
+        mounting = mounting_of(hand)
+        return WornSensor(hand.joint, hand.weight, joint_from_reading(mounting.assumed_pose, mounting))
+    if hand.turning is not None:
+        return TurningAxis(hand.joint, hand.turning.axis, hand.turning.seconds_per_turn, hand.weight)
+    if hand.fixed is not None:
+        return FixedOrientation(hand.joint, hand.fixed.orientation, hand.weight)
+    if hand.kept:
+        return Kept(hand.joint, hand.weight)
+    return Remote(hand.joint, hand.weight)
+
+
+def mounting_of(hand: HandConfig) -> Mounting:
+    """How the sensor of a hand is worn."""
+    return Mounting(hand.facing, hand.at_neutral, hand.neutral)

@@ -1,0 +1,42 @@
+"""What springs cost a tick, beside the puppet's own ten iterations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.bundle import default_show_path
+from appliance.show.show import load_show
+from appliance.stage.stage_parts import StageParts, assemble
+
+GROUP = "springs on the upper body, a tick"
+
+
+@pytest.fixture
+def parts() -> Iterator[StageParts]:
+    default: Path = default_show_path()
+    box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+    made = assemble(load_show(default), box)
+    made.starts_from(0.0)
+    yield made
+    made.close()
+
+
+def test_springs(measured: Callable[..., Any], parts: StageParts) -> None:
+    springs = parts.springs
+    assert springs is not None
+    springs.enabled = True
+    now = iter(range(10**9))
+    measured("springs.pull", GROUP)(lambda: springs.pull(0.02 * next(now)))
+    assert springs.is_holding
+
+
+def test_the_puppet(measured: Callable[..., Any], parts: StageParts) -> None:
+    hands, window = parts.hands, parts.puppet.select(parts.motion.window())
+    measured("ten iterations of the puppet", GROUP, reference=True)(
+        lambda: parts.puppet.dance(window, hands.mask, hands.targets, hands.weights, 10, 9)
+    )
