@@ -31,16 +31,14 @@ def inspect(
     options, and a show keeps those that it was trained with.
     """
     with clear_errors("inspect"):
-        from appliance.studio.data.dataset import find_catalogue
+        from appliance.studio.data.catalogue import find_catalogue, recordings_in
         from appliance.studio.data.takes import load_take
         from appliance.studio.evaluation.masked import draw_masked
         from appliance.studio.inspection import inspect as look_at
         from appliance.studio.studio_error import StudioError
 
         files = [
-            file
-            for given in recordings
-            for file in (sorted(given.glob("*.bvh")) if given.is_dir() else [given])
+            file for given in recordings for file in (recordings_in(given) if given.is_dir() else [given])
         ]
         if not files:
             raise StudioError(f"{recordings[0]} has no .bvh files. Give BVH recordings, or a folder of them.")

@@ -20,7 +20,7 @@ from appliance.studio.data.dataset import WINDOW
 from appliance.studio.data.sources import Sources
 from appliance.studio.disk_room import require_room
 from appliance.studio.evaluation.coders import load_checkpoint, load_state
-from appliance.studio.evaluation.findings import MASKED_PICTURE, findings, require_windows
+from appliance.studio.evaluation.findings import MASKED_PICTURE, few_data, findings, require_windows
 from appliance.studio.evaluation.masked import draw_masked
 from appliance.studio.export.release import Request, release
 from appliance.studio.improviser import own_output
@@ -137,6 +137,8 @@ def _finish(
         request = Request(checkpoint, source, options.out, options.name or "", options.phrase, options.hand)
         release(request, training.dataset, console)
         show = shlex.quote(str(options.out))
+        for line in few_data(training.dataset):
+            console.print(line, highlight=False)
         console.print(f"{options.out} is a show. Dance it: bunraku play --show {show} --emulate")
 
 

@@ -78,6 +78,13 @@ class Catalogue:
         return _spans(self.mask, name)
 
 
+def recordings_in(folder: Path) -> list[Path]:
+    """The BVH files of a folder, without the phrase and the skeleton of a show that was trained into it."""
+    is_show = any((folder / name).exists() for name in ("show.yaml", "checkpoint.pt", "puppet.onnx"))
+    own = {"phrase.bvh", "skeleton.bvh"} if is_show else set()
+    return sorted(file for file in folder.glob("*.bvh") if file.name not in own)
+
+
 def find_catalogue(folder: Path, files: Sequence[Path]) -> Catalogue:
     """catalogue.yaml beside the recordings, else the studio's own if these list every name and size."""
     own = folder / "catalogue.yaml"

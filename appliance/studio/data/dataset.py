@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.capture_errors import find_capture_errors
-from appliance.studio.data.catalogue import Catalogue, find_catalogue, read_catalogue
+from appliance.studio.data.catalogue import Catalogue, find_catalogue, read_catalogue, recordings_in
 from appliance.studio.data.mirror import asymmetry, mirrored
 from appliance.studio.data.takes import (
     FPS,
@@ -85,7 +85,7 @@ def load_dataset(
     progress: Callable[[Sequence[Path]], Sequence[Path]] = lambda files: files,
 ) -> Dataset:
     """Read every BVH file of a folder. Raises DatasetError if skeletons differ or nothing is left."""
-    files = sorted(folder.glob("*.bvh"))
+    files = recordings_in(folder)
     if not files:
         raise DatasetError(f"{folder} has no .bvh files. Give the folder that holds your recordings.")
     catalogue = catalogue or find_catalogue(folder, files)

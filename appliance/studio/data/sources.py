@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
-from appliance.studio.data.catalogue import ALWAYS, Catalogue, find_catalogue, read_catalogue
+from appliance.studio.data.catalogue import ALWAYS, Catalogue, find_catalogue, read_catalogue, recordings_in
 from appliance.studio.data.dataset import Dataset, load_dataset
 from appliance.studio.studio_error import StudioError
 
@@ -38,7 +38,7 @@ def given(
     keep: Sequence[str] = (),
 ) -> Sources:
     """Sources from options; options override the catalogue."""
-    files = sorted(recordings.glob("*.bvh"))
+    files = recordings_in(recordings)
     if not files:
         raise StudioError(f"{recordings} has no .bvh files. Give the folder that holds your recordings.")
     known = read_catalogue(catalogue) if catalogue else find_catalogue(recordings, files)

@@ -35,7 +35,7 @@ def findings(dataset: Dataset) -> list[str]:
         _kept_apart(dataset),
         f"{learned_windows(dataset):,} windows of 8 poses to learn from{images}, {apart:,} kept apart.",
         *([f"Not learned from the mirror's side too: {why_not}."] if why_not else []),
-        *_few_data(dataset),
+        *few_data(dataset),
     ]
 
 
@@ -67,14 +67,15 @@ def _kept_apart(dataset: Dataset) -> str:
     return f"Kept apart to measure on, {how}: {held} ({_minutes(dataset.held_out):.1f} minutes)."
 
 
-def _few_data(dataset: Dataset) -> list[str]:
+def few_data(dataset: Dataset) -> list[str]:
+    """What to expect of little dance, and how much would do; nothing where there is enough."""
     seconds = sum(int(np.count_nonzero(take.sound)) for take in dataset.training) / FPS
     if seconds >= FEW_S:
         return []
     return [
         f"{seconds:.0f} s are little to learn from: expect a dancer that knows these few moves, and that "
-        "answers a hand far from all of them with the nearest one. The show that comes along learned from 11 "
-        "minutes."
+        f"answers a hand far from all of them with the nearest one. {FEW_S / 60:g} minutes of dance are "
+        "enough to begin with, ten for a stage: the show that comes along learned from 11."
     ]
 
 

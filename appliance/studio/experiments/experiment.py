@@ -22,6 +22,7 @@ from appliance.pose.bvh import write_bvh
 from appliance.pose.quaternion import Array
 from appliance.pose.roles import held_joints
 from appliance.show.show import load_show
+from appliance.studio.data.catalogue import recordings_in
 from appliance.studio.data.dataset import FPS, Take, load_dataset
 from appliance.studio.evaluation.coders import Coder, open_coder
 from appliance.studio.evaluation.evaluation import load_takes
@@ -204,7 +205,7 @@ def _takes(options: ExperimentOptions, coder: Coder) -> list[Take]:
     if options.recordings is None:
         return load_takes([load_show(options.show).phrase], coder)
     if options.excerpts is not None:
-        return load_takes(sorted(options.recordings.glob("*.bvh")), coder)
+        return load_takes(recordings_in(options.recordings), coder)
     dataset = load_dataset(options.recordings)
     return list(dataset.held_out or dataset.training)
 

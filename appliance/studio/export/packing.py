@@ -32,20 +32,81 @@ def write_phrase(folder: Path, phrase: Recording, name: str = "phrase.bvh") -> P
 
 
 def write_show_yaml(
-    folder: Path, name: str, hands: list[dict[str, Any]], acknowledgement: str = "", **dancer: int
+    folder: Path,
+    name: str,
+    hands: list[dict[str, Any]],
+    acknowledgement: str = "",
+    phrase: str = "the show's phrase",
 ) -> Path:
-    """show.yaml with what the artist will want to change; refuses to overwrite the artist's own."""
+    """show.yaml with what the artist will want to change; refuses to overwrite the artist's own.
+
+    phrase: what phrase.bvh is, in words.
+    """
     path = folder / "show.yaml"
-    if path.exists():
-        return path
-    show: dict[str, Any] = {"name": name}
-    if acknowledgement:
-        show["acknowledgement"] = acknowledgement
-    show["dancer"] = {"network": "puppet.onnx", **dancer}
-    show["motion"] = {"phrase": "phrase.bvh"}
-    show["hands"] = hands
-    path.write_text(yaml.safe_dump(show, sort_keys=False, allow_unicode=True, width=100), encoding="utf-8")
+    if not path.exists():
+        text = f"name: {_flow(name)}\n"
+        if acknowledgement:
+            text += yaml.safe_dump({"acknowledgement": acknowledgement}, allow_unicode=True, width=100)
+        text += _SHOW.replace("PHRASE", " ".join(phrase.split()))
+        text = text.replace("HANDS", "\n".join(_hand(hand) for hand in hands))
+        path.write_text(text.replace("HELD", _flow([hand["joint"] for hand in hands])), encoding="utf-8")
     return path
+
+
+def _hand(hand: dict[str, Any]) -> str:
+    """A hand as an item of a YAML list."""
+    lines = [f"{key}: {_flow(value)}" for key, value in hand.items()]
+    if "at_neutral" in hand:
+        lines[-1] += "   # a dancer who stands still lets the arm hang"
+    return "  - " + "\n    ".join(lines)
+
+
+def _flow(value: Any) -> str:
+    """A value on one line of YAML."""
+    dumped = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=10_000)
+    return dumped.removesuffix("\n").removesuffix("\n...")
+
+
+_SHOW = """
+dancer:
+  network: puppet.onnx
+  coding_iterations: 10        # more: away from the phrase, towards the dancer's habits
+  interaction_iterations: 9    # the last pass is free, so nothing mirrors the hand
+  hop: 1
+
+motion:
+  phrase: phrase.bvh           # PHRASE
+
+hands:
+HANDS
+
+looks:                         # the first one is shown at the start; more: docs/configuration.md
+  - {name: plaster, style: plaster}
+  - {name: lines, style: lines, camera: {move: orbit}}
+  - {name: ink, style: ink}
+  - {name: cloud, style: cloud, camera: {move: orbit, period_s: 120}}
+  - {name: veil, style: veil}
+
+cues:                          # /cue opening, or /cue alone for the next one; what is left out stays as it is
+  - name: opening
+    iterations: [10, 9]
+    hands: HELD
+    look: plaster
+    master: 1
+    fade_s: 3
+  - name: threads              # nearer to the phrase: fewer passes of the puppet
+    iterations: [4, 3]
+    look: lines
+  - name: alone                # the hand lets go: the puppet dances alone
+    iterations: [10, 9]
+    hands: []
+    look: cloud
+    fade_s: 4
+  - name: finale
+    hands: HELD
+    look: veil
+    fade_s: 6
+"""
 
 
 def seal(folder: Path) -> None:

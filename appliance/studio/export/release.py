@@ -37,6 +37,7 @@ EQUALITY_WINDOWS = 16
 PHRASE_S = 60.0
 SHORT_PHRASE_S = 20.0  # a held-out excerpt shorter than this gives way to a longer one from training
 HANGING_DEGREES = 80.0  # below horizontal: a hanging arm does not touch the hip
+_PHRASE_OF_ITS_OWN = "Its own: bunraku improvise CHECKPOINT --out FILE, then bunraku export --phrase FILE."
 FIRST_HANDS = ("left upper arm", "left forearm", "left hand", "right upper arm", "head")
 
 
@@ -88,15 +89,18 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     say("Measuring whether the body answers a hand.")
     report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png")
     packing.write_skeleton(request.out, dataset.skeleton, dataset.still_pose())
+    about = "what the show starts from; another: bunraku export --phrase FILE"
     if request.phrase is not None:
         packing.write_phrase(request.out, _given_phrase(request.phrase, request.source, dataset))
+        about = f"made of {request.phrase.name}"
     elif not (request.out / "phrase.bvh").exists():
         phrase, take = _excerpt(dataset)
         packing.write_phrase(request.out, phrase)
         say(
             f"phrase.bvh is {phrase.seconds:.0f} s of the recording {take}: the bundle contains a recording. "
-            "Give your own with --phrase, or replace the file and run bunraku export again."
+            f"{_PHRASE_OF_ITS_OWN}"
         )
+        about = f"an excerpt of the recording {take}. {_PHRASE_OF_ITS_OWN}"
     joint, doubt = first_hand(dataset.skeleton, coder.joints, request.hand)
     if doubt:
         say(doubt)
@@ -104,7 +108,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     hanging = hanging_orientation(dataset.skeleton, hand["joint"])
     if hanging is not None:
         hand["at_neutral"] = hanging
-    packing.write_show_yaml(request.out, name, [hand], request.source.catalogue.acknowledgement)
+    packing.write_show_yaml(request.out, name, [hand], request.source.catalogue.acknowledgement, about)
     (request.out / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     shown = _longest_sound_take(judged_on)
     draw_report(request.out / "report.png", name, report, evaluation, coder, shown)
