@@ -13,7 +13,7 @@ from appliance.box.fallback import Fallback, Fallbacks, Fallen, fallen
 from appliance.box.record import Record
 from appliance.pose.foreign_file import kept_json, plain_json
 
-WHO = ("lights", "projector", "keeper", "console")
+WHO = ("lights", "projector", "keeper", "console", "generator")
 BEAT_S, LATE_S = 1.0, 5.0
 _LARGEST = 8192
 _CHOSEN = "chosen.json"
@@ -33,6 +33,11 @@ DIED = {
         "keeper-died",
         "The keeper died or hangs. The audience sees nothing of it; journal and place are kept again when it "
         "is back. If it goes on, look at the disk: bunraku doctor.",
+    ),
+    "generator": Fallback(
+        "generator-died",
+        "The generator died or hangs. The last phrase plays on, and it is started again within two seconds. "
+        "If it goes on, look at its messages: journalctl -u bunraku-generator.",
     ),
     "console": Fallback(
         "console-died",

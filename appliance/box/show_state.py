@@ -13,6 +13,7 @@ from appliance.box.ring_file import RingFileReader
 from appliance.pose.foreign_file import plain_json
 
 FILE, KIND = "show_state", "show_state"
+MOTION = "motion "  # so begin parts of the dance that are for the generator
 LARGEST = 8192  # bytes; the longest names of a show fit, in any script
 
 Part = tuple[int, str, tuple[float, ...]]  # the generation that declared it, a text, numbers
@@ -26,7 +27,8 @@ class ShowState:
 
     dance: what the stage applies, each part once, in this order: `cue` (name), `phrase` (name; fade in
     seconds), `iterations` (coding, interaction, fade in seconds), `rate` (of playback; none: the show's),
-    `hand JOINT` (joint; 1 holds). A stage with another show than `show` ignores it.
+    `hand JOINT` (joint; 1 holds). For the generator: `motion SOURCE NAME` (value; fade in seconds), `motion
+    path points` (x, y of each), `motion again` (how often). A stage with another show than `show` ignores it.
     generation: the newest that declared something for the dance, in nanoseconds since the machine started.
     """
 

@@ -34,6 +34,7 @@ _MODULES = {  # in each a function or a group of the command's name
     "project": "appliance.cli.project",
     "control": "appliance.cli.control",
     "console": "appliance.cli.console",
+    "generate": "appliance.cli.generate",
     "keep": "appliance.cli.keep",
     "check": "appliance.cli.check",
     "pack": "appliance.cli.check",

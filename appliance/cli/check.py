@@ -9,6 +9,7 @@ import typer
 
 from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import BoxFile
+from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
 from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
@@ -66,6 +67,7 @@ def _check(directory: Path, box_file: Path | None) -> None:
         raise StageError("\n".join(parts.complaints))
     if not verdict.fits:
         raise StageError(verdict.sentence())
+    _refuse_motion_networks(show)
     print(f"{show.config.name}: the bundle is whole.")
     print(verdict.sentence())
     too_many = too_much(show.config.cues, verdict.most_coding, show.file)
@@ -114,6 +116,19 @@ def _refuse_damage(directory: Path) -> None:
     changed = [str(finding) for finding in findings if finding.level == "error"]
     if changed:
         raise StageError("\n".join([not_as_packed(directory), *changed]))
+
+
+def _refuse_motion_networks(show: Show) -> None:
+    """Raises ConfigError where a source's network is none of this figure: it would make nothing on stage."""
+    problems = []
+    for source, file in show.motion_networks.items():
+        try:
+            MotionNetwork(file, show.skeleton.names)
+        except MotionNetworkError as error:
+            cure = "Copy the file again, or train it on this dancer's recordings."
+            problems.append(show.file.problem(("motion", source), f"{file.name}: {error}", cure))
+    if problems:
+        raise ConfigError(problems)
 
 
 def _refuse_misfits(show: Show, box: BoxConfig) -> None:

@@ -11,9 +11,8 @@ from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from appliance.box.live_pose import forget_live_pose
+from appliance.box.leftovers import forget_run
 from appliance.box.log_writer import LogWriter
-from appliance.box.show_state import forget_show_state
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.readings import readings_line
 from appliance.sensor.memory import forget_memory
@@ -195,6 +194,8 @@ def _companions(
         )
     named = () if box.path is None else ("--box", str(box.path))
     bunraku = (sys.executable, "-m", "appliance.cli")
+    if show.config.motion.made_sources:
+        yield Companion("The generator", (*bunraku, "generate", *named), "The last phrase plays on.")
     if box.outputs.dmx and show.config.lights.fixtures:
         yield Companion(
             "The process for the lights",
@@ -212,8 +213,7 @@ def _companions(
 
 def _forget_run(stage: Stage) -> None:
     """After a clean end the next show starts from its beginning."""
-    forget_show_state(stage.sharing.folder)
-    forget_live_pose(stage.sharing.folder)
+    forget_run(stage.sharing.folder)
     if stage.box.state_folder is not None:
         forget_memory(stage.sharing.noted, stage.box.state_folder)
 

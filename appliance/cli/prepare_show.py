@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 from pathlib import Path
 
+from appliance.dancer.phrase_cache import FOLDER, prepare
 from appliance.release.choice import EMBEDDED_SHOW
 from appliance.show.show import load_show
-from appliance.stage.phrase_cache import FOLDER, prepare
 
 
 def prepare_show(directory: Path = EMBEDDED_SHOW) -> None:

@@ -76,6 +76,17 @@ class Loop:
         self.step = Placement() if closed else self._close_or_carry()
         self._fade_over()
 
+    @classmethod
+    def made(cls, poses: FloatArray, track: FloatArray, step: Placement, start_s: float) -> Loop:
+        """A closed loop as it is: poses (N + 1, J, 4) and track (N + 1, C), not copied; the last frame is the
+        first one again, placed by the step.
+        """
+        loop = object.__new__(cls)
+        loop.length = loop.period = len(poses) - 1
+        loop.fade, loop.start_s, loop.step = 0, start_s, step
+        loop.poses, loop.track = poses, track
+        return loop
+
     def _close_or_carry(self) -> Placement:
         """Close the root's path if little is missing; returns the step that remains from end to start."""
         first = self.fade // 2

@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from appliance.dancer.crossfade import Crossfade
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
 from appliance.dancer.phrase import FPS, NUMBER, Phrase, X, Z
+from appliance.dancer.played import Played
 from appliance.dancer.reading_head import Reader, ReadingHead
-from appliance.dancer.repertoire import Repertoire
-from appliance.dancer.slerp import FloatArray, Slerp
+from appliance.dancer.repertoire import Made, Repertoire
+from appliance.dancer.slerp import Slerp
 from appliance.dancer.stream import Stream
 from appliance.pose.recording import Recording
 from appliance.show.sources import MAIN
 
 MAX_RATE = 4.0
 RATE_CHANGE_PER_TICK = 0.08  # from standing to full speed in a quarter of a second
-_HURRY = 25  # ticks that a long crossfade takes at most, once the next change waits for it
 _FRAME_DIGITS = 2  # of a place to start at: its seconds are exact to some thousandths of a frame
 
 
-class Playback:
+class Playback(Played):
     """Plays one of its phrases endlessly. Each tick: read window() and roots(), then advance().
 
     The motion is one continuous stream; the window is its next 8 poses, the first of them the pose of this
@@ -60,7 +62,6 @@ class Playback:
         self._entering_track = np.empty(columns, dtype=np.float32)
         self._stream = Stream(joints, columns, window)
         self._request: tuple[Loop, float, int] | None = None
-        self._leaving: ReadingHead | None = None
         self._begin()
 
     def add(self, name: str, phrase: Recording, floor: Floor | None = None) -> None:
@@ -72,29 +73,15 @@ class Playback:
         """Names of all phrases, the show's first phrase first."""
         return self._repertoire.names
 
-    def window(self) -> FloatArray:
-        """The next poses (window, J, 4) of the motion, without sign jumps; valid until advance()."""
-        return self._stream.poses()
-
-    def roots(self) -> FloatArray:
-        """The root's position (window, 3) in metres at the poses of the window."""
-        return self._stream.roots()
+    @property
+    def made(self) -> Made | None:
+        """What was made ahead and dances now or is about to; None: a phrase."""
+        return self._repertoire.made(self._excerpt)
 
     @property
-    def lift(self) -> float:
-        """How far the phrase is above the floor (metres) at the window's first pose."""
-        return self._stream.lift
-
-    @property
-    def rest_heights(self) -> FloatArray | None:
-        """Heights (S,) in metres of the soles' points while they stand, at the window's first pose."""
-        heights = self._stream.rest_heights
-        return heights if len(heights) else None
-
-    @property
-    def phrase(self) -> str:
-        """Name of the phrase of the window's first pose; in a crossfade the entering one."""
-        return self.phrases[self._stream.number]
+    def base(self) -> str:
+        """Name of the phrase that was danced last, or dances."""
+        return self._asked.name
 
     @property
     def position_s(self) -> float:
@@ -113,7 +100,7 @@ class Playback:
     @property
     def excerpt_s(self) -> tuple[float, float]:
         """First and last second of the part of the phrase that plays or is about to."""
-        loop = self._excerpt
+        loop = self._excerpt if self.made is None else self._repertoire.find(self.base)[1]
         return loop.start_s, loop.start_s + loop.length / FPS
 
     @property
@@ -124,13 +111,8 @@ class Playback:
         elif self._on_the_way:
             loop, position = self._head.loop, self._entered_at
         else:
-            return self.phrase, self.position_s
+            return (self.phrase if self.made is None else self.base), self.position_s
         return self._asked.name, loop.start_s + position / FPS
-
-    @property
-    def standing(self) -> tuple[float, float, float]:
-        """The root on the stage at the window's first pose: x, z in metres, heading in radians."""
-        return self._stream.standing
 
     def jump(self, to_s: float) -> None:
         """Continue at another second of the phrase, clamped to the excerpt, with a crossfade.
@@ -155,10 +137,34 @@ class Playback:
         phrase, loop = self._repertoire.find(name)
         if loop is self._excerpt:
             return False
-        self._asked, self._excerpt = phrase, loop
         begin = loop.length - 1.0 if self._wanted_rate < 0 else 0.0
+        if self.made is not None and self.made.phrase == name:
+            begin = self._in_step(loop)
+        self._asked, self._excerpt = phrase, loop
         self._request = loop, begin, self._fade if fade_s is None else max(0, round(fade_s * FPS))
         return True
+
+    def enter(self, recipe: str, loop: Loop, fade_s: float) -> None:
+        """Switch within fade_s to a loop that was made ahead: in step with the phrase that it follows, else
+        from its start. Raises ValueError, LookupError or TypeError for no recipe.
+        """
+        made = self._repertoire.take(recipe, loop)
+        begin = self._in_step(loop) if made.phrase == self.base else 0.0
+        self._excerpt, self._request = loop, (loop, begin, max(0, round(fade_s * FPS)))
+
+    def loop_of(self, name: str) -> Loop:
+        """The whole loop of a phrase. Raises ValueError."""
+        return self._repertoire.find(name)[1]
+
+    def make_by(self, make: Callable[[str], Loop]) -> None:
+        """Who makes the loops that a state names by their recipes."""
+        self._repertoire.make = make
+
+    def _in_step(self, loop: Loop) -> float:
+        """The frame of a loop at the second that is reached, also by what is still to come."""
+        here, position, _ = self._request or (self._head.loop, self._head.position, 0)
+        frame = (here.start_s - loop.start_s) * FPS + position
+        return min(max(frame, 0.0), loop.length - 1.0)
 
     def start_with(self, name: str) -> None:
         """Before the first tick: start with this phrase instead, without a crossfade. Raises ValueError."""
@@ -189,13 +195,14 @@ class Playback:
     def advance(self) -> None:
         """Advance by one tick. `jumped`: whether a jump began in it."""
         self.jumped = False
-        if self._request is not None and self._leaving is None:
+        leaving = self._crossfade.leaving
+        if self._request is not None and leaving is None:
             (loop, position, fade), self._request = self._request, None
             self._cross_over(loop, position, fade)
             self.jumped = True
         elif self._request is not None:
-            self._hurry()
-        elif self._rate < 0 and self._leaving is None and self._head.position < self._head.loop.fade:
+            self._crossfade.hurry(self._fade)
+        elif self._rate < 0 and leaving is None and self._head.position < self._head.loop.fade:
             # Backwards out of the first frames, before the first loop: the end does not lead here by itself.
             loop = self._head.loop
             self._cross_over(loop, self._head.position + loop.period, self._fade)
@@ -204,15 +211,15 @@ class Playback:
 
     def state(self) -> dict[str, Any]:
         """What later poses depend on, for `restore`: plain values and copies of arrays."""
-        repertoire, request = self._repertoire, self._request
+        repertoire, request, leaving = self._repertoire, self._request, self._crossfade.leaving
         return {
             "rate": self._rate,
             "wanted_rate": self._wanted_rate,
             "asked": self._asked.name,
             "excerpt": repertoire.named(self._excerpt),
             "head": repertoire.head_state(self._head),
-            "leaving": None if self._leaving is None else repertoire.head_state(self._leaving),
-            "fade": [self._fade_tick, self._fade_length],
+            "leaving": None if leaving is None else repertoire.head_state(leaving),
+            "fade": self._crossfade.times,
             "entered": [self._on_the_way, float(self._entered_at)],
             "request": None if request is None else [repertoire.named(request[0]), *request[1:]],
             "jumped": self.jumped,
@@ -227,8 +234,8 @@ class Playback:
         self._excerpt = repertoire.loop(state["excerpt"])
         self._head = repertoire.head(state["head"])
         leaving, request = state["leaving"], state["request"]
-        self._leaving = repertoire.head(leaving) if leaving is not None else None
-        self._fade_tick, self._fade_length = state["fade"]
+        left = repertoire.head(leaving) if leaving is not None else None
+        self._crossfade = Crossfade.restored(left, state["fade"])
         self._request = None if request is None else (repertoire.loop(request[0]), *request[1:])
         self._on_the_way, self._entered_at = state["entered"]
         self.jumped = state["jumped"]
@@ -243,9 +250,7 @@ class Playback:
             w, _, y, _ = self._head.pose[0].tolist()
             self._head.placement = Placement.bringing((x, z, 2 * math.atan2(y, w)), standing)
         self._on_the_way, self._entered_at = 0, position
-        self._leaving = None
-        self._fade_tick = self._fade_length = 0.0
-        self._request = None
+        self._crossfade, self._request = Crossfade(), None
         self.jumped = False
         self._stream.clear()
         for _ in range(self._window):
@@ -255,22 +260,19 @@ class Playback:
         """Append one pose to the played motion and move the heads."""
         self._on_the_way = max(0, self._on_the_way - 1)
         pose, track = self._stream.next_row()
-        leaving = self._leaving
+        leaving = self._crossfade.leaving
         if leaving is None:
             self._reader.read(self._head, track)
             pose[:] = self._head.pose
         else:
-            self._fade_tick += 1.0
-            share = self._fade_tick / self._fade_length
-            share = share * share * (3 - 2 * share)
+            share = self._crossfade.advance()
             self._reader.read(leaving, track)
             self._reader.read(self._head, self._entering_track)
             self._between_heads(leaving.pose, self._head.pose, share, pose)
             track += share * (self._entering_track - track)
             track[NUMBER:] = self._entering_track[NUMBER:]
             leaving.move(self._rate)
-            if self._fade_tick > self._fade_length - 1.5:
-                self._leaving = None
+            self._crossfade.end_if_over()
         self._head.move(self._rate)
         self._stream.append()
 
@@ -279,17 +281,8 @@ class Playback:
         leaving = self._head
         entering = ReadingHead(loop, position, leaving.pose.copy())
         entering.placement = Placement.bringing(entering.standing, leaving.standing)
-        self._head = entering
-        self._leaving = leaving if fade else None
-        self._fade_tick, self._fade_length = 0.0, fade + 1.0
+        self._head, self._crossfade = entering, Crossfade(leaving, fade)
         self._on_the_way, self._entered_at = self._window, position
-
-    def _hurry(self) -> None:
-        """End a long crossfade sooner, from its present state: the next change waits for it."""
-        soon = max(_HURRY, self._fade + 1.0)
-        if self._fade_length - self._fade_tick > soon:
-            self._fade_length *= soon / (self._fade_length - self._fade_tick)
-            self._fade_tick = self._fade_length - soon
 
 
 def _checked_rate(rate: float) -> float:

@@ -1,8 +1,10 @@
-"""Repertoire: the phrases of a show by name, and loops and reading heads as plain values with those names."""
+"""Repertoire: phrases by name and loops that were made ahead by recipe, as plain values too."""
 
 from __future__ import annotations
 
-from typing import Any
+import json
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,11 +14,29 @@ from appliance.dancer.phrase import FPS, NUMBER, Phrase, PhraseError
 from appliance.dancer.reading_head import ReadingHead
 from appliance.pose.recording import Recording
 from appliance.show.config_error import did_you_mean
-from appliance.show.sources import MAIN
+from appliance.show.sources import GRANULAR, MAIN
+
+FIRST_MADE = 1000  # numbers of loops that were made ahead; phrases have lower ones
+_MADE_KEPT = 6  # of the newest: a crossfade and the window know four at most
+
+
+class Made(NamedTuple):
+    """A loop that was made ahead. phrase: the one whose seconds it follows; "": it has its own."""
+
+    recipe: str
+    name: str
+    phrase: str
+    number: int
+    loop: Loop
 
 
 class Repertoire:
-    """Phrases of one skeleton and the whole loop of each. names: in their order."""
+    """Phrases of one skeleton and the whole loop of each. names: in their order.
+
+    make: gives the loop of a recipe, for a state that names one that is not here; raises ValueError.
+    """
+
+    make: Callable[[str], Loop]
 
     def __init__(self, main: Phrase, excerpt: Loop, fade: int, window: int) -> None:
         """main: the phrase with which the show starts; excerpt: the loop of it that plays. fade: frames."""
@@ -24,6 +44,8 @@ class Repertoire:
         self._fade, self._window = fade, window
         self._phrases = {MAIN: (main, excerpt)}
         self.names: tuple[str, ...] = (MAIN,)
+        self._made: dict[int, Made] = {}
+        self.make = _unmade
 
     def add(self, name: str, recording: Recording, floor: Floor | None) -> None:
         """Add a phrase. Raises PhraseError."""
@@ -39,14 +61,42 @@ class Repertoire:
             raise ValueError(f"This show has no phrase '{name}'. {did_you_mean(name, self.names)}")
         return self._phrases[name]
 
+    def take(self, recipe: str, loop: Loop) -> Made:
+        """Take in a loop that was made ahead. Raises ValueError, LookupError or TypeError for no recipe."""
+        values = json.loads(recipe)
+        kind = values.get("of", values)
+        phrase = "" if kind.get("points") or kind["source"] == GRANULAR else str(kind["phrase"])
+        name, number = str(values.get("name") or values["source"]), int(values["number"])
+        if loop.track.shape[1] != self._phrases[MAIN][1].track.shape[1] or number < FIRST_MADE:
+            raise ValueError("It was made for another floor, or another show.")
+        made = self._made[number] = Made(recipe, name, phrase, number, loop)
+        for old in [*self._made][:-_MADE_KEPT]:
+            del self._made[old]
+        return made
+
+    def made(self, loop: Loop) -> Made | None:
+        """What is known of a loop that was made ahead; None for one of a phrase."""
+        return self._made.get(round(float(loop.track[0, NUMBER])))
+
+    def name_of(self, number: int) -> str:
+        """The name of a phrase, or of what was made ahead, by the number in its track."""
+        if number < FIRST_MADE:
+            return self.names[number]
+        return self._made[number].name if number in self._made else ""
+
     def named(self, loop: Loop) -> list[Any]:
-        """A loop as plain values: phrase, first second, frames, and whether it is the phrase's whole loop."""
+        """A loop as plain values: phrase or recipe, first second, frames, and whether it is a whole loop."""
+        if (made := self.made(loop)) is not None:
+            return [made.recipe, loop.start_s, loop.length, True]
         name = self.names[round(float(loop.track[0, NUMBER]))]
         return [name, loop.start_s, loop.length, loop is self._phrases[name][1]]
 
     def loop(self, named: list[Any]) -> Loop:
-        """The loop of the values from `named`. Raises KeyError, PhraseError."""
+        """The loop of the values from `named`. Raises KeyError, PhraseError, ValueError."""
         name, start_s, length, is_own = named
+        if name not in self._phrases and name.startswith("{"):
+            known = next((made for made in self._made.values() if made.recipe == name), None)
+            return (known or self.take(name, self.make(name))).loop
         phrase, own = self._phrases[name]
         return own if is_own else phrase.cut(start_s, start_s + length / FPS)
 
@@ -64,3 +114,7 @@ class Repertoire:
         """The reading head of a `head_state`. Raises as `loop` does."""
         pose = np.array(state["pose"], dtype=np.float32)
         return ReadingHead(self.loop(state["loop"]), state["position"], pose, Placement(*state["placement"]))
+
+
+def _unmade(recipe: str) -> Loop:
+    raise ValueError("Nothing was made by this recipe here.")

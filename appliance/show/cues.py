@@ -8,6 +8,7 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from appliance.show.config_error import Problem, did_you_mean
+from appliance.show.motion_sources import MotionChanges
 from appliance.show.section import Section, key, refusal
 from appliance.show.yaml_file import Location, YamlFile
 
@@ -23,8 +24,12 @@ class CueConfig(Section):
 
     name: str = key("What `/cue` calls it.", length=(1, 64))
     phrase: Name | None = key(
-        "The phrase that the puppet starts from: `main`, a name under motion.phrases, or `live`. "
-        "It begins at its start; one that plays already goes on.",
+        "What the puppet starts from: `main`, a name under motion.phrases, `live`, `vary`, `granular` or "
+        "`path`. A phrase begins at its start; one that plays already goes on.",
+        None,
+    )
+    motion: MotionChanges | None = key(
+        "Parameters of the sources that are made ahead, like {vary: {sigma: 1.2}}, reached over the fade.",
         None,
     )
     iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = key(

@@ -6,8 +6,10 @@ from typing import Any, Literal
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
+from appliance.show.config_error import did_you_mean
+from appliance.show.motion_sources import GranularConfig, PathConfig, VaryConfig
 from appliance.show.section import BundleFile, Section, key, refusal
-from appliance.show.sources import LIVE, MAIN
+from appliance.show.sources import GRANULAR, LIVE, MADE, MAIN, PATH, VARY
 
 Blending = Literal["prompt", "hann"]
 
@@ -75,6 +77,15 @@ class MotionConfig(Section):
         "`live`. It comes to the control port as `/mocap/0/joint/rot_local` (docs/osc.md).",
         False,
     )
+    vary: VaryConfig | None = key("The source `vary`: the phrase danced anew at every return.", None)
+    granular: GranularConfig | None = key("The source `granular`: a walk through what the dancer does.", None)
+    path: PathConfig | None = key("The source `path`: a path through the dancer's poses that wobbles.", None)
+    source: str = key(
+        "What the show starts from: `main`, a name under phrases, `live`, `vary`, `granular` or `path`. The "
+        "phrase plays until what is made ahead is there.",
+        MAIN,
+        length=(1, 64),
+    )
     start_s: float = key("Where in `phrase` the excerpt starts, in seconds.", 0.0, within=(0, 86400))
     end_s: float | None = key(
         "Where it ends, in seconds; after start_s. null: at the phrase's end.", None, above=0, most=86400
@@ -90,14 +101,32 @@ class MotionConfig(Section):
     )
     grounded: bool = key("Keep the lowest foot on the floor after the puppet has changed the legs.", True)
 
+    @model_validator(mode="after")
+    def _names_that_are_there(self) -> MotionConfig:
+        if self.source not in self.sources:
+            raise refusal(
+                f"The show starts from '{self.source}', which it does not have.",
+                did_you_mean(self.source, self.sources),
+                at="source",
+            )
+        for name in (self.granular.from_, self.granular.to) if self.granular else ():
+            if name is not None and name not in self.files:
+                place = "from" if name == self.granular.from_ else "to"  # type: ignore[union-attr]
+                raise refusal(
+                    f"There is no phrase '{name}' to walk along.",
+                    did_you_mean(name, list(self.files)),
+                    at=("granular", place),
+                )
+        return self
+
     @field_validator("phrases")
     @classmethod
     def _names_that_can_be_called(cls, phrases: dict[str, str]) -> dict[str, str]:
         for name in phrases:
-            if name in (MAIN, LIVE):
-                what = "phrase that the show starts with" if name == MAIN else "stream of motion capture"
+            if name in (MAIN, LIVE, *MADE):
+                what = {MAIN: "phrase that the show starts with", LIVE: "stream of motion capture"}
                 raise refusal(
-                    f"'{name}' is what the {what} is called.",
+                    f"'{name}' is what the {what.get(name, 'source of motion')} is called.",
                     "Give this one another name.",
                     at=name,
                 )
@@ -110,7 +139,13 @@ class MotionConfig(Section):
     @property
     def sources(self) -> tuple[str, ...]:
         """What the puppet can start from, by the names that cues call, the one at the start first."""
-        return (*self.files, *([LIVE] if self.live else []))
+        return (*self.files, *([LIVE] if self.live else []), *self.made_sources)
+
+    @property
+    def made_sources(self) -> dict[str, VaryConfig | GranularConfig | PathConfig]:
+        """The sources that the generator makes, by name."""
+        sections = {VARY: self.vary, GRANULAR: self.granular, PATH: self.path}
+        return {name: section for name, section in sections.items() if section is not None}
 
     @property
     def files(self) -> dict[str, str]:

@@ -151,6 +151,12 @@ class Show:
         """All phrases' BVH files by their names, the one that playback starts from first."""
         return {name: self.directory / file for name, file in self.config.motion.files.items()}
 
+    @property
+    def motion_networks(self) -> dict[str, Path]:
+        """The networks of the sources that the generator makes, by source."""
+        sources = self.config.motion.made_sources
+        return {name: self.directory / section.network for name, section in sources.items()}
+
     def require_moving(self, joints: Sequence[str]) -> None:
         """Refuse hands on joints that the network does not move; `joints` are those that it does."""
         words = "The network does not move the joint '{}'."

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from appliance.show.config_error import nearest
+from appliance.show.sources import MOST_POINTS, PARAMETERS
 from appliance.show_control.packet import Unread, is_readable
 
 REPLY, SENSORS_REPLY, PONG = "/reply", "/sensors/reply", "/pong"  # what the box answers with
@@ -15,6 +16,7 @@ STREAMS = ("/player/", "/mocap/")  # answered only when refused or not carried o
 LONGEST_NAME = 100
 _MOST_FADE_S = 60.0
 _FAR = 1e6
+_MOST_SAID = 4  # optional numbers in an error
 
 
 class Number(NamedTuple):
@@ -52,7 +54,8 @@ class Form(NamedTuple):
         text = f"[{self.text}]" if self.text and self.may_be_nameless else self.text
         fewest = len(self.numbers) - self.optional
         parts = [*([text] if text else []), *map(str, self.numbers[:fewest])]
-        parts += [f"[{number}]" for number in self.numbers[fewest:]]
+        parts += [f"[{number}]" for number in self.numbers[fewest:][:_MOST_SAID]]
+        parts += ["..."] if self.optional > _MOST_SAID else []
         return ", ".join(parts) or "nothing"
 
 
@@ -63,6 +66,7 @@ _ANY = -_FAR, _FAR
 _WIND = tuple(Number(f"{axis}, m/s", -30, 30) for axis in "xyz")
 _CORNER = Number("corner", 1, 4, is_whole=True)
 _PLACE = (Number("x", -0.5, 1.5), Number("y", -0.5, 1.5))  # as far as keys move a corner
+_POINT = (Number("x", 0, 1), Number("y", 0, 1))
 _WAY = (Number("dx", -1, 1), Number("dy", -1, 1))
 
 FORMS: dict[str, Form] = {
@@ -73,6 +77,15 @@ FORMS: dict[str, Form] = {
     "/master": Form(numbers=(Number("brightness", 0, 1), _FADE), optional=1),
     "/cue": Form("cue", may_be_nameless=True),
     "/phrase": Form("phrase", (_FADE,), optional=1),
+    "/motion/path": Form(numbers=_POINT * MOST_POINTS, optional=2 * MOST_POINTS),
+    "/motion/again": Form(),
+    "/motion/keep": Form("name"),
+    "/motion": Form(),
+    **{
+        f"/motion/{source}/{name}": Form(numbers=(Number(name, *about[2:]), _FADE), optional=1)
+        for source, parameters in PARAMETERS.items()
+        for name, about in parameters.items()
+    },
     "/look": Form("look", (_FADE,), optional=1),
     "/lights": Form("light mappings", (_FADE,), optional=1),
     "/springs": Form("setting"),
@@ -113,11 +126,15 @@ FORMS: dict[str, Form] = {
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One message in a valid form. `text`: what it is about, a joint also by number; "": left out."""
+    """One message in a valid form. `text`: what it is about, a joint also by number; "": left out.
+
+    kept: names of motions that were kept, which /phrase may call as well.
+    """
 
     address: str
     values: tuple[float, ...] = ()
     text: str | int = ""
+    kept: tuple[str, ...] = ()
 
 
 def command(address: str, arguments: Sequence[object]) -> Command:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 # What a box sends is never answered: two boxes would go on answering each other for ever.
 _ANSWERS = frozenset((REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END))
-_LISTED = ("/cues/", "/phrases/", "/looks/", "/hands/", "/fallbacks/")
+_LISTED = ("/cues/", "/phrases/", "/looks/", "/hands/", "/fallbacks/", "/motion/is")
 _ONCE_A_BUNDLE = frozenset((*QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
 
@@ -48,6 +49,7 @@ ORDERS: Mapping[str, tuple[Place, str]] = {
     "/sensors/heading": ("stage", "heading"),
     "/sensors/strobe": ("stage", "strobe"),
     "/sensors/reload": ("stage", "reload"),
+    "/motion/keep": ("generator", "keep"),
     "/projector/corner": ("projector", "corner"),
     "/projector/corners": ("projector", "corners"),
     "/projector/corners/reset": ("projector", "corners/reset"),
@@ -158,6 +160,8 @@ class CommandHandler:
         """Reply at once; about the dance once it follows."""
         address, observer = command.address, self._observer
         before = of_this_show(self.show_state, observer.facts)
+        if address in ("/phrase", "/cue"):
+            command = replace(command, kept=observer.kept())
         show_state, words = DECLARATIONS[address](before, command, observer.facts, now)
         if address == "/go" and before.going and observer.state(now) == "stopped":
             show_state = show_state.with_dance(now, SHOWS_RATE)

@@ -23,11 +23,13 @@ _SILENT = {
     "or with: bunraku play.",
     "projector": "The projector does not answer, and nothing is changed.",
     "lights": "The lights do not answer, and nothing is changed.",
+    "generator": "The generator does not answer, and nothing is changed.",
 }
 _ABSENT = {
     "stage": "No stage dances on this box: nothing is changed. Start it: bunraku play.",
     "projector": "No projector runs on this box: nothing is changed. Start it: bunraku project.",
     "lights": "No lights run on this box: nothing is changed. Start them: bunraku lights.",
+    "generator": "No generator runs on this box: nothing is changed. Start it: bunraku generate.",
 }
 _TOO_MANY = "Too many commands came at once: this one gave way, and nothing is changed."
 

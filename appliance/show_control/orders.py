@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from appliance.sensor.keys import SensorKey
 
-Place = Literal["stage", "projector", "lights"]
+Place = Literal["stage", "projector", "lights", "generator"]
 Delivery = Literal["sent", "full", "absent"]  # full: the receiver's socket is; absent: there is no receiver
 ANSWERS = "control"
 _LARGEST = 65536
@@ -35,6 +35,7 @@ class Order:
     joint), neutral, heading, strobe (text: the sensor or ""), reload (keys).
     For the projector:  corner (number 1..4, x, y), corners (x1, y1 .. x4, y4), corners/reset, brightness (b),
     mirror (0|1), grid (0|1), info (0|1).
+    For the generator:  keep (text: the name).
 
     keys: those that a reload has read. ask: number of the answer that is waited for; 0: none.
     quiet: only a refusal is answered (streams of orders). until: monotonic seconds, after which the order

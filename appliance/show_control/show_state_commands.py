@@ -6,15 +6,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from appliance.box.show_state import ShowState
+from appliance.box.show_state import MOTION, ShowState
 from appliance.outputs.shared_frame import Facts
 from appliance.show.config_error import did_you_mean
+from appliance.show.sources import MADE, PARAMETERS, PATH, POINTS
 from appliance.show_control.command import Command
 
 STOP_FADE_S = 2.0
 GO_FADE_S = 1.0
 LOOK_FADE_S = 2.0  # of looks and lights, where a command gives none
 PHRASE_FADE_S = 2.0
+MOST_AGAIN = 1000
 
 SHOWS_RATE: dict[str, tuple[str, tuple[float, ...]]] = {"rate": ("", ())}
 
@@ -86,14 +88,43 @@ def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: floa
         parts |= {f"hand {joint}": (joint, (float(joint in cue["hands"]),)) for joint in _held(facts)}
     if cue.get("springs") is not None:
         show_state, parts["springs"] = _without_weather(show_state), (cue["springs"], ())
+    for source, changes in (cue.get("motion") or {}).items():
+        parts |= {f"{MOTION}{source} {key}": ("", (float(value), fade_s)) for key, value in changes.items()}
     if cue.get("iterations") is not None:
         parts["iterations"] = "", (*map(float, cue["iterations"]), fade_s)
     return in_cue(show_state, cue, PARTS, now).with_dance(now, parts), f"Cue {name}."
 
 
 def _phrase(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    name = known("phrase", command.text, _danced(facts).phrases)
+    name = known("phrase", command.text, (*_danced(facts).phrases, *command.kept))
     return show_state.with_dance(now, {"phrase": (name, command.values or (PHRASE_FADE_S,))}), ""
+
+
+def _motion(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    _, _, source, name = command.address.split("/")
+    known("source of motion", source, _danced(facts).phrases)
+    value, *fade_s = command.values
+    words = f"The {name} of {source} goes to {value:g}{f' over {fade_s[0]:g} s' if fade_s else ''}."
+    return show_state.with_dance(now, {f"{MOTION}{source} {name}": ("", command.values)}), words
+
+
+def _points(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    known("source of motion", PATH, _danced(facts).phrases)
+    if len(command.values) % 2:
+        raise ValueError("/motion/path takes x and y of each point, and the last one has no y.")
+    points = len(command.values) // 2
+    words = {0: "The path is the phrase's own again.", 1: "The path stays at this point of the map."}
+    said = words.get(points, f"The path is a line of {points} points, there and back.")
+    return show_state.with_dance(now, {f"{MOTION}{PATH} {POINTS}": ("", command.values)}), said
+
+
+def _again(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    if not any(source in _danced(facts).phrases for source in MADE):
+        raise ValueError("This show has no source that is made ahead: show.yaml names them under motion.")
+    before = show_state.dance.get(f"{MOTION}again", (0, "", (0.0,)))[2][0]
+    return show_state.with_dance(
+        now, {f"{MOTION}again": ("", ((before + 1) % MOST_AGAIN,))}
+    ), "Once more, anew."
 
 
 def _iterations(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
@@ -149,6 +180,9 @@ DECLARATIONS: dict[str, Declaration] = {
     "/springs": _springs,
     "/springs/wind": _weather,
     "/springs/gravity": _weather,
+    "/motion/path": _points,
+    "/motion/again": _again,
+    **{f"/motion/{source}/{name}": _motion for source, names in PARAMETERS.items() for name in names},
     "/player/start": _rate,
     "/player/stop": _rate,
     "/player/rate": _rate,

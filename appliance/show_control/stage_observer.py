@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from appliance.box.fallback import Fallbacks, Fallen, fallen
+from appliance.box.made_motion import KeptNamesReader
 from appliance.box.process_health import COMMANDS_DROPPED, STAGE_HUNG, ProcessHealth
 from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
@@ -19,6 +20,7 @@ class StageObserver:
     def __init__(self, folder: Path) -> None:
         self._reader = FrameReader(folder)
         self._process_health = ProcessHealth(folder)
+        self._kept = KeptNamesReader(folder)
         self._fallbacks = Fallbacks((STAGE_HUNG, COMMANDS_DROPPED))
 
     def state(self, now: float) -> StageState:
@@ -42,6 +44,10 @@ class StageObserver:
         """The generation of the show state that the dance follows, and what the stage says about it."""
         generation, words = self.health().get("applied", (0, ""))
         return int(generation), str(words)
+
+    def kept(self) -> tuple[str, ...]:
+        """Names of motions that were kept: /phrase calls them."""
+        return self._kept.read()
 
     def note_dropped(self, total: int, now: float) -> None:
         """How many datagrams at the control port gave way, since it was opened."""
@@ -67,3 +73,4 @@ class StageObserver:
         """Let go of the shared frame."""
         self._reader.close()
         self._process_health.close()
+        self._kept.close()

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 from appliance.box.show_state import ShowState
+from appliance.pose.foreign_file import plain_json
 from appliance.show_control.packet import Message
 
 if TYPE_CHECKING:
     from appliance.show_control.stage_observer import StageObserver
 
 STATUS, END = "/bunraku/status", "/end"
-QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/hands", "/fallbacks")
+QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/hands", "/fallbacks", "/motion")
 UNKNOWN = -1.0
 _LONGEST_WORDS = 1000  # of a sentence in an answer
 
@@ -97,7 +98,7 @@ def _cues(status: Status, observer: StageObserver, now: float) -> Iterator[Messa
 
 
 def _phrases(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
-    for name in observer.facts.phrases if observer.facts else ():
+    for name in (*observer.facts.phrases, *observer.kept()) if observer.facts else ():
         yield "/phrases/phrase", name, int(name == status.phrase)
 
 
@@ -121,12 +122,22 @@ def _fallbacks(status: Status, observer: StageObserver, now: float) -> Iterator[
         yield "/fallbacks/fallback", one.name, who, one.times, int(one.active), one.words[:_LONGEST_WORDS]
 
 
+def _motion(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
+    """What was made ahead and is danced, number by number; nothing while a phrase or a live dancer is."""
+    recipe = plain_json(str(observer.health().get("made") or "{}"))
+    recipe = recipe.get("of", recipe)
+    for name, value in recipe.items() if status.phrase else ():
+        if name != "number" and isinstance(value, str | int | float):
+            yield "/motion/is", name, value
+
+
 _LISTS = {
     "/cues": _cues,
     "/phrases": _phrases,
     "/looks": _looks,
     "/hands": _hands,
     "/fallbacks": _fallbacks,
+    "/motion": _motion,
 }
 
 

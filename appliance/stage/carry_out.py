@@ -46,6 +46,8 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
             _spring(order, parts)
         elif order.name == "phrase":
             words = parts.play(order.text, *order.values)
+        elif order.name == "made":
+            parts.dance_made(order.text, order.values[0])
         elif order.name == "rate":
             motion.rate = order.values[0]
         elif order.name == "jump":

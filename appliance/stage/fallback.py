@@ -88,8 +88,9 @@ POWER_CUT = Fallback(
 )
 SOURCE_LATE = Fallback(
     "source-late",
-    "The live dancer's motion capture was silent for half a second: the phrase plays on, and the stream "
-    "takes over again with its next pose. Check the program that sends it, and the network.",
+    "What the puppet was to start from did not come in time: the last phrase plays on, and the source takes "
+    "over again when it is back. Of a live dancer check the program that sends it, and the network; of vary, "
+    "granular and path the generator: journalctl -u bunraku-generator.",
 )
 OF_THE_STAGE = (
     *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, ADDRESS_ABSENT, NOT_LET_IN),

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from appliance.box.show_state import ShowStateReader
-from appliance.show.sources import LIVE
+from appliance.box.show_state import MOTION, ShowStateReader
+from appliance.show.sources import LIVE, MAIN
 from appliance.show_control.orders import Order
 from appliance.stage.carry_out import SPRINGS_ORDERS, obey
 from appliance.stage.iterations import Iterations
+from appliance.stage.made_motions import MELT_S, MadeMotions
 from appliance.stage.stage_parts import StageParts
 
 
@@ -20,12 +21,22 @@ class Reconciler:
     goes. words: what there was to say about the newest change.
     """
 
-    def __init__(self, show: str, parts: StageParts, iterations: Iterations, reader: ShowStateReader) -> None:
+    def __init__(
+        self,
+        show: str,
+        parts: StageParts,
+        iterations: Iterations,
+        reader: ShowStateReader,
+        made: MadeMotions | None = None,
+        source: str = MAIN,
+    ) -> None:
+        """made: what the generator makes, for a show that has sources of it. source: it starts from that."""
         self.parts, self.iterations = parts, iterations
         self.generation, self.cue, self.words = 0, "", ""
         self.rate = self._usual_rate = parts.motion.rate
         self._show, self._reader = show, reader
         self._is_first = parts.springs is not None  # a checkpoint knows nothing of the springs' setting
+        self._made, self._source = made, source
 
     def pending(self, now: float) -> Sequence[Order]:
         """Orders that make the dance follow the show state; none in nearly every tick."""
@@ -38,16 +49,28 @@ class Reconciler:
             for name, (number, text, values) in show_state.dance.items():
                 if number > before and name == "rate":
                     self.rate = values[0] if values else self._usual_rate or 1.0
+                elif name.startswith(MOTION) or (name == "phrase" and self._is_made(text)):
+                    continue  # the generator makes it
                 elif number > before or (self._is_first and name in SPRINGS_ORDERS):
                     orders.append(Order(name.partition(" ")[0], values, text))
             self._is_first = False
-        wanted, live = show_state.dance.get("phrase"), self.parts.live
-        if wanted and wanted[1] == LIVE and live is not None and not (orders or live.is_chosen):
-            orders.append(Order("phrase", wanted[2], LIVE))  # after a restart: checkpoints know phrases only
+        live, is_ours = self.parts.live, show_state.show == self._show
+        declared = show_state.dance.get("phrase") if is_ours else None
+        wanted, fade = (declared[1], declared[2]) if declared else (self._source, ())
+        if wanted == LIVE and live is not None and not (orders or live.is_chosen):
+            orders.append(Order("phrase", fade, LIVE))  # after a restart: checkpoints know phrases only
+        if self._made is not None:
+            source = wanted if self._is_made(wanted) else ""
+            if (made := self._made.order(source, fade[0] if fade else MELT_S, now)) is not None:
+                orders.append(made)
         rate = 0.0 if show_state.stands(now) else self.rate
         if rate != self.parts.motion.rate:
             orders.append(Order("rate", (rate,)))
         return orders
+
+    def _is_made(self, name: str) -> bool:
+        """Whether the generator makes it: a source, or a motion that was kept."""
+        return self._made is not None and name != LIVE and name not in self.parts.motion.phrases
 
     def stands(self, now: float) -> bool:
         """Whether the phrase has to stand still, because the show is stopped and dark."""

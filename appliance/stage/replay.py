@@ -23,6 +23,7 @@ from appliance.show_control.orders import Order
 from appliance.stage.carry_out import carry_out
 from appliance.stage.comparison import Comparison
 from appliance.stage.iterations import Iterations
+from appliance.stage.made_again import maker_of
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.sensor_memory import SensorMemory
 from appliance.stage.stage_parts import assemble
@@ -52,6 +53,9 @@ class Replay:
         parts.link = self._link = _RecordedLink(run)
         parts.puppet = self._puppet = _RecordedPuppet(show)
         parts.live_inbox = self._live = _RecordedLive(run)
+        maker = maker_of(show, parts.motion)
+        parts.loop_of = maker
+        parts.motion.make_by(maker)
         self._wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
         self.tick = Tick(parts, self._wearing, Iterations(1, 0, 1), 0.0)
 

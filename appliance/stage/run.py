@@ -11,6 +11,7 @@ from appliance.box.live_pose import LivePoseReader
 from appliance.box.notify import Notifier
 from appliance.box.realtime import enter_realtime, leave_realtime
 from appliance.box.show_state import ShowStateReader
+from appliance.dancer.phrase_cache import MEMORY
 from appliance.recorder.record import JUMPED, LATE, NOT_FINITE, ORDER, RESENT, SAID, facts_of_run
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
@@ -20,8 +21,8 @@ from appliance.stage.admission_cache import admitted
 from appliance.stage.carry_out import carry_out
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
+from appliance.stage.made_motions import open_made_motions
 from appliance.stage.phase_lock import PhaseLock
-from appliance.stage.phrase_cache import MEMORY
 from appliance.stage.reconcile import Reconciler
 from appliance.stage.recorder import Recorder
 from appliance.stage.resume import Resumption
@@ -81,6 +82,9 @@ class Stage:
             self.recorder = self._open_recorder()
             if self.recorder is not None:
                 opened.callback(self.recorder.close)
+            self.made = open_made_motions(self.sharing.folder, show, self.parts)
+            if self.made is not None:
+                opened.callback(self.made.close)
             show_state = ShowStateReader(self.sharing.folder)
             opened.callback(show_state.close)
             self.admission: Admission = admitted(
@@ -91,7 +95,9 @@ class Stage:
         wished = measured.asked_coding, measured.asked_interaction
         self.iterations = Iterations(measured.coding, measured.interaction, measured.most_coding, wished)
         self.second_look = SecondLook(self.admission)
-        self.reconciler = Reconciler(show.config.name, self.parts, self.iterations, show_state)
+        self.reconciler = Reconciler(
+            *(show.config.name, self.parts, self.iterations, show_state, self.made, show.config.motion.source)
+        )
         needed_ms = min(self.admission.p99_ms, box.limits.tick_budget_ms)
         latest_start_s = max(0.0, box.limits.late_ms - needed_ms) / 1000.0
         self.wearing = SensorFit(self.parts, self.memory, self._say_and_note)
@@ -100,7 +106,7 @@ class Stage:
         lead_ms = self.admission.one_ms + _WARM_UP_MARGIN_MS
         self.lead_s = lead_ms / 1000.0 if lead_ms < _LONGEST_WARM_UP_MS else 0.0
         self.lock = PhaseLock() if box.phase_lock and self.parts.primary else None
-        self.watch = Watch(self.parts, self.admission)
+        self.watch = Watch(self.parts, self.admission, self.made)
 
     def dance(self, seconds: float | None, stopped: Callable[[], bool]) -> None:
         """Tick until `stopped` says so or the seconds are over; this thread is the real-time one."""

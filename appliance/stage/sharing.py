@@ -103,6 +103,8 @@ class Sharing:
             "coding": iterations.coding,
             "interaction": iterations.interaction,
             "phrase": parts.source,
+            "base": parts.motion.base,
+            "made": parts.motion.made.recipe if parts.motion.made else "",
             "position_s": parts.motion.position_s,
             "cue": reconciler.cue,
             "applied": [reconciler.generation, reconciler.words],

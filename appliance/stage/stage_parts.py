@@ -16,8 +16,10 @@ from appliance.dancer.blending import Blending
 from appliance.dancer.grounding import Floor, Grounding, GroundingError
 from appliance.dancer.hands import Hands
 from appliance.dancer.live import Live
+from appliance.dancer.loop import Loop
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.phrase import PhraseError
+from appliance.dancer.phrase_cache import PhraseCache
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.dancer.puppeteers import WornSensor
 from appliance.dancer.slerp import FloatArray
@@ -37,9 +39,12 @@ from appliance.show.show import Show
 from appliance.show.sources import LIVE
 from appliance.stage.admission import Admission, admit
 from appliance.stage.open_sensors import open_sensors
-from appliance.stage.phrase_cache import PhraseCache
 from appliance.stage.puppeteers_of_show import mounting_of, puppeteers_of
 from appliance.stage.stage_error import StageError
+
+
+def _nothing_made(recipe: str) -> Loop:
+    raise ValueError("Nothing was made ahead here.")
 
 
 @dataclass(slots=True)
@@ -69,6 +74,7 @@ class StageParts:
     springs: Springs | None = None  # those among the hands
     complaints: tuple[str, ...] = ()
     newest_primary: SensorReading | None = field(default=None)
+    loop_of: Callable[[str], Loop] = field(default=_nothing_made)  # of a recipe
 
     def hear(self, reading: SensorReading) -> None:
         """Give a reading to the joints that its sensor holds."""
@@ -108,6 +114,15 @@ class StageParts:
         if self.springs is not None:
             self.springs.follow_phrase(window[0], roots[0])
         return window, roots
+
+    def dance_made(self, recipe: str, fade_s: float) -> None:
+        """Go over to what the generator made. Raises ValueError, and the phrase plays on."""
+        try:
+            self.motion.enter(recipe, self.loop_of(recipe), fade_s)
+        except (LookupError, TypeError) as error:
+            raise ValueError(f"What was made has no sound recipe ({error}); the phrase plays on.") from None
+        if self.live is not None and self.live.is_chosen:
+            self.live.choose(False, fade_s)
 
     def play(self, name: str, *fade_s: float) -> str:
         """Switch to a phrase, or to `live`; a sentence where nothing changes. Raises ValueError."""

@@ -14,6 +14,7 @@ from appliance.show.sources import LIVE
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
 from appliance.stage.health import Health
+from appliance.stage.made_motions import MadeMotions
 from appliance.stage.resume import Resumption
 from appliance.stage.stage_parts import StageParts
 
@@ -26,8 +27,8 @@ _FOREIGN = ("length", "magic", "version", "kind", "device", "tag", "old_session"
 class Watch:
     """Checks for silent sensors at each tick, for all else once a second, after the frame has left."""
 
-    def __init__(self, parts: StageParts, admission: Admission) -> None:
-        self._parts = parts
+    def __init__(self, parts: StageParts, admission: Admission, made: MadeMotions | None = None) -> None:
+        self._parts, self._made = parts, made
         self.fallbacks = Fallbacks(rows.OF_THE_STAGE)
         self._worn = [joints[0] for joints in parts.worn.values()]
         self._silent = [False] * len(self._worn)
@@ -40,11 +41,12 @@ class Watch:
 
     def count_silences(self, now: float) -> None:
         """At each tick: sensors, and a live dancer, that have just fallen silent. Allocates nothing."""
-        if (live := self._parts.live) is not None:
-            late = live.is_chosen and LIVE_SILENT_S < live.silent_s(now) < math.inf
-            if late and not self._is_source_late:
-                self.fallbacks.count(rows.SOURCE_LATE.name, now)
-            self._is_source_late = late
+        live, made = self._parts.live, self._made
+        late = live is not None and live.is_chosen and LIVE_SILENT_S < live.silent_s(now) < math.inf
+        late = late or (made is not None and made.is_late)
+        if late and not self._is_source_late:
+            self.fallbacks.count(rows.SOURCE_LATE.name, now)
+        self._is_source_late = late
         for place, worn in enumerate(self._worn):
             silent = HOLD_S < worn.silent_s(now) < math.inf
             if silent != self._silent[place]:

@@ -22,6 +22,7 @@ from appliance.studio.disk_room import require_room
 from appliance.studio.evaluation.coders import load_checkpoint, load_state
 from appliance.studio.evaluation.findings import MASKED_PICTURE, few_data, findings, require_windows
 from appliance.studio.evaluation.masked import draw_masked
+from appliance.studio.export.motion_network import FILES, export_motion
 from appliance.studio.export.release import Request, release
 from appliance.studio.improviser import own_output
 from appliance.studio.improviser.learning import AnyTraining, train_until_done, training_for
@@ -127,6 +128,10 @@ def _finish(
     if not isinstance(training, Training) or training.settings.model != "puppet":
         if isinstance(training, Training) and settings.model == "sequence":
             report(load_checkpoint(checkpoint)[0].autoencoder, training.dataset, options.out, console)
+        if isinstance(training, Training) and settings.model in FILES and settings.network == "mlp":
+            coder = load_checkpoint(checkpoint)[0]
+            file = export_motion(coder, training.dataset, settings.model, options.out)
+            console.print(f"{file}: a show that holds it dances from it live (docs/variations.md, On stage).")
         console.print(f"{checkpoint} is ready. What it is for: {MODELS[settings.model].use}.")
     elif training.settings.window != WINDOW:
         console.print(

@@ -68,8 +68,9 @@ def running(supervisor: Supervisor, *command: str, **environ: str) -> Iterator[s
         (("-m", "appliance.cli", "project", "--wait"), NO_DISPLAY),
         (("-m", "appliance.cli", "project", "--offscreen", "64x36"), {}),
         (("-m", "appliance.cli", "console"), {}),
+        (("-m", "appliance.cli", "generate"), {}),
     ],
-    ids=["control", "lights", "projector without a display", "projector", "console"],
+    ids=["control", "lights", "projector without a display", "projector", "console", "generator"],
 )
 def test_it_is_ready_pings_and_ends_when_asked(
     supervisor: Supervisor, box: Path, command: tuple[str, ...], environ: dict[str, str]

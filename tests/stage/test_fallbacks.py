@@ -12,6 +12,7 @@ import pytest
 
 from appliance.box.fallback import RECENT_S, Fallback, Fallbacks, Fallen, fallen
 from appliance.box.process_health import OF_THE_COMPANY
+from appliance.generator.fallback import OF_THE_GENERATOR
 from appliance.keeper.fallback import OF_THE_KEEPER
 from appliance.lights.fallback import OF_THE_LIGHTS
 from appliance.projector.fallback import OF_THE_PROJECTOR
@@ -222,7 +223,14 @@ ROOT = Path(__file__).resolve().parents[2]
 TABLE = re.compile(r"^\| [^|]+ \| `([a-z-]+)` \|.*\| `(\S+)::(\w+)` \|$", re.MULTILINE)
 EVERY = {
     row.name: row
-    for row in (*OF_THE_STAGE, *OF_THE_KEEPER, *OF_THE_LIGHTS, *OF_THE_PROJECTOR, *OF_THE_COMPANY)
+    for row in (
+        *OF_THE_STAGE,
+        *OF_THE_KEEPER,
+        *OF_THE_LIGHTS,
+        *OF_THE_PROJECTOR,
+        *OF_THE_GENERATOR,
+        *OF_THE_COMPANY,
+    )
 }
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import torch
 
+from appliance.dancer.material import latent_paths
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.granular import latent_paths
 from appliance.studio.granular.granular import cycle, decoded, encoded, fed_back, once
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import moving, untrained

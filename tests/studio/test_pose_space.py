@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.dancer.material.pose_paths import even_path, wobbled
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.studio.evaluation.coders import load_checkpoint
 from appliance.studio.pose_space.drawing import read_line
-from appliance.studio.pose_space.latent_poses import PoseMap, even_path, latents_of, poses_of, wobbled
+from appliance.studio.pose_space.latent_poses import PoseMap, latents_of, poses_of
 from appliance.studio.studio_error import StudioError
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import moving, swaying

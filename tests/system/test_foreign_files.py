@@ -18,6 +18,7 @@ import pytest
 from appliance.box.block import BlockReader, BlockWriter
 from appliance.box.checkpoint import Checkpoint, packed, read_checkpoint, unpacked
 from appliance.cli.run_with_timeout import run_with_timeout
+from appliance.dancer.phrase_cache import FOLDER, LARGEST, SUFFIX, PhraseCache, prepare
 from appliance.fixture_library.convert import convert_file
 from appliance.outputs.dmx.identity import component_identifier
 from appliance.pose.bvh import BvhError, read_bvh, write_bvh
@@ -27,7 +28,6 @@ from appliance.release.trial import pair_to_dance
 from appliance.sensor.keys import KeyFileError, load_keys
 from appliance.show.config_error import ConfigError
 from appliance.show.projector import ProjectorConfig
-from appliance.stage.phrase_cache import FOLDER, LARGEST, SUFFIX, PhraseCache, prepare
 from appliance.stage.sensor_memory import SensorMemory
 from tests.bundles import FIGURE, swaying_phrase, write_show
 

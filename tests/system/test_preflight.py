@@ -18,11 +18,11 @@ from appliance.cli import candidate
 from appliance.cli import preflight as commands
 from appliance.cli.preflight import ANEW, Options, candidate_problems, preflight
 from appliance.cli.run_with_timeout import TimedOutError, run_with_timeout
+from appliance.dancer.phrase_cache import FOLDER, SUFFIX
 from appliance.release.choice import APPLIANCE_BOX, CHOSEN, EMBEDDED_SHOW, Choice
 from appliance.show.box import load_box
 from appliance.show.bundle import checksum_problems, write_checksums
 from appliance.show.show import load_show
-from appliance.stage.phrase_cache import FOLDER, SUFFIX
 from tests.bundles import write_show
 from tests.system.processes import run
 

@@ -31,7 +31,7 @@ def encode(
         steps = _reshaped(graph, window, shape.window, shape.pose)
         basis = graph.constant("curves", encoder.time.curves.numpy())
         amounts = _reshaped(graph, graph.op("MatMul", basis, steps), 1, shape.curves * shape.pose)
-        return _dense_stack(graph, layers, encoder.stack, amounts, "encoder", out, bias)
+        return dense_stack(graph, layers, encoder.stack, amounts, "encoder", out, bias)
     if isinstance(encoder, networks.ConvEncoder):
         return _conv_encoder(graph, layers, encoder, shape, window, out)
     if isinstance(encoder, networks.LstmEncoder):
@@ -82,7 +82,7 @@ def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent:
     """Nodes of the decoder: latent (1, Z) -> raw window (T, M, 4); bias: of its last layer."""
     decoder = network.decoder
     if isinstance(decoder, networks.MlpDecoder):
-        amounts = _dense_stack(graph, layers, decoder.stack, latent, "decoder", bias=bias)
+        amounts = dense_stack(graph, layers, decoder.stack, latent, "decoder", bias=bias)
         amounts = _reshaped(graph, amounts, shape.curves, shape.pose)
         basis = graph.constant("curves_back", decoder.time.curves.numpy().T)
         flat = graph.op("MatMul", basis, amounts)
@@ -101,12 +101,7 @@ def decode(graph: Graph, layers: Layers, network: Network, shape: Shape, latent:
     return _reshaped(graph, flat, shape.window, shape.joints, 4)
 
 
-def _reshaped(graph: Graph, x: str, *sizes: int) -> str:
-    name = "shape_" + "x".join(map(str, sizes))
-    return graph.op("Reshape", x, graph.constant(name, sizes, np.int64))
-
-
-def _dense_stack(
+def dense_stack(
     graph: Graph,
     layers: Layers,
     stack: nn.Sequential,
@@ -138,6 +133,11 @@ def _dense_stack(
         else:
             raise TypeError(f"No ONNX form is known for {type(layer).__name__}.")
     return x
+
+
+def _reshaped(graph: Graph, x: str, *sizes: int) -> str:
+    name = "shape_" + "x".join(map(str, sizes))
+    return graph.op("Reshape", x, graph.constant(name, sizes, np.int64))
 
 
 def _conv_encoder(

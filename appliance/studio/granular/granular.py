@@ -10,11 +10,11 @@ import numpy as np
 import torch
 
 from appliance.dancer.blending import Blending
+from appliance.dancer.material.latent_paths import Latents
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.granular.latent_paths import Latents
 
 
 @torch.no_grad()

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from appliance.dancer.material import latent_paths
 from appliance.pose import quaternion
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.dance_files import write_dance
 from appliance.studio.data.dataset import FPS, Dataset, Take
 from appliance.studio.evaluation.coders import Poses, load_checkpoint
-from appliance.studio.granular import latent_paths
 from appliance.studio.granular.granular import cycle, decoded, encoded, fed_back, once
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.naturalness import Yardstick, measure

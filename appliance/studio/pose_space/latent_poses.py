@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from appliance.dancer.material.latent_paths import Latents
 from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.granular.granular import decoded, encoded
-from appliance.studio.granular.latent_paths import Latents
 
 
 def latents_of(autoencoder: Autoencoder, poses: Array) -> tuple[Latents, Array]:
@@ -26,18 +26,6 @@ def poses_of(autoencoder: Autoencoder, latents: Latents, facing: Array | None = 
     """Latents (T, Z) -> poses (T, M, 4); facing (T, 4), left out: ahead."""
     made: Poses = decoded(autoencoder, latents, facing)[:, 0]
     return made
-
-
-def wobbled(latents: Latents, amplitude: float, frequency: float, seed: int, fps: float = 50.0) -> Latents:
-    """The path with a sinusoid on each number of the latent.
-
-    amplitude: in standard deviations of the prior, of each number; frequency in Hz; the phases are the
-    seed's.
-    """
-    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, latents.shape[1])
-    angles = 2 * np.pi * frequency * np.arange(len(latents))[:, None] / fps + phases
-    moved: Latents = (latents + amplitude * np.sin(angles)).astype(np.float32)
-    return moved
 
 
 @dataclass(frozen=True)
@@ -78,17 +66,6 @@ class PoseMap:
         """(T, D) -> (T, Z): the pose that is usual there."""
         back: Latents = (self.middle + points @ self.directions[: points.shape[1]]).astype(np.float32)
         return back
-
-
-def even_path(points: Array, ticks: int) -> Array:
-    """A drawn line (N, D) -> (ticks, D): at an even speed, its corners rounded over 0.2 s."""
-    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    at = np.linspace(0.0, lengths[-1], ticks)
-    walked = np.stack([np.interp(at, lengths, column) for column in points.T], axis=1)
-    weights = np.hanning(11 + 2)[1:-1]
-    padded = np.pad(walked, ((5, 5), (0, 0)), mode="edge")
-    smooth = [np.convolve(column, weights / weights.sum(), "valid") for column in padded.T]
-    return np.stack(smooth, axis=1)
 
 
 def distance_over_time(one: Array, other: Array) -> Array:

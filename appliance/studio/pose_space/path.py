@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from appliance.dancer.material.pose_paths import even_path, wobbled
 from appliance.pictures.filmstrip import Strip, draw_strips
 from appliance.studio.dance_files import write_recording, write_report
 from appliance.studio.data.dataset import FPS
@@ -15,7 +16,7 @@ from appliance.studio.evaluation.nearest import reference_of, without_heading
 from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.phrase import verdict
 from appliance.studio.pose_space.drawing import read_line
-from appliance.studio.pose_space.latent_poses import even_path, latents_of, poses_of, wobbled
+from appliance.studio.pose_space.latent_poses import latents_of, poses_of
 from appliance.studio.pose_space.pose_model import map_of
 from appliance.studio.standing_dance import excerpt_of, standing
 from appliance.studio.trained_on import open_model

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from appliance.dancer.material.latent_paths import Latents
 from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import Dataset
-from appliance.studio.granular.latent_paths import Latents
 from appliance.studio.improviser.naturalness import figure_shapes
 from appliance.studio.pose_space.latent_poses import PoseMap, latents_of
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from appliance.dancer.material import latent_paths
+from appliance.dancer.material.latent_paths import Latents
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.granular import latent_paths
 from appliance.studio.granular.granular import decoded, encoded, to_the_end
-from appliance.studio.granular.latent_paths import Latents
 from appliance.studio.studio_error import StudioError
 
 OVERLAP = 4  # windows that know a pose

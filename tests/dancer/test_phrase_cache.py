@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.dancer import phrase_cache as prepared
 from appliance.dancer.grounding import survey
 from appliance.dancer.motion_source import Playback
+from appliance.dancer.phrase_cache import FOLDER, SUFFIX, PhraseCache, prepare
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.skeleton import Skeleton
-from appliance.stage import phrase_cache as prepared
-from appliance.stage.phrase_cache import FOLDER, SUFFIX, PhraseCache, prepare
 from tests.bundles import FIGURE, swaying_phrase, write_show
 
 

@@ -1,0 +1,101 @@
+"""Made motion: what the generator made last, on its way to the stage, and the names of what it keeps."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from appliance.box.block import BlockReader, BlockWriter
+from appliance.pose.foreign_file import plain_json
+
+FILE, KIND = "made_motion", "made_motion"
+KEPT_FILE, KEPT_KIND = "kept_motions", "kept_motions"
+_LARGEST, _LARGEST_KEPT = 4096, 8192
+
+
+class MadeMotion(NamedTuple):
+    """recipe: JSON; file: its name in the runtime folder's `material`; name: of the source, or of what was
+    kept. at_once: it is to be danced now, not at the next return.
+    """
+
+    recipe: str
+    file: str
+    name: str
+    at_once: bool
+
+
+class MadeMotionWriter:
+    """The generator's end. Raises OSError where the folder takes no file."""
+
+    def __init__(self, folder: Path) -> None:
+        self._made = BlockWriter(folder / FILE, KIND, _LARGEST, fresh=True)
+        self._kept = BlockWriter(folder / KEPT_FILE, KEPT_KIND, _LARGEST_KEPT, fresh=True)
+
+    def write(self, made: MadeMotion) -> None:
+        """Publish. Raises ValueError for a recipe that is too long."""
+        self._made.write(json.dumps(made._asdict()).encode())
+
+    def write_kept(self, names: list[str]) -> None:
+        """Publish the names of all motions that were kept."""
+        self._kept.write(json.dumps(names).encode())
+
+    def close(self) -> None:
+        """Release the files; they stay."""
+        self._made.close()
+        self._kept.close()
+
+
+class MadeMotionReader:
+    """The stage's end. The same object until there is a newer one."""
+
+    def __init__(self, folder: Path) -> None:
+        self._block = BlockReader(folder / FILE, KIND, writer="the generator")
+        self._payload: bytes | None = None
+        self._made: MadeMotion | None = None
+
+    def read(self) -> MadeMotion | None:
+        """What was made last, or None. Never waits, never raises."""
+        payload = self._block.read()
+        if payload is not None and payload != self._payload:
+            self._payload, self._made = payload, _parsed(payload)
+        return self._made
+
+    def close(self) -> None:
+        """Release the file."""
+        self._block.close()
+
+
+class KeptNamesReader:
+    """Show control's end: which motions can be called by name."""
+
+    def __init__(self, folder: Path) -> None:
+        self._block = BlockReader(folder / KEPT_FILE, KEPT_KIND, writer="the generator")
+
+    def read(self) -> tuple[str, ...]:
+        """Never waits, never raises."""
+        try:
+            names = plain_json(self._block.read() or b"[]")
+            return tuple(name for name in names if isinstance(name, str))
+        except (ValueError, TypeError):
+            return ()
+
+    def close(self) -> None:
+        """Release the file."""
+        self._block.close()
+
+
+def forget_made_motion(folder: Path) -> None:
+    """A show that ended as it should leaves nothing for the next one to take up."""
+    (folder / FILE).unlink(missing_ok=True)
+    (folder / KEPT_FILE).unlink(missing_ok=True)
+
+
+def _parsed(payload: bytes) -> MadeMotion | None:
+    try:
+        values = plain_json(payload)
+        return MadeMotion(
+            str(values["recipe"]), str(values["file"]), str(values["name"]), bool(values["at_once"])
+        )
+    except (ValueError, LookupError, TypeError):
+        return None

@@ -1,0 +1,147 @@
+"""Maker: a recipe becomes a loop: a phrase varied, a walk through what a dancer does, a path over the map.
+
+The same recipe gives the same loop, bit for bit, on the same machine with the same versions: a replay makes
+what was danced again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from appliance.dancer.grounding import Floor, survey
+from appliance.dancer.loop import Loop, Placement
+from appliance.dancer.material import latent_paths
+from appliance.dancer.material.cyclic import Cycle, Starts, even_starts
+from appliance.dancer.material.motion_network import MotionNetwork, Poses
+from appliance.dancer.material.pose_paths import even_path, wobbled
+from appliance.dancer.phrase import FPS, X, Z
+from appliance.pose import quaternion
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.pose.skeleton import Skeleton
+from appliance.show.sources import GRANULAR, KEPT, MAIN, PATH, VARY
+
+GRANULAR_S, POINT_S = 20.0, 12.0  # of a walk; of a point or a stroke of the map, there and back
+Recipe = Mapping[str, Any]
+
+
+class Maker:
+    """Makes loops of a show. loop_of: the whole loop of a phrase by its name.
+
+    networks: the files of the sources' networks by source; each is read when it is first needed.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        networks: Mapping[str, Path],
+        loop_of: Callable[[str], Loop],
+        grounded: bool,
+    ) -> None:
+        self._skeleton, self._files, self._grounded = skeleton, networks, grounded
+        self._loop_of = loop_of
+        self._networks: dict[Path, MotionNetwork] = {}
+
+    def make(self, recipe: Recipe) -> Loop:
+        """Raises MotionNetworkError, and LookupError or ValueError for a recipe that is none of this show."""
+        if recipe["source"] == KEPT:
+            return self.make({**recipe["of"], "number": recipe["number"]})
+        network = self._network(recipe["source"])
+        make = {VARY: self._varied, GRANULAR: self._walked, PATH: self._path}[recipe["source"]]
+        cycle, poses = make(network, recipe)
+        floor = self._floor(cycle, poses)
+        lifts, heights = (None, None) if floor is None else (floor.lifts, floor.rest_heights)
+        return cycle.loop(poses, lifts, heights, recipe["number"])
+
+    def _varied(self, network: MotionNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
+        """The phrase moved by noise of sigma standard deviations, the same for all its windows."""
+        cycle = Cycle.of(self._loop_of(recipe["phrase"]))
+        starts, latents, facing = _encoded(network, cycle)
+        noise = np.random.default_rng(recipe["seed"]).standard_normal(network.latent)
+        moved = (latents + recipe["sigma"] * noise).astype(np.float32)
+        windows = _facing(network.decode(moved), facing)
+        return cycle, cycle.blended(windows, starts, network.places)
+
+    def _walked(self, network: MotionNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
+        """A walk through the prior, or the path between two phrases, that leads into its own start."""
+        seed = recipe["seed"]
+        if recipe.get("from"):
+            cycle = Cycle.of(self._loop_of(recipe["from"]))
+            other = Cycle.of(self._loop_of(recipe.get("to") or recipe["from"]))
+            starts, one, facing = _encoded(network, cycle)
+            _, two, _ = _encoded(network, other)
+            two = np.resize(two, one.shape)  # the shorter one goes round
+            path = latent_paths.between(one, two, recipe["mix"], recipe["offset"], seed)
+            windows = _facing(network.decode(path), facing)
+            return cycle, cycle.blended(windows, starts, network.places)
+        cycle = self._on_the_spot(GRANULAR_S)
+        starts = even_starts(len(cycle.poses), network.window)
+        waves = recipe["speed"] * GRANULAR_S
+        path = latent_paths.walked(len(starts), network.latent, recipe["spread"], waves, seed)
+        return cycle, cycle.blended(network.decode(path), starts, network.places)
+
+    def _path(self, network: MotionNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
+        """A phrase's own path, or a point or stroke of the map, that wobbles."""
+        points, rate = recipe.get("points"), recipe["frequency"]
+        if not points:
+            cycle = Cycle.of(self._loop_of(recipe["phrase"]))
+            starts, latents, facing = _encoded(network, cycle)
+        else:
+            cycle = self._on_the_spot(POINT_S)
+            starts, facing = np.arange(len(cycle.poses)), np.tile(quaternion.IDENTITY, (len(cycle.poses), 1))
+            latents = _on_the_map(network, np.array(points, float).reshape(-1, 2), len(starts))
+        seconds = len(latents) / FPS
+        rate = max(1, round(rate * seconds)) / seconds  # a whole number of waves leads into the start
+        moved = wobbled(latents, recipe["wobble"], rate, recipe["seed"])
+        windows = _facing(network.decode(moved), facing)
+        return cycle, cycle.blended(windows, starts, network.places)
+
+    def _on_the_spot(self, seconds: float) -> Cycle:
+        """A dancer that stays in its place, as high as the show's phrase on the mean, in its first pose."""
+        main = self._loop_of(MAIN)
+        count = round(seconds * FPS)
+        poses = np.repeat(main.poses[:1], count, axis=0)
+        turned = quaternion.inverse(quaternion.heading(poses[:, 0]))
+        poses[:, 0] = quaternion.multiply(turned, poses[:, 0])
+        track = np.repeat(main.track[:1], count + 1, axis=0)
+        track[:, X : Z + 1] = 0.0, float(main.track[:, 1].mean()), 0.0
+        return Cycle(poses, track, Placement(), 0.0)
+
+    def _floor(self, cycle: Cycle, poses: Poses) -> Floor | None:
+        if not self._grounded:
+            return None
+        return survey(Recording(self._skeleton, poses, cycle.track[:-1, X : Z + 1], FPS))
+
+    def _network(self, source: str) -> MotionNetwork:
+        file = self._files[source]
+        if file not in self._networks:
+            self._networks[file] = MotionNetwork(file, self._skeleton.names)
+        return self._networks[file]
+
+
+def _encoded(network: MotionNetwork, cycle: Cycle) -> tuple[Starts, latent_paths.Latents, Array]:
+    """Where windows of a cycle begin, their latents and where they face."""
+    starts = even_starts(len(cycle.poses), network.window)
+    return starts, *network.encode(cycle.windows(starts, network.window, network.places))
+
+
+def _facing(windows: Poses, facing: Array) -> Poses:
+    """Windows (W, T, M, 4) turned to where they face (W, 4)."""
+    turned = windows.copy()
+    turned[:, :, 0] = quaternion.multiply(facing[:, None], windows[:, :, 0])
+    return turned
+
+
+def _on_the_map(network: MotionNetwork, points: Array, ticks: int) -> latent_paths.Latents:
+    """Latents (ticks, Z) at a point, or along a line there and back; points (N, 2) of 0 to 1."""
+    if network.ground is None:
+        raise ValueError("This network of poses has no map. Export it again with this release.")
+    middle, directions, low, high = network.ground
+    places = low + (high - low) * points
+    there_and_back = np.concatenate([places, places[-2::-1]])
+    line = even_path(there_and_back, ticks) if len(places) > 1 else np.repeat(places, ticks, axis=0)
+    return (middle + line @ directions).astype(np.float32)

@@ -1,0 +1,101 @@
+"""Sources of motion that the generator makes: their sections in show.yaml, and what cues change of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field, model_serializer
+
+from appliance.show.section import BundleFile, Section, key
+from appliance.show.sources import GRANULAR, PARAMETERS, PATH, VARY
+
+
+def _parameter(source: str, name: str, default: Any = ...) -> Any:
+    """A key with the sentence and the bounds of the source's parameter."""
+    about = PARAMETERS[source][name]
+    first: Any = (int(about.default) if about.is_whole else about.default) if default is ... else default
+    return Field(default=first, description=about.meaning, ge=about.least, le=about.most)
+
+
+def _network(model: str) -> Any:
+    """A key for the file of a model, which must be in the bundle where the source is."""
+    meaning = f"File in the bundle that `bunraku train --model {model}` wrote."
+    return Field(default=f"{model}.onnx", description=meaning, validate_default=True)
+
+
+class VaryConfig(Section):
+    """The phrase danced anew at every return, by noise in a network that knows 2.6 s at once."""
+
+    network: BundleFile = _network("sequence")
+    sigma: float = _parameter(VARY, "sigma")
+    seed: int = _parameter(VARY, "seed")
+
+
+class GranularConfig(Section):
+    """A dance without a phrase, or between two."""
+
+    network: BundleFile = _network("sequence")
+    from_: str | None = Field(
+        default=None,
+        alias="from",
+        description="A phrase whose path is danced, instead of a walk.",
+        max_length=64,
+    )
+    to: str | None = key("Another phrase, mixed into it.", None, length=(1, 64))
+    speed: float = _parameter(GRANULAR, "speed")
+    spread: float = _parameter(GRANULAR, "spread")
+    mix: float = _parameter(GRANULAR, "mix")
+    offset: float = _parameter(GRANULAR, "offset")
+    seed: int = _parameter(GRANULAR, "seed")
+
+
+class PathConfig(Section):
+    """The phrase's path through the dancer's poses that wobbles, or a point or line by `/motion/path`."""
+
+    network: BundleFile = _network("pose")
+    wobble: float = _parameter(PATH, "wobble")
+    frequency: float = _parameter(PATH, "frequency")
+    seed: int = _parameter(PATH, "seed")
+
+
+class _Changes(Section):
+    """What a cue leaves out stays as it is."""
+
+    @model_serializer
+    def _given(self) -> dict[str, Any]:
+        return {
+            name: getattr(self, name) for name in self.model_fields_set if getattr(self, name) is not None
+        }
+
+
+class VaryChanges(_Changes):
+    """Of the source vary."""
+
+    sigma: float | None = _parameter(VARY, "sigma", None)
+    seed: int | None = _parameter(VARY, "seed", None)
+
+
+class GranularChanges(_Changes):
+    """Of the source granular."""
+
+    speed: float | None = _parameter(GRANULAR, "speed", None)
+    spread: float | None = _parameter(GRANULAR, "spread", None)
+    mix: float | None = _parameter(GRANULAR, "mix", None)
+    offset: float | None = _parameter(GRANULAR, "offset", None)
+    seed: int | None = _parameter(GRANULAR, "seed", None)
+
+
+class PathChanges(_Changes):
+    """Of the source path."""
+
+    wobble: float | None = _parameter(PATH, "wobble", None)
+    frequency: float | None = _parameter(PATH, "frequency", None)
+    seed: int | None = _parameter(PATH, "seed", None)
+
+
+class MotionChanges(_Changes):
+    """Parameters of the sources, reached over the cue's fade."""
+
+    vary: VaryChanges | None = key("Of the source `vary`.", None)
+    granular: GranularChanges | None = key("Of the source `granular`.", None)
+    path: PathChanges | None = key("Of the source `path`.", None)

@@ -1,0 +1,84 @@
+"""Made motions: when the dance goes over to what the generator made, and where its loops come from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from appliance.box.made_motion import MadeMotion, MadeMotionReader
+from appliance.dancer.loop import Loop
+from appliance.dancer.material.material_file import FOLDER, read_material
+from appliance.dancer.motion_source import Playback
+from appliance.show.show import Show
+from appliance.show_control.orders import Order
+from appliance.stage.stage_parts import StageParts
+
+LATE_S = 3.0  # after which a source that was called and has not come is late
+MELT_S = 1.0  # from one variation to the next
+ORDER = "made"
+_ROUND_S = 0.5  # back by more than this, a loop has come round
+
+
+class MadeMotions:
+    """Follows the generator at the price of a small read a tick, while a source of it is wanted.
+
+    is_late: the dance goes on with what is there, because nothing newer came in time.
+    """
+
+    def __init__(self, folder: Path, joints: tuple[str, ...], motion: Playback) -> None:
+        self._reader, self._folder, self._joints = MadeMotionReader(folder), folder / FOLDER, joints
+        self._motion = motion
+        self._wanted, self._since = "", 0.0
+        self._place, self._returned = (0, 0.0), False  # number of the loop, second in it
+        self._tried: MadeMotion | None = None
+        self.is_late = False
+
+    def order(self, wanted: str, fade_s: float, now: float) -> Order | None:
+        """The order to dance what was made, once it is time; wanted: a source or a kept motion, or ""."""
+        if wanted != self._wanted:
+            self._wanted, self._since, self._returned, self.is_late = wanted, now, False, False
+        if not wanted:
+            return None
+        dances, newest = self._motion.made, self._reader.read()
+        before, self._place = self._place, (self._motion.number, self._motion.position_s)
+        same, second = before[0] == self._place[0], self._place[1]
+        self._returned = self._returned or (dances is not None and same and second < before[1] - _ROUND_S)
+        is_here = dances is not None and dances.name == wanted
+        if newest is None or newest.name != wanted or newest is self._tried:
+            self.is_late = not is_here and now - self._since > LATE_S
+            return None
+        if is_here and dances is not None and newest.recipe == dances.recipe:
+            self._returned = False
+            return None
+        if is_here and not (newest.at_once or self._returned):
+            return None
+        self._tried, self._returned, self.is_late = newest, False, False
+        return Order(ORDER, (MELT_S if is_here else fade_s,), newest.recipe)
+
+    def loop(self, recipe: str) -> Loop:
+        """The loop of a recipe that the generator has made. Raises ValueError."""
+        newest = self._reader.read()
+        if newest is None or newest.recipe != recipe:
+            raise ValueError("What was made is not there any more; the phrase plays on.")
+        try:
+            material = read_material(self._folder / newest.file, self._joints)
+        except OSError as error:
+            raise ValueError(
+                f"What was made cannot be read ({error.strerror}); the phrase plays on."
+            ) from None
+        if material.recipe != recipe:
+            raise ValueError("What was made was made by another recipe; the phrase plays on.")
+        return material.loop
+
+    def close(self) -> None:
+        """Release the file."""
+        self._reader.close()
+
+
+def open_made_motions(folder: Path, show: Show, parts: StageParts) -> MadeMotions | None:
+    """What the generator makes, if the show has sources of it; the parts take their loops from there."""
+    if not show.config.motion.made_sources:
+        return None
+    made = MadeMotions(folder, show.skeleton.names, parts.motion)
+    parts.loop_of = made.loop
+    parts.motion.make_by(made.loop)
+    return made

@@ -1,0 +1,132 @@
+"""The generator: one motion ahead of the stage, parameters that fade, kept motions, and what fails."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from appliance.generator import wish as wishes
+from appliance.generator.fallback import NOT_KEPT, NOT_MADE
+from appliance.show_control.orders import Order
+from tests.generator.conftest import Bench
+from tests.sources import write_motion_network, write_show_with_sources
+from tests.system.processes import wait_until
+
+Benches = Callable[..., Bench]
+NO_FADE: tuple[float, ...] = ()
+
+
+def active(bench: Bench, name: str) -> bool:
+    return any(one.name == name and one.active for one in bench.fallbacks.happened(time.monotonic()))
+
+
+def test_one_variation_ahead_and_no_more(bench: Benches, tmp_path: Path) -> None:
+    one = bench(write_show_with_sources(tmp_path / "show"))
+    assert one.recipe() == {}, "nothing is made while a phrase is danced"
+    one.declare(phrase=("vary", (0.5,)))
+    first = one.recipe()
+    assert (first["source"], first["phrase"], first["sigma"], first["seed"]) == ("vary", "main", 1.0, 1)
+    assert one.made.read() is not None and one.made.read().at_once  # type: ignore[union-attr]
+    assert one.recipe() == first, "what was made is not danced yet"
+    second = one.dance()
+    assert second["seed"] == 2 and not one.made.read().at_once  # type: ignore[union-attr]
+    assert one.recipe() == second
+    assert one.dance()["seed"] == 3
+    one.health["base"] = "other"
+    one.declare(phrase=("path", (0.5,)))
+    one.health["base"] = "main"
+    assert one.recipe()["source"] == "path"
+    assert one.dance() == one.recipe(), "a path loops: the next one comes when another is asked for"
+    assert len(list((one.folder / "material").iterdir())) <= 4
+
+
+def test_a_generator_that_was_killed_goes_on_where_it_was(bench: Benches, tmp_path: Path) -> None:
+    show = write_show_with_sources(tmp_path / "show")
+    one = bench(show)
+    one.declare(phrase=("vary", NO_FADE))
+    one.recipe()
+    danced = one.dance()
+    health = one.health | {"made": one.made.read().recipe}  # type: ignore[union-attr]
+    one.close()
+    other = bench(show)
+    other.health = health
+    other.declare(phrase=("vary", NO_FADE))
+    assert other.recipe()["seed"] == danced["seed"] + 1
+    assert not other.made.read().at_once  # type: ignore[union-attr]
+
+
+def test_parameters_reach_their_value_in_steps(
+    bench: Benches, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wishes, "STEP_S", 1000.0)
+    one = bench(write_show_with_sources(tmp_path / "show"))
+    one.declare(phrase=("vary", NO_FADE))
+    assert one.recipe()["sigma"] == 1.0
+    one.declare(motion_vary_sigma=("", (3.0, 4000.0)))
+    assert one.recipe()["sigma"] == 1.5
+    one.declare(motion_vary_sigma=("", (0.5,)))
+    assert one.recipe()["sigma"] == 0.5
+    one.declare(motion_again=("", (2.0,)))
+    assert one.recipe()["seed"] == 2001
+    one.declare(phrase=("path", NO_FADE), motion_path_points=("", (0.25, 0.75)))
+    recipe = one.recipe()
+    assert recipe["points"] == [0.25, 0.75] and recipe["wobble"] == 0.3
+
+
+def test_a_kept_motion_outlives_the_power(bench: Benches, tmp_path: Path) -> None:
+    show = write_show_with_sources(tmp_path / "show")
+    one = bench(show)
+    keep = Order("keep", text="anna")
+    assert one.generator.obey(keep)[0] is False, "a phrase is kept already"
+    one.declare(phrase=("vary", NO_FADE))
+    kept = one.recipe()
+    one.dance()
+    for name, why in {"main": "already", "../up": "letters", "vary": "already"}.items():
+        done, words = one.generator.obey(Order("keep", text=name))
+        assert not done and why in words
+    assert one.generator.obey(keep)[0]
+    one.generator.kept.wait()
+    for file in [*(one.folder / "kept").iterdir()]:  # the power is cut
+        file.unlink()
+    one.close()
+    other = bench(show)
+    wait_until(lambda: "anna" in other.generator.kept.recipes, "what was kept is not read")
+    other.declare(phrase=("anna", NO_FADE))
+    recipe = other.recipe()
+    assert recipe["source"] == "kept" and recipe["of"] == kept
+    assert other.dance()["number"] == recipe["number"], "it loops"
+
+
+def test_a_disk_that_takes_nothing_is_told(bench: Benches, tmp_path: Path) -> None:
+    (tmp_path / "state").mkdir()
+    (tmp_path / "state/kept").write_text("a file where the folder should be")
+    one = bench(write_show_with_sources(tmp_path / "show"))
+    one.declare(phrase=("vary", NO_FADE))
+    one.recipe()
+    one.dance()
+    assert one.generator.obey(Order("keep", text="anna"))[0], "it can be called until the box is switched off"
+    one.generator.kept.wait()
+    one.recipe()
+    assert active(one, NOT_KEPT.name) and "anna" in one.generator.kept.recipes
+
+
+def test_a_network_that_gives_nothing_sound_is_told(bench: Benches, tmp_path: Path) -> None:
+    show = write_show_with_sources(tmp_path / "show")
+    write_motion_network(show / "sequence.onnx", 32, fails=True)
+    one = bench(show)
+    one.declare(phrase=("vary", NO_FADE))
+    assert one.recipe() == {} and active(one, NOT_MADE.name)
+    one.declare(phrase=("path", NO_FADE))
+    assert one.recipe()["source"] == "path" and not active(one, NOT_MADE.name)
+
+
+def test_what_was_kept_is_not_lost_with_a_strange_file_beside_it(bench: Benches, tmp_path: Path) -> None:
+    folder = tmp_path / "state/kept"
+    folder.mkdir(parents=True)
+    (folder / "strange.material").write_bytes(b"strange")
+    one = bench(write_show_with_sources(tmp_path / "show"))
+    wait_until(lambda: one.generator.kept.complaint, "nothing is said of it")
+    assert one.generator.kept.recipes == {}
