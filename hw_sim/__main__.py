@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from appliance.box.parent_death import end_with_parent
 from hw_sim.commands import app
 
 main = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -16,4 +17,5 @@ def simulation() -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     main(prog_name="python -m hw_sim")

@@ -26,7 +26,7 @@ from hw_sim.senders import SendLog, SerialSender, UdpSender
 from hw_sim.status import StatusLine
 from hw_sim.traces import read_trace
 
-REFUSED = 2
+REFUSED, UNANSWERED = 2, 1
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 app.command()(measure)
@@ -94,7 +94,8 @@ def emulate(
         float, typer.Option(min=-5000, max=5000, help="How much too fast the sensors' clocks are.")
     ] = 0.0,
     seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="End after this time; else Ctrl-C ends it.")
+        float | None,
+        typer.Option(min=0.0, help="End after this time, else at Ctrl-C; 0: only write keys."),
     ] = None,
     firmware: Annotated[
         bool,
@@ -159,9 +160,11 @@ def emulate(
             StatusLine(where) as status,
         ):
             emulator.run(seconds, should_stop, lambda: status.show(emulator, time.monotonic()))
-            status.end(emulator)
+            is_taken = status.end(emulator)
     except OSError as error:
         _refuse(error)
+    if not is_taken and seconds != 0:
+        raise typer.Exit(UNANSWERED)
 
 
 @contextmanager

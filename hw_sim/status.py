@@ -46,8 +46,8 @@ class StatusLine:
         )
         self._next_at, self._sent, self._shown_at = now + 1.0, sent, now
 
-    def end(self, emulator: Emulator) -> None:
-        """Print what was sent; when nothing was, what to check."""
+    def end(self, emulator: Emulator) -> bool:
+        """Print what was sent; when nothing was, what to check. Whether a box took the sensors."""
         self._live.stop()
         self._console.print(
             f"{sensors(len(emulator.devices))} -> {self._where}: {_totals(emulator)}", soft_wrap=True
@@ -59,10 +59,11 @@ class StatusLine:
             )
         elif not emulator.counts["readings"]:
             self._console.print(
-                f"No box took these sensors at {self._where}. "
-                "Is it running, and does it read the same key file?",
+                f"No box took these sensors at {self._where}. Start one that reads the same key file "
+                "(bunraku play --box FILE), or let it start the sensors itself: bunraku play --emulate",
                 soft_wrap=True,
             )
+        return bool(emulator.counts["readings"])
 
 
 def sensors(count: int) -> str:

@@ -12,11 +12,13 @@ from pathlib import Path
 
 from appliance.box.parent_death import PARENT
 from appliance.sensor.keys import create_keys
+from appliance.sensor.neutral import STILL_S
 from appliance.show.box import BoxConfig, UdpConfig
 from appliance.show.show import Show
 from appliance.stage.stage_error import StageError
 
 _LAST_WORDS_S = 2.0
+_STAND_STILL_S = STILL_S + 0.2  # the neutral pose is taken; then the hand leads
 
 
 @contextmanager
@@ -33,8 +35,8 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     create_keys(keys, names)
     udp = box.sensors.udp or UdpConfig()
     command = [
-        *(sys.executable, "-m", "appliance.cli", "emulate", "--keys", str(keys), "--motion", "dance"),
-        *("--host", udp.host, "--port", str(udp.port)),
+        *(sys.executable, "-m", "hw_sim", "emulate", "--keys", str(keys), "--motion", "dance"),
+        *("--host", udp.host, "--port", str(udp.port), "--stand-still", str(_STAND_STILL_S)),
     ]
     sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
     journal = box.journal.model_copy(update={"folder": None})

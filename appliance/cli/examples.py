@@ -50,6 +50,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
         "bunraku emulate --firmware --motion dance",
     ),
     "measure": ("bunraku measure --seconds 30 --report out/measure",),
+    "inspect": ("bunraku inspect takes/solo_3.bvh",),
     "filmstrip": (
         "bunraku filmstrip my_show/phrase.bvh --start 22 --seconds 5",
         "bunraku filmstrip out/tonight --look ink --out tonight.png",
@@ -99,6 +100,7 @@ OTHER_WORDS: dict[str, tuple[str, ...]] = {
     "lights": ("light", "dmx", "rig", "fixtures", "lamps"),
     "emulate": ("emulator", "simulate", "simulator", "fake", "mock"),
     "measure": ("latency", "benchmark", "bench", "jitter", "speed"),
+    "inspect": ("identify", "recognise", "recordings", "file", "joints"),
     "filmstrip": ("draw", "picture", "image", "render", "strip", "plot", "view"),
     "convert": ("glb", "gltf", "csv", "npz", "bvh", "save-as"),
     "import": ("points", "markers", "load", "read", "c3d"),

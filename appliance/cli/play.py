@@ -26,6 +26,7 @@ from appliance.stage.stage_error import StageError
 
 if TYPE_CHECKING:
     from appliance.cli.companions import Companion
+    from appliance.outputs.datagram_sender import DatagramSender
 
 PICTURED_MINUTES = 0.5  # a journal for the picture at the end keeps little more than is drawn
 _REHEARSAL = (
@@ -247,7 +248,7 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
         f"{hand.sensor or hand.kind} hold{'' if hand.springs else 's'} {hand.joint}"
         for hand in show.config.hands
     )
-    receivers = ", ".join(receiver.name for receiver in stage.parts.outputs.receivers) or "no receiver"
+    receivers = ", ".join(map(_receiver, stage.parts.outputs.receivers)) or "no receiver"
     lines = [
         f"{show.config.name}: {hands or 'no hands, the dancer moves freely'}.",
         f"The dance goes to {receivers}.",
@@ -261,6 +262,10 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
     else:
         lines += reach(list(stage.parts.worn), stage.box)
     return lines
+
+
+def _receiver(one: DatagramSender) -> str:
+    return one.name if one.is_asked_for else f"{one.name}, should a program listen there"
 
 
 def _inputs(stage: Stage, control: socket.socket | None) -> str:

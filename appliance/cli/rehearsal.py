@@ -7,9 +7,15 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from appliance.show.look import looks_by_name
 from appliance.show.show import Show
+
+if TYPE_CHECKING:
+    from appliance.cli.pictures import RecordedDance
 
 PICTURED_S = 10.0
 _RENDERED_WITHIN_S = 120.0  # a processor without a graphics card takes two seconds
@@ -29,10 +35,12 @@ def rehearsal_picture(journal: Path, out: Path, show: Show) -> list[str]:
     look = next(iter(looks_by_name(show.config.looks)))
     from appliance.cli.pictures import draw_dance, load_dance
 
-    trouble = _render(journal, out, show.directory, look)
+    whole = load_dance(journal)
+    start_s = pictured_from(whole)
+    trouble = _render(journal, out, show.directory, look, start_s)
     if trouble is None:
         return [f"What was just danced, as the projector shows it: {out}"]
-    dance = load_dance(journal).part(-PICTURED_S, PICTURED_S)
+    dance = whole.part(start_s, PICTURED_S)
     marked = ", held joints highlighted" if dance.holds is not None and dance.holds.any() else ""
     return [
         f"The projection cannot be rendered here: {trouble}",
@@ -40,11 +48,19 @@ def rehearsal_picture(journal: Path, out: Path, show: Show) -> list[str]:
     ]
 
 
-def _render(journal: Path, out: Path, show: Path, look: str) -> str | None:
+def pictured_from(dance: RecordedDance) -> float:
+    """Second at which a picture of the end begins: ten seconds before it, and not before a hand leads."""
+    firmest = np.zeros(len(dance.recording)) if dance.holds is None else dance.holds.max(axis=1)
+    led = np.flatnonzero(firmest > 0.5)
+    first_s = led[0] / dance.recording.fps if len(led) else 0.0
+    return max(0.0, dance.recording.seconds - PICTURED_S, float(first_s))
+
+
+def _render(journal: Path, out: Path, show: Path, look: str, start_s: float) -> str | None:
     """What went wrong, or None. Runs in its own process, which a broken graphics driver may crash."""
     command = [
         *(sys.executable, "-m", "appliance.cli", "filmstrip", str(journal), "--out", str(out)),
-        *("--start", str(-PICTURED_S), "--seconds", str(PICTURED_S), "--look", look, "--show", str(show)),
+        *("--start", str(start_s), "--seconds", str(PICTURED_S), "--look", look, "--show", str(show)),
     ]
     try:
         done = subprocess.run(

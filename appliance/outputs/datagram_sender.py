@@ -73,8 +73,9 @@ class DatagramSender:
     socket for all, two such machines cost the others 85 % of their frames.
     """
 
-    def __init__(self, name: str, path: DatagramPath) -> None:
+    def __init__(self, name: str, path: DatagramPath, is_asked_for: bool = True) -> None:
         self.name = name  # in messages: where datagrams go, and what they carry
+        self.is_asked_for = is_asked_for  # a box file names it, so that its absence is worth a word
         self.sent = 0  # datagrams handed to the network
         self.dropped = 0  # datagrams that were not
         self.last_error = ""  # why the last one was dropped; stays when all is well again

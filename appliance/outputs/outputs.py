@@ -18,7 +18,7 @@ class Outputs:
     """The receivers that the stage sends joint frames to; lights and projector read the shared frame."""
 
     def __init__(self, config: OutputsConfig, skeleton: Skeleton) -> None:
-        self._osc = OscOutputs(config.osc, skeleton)
+        self._osc = OscOutputs(config.osc, skeleton, "osc" in config.model_fields_set)
         self._posistagenet = tuple(PosiStageNet(one, skeleton) for one in config.posistagenet)
         self.receivers: tuple[DatagramSender, ...] = (*self._osc.receivers, *self._posistagenet)
         self._shared: FrameWriter | None = None

@@ -15,11 +15,12 @@ from appliance.show.osc import OscConfig
 class OscOutputs:
     """All OSC receivers of a box. Encoded once a frame for all receivers that want the same."""
 
-    def __init__(self, configs: Sequence[OscConfig], skeleton: Skeleton) -> None:
+    def __init__(self, configs: Sequence[OscConfig], skeleton: Skeleton, asked_for: bool = True) -> None:
         self.receivers = tuple(
             DatagramSender(
                 f"{config.host}:{config.port} ({config.dialect})",
                 DatagramPath(config.host, config.port, broadcast=True),
+                asked_for,
             )
             for config in configs
         )

@@ -83,7 +83,7 @@ class Watch:
         """
         before, self._dropped = (
             self._dropped,
-            {one.name: one.dropped for one in self._parts.outputs.receivers},
+            {one.name: one.dropped for one in self._parts.outputs.receivers if one.is_asked_for},
         )
         gone = {name for name, dropped in self._dropped.items() if dropped > before.get(name, 0)}
         self._update_fallbacks(now, health, bool(gone))
