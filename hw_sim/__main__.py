@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import typer
 
-from appliance.box.parent_death import end_with_parent
 from hw_sim.commands import app
 
 main = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -17,5 +16,4 @@ def simulation() -> None:
 
 
 if __name__ == "__main__":
-    end_with_parent()
     main(prog_name="python -m hw_sim")

@@ -35,7 +35,7 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     create_keys(keys, names)
     udp = box.sensors.udp or UdpConfig()
     command = [
-        *(sys.executable, "-m", "hw_sim", "emulate", "--keys", str(keys), "--motion", "dance"),
+        *(sys.executable, "-m", "appliance.cli", "emulate", "--keys", str(keys), "--motion", "dance"),
         *("--host", udp.host, "--port", str(udp.port), "--stand-still", str(_STAND_STILL_S)),
     ]
     sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})

@@ -52,7 +52,9 @@ def test_a_default_receiver_is_nothing_to_warn_of_and_no_emulator_outlives_a_kil
         assert "receiver-gone" not in said
         assert "does not get the dance" not in said
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        emulators = [int(pid) for pid in children if b"hw_sim" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        emulators = [
+            int(pid) for pid in children if b"emulate\0--keys" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        ]
         assert len(emulators) == 1
         process.send_signal(signal.SIGKILL)
     deadline = time.monotonic() + DEADLINE_S
