@@ -48,7 +48,7 @@ def serve(context: typer.Context, box: BoxFile = None, chosen: ChosenFile = None
     descriptor = open_console_port(config.console).detach()
     print(f"The page: {address_of(descriptor)}. Its PIN: bunraku console pin.", flush=True)
     os.set_inheritable(descriptor, True)
-    command = console_command(config, descriptor, kept_in(config))
+    command = console_command(config, descriptor, kept_in(config), journal=config.journal.folder)
     os.execv(command[0], command)  # a fresh process, which loads only what the page needs
 
 
@@ -112,9 +112,14 @@ def address_of(descriptor: int) -> str:
 
 
 def console_command(
-    box: BoxConfig, descriptor: int, kept: Path, control: tuple[str, int] | None = None
+    box: BoxConfig,
+    descriptor: int,
+    kept: Path,
+    control: tuple[str, int] | None = None,
+    journal: Path | None = None,
 ) -> tuple[str, ...]:
-    """How to start the page of a box whose port is open. control: where commands arrive in fact.
+    """How to start the page of a box whose port is open. control: where commands arrive in fact; journal:
+    where one is kept in fact.
 
     Raises StageError.
     """
@@ -134,6 +139,7 @@ def console_command(
         viewers=tuple(console.viewers),
         names=tuple(console.names),
         rehearsal=console.rehearsal,
+        journal=None if journal is None else str(journal.resolve()),
     )
     return sys.executable, "-m", "appliance.console", settings.packed()
 
@@ -144,6 +150,7 @@ def page_companion(
     control: socket.socket | None,
     say: Callable[[str], None],
     rehearsal: bool,
+    journal: Path | None,
 ) -> Companion:
     """The page's process beside the stage; says where browsers find it. Raises StageError.
 
@@ -151,7 +158,7 @@ def page_companion(
     """
     heard_on = None if control is None else control.getsockname()
     kept = _runtime(box) / _KEPT if rehearsal else kept_in(box)
-    command = console_command(box, page.fileno(), kept, heard_on)
+    command = console_command(box, page.fileno(), kept, heard_on, journal)
     try:
         say(f"The page: {address_of(page.fileno())}, PIN {Devices(kept).pin}.")
     except OSError as error:

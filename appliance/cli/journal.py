@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import time
@@ -15,11 +16,13 @@ import typer
 
 from appliance.cli.options import ChosenFile, ThisBoxFile, command_group
 from appliance.release.installed_box import box_here
+from appliance.show_control.packet import readable
 
 if TYPE_CHECKING:
     from appliance.recorder.reading import Run
 
 STICK = Path("/media/bunraku")
+_TROUBLES = ("late", "skipped", "failed")
 
 journal = command_group("List what the flight recorder holds, or export it to a stick.", needs_command=True)
 
@@ -39,12 +42,75 @@ def list_journal(
 ) -> None:
     """List the runs in a journal: when, how long, what was late, how often the network failed."""
     from appliance.recorder.reading import read_journal
-    from appliance.show_control.packet import readable
+    from appliance.recorder.timeline import words_of
 
     for number, run in enumerate(read_journal(_recorded(box, chosen, recorded)).runs, 1):
         typer.echo(readable(_line(number, run)))
         for _, event in run.events if events else ():
-            typer.echo(readable(_event_line(event, float(run.ticks["frame_time"][0]))))
+            second = event["now"] - float(run.ticks["frame_time"][0])
+            typer.echo(readable(f"   {second:9.2f} s  {event['kind']}: {words_of(event)}"))
+
+
+@journal.command("timeline")
+def show_timeline(
+    box: ThisBoxFile = None,
+    chosen: ChosenFile = None,
+    recorded: Recorded = None,
+    as_json: Annotated[bool, typer.Option("--json", help="As JSON, for programs.")] = False,
+) -> None:
+    """Show minute by minute what was late or skipped, and how long the slowest tick took."""
+    from appliance.recorder.reading import read_journal
+    from appliance.recorder.timeline import timeline
+
+    read = read_journal(_recorded(box, chosen, recorded)).runs
+    runs = [timeline(number, run) for number, run in enumerate(read, 1)]
+    if as_json:
+        typer.echo(json.dumps(runs))
+        return
+    for run in runs:
+        begun = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(run["begun"]))
+        typer.echo(readable(f"{run['number']}. {begun}  {run['show']}: {run['seconds']:.0f} s"))
+        for line in _minutes(run):
+            typer.echo(line)
+
+
+def _minutes(run: dict[str, Any]) -> Iterator[str]:
+    """A line for each minute of a run, or for each bin where bins are longer."""
+    bins = max(1, round(60.0 / run["bin_s"]))
+    for first in range(0, len(run["late"]), bins):
+        part = slice(first, first + bins)
+        counts = [f"{sum(run[what][part])} {what}" for what in _TROUBLES if any(run[what][part])]
+        slowest = f"slowest tick {max(run['slowest_ms'][part]):.1f} ms"
+        yield f"   {first * run['bin_s'] / 60:6.1f} min  {', '.join([*counts, slowest])}"
+
+
+@journal.command("stretch", hidden=True)
+def write_stretch(
+    run: Annotated[int, typer.Option(min=1, help="Its number in the list.")],
+    box: ThisBoxFile = None,
+    chosen: ChosenFile = None,
+    recorded: Recorded = None,
+    start: Annotated[float, typer.Option(help="Second of the run.")] = 0.0,
+    seconds: Annotated[float, typer.Option(min=0.02)] = 10.0,
+    out: Annotated[Path | None, typer.Option(help="A BVH or glTF file; left out: frames to stdout.")] = None,
+) -> None:
+    """Write a stretch of a run for the page."""
+    from appliance.exchange.formats import write_recording
+    from appliance.pose.recording import Recording
+    from appliance.recorder.journal_error import JournalError
+    from appliance.recorder.reading import read_journal
+    from appliance.recorder.timeline import stretch
+
+    runs = read_journal(_recorded(box, chosen, recorded)).runs
+    if run > len(runs):
+        raise JournalError(f"The journal has {len(runs)} runs, and no run {run}.")
+    one = runs[run - 1]
+    if out is None:
+        for part in stretch(one, start, seconds):
+            sys.stdout.buffer.write(part)
+        return
+    whole = Recording(one.skeleton, one.ticks["pose"], one.ticks["root"], 1.0 / one.header["tick_s"])
+    write_recording(out, whole.excerpt(start, start + seconds))
 
 
 @journal.command("export")
@@ -121,14 +187,6 @@ def _line(number: int, run: Run) -> str:
     told += [f"{count} x {kind}" for kind, count in sorted(happened.items())]
     seconds = len(run.ticks) * run.header["tick_s"]
     return f"{number}. {begun}  {run.header['show']}: {seconds:.0f} s, {', '.join(told)}"
-
-
-def _event_line(event: dict[str, Any], begun: float) -> str:
-    """When, in seconds of the run, and what."""
-    asked = event.get("order", {})
-    words = [str(word) for word in (asked.get("name", ""), asked.get("text", ""), *asked.get("values", ()))]
-    words += [str(event.get("words", ""))] + ["(refused)"] * (event.get("done") is False)
-    return f"   {event['now'] - begun:9.2f} s  {event['kind']}: {' '.join(filter(None, words))}"
 
 
 @contextmanager

@@ -97,7 +97,7 @@ def play_show(
                 speaker.say(line)
             companions = () if alone else tuple(_companions(show, box, control, window or shown))
             if page is not None:
-                companions += (page_companion(box, page, control, speaker.say, emulate),)
+                companions += (page_companion(box, page, control, speaker.say, emulate, journal),)
             with _running(companions + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:

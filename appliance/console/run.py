@@ -19,6 +19,7 @@ from appliance.console.box_view import BoxView
 from appliance.console.desk import Desk
 from appliance.console.devices import Devices
 from appliance.console.guard import Guard
+from appliance.console.happened import Happened
 from appliance.console.server import Server
 from appliance.console.settings import Settings
 from appliance.console.stage_view import StageView
@@ -49,7 +50,8 @@ async def _serve(settings: Settings) -> int:
     guard, desk = Guard(settings.viewers, settings.names, devices), Desk(settings.control)
     box = BoxView(desk, stage, ProcessHealth(folder))
     health, notifier = ProcessHealthWriter(folder, "console", Fallbacks(())), Notifier()
-    app = Server(guard, devices, desk, stage, box, watchers, settings.rehearsal).app()
+    happened = Happened(settings.journal)
+    app = Server(guard, devices, desk, stage, box, watchers, happened, settings.rehearsal).app()
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=_LAST_REQUESTS_S, keepalive_timeout=30.0)
     await runner.setup()
     listening = socket.socket(fileno=settings.descriptor)

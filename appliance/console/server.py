@@ -15,6 +15,7 @@ from appliance.console.box_view import BoxView
 from appliance.console.desk import Desk, NoAnswerError
 from appliance.console.devices import DIGITS, LONGEST_NAME, Devices, WrongPins
 from appliance.console.guard import COOKIE, Guard, peer
+from appliance.console.happened import Happened
 from appliance.console.metrics import CONTENT_TYPE, metrics
 from appliance.console.page_files import PageFiles, languages
 from appliance.console.stage_view import StageView
@@ -40,9 +41,10 @@ class Server:
         stage: StageView,
         box: BoxView,
         watchers: Watchers,
+        happened: Happened,
         rehearsal: bool,
     ) -> None:
-        self._rehearsal = rehearsal
+        self._happened, self._rehearsal = happened, rehearsal
         self._guard, self._devices, self._desk = guard, devices, desk
         self._stage, self._box, self._watchers = stage, box, watchers
         self._wrong_pins, self._languages = WrongPins(), languages()
@@ -58,6 +60,9 @@ class Server:
                 web.get("/watch", self._watch),
                 web.get("/api/show", self._show),
                 web.get("/api/me", self._me),
+                web.get("/api/happened", self._happened.timeline),
+                web.get("/api/happened/stretch", self._happened.stretch),
+                web.get("/api/happened/dance.{ending}", self._happened.download),
                 web.get("/api/devices", self._listed),
                 web.post("/api/pin", self._take_pin),
                 web.post("/api/revoke", self._revoke),

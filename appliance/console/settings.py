@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 class Settings:
     """The port's socket is open already: `descriptor`. control: where commands arrive; None: nowhere.
 
+    journal: its folder; None: none is kept.
     folder: where the box's processes meet. kept: the file with PIN and remembered devices. viewers, names,
     rehearsal: as in the box file.
     """
@@ -21,6 +22,7 @@ class Settings:
     viewers: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     rehearsal: bool = True
+    journal: str | None = None
 
     def packed(self) -> str:
         """As one argument of a command line; there are no secrets in it."""

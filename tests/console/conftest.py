@@ -23,5 +23,5 @@ def venue(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Box, Page]
     """A box that dances, with a sensor and two cues."""
     folder = tmp_path_factory.mktemp("venue")
     show = write_show(folder / "show", cues=CUES)
-    with box_with_page(show, folder) as (box, page):
+    with box_with_page(show, folder, "--journal", str(folder / "night")) as (box, page):
         yield box, page

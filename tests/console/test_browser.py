@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,6 +17,9 @@ from playwright.sync_api import Page as Tab
 
 from appliance.box.show_state import ShowState, ShowStateReader
 from appliance.outputs.frame_reader import FrameReader
+from appliance.pose.bvh import read_bvh
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.reading import Run, read_journal
 from tests.console.page import Page
 from tests.system.box import Box
 from tests.system.processes import PATIENCE_S, children_running, wait_until
@@ -190,6 +195,39 @@ def test_a_rehearsal_changes_iterations_and_hands(tab: Tab, venue: tuple[Box, Pa
     assert not page.status()["hands"][0]["holds"]
     press(tab, "#hands button")
     expect(hand).to_have_attribute("aria-pressed", "true")
+
+
+def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> None:
+    """The journal's newest run: a timeline, and a stretch of it in 3D, the poses those of the journal."""
+    wait_until(lambda: len(recorded(venue[0]).ticks) > 100, "nothing was recorded")
+    press(tab, '[data-page="happened"]')
+    expect(tab.locator("#happened-sum")).to_contain_text("late ticks")
+    assert tab.evaluate("document.querySelector('#timeline').width") > 200
+    tab.locator("#happened-second").fill("0")
+    press(tab, "#happened-dance")
+    expect(tab.locator("#again")).to_be_visible()
+    await_true(tab, "Boolean(document.body.dataset.tick)")
+    seen = {
+        tab.evaluate("[+document.body.dataset.tick, document.body.dataset.root].join(' ')") for _ in range(20)
+    }
+    ticks = recorded(venue[0]).ticks
+    for one in seen:
+        tick, *root = map(float, one.split())
+        (row,) = ticks[ticks["tick"] == tick]
+        positions, _ = recorded(venue[0]).skeleton.forward_kinematics(row["pose"], row["root"])
+        np.testing.assert_allclose(root, positions[0], atol=2e-3)
+    with tab.expect_download() as download:
+        press(tab, "#happened-bvh")
+    dance = read_bvh(download.value.path(), metres_per_unit=0.01)
+    assert dance.seconds > 1.0
+    press(tab, '[data-page="tonight"]')
+    expect(tab.locator("#again")).to_be_hidden()
+
+
+def recorded(box: Box) -> Run:
+    with contextlib.suppress(JournalError):
+        return read_journal(box.box_file.parent / "night").runs[-1]
+    return cast(Run, SimpleNamespace(ticks=()))
 
 
 def test_a_thumb_that_scrolls_over_panic_does_nothing(browser: Browser, venue: tuple[Box, Page]) -> None:

@@ -143,6 +143,33 @@ def test_whatever_comes_as_a_body_is_refused(page: Page, chance: random.Random, 
     assert page.get("/status").status == 200
 
 
+def test_a_box_without_a_journal_says_so(page: Page) -> None:
+    for path in (
+        "/api/happened",
+        "/api/happened/stretch?run=1&from=0",
+        "/api/happened/dance.bvh?run=1&from=0",
+    ):
+        answer = page.get(path)
+        assert answer.status == 404 and "keeps no journal" in answer.text
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "",
+        "run=1",
+        "run=x&from=0",
+        "run=0&from=0",
+        "run=1&from=-1",
+        "run=1&from=0&seconds=1000",
+        "run=1&from=nan",
+    ],
+)
+def test_no_more_of_the_dance_is_read_than_a_stretch(page: Page, query: str) -> None:
+    assert page.get(f"/api/happened/stretch?{query}").status == 400
+    assert page.get("/api/happened/dance.exe?run=1&from=0").status in (400, 404)
+
+
 def test_a_venue_may_hide_the_rehearsal(tmp_path: Path) -> None:
     with page_alone(tmp_path, rehearsal=False) as (page, _):
         assert page.get("/api/me").value["rehearsal"] is False

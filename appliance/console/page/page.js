@@ -3,6 +3,7 @@ import { Box } from "./box.js";
 import { showChoices } from "./choices.js";
 import { Dance } from "./dance.js";
 import { command, initDevice } from "./device.js";
+import { initHappened, readHappened, stopHappened } from "./happened.js";
 import { initPicture, showPicture } from "./picture.js";
 import { initRehearsal, showRehearsal } from "./rehearsal.js";
 import { showSensors } from "./sensors.js";
@@ -21,6 +22,8 @@ function show(page) {
   document.body.dataset.shown = known;
   if (location.hash !== `#${known}`) history.replaceState(null, "", `#${known}`);
   scrollTo(0, 0);
+  if (known === "happened") readHappened();
+  else stopHappened();
   box.showFrames(known === "dance" && byId("show-dance").checked);
 }
 
@@ -118,6 +121,7 @@ const box = new Box();
 const dance = new Dance(byId("stage"), byId("held"), box, words);
 initDevice(me, words);
 initPicture();
+initHappened();
 initRehearsal(me);
 for (const button of document.querySelectorAll("nav button")) button.addEventListener("click", () => show(button.dataset.page));
 byId("show-dance").addEventListener("change", () => show("dance"));

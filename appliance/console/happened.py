@@ -1,0 +1,107 @@
+"""What happened: the journal, read by a process of its own when a browser asks for it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import sys
+import tempfile
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+from aiohttp import web
+
+LARGEST = 8 << 20  # bytes of an answer
+LONGEST_S = 20.0  # of the dance at once
+_PATIENCE_S = 60.0  # for reading half an hour
+_FRESH_S = 5.0
+_ENDINGS = {"bvh": "text/plain", "glb": "model/gltf-binary"}
+
+
+class Happened:
+    """One reader at a time, whoever asks: a browser can take no processor from the dance by asking often.
+
+    journal: its folder; None: this box keeps none.
+    """
+
+    def __init__(self, journal: str | None) -> None:
+        self._journal = journal
+        self._reading = asyncio.Lock()
+        self._timeline, self._read_at = b"", -_FRESH_S
+
+    async def timeline(self, request: web.Request) -> web.Response:
+        """All runs, newest last, as JSON: recorder/timeline.py."""
+        async with self._turn():
+            if time.monotonic() - self._read_at > _FRESH_S:
+                self._timeline = await self._read("timeline", "--json")
+                self._read_at = time.monotonic()
+            return web.Response(body=self._timeline, content_type="application/json")
+
+    async def stretch(self, request: web.Request) -> web.Response:
+        """A stretch of the dance, as frames for the page."""
+        part = self._part(request)
+        async with self._turn():
+            body = await self._read("stretch", *part)
+        return web.Response(body=body, content_type="application/octet-stream")
+
+    async def download(self, request: web.Request) -> web.Response:
+        """A stretch of the dance as a recording: BVH or glTF."""
+        part, ending = self._part(request), request.match_info["ending"]
+        if ending not in _ENDINGS:
+            raise web.HTTPNotFound(text="There is nothing at this address.")
+        async with self._turn():
+            with tempfile.TemporaryDirectory(prefix="bunraku-") as folder:
+                out = Path(folder) / f"dance.{ending}"
+                await self._read("stretch", *part, "--out", str(out))
+                body = await asyncio.to_thread(out.read_bytes)
+        name = f"bunraku-{time.strftime('%Y%m%d-%H%M%S')}.{ending}"
+        headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+        return web.Response(body=body, content_type=_ENDINGS[ending], headers=headers)
+
+    @contextlib.asynccontextmanager
+    async def _turn(self) -> AsyncIterator[None]:
+        if self._reading.locked():
+            raise web.HTTPServiceUnavailable(text="The journal is being read already. Try again in a moment.")
+        async with self._reading:
+            yield
+
+    def _part(self, request: web.Request) -> list[str]:
+        """Options of a stretch from a request's query. Raises 400."""
+        try:
+            run, start_s = int(request.query["run"]), float(request.query["from"])
+            seconds = float(request.query.get("seconds", "10"))
+        except (KeyError, ValueError):
+            raise web.HTTPBadRequest(text="Give run, from and seconds as numbers.") from None
+        if not (1 <= run < 1e6 and 0 <= start_s < 1e7 and 0 < seconds <= LONGEST_S):
+            raise web.HTTPBadRequest(text=f"A stretch has at most {LONGEST_S:g} seconds.")
+        return ["--run", str(run), "--start", str(start_s), "--seconds", str(seconds)]
+
+    async def _read(self, what: str, *options: str) -> bytes:
+        """What a reading process answers. Raises 404 with its own sentence, 503 where it takes too long."""
+        if self._journal is None:
+            raise web.HTTPNotFound(
+                text="This box keeps no journal. Write `journal: {folder: journal}` into its box file."
+            )
+        reader = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "appliance.cli", "journal", what, "--journal", self._journal, *options),
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        )
+        try:
+            async with asyncio.timeout(_PATIENCE_S):
+                said, troubles = await reader.communicate()
+        except TimeoutError:
+            raise web.HTTPServiceUnavailable(text="Reading the journal took too long.") from None
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                reader.kill()
+        if reader.returncode:
+            words = troubles.decode(errors="replace").strip().rpartition("\n")[2]
+            raise web.HTTPNotFound(text=words.removeprefix("bunraku: ") or "The journal cannot be read.")
+        if len(said) > LARGEST:
+            raise web.HTTPServiceUnavailable(text="That is too much at once.")
+        return said
