@@ -59,7 +59,7 @@ def _strip(out: Path, setting: str) -> Path:
     begin = round(BEFORE_S / TICK_S)
     title = f"springs: {setting}" if setting else "without springs"
     danced = np.array(poses[begin:]), np.array(roots[begin:])
-    return draw_filmstrip(out, show.skeleton, *danced, 1 / TICK_S, held=(), title=title, rows=1)
+    return draw_filmstrip(out, show.skeleton, *danced, 1 / TICK_S, title=title, rows=1)
 
 
 if __name__ == "__main__":
