@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from appliance.pose import quaternion
 from appliance.pose.roles import UPPER_ARMS
 from appliance.pose.skeleton import Skeleton
 
@@ -46,8 +45,7 @@ class Trunk:
             if elbow is None or wrist is None or shoulder == 0:
                 return None
             arms.append(Arm(skeleton.parents[shoulder], shoulder, elbow, wrist))
-        rest = np.tile(quaternion.IDENTITY.astype(float), (len(skeleton), 1))
-        positions, _ = skeleton.forward_kinematics(rest, np.zeros(3))
+        positions, _ = skeleton.forward_kinematics(skeleton.standing, np.zeros(3))
         apart = float(np.linalg.norm(positions[arms[0].shoulder] - positions[arms[1].shoulder]))
         return cls(tuple(spine), tuple(arms), TRUNK_RADIUS * apart) if len(spine) > 1 else None
 

@@ -28,7 +28,7 @@ from appliance.outputs.frame_layout import (
 )
 from appliance.outputs.joint_frame import JointFrame
 from appliance.pose.foreign_file import plain_json
-from appliance.pose.skeleton import Skeleton
+from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,7 @@ class Facts:
                 "parents": [int(parent) for parent in skeleton.parents],
                 "offsets": np.asarray(skeleton.offsets).tolist(),
                 "ends": [(int(joint), [float(part) for part in offset]) for joint, offset in skeleton.ends],
+                **stance_facts(skeleton),
             },
         }
         return json.dumps(facts).encode()
@@ -85,6 +86,7 @@ class Facts:
                     tuple(skeleton["parents"]),
                     np.asarray(skeleton["offsets"], np.float64),
                     tuple((joint, (x, y, z)) for joint, (x, y, z) in skeleton["ends"]),
+                    stance_of(skeleton),
                 ),
             }
         )

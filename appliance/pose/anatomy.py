@@ -21,14 +21,15 @@ _UP = np.array([0.0, 1.0, 0.0])
 class Anatomy:
     """The parts of a skeleton of any kind, from its shape; names matter for the head and for left and right.
 
-    pose: (J, 4) local rotations in which the body is modelled; left out: the rest pose.
+    pose: (J, 4) local rotations in which the body is modelled; left out: as it stands.
     """
 
     def __init__(self, skeleton: Skeleton, pose: Array | None = None) -> None:
         self.skeleton = skeleton
         joints = len(skeleton)
-        rest = np.tile(quaternion.IDENTITY.astype(float), (joints, 1))
-        self.positions, self.world = skeleton.forward_kinematics(rest if pose is None else pose, np.zeros(3))
+        self.positions, self.world = skeleton.forward_kinematics(
+            skeleton.standing if pose is None else pose, np.zeros(3)
+        )
         self.children: list[list[int]] = [[] for _ in range(joints)]
         for joint, parent in enumerate(skeleton.parents):
             if parent >= 0:

@@ -30,11 +30,8 @@ class Body:
 
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton
-        joints = len(skeleton)
-        rest, _ = skeleton.forward_kinematics(
-            np.tile(quaternion.IDENTITY.astype(float), (joints, 1)), np.zeros(3)
-        )
-        self.height = float(np.ptp(np.vstack([rest, self._ends(rest, None)]), axis=0).max()) or 1.0
+        rest, world = skeleton.forward_kinematics(skeleton.standing, np.zeros(3))
+        self.height = float(np.ptp(np.vstack([rest, self._ends(rest, world)]), axis=0).max()) or 1.0
         self._trunk = self._trunk_joints()
         self._radius = self.height * np.clip(
             0.042 * (skeleton.reaches / self.height) ** 0.62 * 1.36, 0.011, None

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
@@ -15,6 +18,7 @@ SAMPLES_A_SECOND = 5.0
 STANDING_PERCENTILE = (
     90.0  # of the heights from sole to crown: the dancer stands upright in a tenth of the time
 )
+HANGING_SHARE = 0.5  # of a metre of height that a metre of lower hands is worth in a standing pose
 PLANTED_PERCENTILE = 5.0  # of the heights of the lowest sole: the floor
 
 
@@ -60,6 +64,38 @@ def stands(skeleton: Skeleton, positions: Array) -> bool:
         return False
     below = positions[:, 0, 1] - positions[:, feet, 1].mean(axis=-1)
     return bool(way[1] > UPRIGHT and (below > 0.2 * skeleton.reaches[0]).all())
+
+
+def needs_stance(skeleton: Skeleton) -> bool:
+    """Whether the zero pose of a skeleton with head and feet is no figure."""
+    known = skeleton.head is not None and bool(skeleton.feet)
+    return known and not stands(skeleton, rest_positions(skeleton))
+
+
+def with_stance(recording: Recording) -> Skeleton:
+    """The skeleton of a bundle's skeleton.bvh, whose pose is the stance where the zero pose is no figure."""
+    skeleton = recording.skeleton
+    if not needs_stance(skeleton) or not len(recording):
+        return skeleton
+    return replace(skeleton, stance=recording.poses[0].astype(np.float64))
+
+
+def standing_pose(recording: Recording) -> NDArray[np.float64]:
+    """(J, 4): the recorded pose that stands tallest with the lowest hands, turned to the front."""
+    skeleton = recording.skeleton
+    every = max(1, round(recording.fps / SAMPLES_A_SECOND))
+    positions = sampled_positions(recording)
+    head = skeleton.head or 0
+    tall = positions[:, head, 1] - lowest_soles(skeleton, positions)
+    hands = [joint for role, joint in skeleton.roles.items() if role.endswith(" hand")]
+    low = positions[:, hands, 1].mean(axis=-1) - positions[:, 0, 1] if hands else np.zeros(len(tall))
+    best = int(np.argmax(tall - HANGING_SHARE * low))
+    pose: NDArray[np.float64] = recording.poses[best * every].astype(np.float64).copy()
+    front = fronts(skeleton, positions[best : best + 1])
+    if front is not None:
+        turn = quaternion.from_axis_angle([0.0, 1.0, 0.0], -np.arctan2(front[0, 0], front[0, 1]))
+        pose[0] = quaternion.multiply(turn, pose[0])
+    return pose
 
 
 def lowest_soles(skeleton: Skeleton, positions: Array) -> Array:

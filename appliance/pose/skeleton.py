@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,13 +36,15 @@ class Skeleton:
 
     names: J joint names; parents: index of each joint's parent, -1 for the root;
     offsets: (J, 3) metres from the parent joint, in the parent's frame, zero for the root;
-    ends: where bones without a child joint end, as (joint, offset in metres).
+    ends: where bones without a child joint end, as (joint, offset in metres);
+    stance: (J, 4) local rotations in which the body stands, where the zero pose is no figure.
     """
 
     names: tuple[str, ...]
     parents: tuple[int, ...]
     offsets: NDArray[np.float64]
     ends: tuple[tuple[int, tuple[float, float, float]], ...] = ()
+    stance: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -56,6 +59,13 @@ class Skeleton:
     def same_joints(self, other: Skeleton) -> bool:
         """Whether a pose of the other skeleton means the same here: equal names and parents."""
         return self.names == other.names and self.parents == other.parents
+
+    @property
+    def standing(self) -> NDArray[np.float64]:
+        """(J, 4): the pose in which the body is modelled: the stance, else the zero pose."""
+        if self.stance is not None:
+            return self.stance
+        return np.tile(quaternion.IDENTITY.astype(np.float64), (len(self), 1))
 
     @cached_property
     def roles(self) -> dict[str, int]:
@@ -132,3 +142,15 @@ class Skeleton:
             reach = quaternion.rotate(above, offsets[..., joints, :])
             positions[..., joints, :] = positions[..., parents, :] + reach
         return positions, world
+
+
+def stance_facts(skeleton: Skeleton) -> dict[str, list[list[float]]]:
+    """The stance as plain values, for JSON; empty without one."""
+    return {} if skeleton.stance is None else {"stance": np.round(skeleton.stance, 6).tolist()}
+
+
+def stance_of(facts: Mapping[str, Any]) -> NDArray[np.float64] | None:
+    """The stance in plain values. Raises ValueError or TypeError where they are none."""
+    if facts.get("stance") is None:
+        return None
+    return np.asarray(facts["stance"], np.float64).reshape(-1, 4)

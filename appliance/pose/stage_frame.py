@@ -13,8 +13,10 @@ from appliance.pose.body_facts import (
     floor_m,
     fronts,
     head_way,
+    needs_stance,
     rest_positions,
     sampled_positions,
+    standing_pose,
     stands,
 )
 from appliance.pose.bones import span_m
@@ -95,6 +97,9 @@ def in_stage_frame(
     if abs(floor) > FLOOR_M:
         recording = replace(recording, roots=recording.roots - np.array([0.0, floor, 0.0]))
         guesses.append(Guess(f"the floor, at a height of {floor:.2f} m in the file, set to 0", ""))
+    if needs_stance(recording.skeleton):
+        standing = replace(recording.skeleton, stance=standing_pose(recording))
+        recording = replace(recording, skeleton=standing)
     return recording, guesses
 
 
@@ -207,7 +212,7 @@ def _faced(recording: Recording, facing: str | None, turn_dance: bool) -> tuple[
     if at_rest and facing != "z":
         recording = _axes_turned(recording, _quarter_turn(-at_rest))
         words.append(f"the zero pose, which faces {_side(at_rest)}, turned to the audience")
-        given = (given - at_rest) % 4
+        given = 0 if facing is None else (given - at_rest) % 4
     if facing is None and turn_dance:
         given = _quarters(fronts(skeleton, sampled_positions(recording)))
         if given:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from appliance.box.clock import TICK_S
-from appliance.pose.skeleton import Skeleton
+from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
 from appliance.show.bundle import default_show_path
 from appliance.show.show import Show
 
@@ -85,6 +85,7 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
         "parents": [int(parent) for parent in skeleton.parents],
         "offsets": np.asarray(skeleton.offsets).tolist(),
         "ends": [(int(joint), [float(part) for part in offset]) for joint, offset in skeleton.ends],
+        **stance_facts(skeleton),
         "show": show.config.name,
         "show_directory": None if bundled else str(show.directory.resolve()),
         "show_files": [os.path.relpath(path, show.directory) for path in files],
@@ -126,4 +127,5 @@ def skeleton_of(facts: dict[str, Any]) -> Skeleton:
         tuple(facts["parents"]),
         np.asarray(facts["offsets"], np.float64),
         tuple((int(joint), (float(x), float(y), float(z))) for joint, (x, y, z) in facts["ends"]),
+        stance_of(facts),
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pydantic import field_validator, model_validator
 
+from appliance.pose.body_facts import with_stance
 from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import require_inside
 from appliance.pose.skeleton import Skeleton
@@ -222,7 +223,7 @@ def _skeleton(path: Path) -> tuple[Skeleton | None, list[Problem]]:
     cure = COPY_AGAIN
     try:
         require_inside(path, path.parent)
-        return read_bvh(path).skeleton, []
+        return with_stance(read_bvh(path)), []
     except BvhError as error:
         return None, [Problem(path, error.line, str(error).split(": ", 1)[-1], cure)]
     except OSError as error:

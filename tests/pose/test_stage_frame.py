@@ -23,7 +23,9 @@ def assert_the_same_dance(found, meant) -> None:  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_every_convention_arrives_as_the_same_dance(convention: str) -> None:
     meant = dance_of(convention, seconds=4.0)
-    found, _ = in_stage_frame(as_the_system_writes(meant, convention))
+    written = as_the_system_writes(meant, convention)
+    assert_the_same_dance(in_stage_frame(written, turn_dance=False)[0], meant)
+    found, _ = in_stage_frame(written)
     assert_the_same_dance(found, meant)
     assert found.skeleton.names[0] == CONVENTIONS[convention].name("hips")
     positions = sampled_positions(found)

@@ -18,15 +18,16 @@ _DOWNWARDS = 0.35  # how steeply feet point to the floor
 
 
 def anatomy_of(skeleton: Skeleton) -> Anatomy:
-    """The parts of a skeleton in its rest pose; with spread limbs where the rest pose leaves them no room.
+    """The parts of a skeleton as it stands; with spread limbs where the pose leaves them no room.
 
-    Some recordings have all bones along one axis at rest, and only their motion says how a body stands.
+    Some recordings have all bones along one axis at rest, and only their motion says how a body stands: that
+    pose is the skeleton's stance, and the limbs are spread from there.
     """
     at_rest = Anatomy(skeleton)
-    if not is_crowded(at_rest):
+    if skeleton.stance is None and not is_crowded(at_rest):
         return at_rest
-    upright = Anatomy(skeleton, _aimed(skeleton, _spine_aims(at_rest)))
-    return Anatomy(skeleton, _aimed(skeleton, {**_spine_aims(at_rest), **_limb_aims(upright)}))
+    upright = Anatomy(skeleton, _aimed(at_rest, _spine_aims(at_rest)))
+    return Anatomy(skeleton, _aimed(at_rest, {**_spine_aims(at_rest), **_limb_aims(upright)}))
 
 
 def is_crowded(anatomy: Anatomy) -> bool:
@@ -78,18 +79,19 @@ def _limb_aims(anatomy: Anatomy) -> dict[tuple[int, int], Array]:
     return aims
 
 
-def _aimed(skeleton: Skeleton, aims: dict[tuple[int, int], Array]) -> Array:
+def _aimed(standing: Anatomy, aims: dict[tuple[int, int], Array]) -> Array:
     """Local rotations (J, 4) by which bones point where they should, each turned the shortest way."""
+    skeleton = standing.skeleton
     towards = {joint: (child, aim) for (joint, child), aim in aims.items()}
-    world = np.tile(quaternion.IDENTITY.astype(float), (len(skeleton), 1))
-    local = world.copy()
+    local = skeleton.standing.copy()
+    world = local.copy()
     for joint, parent in enumerate(skeleton.parents):
         above = world[parent] if parent >= 0 else quaternion.IDENTITY.astype(float)
-        world[joint] = above
+        world[joint] = quaternion.multiply(above, local[joint])
         if joint in towards:
             child, aim = towards[joint]
-            bone = quaternion.rotate(above, skeleton.offsets[child])
-            world[joint] = quaternion.multiply(_shortest_turn(bone, aim), above)
+            bone = quaternion.rotate(world[joint], skeleton.offsets[child])
+            world[joint] = quaternion.multiply(_shortest_turn(bone, aim), world[joint])
         local[joint] = quaternion.multiply(quaternion.inverse(above), world[joint])
     return local
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 
 from appliance.pose import quaternion
@@ -88,7 +89,7 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     report[KEY] = reading_facts(request.source.catalogue)
     say("Measuring whether the body answers a hand.")
     report["puppetry"] = own_answer(coder, dataset, request.out / "answer.png")
-    packing.write_skeleton(request.out, dataset.skeleton, dataset.still_pose())
+    packing.write_skeleton(request.out, dataset.skeleton, _shown_pose(dataset))
     about = "what the show starts from; another: bunraku export --phrase FILE"
     if request.phrase is not None:
         packing.write_phrase(request.out, _given_phrase(request.phrase, request.source, dataset))
@@ -159,6 +160,8 @@ def hanging_orientation(skeleton: Skeleton, joint: str) -> list[float] | None:
     None for a joint whose bone is not horizontal in the rest pose: only arms of a T-pose are lowered.
     """
     place = skeleton.index(joint)
+    if skeleton.stance is not None:
+        return [round(float(part), 3) for part in skeleton.stance[place]]
     bones = [
         offset for offset, parent in zip(skeleton.offsets, skeleton.parents, strict=True) if parent == place
     ]
@@ -168,6 +171,14 @@ def hanging_orientation(skeleton: Skeleton, joint: str) -> list[float] | None:
         return None
     down = quaternion.from_axis_angle(np.cross(level, [0.0, -1.0, 0.0]), np.radians(HANGING_DEGREES))
     return [round(float(part), 3) for part in down]
+
+
+def _shown_pose(dataset: Dataset) -> NDArray[np.float64]:
+    """(J, 4): still joints as they are; where the zero pose is no figure, the others as in the stance."""
+    pose, stance = dataset.still_pose(), dataset.skeleton.stance
+    if stance is not None:
+        pose[list(dataset.moving)] = stance[list(dataset.moving)]
+    return pose
 
 
 def _export_both(coder: TorchCoder, architecture: str, folder: Path) -> dict[str, Path]:
