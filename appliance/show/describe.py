@@ -76,6 +76,8 @@ def _one_kind(annotation: Any) -> str:
         return words[0] if len(words) == 1 else f"one of {', '.join(words)}"
     if get_origin(annotation) is tuple:
         parts = get_args(annotation)
+        if parts == (float,) * 4:
+            return "an orientation: 4 numbers in brackets, or degrees"
         what = "words" if get_origin(parts[0]) is Literal else "numbers"
         return f"{len(parts)} {what} in brackets"
     if get_origin(annotation) is list:

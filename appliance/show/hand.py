@@ -23,7 +23,7 @@ class TurningConfig(Section):
 class FixedConfig(Section):
     """A hand that holds its joint still."""
 
-    orientation: Orientation = key("Local to the parent joint; order w, x, y, z.", (1.0, 0.0, 0.0, 0.0))
+    orientation: Orientation = key("Local to the parent joint.", (1.0, 0.0, 0.0, 0.0))
 
 
 class HandConfig(Section):
@@ -57,12 +57,12 @@ class HandConfig(Section):
         (1.0, 0.0, 0.0),
     )
     at_neutral: Orientation = key(
-        "For sensors: the joint's orientation, local to its parent (w, x, y, z), while the "
+        "For sensors: the joint's orientation, local to its parent, while the "
         "dancer stands in the neutral pose; [1, 0, 0, 0] is the skeleton's rest pose.",
         (1.0, 0.0, 0.0, 0.0),
     )
     neutral: Orientation = key(
-        "For sensors: the sensor's own orientation (w, x, y, z in its axes: z up) that counts as "
+        "For sensors: the sensor's own orientation (in its axes: z up) that counts as "
         "the neutral pose until the dancer has stood still for one.",
         (1.0, 0.0, 0.0, 0.0),
     )

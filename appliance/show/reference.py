@@ -22,9 +22,12 @@ venue and is given with `--box`. Every key may be left out unless it is marked *
 word in place of a number or a value out of bounds is refused with file, line, the nearest known key and what
 to do; all faults of a file are listed at once. `bunraku check SHOW --box FILE` tells without dancing.
 
-Numbers are written without quotes and without an exponent (`0.001`). Orientations are unit quaternions in
-the order w, x, y, z. Axes are right-handed with Y up, lengths in metres. Addresses are IPv4 in numbers,
-because looking up a name could hold up the show.
+Numbers are written without quotes and without an exponent (`0.001`). Axes are right-handed
+with Y up, lengths in metres. Addresses are IPv4 in numbers, because looking up a name could hold up the show.
+
+An orientation is a unit quaternion, `[w, x, y, z]`, or is written in degrees: `{euler: {x: 90, z: -30}}`
+turns about x, then about y, then about z, axes that stay where they are (one that is left out has no turn);
+`{axis: [0, 1, 0], angle: 90}` turns about one axis, by the right-hand rule.
 """
 
 _SHOW_EXAMPLE = """\

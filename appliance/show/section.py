@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
+import numpy as np
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
+from appliance.pose import quaternion
 from appliance.show.bundle import require_file
 from appliance.show.config_error import did_you_mean
 
@@ -69,14 +71,37 @@ def refuse_repeats(values: Sequence[object], message: str, cure: str) -> None:
             raise refusal(words, cure, at=place)
 
 
-def _unit(quaternion: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    length = math.hypot(*quaternion)
+def _in_degrees(value: Any) -> Any:
+    """`euler: {x: 90}` or `axis: [0, 1, 0]` with `angle: 90` as a quaternion; anything else as it is."""
+    if not isinstance(value, dict):
+        return value
+    cure = "Write {euler: {x: 90}}, or {axis: [0, 1, 0], angle: 90}, in degrees; or [w, x, y, z]."
+    euler = value.get("euler")
+    if len(value) == 1 and isinstance(euler, dict) and set(euler) <= {"x", "y", "z"}:
+        angles = [euler.get(axis, 0.0) for axis in "zyx"]
+        if all(map(_is_number, angles)):
+            return quaternion.from_euler(np.radians(np.array(angles, np.float64)), "zyx").tolist()
+    if set(value) == {"axis", "angle"} and _is_number(value["angle"]):
+        axis = value["axis"]
+        if isinstance(axis, list) and len(axis) == 3 and all(map(_is_number, axis)):
+            turn = quaternion.from_axis_angle(_axis((axis[0], axis[1], axis[2])), np.radians(value["angle"]))
+            return turn.tolist()
+    raise refusal("This is no orientation.", cure)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _unit(orientation: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    length = math.hypot(*orientation)
     if abs(length - 1.0) > UNIT_TOLERANCE:
         raise refusal(
             f"This orientation has the length {length:.3g}; a rotation has the length 1.",
-            "Write a unit quaternion in the order w, x, y, z; [1, 0, 0, 0] turns nothing.",
+            "Write a unit quaternion in the order w, x, y, z ([1, 0, 0, 0] turns nothing), or degrees: "
+            "{euler: {x: 90}}.",
         )
-    w, x, y, z = (part / length for part in quaternion)
+    w, x, y, z = (part / length for part in orientation)
     return w, x, y, z
 
 
@@ -141,7 +166,12 @@ def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
     return path if directory is None else Path(directory, path.expanduser())
 
 
-Orientation = Annotated[tuple[float, float, float, float], Field(strict=False), AfterValidator(_unit)]
+Orientation = Annotated[
+    tuple[float, float, float, float],
+    Field(strict=False),
+    BeforeValidator(_in_degrees),
+    AfterValidator(_unit),
+]
 Axis = Annotated[tuple[float, float, float], Field(strict=False), AfterValidator(_axis)]
 Joint = Annotated[str, AfterValidator(_in_the_skeleton)]
 Ipv4 = Annotated[str, AfterValidator(_ipv4)]

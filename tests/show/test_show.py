@@ -239,3 +239,37 @@ def test_the_models_hold_their_bounds_without_a_file() -> None:
         HandConfig.model_validate({"joint": "hip", "sensor": "a", "osc": True})
     with pytest.raises(ValidationError):
         DancerConfig(coding_iterations=3, interaction_iterations=4)
+
+
+@pytest.mark.parametrize(
+    ("written", "wanted"),
+    [
+        ("[0.7071, 0.7071, 0, 0]", (0.5**0.5, 0.5**0.5, 0, 0)),
+        ("{euler: {x: 90}}", (0.5**0.5, 0.5**0.5, 0, 0)),
+        ("{euler: {x: 90, z: 90}}", (0.5, 0.5, 0.5, 0.5)),  # about x first: y goes up to z, then x to y
+        ("{axis: [0, 2, 0], angle: -90}", (0.5**0.5, 0, -(0.5**0.5), 0)),
+        ("{axis: [0, 1, 0], angle: 0}", (1, 0, 0, 0)),
+    ],
+)
+def test_an_orientation_in_degrees(show_yaml: ShowYaml, written: str, wanted: tuple[float, ...]) -> None:
+    hands = f"name: x\nhands:\n  - {{fixed: {{orientation: {written}}}, joint: hip}}\n"
+    (hand,) = load_show(show_yaml(hands)).config.hands
+    assert hand.fixed is not None
+    assert hand.fixed.orientation == pytest.approx(wanted, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "{euler: {w: 90}}",
+        "{euler: 90}",
+        "{euler: {x: far}}",
+        "{axis: [0, 1, 0]}",
+        "{axis: [0, 1], angle: 90}",
+        "{axis: [0, 1, 0], angle: yes}",
+        "{roll: 5}",
+    ],
+)
+def test_what_is_no_orientation_is_refused_with_its_line(show_yaml: ShowYaml, written: str) -> None:
+    directory = show_yaml(f"name: x\nhands:\n  - {{fixed: {{orientation: {written}}}, joint: hip}}\n")
+    assert "show.yaml:3: This is no orientation. Write {euler: {x: 90}}" in str(refusal(directory))
