@@ -27,9 +27,10 @@ class Checkpoint:
     phrase, position_s: which pose comes next; excerpt: first and last second of the part that plays;
     rate: its speed while the show goes; x, z (metres), heading (radians about +Y): where the phrase's root
     stands on the stage; strayed: how far grounding has moved the figure from there (metres); let_go: joints
-    whose hands have let go; applied: the generation of the show state that all this follows; boot: the
-    machine's boot id; tick: of the last frame; restarts, power_cuts: how often the show went on after one;
-    ended: the show was ended as it should; tries: starts from here that produced no frame.
+    whose hands have let go; source: what is to take the phrase's place, else ""; applied: the generation of
+    the show state that all this follows; boot: the machine's boot id; tick: of the last frame; restarts,
+    power_cuts: how often the show went on after one; ended: the show was ended as it should; tries: starts
+    from here that produced no frame.
     """
 
     show: str
@@ -52,6 +53,7 @@ class Checkpoint:
     ended: bool = False
     tries: int = 0
     applied: int = 0
+    source: str = ""
 
 
 def packed(place: Checkpoint) -> bytes:
@@ -72,7 +74,9 @@ def packed(place: Checkpoint) -> bytes:
         _ENDED * place.ended,
         place.tries,
     )
-    payload = numbers + _names(place.show, place.phrase, place.cue, place.let_go, place.boot, place.applied)
+    payload = numbers + _names(
+        *(place.show, place.phrase, place.cue, place.let_go, place.boot, place.applied, place.source)
+    )
     if len(payload) > LARGEST:
         raise ValueError(f"A place of {len(payload)} bytes is longer than {LARGEST}.")
     return payload
@@ -84,7 +88,7 @@ def unpacked(payload: bytes) -> Checkpoint | None:
         tick, position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, *small = (
             _NUMBERS.unpack_from(payload)
         )
-        show, phrase, cue, let_go, boot, applied = plain_json(payload[_NUMBERS.size :])
+        show, phrase, cue, let_go, boot, applied, *later = plain_json(payload[_NUMBERS.size :])
         place = Checkpoint(
             str(show),
             str(phrase),
@@ -106,6 +110,7 @@ def unpacked(payload: bytes) -> Checkpoint | None:
             bool(small[4] & _ENDED),
             small[5],
             int(applied),
+            *map(str, later[:1]),
         )
     except (struct.error, ValueError, TypeError):
         return None

@@ -79,7 +79,8 @@ class Generator:
         self._fallbacks.set(NOT_KEPT.name, self.kept.complaint)
         health = self._stage.health() or {}
         base = str(health.get("base", MAIN))
-        wish = self._wishes.wish(state_reader.read(), base, self.kept.recipes, now)
+        wanted = str(health.get("wanted", ""))
+        wish = self._wishes.wish(state_reader.read(), base, self.kept.recipes, now, wanted)
         if wish is None:
             self._wish = None
             return False

@@ -37,14 +37,15 @@ class Wishes:
         self._newest: dict[str, float] = {}  # by part: the value that was asked for last
 
     def wish(
-        self, state: ShowState, base: str, kept: Mapping[str, dict[str, Any]], now: float
+        self, state: ShowState, base: str, kept: Mapping[str, dict[str, Any]], now: float, wanted: str = ""
     ) -> Wish | None:
         """What the stage waits for; None: phrases or a live dancer. base: the phrase that it danced last.
 
-        kept: recipes of kept motions by name. now: monotonic seconds.
+        kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the stage waits for while
+        nothing is declared, after a power cut.
         """
         dance: Mapping[str, Part] = state.dance if state.show == self._config.name else {}
-        name = dance["phrase"][1] if "phrase" in dance else self._config.motion.source
+        name = dance["phrase"][1] if "phrase" in dance else wanted or self._config.motion.source
         if name in kept:
             return Wish(name, {"source": KEPT, "name": name, "of": kept[name]})
         if name not in MADE or name not in self._sections:

@@ -127,8 +127,8 @@ def _motion(status: Status, observer: StageObserver, now: float) -> Iterator[Mes
     recipe = plain_json(str(observer.health().get("made") or "{}"))
     recipe = recipe.get("of", recipe)
     for name, value in recipe.items() if status.phrase else ():
-        if name != "number" and isinstance(value, str | int | float):
-            yield "/motion/is", name, value
+        if name != "number" and value is not None:
+            yield "/motion/is", name, *(value if isinstance(value, list) else (value,))
 
 
 _LISTS = {

@@ -18,7 +18,8 @@ class Reconciler:
     """Compares the show state with what the dance does: once a tick, at the price of a small read.
 
     generation: of the show state that the dance follows. cue: the newest. rate: of playback while the show
-    goes. words: what there was to say about the newest change.
+    goes. words: what there was to say about the newest change. source: what the show starts from while
+    nothing is declared; wanted: what is to take the phrase's place now, "" for none.
     """
 
     def __init__(
@@ -36,7 +37,7 @@ class Reconciler:
         self.rate = self._usual_rate = parts.motion.rate
         self._show, self._reader = show, reader
         self._is_first = parts.springs is not None  # a checkpoint knows nothing of the springs' setting
-        self._made, self._source = made, source
+        self._made, self.source, self.wanted = made, source, ""
 
     def pending(self, now: float) -> Sequence[Order]:
         """Orders that make the dance follow the show state; none in nearly every tick."""
@@ -56,7 +57,8 @@ class Reconciler:
             self._is_first = False
         live, is_ours = self.parts.live, show_state.show == self._show
         declared = show_state.dance.get("phrase") if is_ours else None
-        wanted, fade = (declared[1], declared[2]) if declared else (self._source, ())
+        wanted, fade = (declared[1], declared[2]) if declared else (self.source, ())
+        self.wanted = "" if wanted in self.parts.motion.phrases else wanted
         if wanted == LIVE and live is not None and not (orders or live.is_chosen):
             orders.append(Order("phrase", fade, LIVE))  # after a restart: checkpoints know phrases only
         if self._made is not None:

@@ -109,6 +109,8 @@ class Resumption:
             puppeteer.enabled = puppeteer.joint not in place.let_go
         reconciler.cue, reconciler.rate = place.cue, rate
         reconciler.generation = 0 if self._after_power_cut else place.applied
+        if self._after_power_cut and place.source:
+            reconciler.source = place.source
         return reconciler.iterations.ask(place.coding, place.interaction)
 
     def _place(self, reconciler: Reconciler, tick: int) -> Checkpoint:
@@ -132,6 +134,7 @@ class Resumption:
             self.restarts,
             self.power_cuts,
             applied=reconciler.generation,
+            source=reconciler.wanted,
         )
 
     def _write(self, place: Checkpoint) -> None:

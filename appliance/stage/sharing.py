@@ -104,6 +104,7 @@ class Sharing:
             "interaction": iterations.interaction,
             "phrase": parts.source,
             "base": parts.motion.base,
+            "wanted": reconciler.wanted,
             "made": parts.motion.made.recipe if parts.motion.made else "",
             "position_s": parts.motion.position_s,
             "cue": reconciler.cue,

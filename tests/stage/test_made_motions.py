@@ -1,0 +1,181 @@
+"""Motion made ahead on the stage: it comes when it is there, changes at returns, and its absence is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from appliance.box.made_motion import MadeMotion, MadeMotionWriter
+from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
+from appliance.dancer.material.maker import Maker
+from appliance.dancer.material.material_file import FOLDER, Material, recipe_text, write_material
+from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
+from appliance.show.show import Show, load_show
+from appliance.stage import fallback as rows
+from appliance.stage.admission import Admission
+from appliance.stage.carry_out import obey
+from appliance.stage.iterations import Iterations
+from appliance.stage.made_motions import LATE_S, open_made_motions
+from appliance.stage.reconcile import Reconciler
+from appliance.stage.resume import Resumption
+from appliance.stage.stage_parts import StageParts, assemble
+from appliance.stage.watch import Watch
+from tests.bundles import FIGURE
+from tests.sources import write_show_with_sources
+
+BOX = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
+FITS = Admission(3, 2, 3, 2, 64, 0.1, 0.2, 0.3, 10.0)
+TICK_S = 0.02
+
+
+class Dance:
+    """A stage's playback, reconciled tick by tick, and a generator's end."""
+
+    def __init__(self, show: Show, folder: Path) -> None:
+        self.show, self.now, self.folder = show, 1000.0, folder
+        self.parts: StageParts = assemble(show, BOX)
+        self.made = open_made_motions(folder, show, self.parts)
+        reader, self.iterations = ShowStateReader(folder), Iterations(3, 2, 64)
+        source = show.config.motion.source
+        self.reconciler = Reconciler("A test", self.parts, self.iterations, reader, self.made, source)
+        self.watch = Watch(self.parts, FITS, self.made)
+        self._maker = Maker(show.skeleton, show.motion_networks, self.parts.motion.loop_of, grounded=True)
+
+    def run(self, seconds: float) -> set[str]:
+        """Tick on; the names of what was danced."""
+        seen = set()
+        for _ in range(round(seconds / TICK_S)):
+            for order in self.reconciler.pending(self.now):
+                done, words = obey(order, self.parts, self.iterations)
+                assert done, words
+            self.watch.count_silences(self.now)
+            self.parts.motion.advance()
+            self.now += TICK_S
+            seen.add(self.parts.source)
+        return seen
+
+    def make(self, writer: MadeMotionWriter, at_once: bool, **recipe: Any) -> None:
+        """What the generator does."""
+        whole = {"source": "vary", "phrase": "main", "sigma": 1.0, "seed": 1} | recipe
+        file = f"{whole['number']}.material"
+        loop, text = self._maker.make(whole), recipe_text(whole)
+        write_material(self.folder / FOLDER / file, Material(text, loop), FIGURE.names)
+        writer.write(MadeMotion(text, file, whole["source"], at_once))
+
+    def late(self) -> int:
+        """How often a source was late."""
+        told = {one.name: one for one in self.watch.fallbacks.happened(self.now)}
+        return told[rows.SOURCE_LATE.name].times if rows.SOURCE_LATE.name in told else 0
+
+
+@pytest.fixture
+def writer(tmp_path: Path) -> Iterator[MadeMotionWriter]:
+    with closing(MadeMotionWriter(tmp_path)) as writer:
+        yield writer
+
+
+@pytest.fixture
+def dance_of(tmp_path: Path) -> Iterator[Callable[..., Dance]]:
+    opened: list[Dance] = []
+
+    def made(**motion: Any) -> Dance:
+        show = load_show(write_show_with_sources(tmp_path / "show", motion))
+        opened.append(Dance(show, tmp_path))
+        return opened[-1]
+
+    yield made
+    for dance in opened:
+        dance.parts.close()
+
+
+def declare(folder: Path, *names: str) -> None:
+    state = ShowState(show="A test")
+    for name in names:
+        state = state.with_dance(5.0, {"phrase": (name, (0.2,))})
+    with closing(ShowStateWriter(folder)) as writer:
+        writer.write(state)
+
+
+def test_the_phrase_plays_on_until_it_is_made_and_the_wait_is_told_once(
+    dance_of: Callable[..., Dance], writer: MadeMotionWriter, tmp_path: Path
+) -> None:
+    dance = dance_of()
+    declare(tmp_path, "vary")
+    assert dance.run(LATE_S - 0.5) == {"main"} and dance.late() == 0
+    assert dance.run(1.0) == {"main"} and dance.late() == 1
+    dance.run(2.0)
+    assert dance.late() == 1
+    dance.make(writer, True, number=1001)
+    assert dance.run(1.0) == {"main", "vary"} and dance.parts.source == "vary"
+    declare(tmp_path, "vary", "main")
+    dance.run(1.0)
+    assert dance.parts.source == "main" and dance.parts.motion.made is None
+
+
+def test_what_is_made_for_the_return_waits_for_it_and_what_is_not_does_not(
+    dance_of: Callable[..., Dance], writer: MadeMotionWriter, tmp_path: Path
+) -> None:
+    dance = dance_of()
+    declare(tmp_path, "vary")
+    dance.make(writer, True, number=1001)
+    dance.run(0.5)
+    dance.make(writer, False, number=1002, seed=2)
+    number = dance.parts.motion
+    dance.run(1.5)
+    assert number.made is not None and number.made.number == 1001
+    dance.run(1.5)  # the phrase has three seconds
+    assert number.made.number == 1002
+    dance.make(writer, True, number=1003, sigma=2.0)
+    dance.run(0.1)
+    assert number.made.number == 1003
+    dance.run(7.0)  # nothing more comes: the last one plays on
+    assert number.made.number == 1003 and dance.parts.source == "vary"
+
+
+def test_a_show_may_start_from_it(dance_of: Callable[..., Dance], writer: MadeMotionWriter) -> None:
+    dance = dance_of(source="vary")
+    dance.make(writer, True, number=1001)
+    dance.run(1.5)
+    assert dance.parts.source == "vary"
+
+
+def test_a_file_that_is_gone_or_foreign_changes_nothing(
+    dance_of: Callable[..., Dance], writer: MadeMotionWriter, tmp_path: Path
+) -> None:
+    dance = dance_of()
+    dance.make(writer, True, number=1001)
+    recipe = recipe_text({"source": "vary", "phrase": "main", "sigma": 1.0, "seed": 1, "number": 1001})
+    (tmp_path / FOLDER / "1001.material").write_bytes(b"damaged")
+    with pytest.raises(ValueError, match="no material"):
+        dance.parts.dance_made(recipe, 0.2)
+    (tmp_path / FOLDER / "1001.material").unlink()
+    with pytest.raises(ValueError, match="cannot be read"):
+        dance.parts.dance_made(recipe, 0.2)
+    with pytest.raises(ValueError, match="not there any more"):
+        dance.parts.dance_made("{}", 0.2)
+    assert dance.run(0.2) == {"main"}
+
+
+def test_after_a_power_cut_it_goes_on_with_its_source(
+    dance_of: Callable[..., Dance], writer: MadeMotionWriter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dance = dance_of()
+    declare(tmp_path, "vary")
+    dance.make(writer, True, number=1001)
+    dance.run(1.5)
+    (runtime := tmp_path / "place").mkdir()
+    noted = Resumption("A test", runtime, None, "always")
+    noted.write_checkpoint(dance.reconciler, 7)
+    noted.close()
+    monkeypatch.setattr("appliance.stage.resume.boot_id", lambda: "another")
+    (tmp_path / "show_state").unlink()
+    again = dance_of()
+    resumed = Resumption("A test", runtime, None, "always")
+    assert "After a power cut" in resumed.go_on(again.reconciler, again.now)
+    again.run(0.5)
+    assert again.reconciler.wanted == "vary" and again.parts.source == "vary"
+    resumed.close()
