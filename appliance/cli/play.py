@@ -20,6 +20,7 @@ from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
 from appliance.show.control import ControlConfig
 from appliance.show.show import Show, load_show
+from appliance.show.venue_rig import unwired
 from appliance.stage.open_sensors import reach
 from appliance.stage.run import Stage
 from appliance.stage.stage_error import StageError
@@ -93,7 +94,8 @@ def play_show(
         with closing(stage):
             keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
             keeper = _keeper(keepers_box, journal, minutes) if keeps else None
-            for line in (*words.splitlines(), *_introduction(stage, emulate, control)):
+            unlit = () if alone or show.config.lights.fixtures else unwired(show, box)
+            for line in (*words.splitlines(), *_introduction(stage, emulate, control), *unlit):
                 speaker.say(line)
             companions = () if alone else tuple(_companions(show, box, control, window or shown))
             if page is not None:

@@ -2,32 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from appliance.lights.patch import Patch
+from appliance.lights.beams import Beam
 from appliance.pictures.filmstrip import MissingPicturesError
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
-from appliance.show.lights import FixtureConfig
 
 DARK, FLOOR, GRID = "#101015", "#1b1c24", "#2a2c37"
 INK, FAINT, BONE = "#efe6d8", "#9a948c", "#e8dcc6"
-BEAM, LAMP, AUDIENCE = "#f2c14e", "#f45d48", "#6f7a94"
+LAMP, AUDIENCE = "#f45d48", "#6f7a94"
 MARGIN_M = 1.0
 LONGEST_BEAM_M = 12.0
+DARK_LEVEL = 0.02
 VIEWS = (("From above", 0, 2), ("From the audience", 0, 1))  # title, axis to the right, axis upwards
 
 
 def draw_plan(
-    path: Path, patch: Patch, skeleton: Skeleton, dancer: Array, trail: Array, title: str, scene: str
+    path: Path,
+    beams: Sequence[Beam],
+    skeleton: Skeleton,
+    dancer: Array,
+    trail: Array,
+    title: str,
+    scene: str,
 ) -> Path:
     """Draw the rig into a PNG and return its path.
 
-    dancer: (J, 3) metres, the joints in the moment that the heads' angles belong to; trail: (N, 3) metres,
-    the root's way through the phrase; scene: a line about that moment. Raises MissingPicturesError.
+    Each beam has its colour, width and level; a dark one is dashed. dancer: (J, 3) metres, the joints in the
+    moment that the beams belong to; trail: (N, 3) metres, the root's way through the phrase; scene: a line
+    about that moment. Raises MissingPicturesError.
     """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -38,7 +46,7 @@ def draw_plan(
     grid = figure.add_gridspec(1, 2, left=0.05, right=0.98, top=0.84, bottom=0.08, wspace=0.12)
     for number, view in enumerate(VIEWS):
         axes = figure.add_subplot(grid[number])
-        _View(axes, view, patch, dancer).draw(skeleton, dancer, trail)
+        _View(axes, view, beams, dancer).draw(skeleton, dancer, trail)
     figure.text(0.05, 0.94, title, color=INK, fontsize=20, va="center")
     figure.text(0.05, 0.89, scene, color=FAINT, fontsize=11.5, va="center")
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -50,8 +58,8 @@ def draw_plan(
 class _View:
     """One projection of the stage: two of its axes, in metres."""
 
-    def __init__(self, axes: Any, view: tuple[str, int, int], patch: Patch, dancer: Array) -> None:
-        self._axes, self._patch = axes, patch
+    def __init__(self, axes: Any, view: tuple[str, int, int], beams: Sequence[Beam], dancer: Array) -> None:
+        self._axes, self._beams = axes, beams
         title, self._right, self._up = view
         self._is_plan = self._up == 2
         axes.set_title(title, color=INK, fontsize=13, loc="left", pad=10)
@@ -66,14 +74,15 @@ class _View:
                 axes.plot(
                     *self._flat(dancer[[parent, joint]]).T, color=BONE, lw=3, solid_capstyle="round", zorder=6
                 )
-        self._beams()
-        for fixture in self._patch.fixtures:
-            self._fixture(fixture)
+        for beam in self._beams:
+            self._beam(beam)
+        for beam in {beam.fixture.name: beam for beam in self._beams}.values():
+            self._fixture(beam)
 
     def _frame(self, dancer: Array) -> None:
         """Limits around everything, a 1 m grid, and the audience."""
         axes = self._axes
-        places = np.array([fixture.place for fixture in self._patch.fixtures])
+        places = np.array([beam.place for beam in self._beams])
         points = self._flat(np.concatenate([places, dancer, [[-2, 0, -2], [2, 0, 2]]]))
         low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
         if not self._is_plan:
@@ -105,30 +114,37 @@ class _View:
         else:
             axes.axhline(0, color=AUDIENCE, lw=1.5, zorder=1)
 
-    def _beams(self) -> None:
-        """Each head's beam down to the floor, at most LONGEST_BEAM_M."""
-        heads = self._patch.heads
-        for place, beam in zip(heads.places, heads.beams(), strict=True):
-            end = place + beam * _length(place, beam)
-            for width, alpha in ((9, 0.10), (4, 0.18), (1.4, 0.9)):
+    def _beam(self, beam: Beam) -> None:
+        """A beam to the floor, at most LONGEST_BEAM_M: a cone of its colour, the brighter the denser."""
+        reach = _length(beam.place, beam.direction)
+        end = beam.place + beam.direction * reach
+        if beam.level < DARK_LEVEL:
+            if beam.is_head:
                 self._axes.plot(
-                    *self._flat(np.array([place, end])).T,
-                    color=BEAM,
-                    lw=width,
-                    alpha=alpha,
-                    zorder=4,
-                    solid_capstyle="round",
+                    *self._flat(np.array([beam.place, end])).T, color=FAINT, lw=0.8, ls=(0, (2, 4)), zorder=4
                 )
-            if self._is_plan and end[1] < 0.01:
-                self._axes.plot(*self._flat(end), "o", color=BEAM, ms=7, alpha=0.5, zorder=4)
+            return
+        radius = reach * np.tan(np.radians(beam.degrees / 2))
+        around = end + radius * _circle(beam.direction)
+        around[:, 1] = np.maximum(around[:, 1], 0.0)
+        rim = self._flat(around)
+        start = self._flat(beam.place)
+        for share in (1.0, 0.6, 0.3):  # denser towards the middle
+            inner = self._flat(end) + share * (rim - self._flat(end))
+            outline = _hull(np.vstack([start, inner]))
+            self._axes.fill(
+                *outline.T, color=tuple(beam.colour), alpha=0.02 + 0.1 * beam.level, lw=0, zorder=4
+            )
+        if self._is_plan and end[1] < 0.01:
+            self._axes.fill(*rim.T, color=tuple(beam.colour), alpha=0.05 + 0.2 * beam.level, lw=0, zorder=3)
 
-    def _fixture(self, fixture: FixtureConfig) -> None:
-        moves = any(head.fixture is fixture for head in self._patch.heads.heads)
+    def _fixture(self, beam: Beam) -> None:
+        fixture = beam.fixture
         x, y = self._flat(np.array(fixture.place))
-        marker = ("v" if fixture.pose == "hanging" else "^") if moves else "s"
-        self._axes.plot(x, y, marker, color=LAMP, ms=11 if moves else 8, mec=DARK, mew=1, zorder=7)
+        marker = ("v" if fixture.pose == "hanging" else "^") if beam.is_head else "s"
+        self._axes.plot(x, y, marker, color=LAMP, ms=11 if beam.is_head else 8, mec=DARK, mew=1, zorder=7)
         self._axes.annotate(
-            fixture.name,
+            f"{fixture.name}  {100 * beam.level:.0f} %",
             (x, y),
             (0, 11),
             textcoords="offset points",
@@ -149,3 +165,30 @@ def _length(place: Array, beam: Array) -> float:
     if beam[1] >= -1e-3:
         return LONGEST_BEAM_M
     return min(float(place[1] / -beam[1]), LONGEST_BEAM_M)
+
+
+def _circle(axis: Array) -> Array:
+    """(P, 3): points around an axis, at a distance of 1."""
+    aside = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 1.0, 0.0])
+    aside /= np.linalg.norm(aside)
+    angles = np.linspace(0.0, 2.0 * np.pi, 49)[:, None]
+    around: Array = np.cos(angles) * aside + np.sin(angles) * np.cross(axis, aside)
+    return around
+
+
+def _hull(points: Array) -> Array:
+    """The convex outline (H, 2) of points (P, 2), counter-clockwise (Andrew's monotone chain)."""
+    outline: list[Array] = []
+    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
+    for line in (ordered, ordered[::-1]):
+        first = len(outline)
+        for point in line:
+            while len(outline) > first + 1 and _turn(outline[-2], outline[-1], point) <= 0:
+                outline.pop()
+            outline.append(point)
+        outline.pop()
+    return np.array(outline)
+
+
+def _turn(a: Array, b: Array, c: Array) -> float:
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

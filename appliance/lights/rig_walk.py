@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from contextlib import ExitStack
 from pathlib import Path
+from typing import NoReturn
+
+import typer
 
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.stop_signals import stop_signals
@@ -13,7 +16,7 @@ from appliance.lights.run import require_wires, rig_here, say, wired
 from appliance.lights.walk import steps, walk
 from appliance.show.box import load_box
 from appliance.show.bundle import default_show_path
-from appliance.show.config_error import ConfigError, Problem, did_you_mean
+from appliance.show.config_error import did_you_mean
 from appliance.show.lights import drivable
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import unwired
@@ -22,7 +25,10 @@ from appliance.show.venue_rig import unwired
 def walk_rig(
     directory: Path | None, box_file: Path | None, fixtures: list[str], attribute: str | None, step_s: float
 ) -> None:
-    """Take every step, then send zeros. Raises ConfigError, or AlreadyHereError while the lights run."""
+    """Take every step, then send zeros.
+
+    Raises ConfigError, typer.BadParameter for unknown names, or AlreadyHereError while the lights run.
+    """
     show, box = load_show(directory or default_show_path()), load_box(box_file)
     require_wires(box)
     config = rig_here(show, box)
@@ -52,19 +58,16 @@ def walk_rig(
 
 
 def _require_known(show: Show, fixtures: list[str], attribute: str | None) -> None:
-    """Refuse names that the rig does not have."""
+    """Raises typer.BadParameter for names that the rig does not have."""
     rig = show.config.lights.fixtures
     names = [fixture.name for fixture in rig]
-    line = show.file.line(("lights", "fixtures"))
-    problems = [
-        Problem(show.file.path, line, f"There is no fixture '{name}'.", did_you_mean(name, names))
-        for name in fixtures
-        if name not in names
-    ]
-    words = sorted({word for fixture in rig for word in drivable(fixture, show.directory)})
-    if attribute is not None and attribute not in words:
-        problems.append(
-            Problem(show.file.path, 0, f"No fixture has '{attribute}'.", did_you_mean(attribute, words))
-        )
-    if problems:
-        raise ConfigError(problems)
+    for name in fixtures:
+        if name not in names:
+            _refuse("--fixture", f"The show has no fixture '{name}'. {did_you_mean(name, names)}")
+    known = sorted({word for fixture in rig for word in drivable(fixture, show.directory)})
+    if attribute is not None and attribute not in known:
+        _refuse("--attribute", f"No fixture has '{attribute}'. {did_you_mean(attribute, known)}")
+
+
+def _refuse(option: str, words: str) -> NoReturn:
+    raise typer.BadParameter(words, param_hint=option)

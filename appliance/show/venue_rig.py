@@ -18,9 +18,15 @@ from appliance.show.show import Show
 
 
 def unwired(show: Show, box: BoxConfig) -> list[str]:
-    """A sentence for each universe that the show's fixtures are on and the box file has no wire for."""
+    """A sentence for each universe that the show's fixtures are on and the box file has no wire for; one for
+    wires that no fixture of the show is on."""
     wired = {wire.universe for wire in box.outputs.dmx}
     fixtures = at_venue(show.config.lights, box.lights).fixtures
+    if wired and not fixtures:
+        return [
+            "The box file has wires for lights, but this show has no fixtures, so all lamps stay dark. Add "
+            "them under lights: in its show.yaml (docs/lights.md)."
+        ]
     return [
         f"Universe {universe} has no wire, so these stay dark: {_names(fixtures, universe)}. "
         f"Add {{universe: {universe}, wire: artnet}} (or another wire) under outputs: dmx: in the box file."

@@ -189,7 +189,10 @@ def test_unknown_names_are_refused_with_the_nearest(
     show: Path, tmp_path: Path, arguments: tuple[str, ...], words: str, bunraku: Command
 ) -> None:
     file = box(tmp_path, 9)
-    assert words in bunraku("lights", "test", "--show", show, "--box", file, *arguments, status=2).err
+    said = " ".join(
+        bunraku("lights", "test", "--show", show, "--box", file, *arguments, status=2).err.split()
+    )
+    assert words in said and arguments[0] in said and "show.yaml" not in said
 
 
 def test_a_walk_beside_running_lights_is_refused(show: Path, tmp_path: Path, bunraku: Command) -> None:
@@ -229,3 +232,13 @@ def test_the_picture_shows_where_heads_point_in_the_chosen_mapping(
     assert (
         "Did you mean 'warm'?" in bunraku("lights", "show", "--show", show, "--mapping", "wram", status=2).err
     )
+
+
+def test_wires_without_fixtures_are_told(tmp_path: Path) -> None:
+    from appliance.show.box import load_box
+    from appliance.show.show import load_show
+    from appliance.show.venue_rig import unwired
+
+    [sentence] = unwired(load_show(default_show_path()), load_box(box(tmp_path, 9)))
+    assert "wires for lights, but this show has no fixtures" in sentence
+    assert unwired(load_show(default_show_path()), load_box(None)) == []

@@ -1,0 +1,54 @@
+"""The rig while a phrase dances, without stage, wires or clock: for pictures and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.box.show_state import ShowState
+from appliance.lights.patch import Patch, Values
+from appliance.lights.rig import Rig
+from appliance.outputs.frame_reader import SeenFrame
+from appliance.pose.recording import Recording
+from appliance.show.lights import LightsConfig
+
+_SETTLING_S = 5.0  # every head has arrived
+
+
+class Pass(NamedTuple):
+    """One pass: its second of the phrase, the dancer's joints (J, 3) in metres, the rig's values (S,)."""
+
+    second: float
+    dancer: NDArray[np.float64]
+    values: Values
+
+
+def passes(
+    config: LightsConfig, patch: Patch, phrase: Recording, mapping: str, start: int, end: int, step: int = 1
+) -> Iterator[Pass]:
+    """Dance frames start to end (without it) of the phrase under a mapping, "": the first one.
+
+    Every step-th frame is a pass. Heads have reached the first one before it; they stand in the patch.
+    """
+    step_s = step / phrase.fps
+    rig = Rig(config, patch, phrase.skeleton, 1.0 / step_s)
+    rig.safety = 0.0
+    settling = round(_SETTLING_S / step_s)
+    places = np.concatenate([np.full(settling, start), np.arange(start, end, step)])
+    for tick, place in enumerate(places):
+        frame = _frame(phrase, int(place), tick, step_s)
+        rig.render(frame, 1, ShowState(lights=mapping, lights_before=mapping), frame.frame_time)
+        if tick >= settling:
+            yield Pass(float(place / phrase.fps), frame.positions.astype(float), rig.values)
+
+
+def _frame(phrase: Recording, place: int, tick: int, step_s: float) -> SeenFrame:
+    """One instant of the phrase, as the stage would show it."""
+    pose, root = phrase.poses[place], phrase.roots[place]
+    positions, world = phrase.skeleton.forward_kinematics(pose, root)
+    free = np.zeros(len(pose))
+    small = [np.asarray(part, np.float32) for part in (pose, world, positions, root, free)]
+    return SeenFrame(tick, tick * step_s, 0.0, False, -1, 0.0, *small)
