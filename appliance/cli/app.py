@@ -43,6 +43,7 @@ _MODULES = {  # in each a function or a group of the command's name
     "replay": "appliance.cli.replay",
     "filmstrip": "appliance.cli.pictures",
     "convert": "appliance.cli.exchange",
+    "retarget": "appliance.cli.exchange",
     "import": "appliance.cli.exchange",
     "provision": "appliance.cli.sensors.commands",
     "sensors": "appliance.cli.sensors.commands",

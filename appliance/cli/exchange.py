@@ -1,4 +1,4 @@
-"""`bunraku convert` and `bunraku import`: recordings for other programs, and from them."""
+"""`bunraku convert`, `retarget` and `import`: recordings for other programs and skeletons, and from them."""
 
 from __future__ import annotations
 
@@ -52,6 +52,38 @@ def convert(
     write_recording(out, recording)
     joints, rate = len(recording.skeleton), recording.fps
     print(f"{out}: {recording.seconds:.1f} s, {len(recording)} poses at {rate:g} a second, {joints} joints.")
+
+
+@reading_options
+def retarget(
+    phrase: Annotated[Path, typer.Argument(help="A recording: .bvh, .glb, .npz or .csv.")],
+    to: Annotated[Path, typer.Option(help="The other skeleton: a recording of it, or a show folder.")],
+    out: Annotated[Path, typer.Option(help="The file; its ending says the format.")],
+    *,
+    reading: ReadingOptions,
+) -> None:
+    """Put a dance on another skeleton: a phrase of one dancer for the show of another.
+
+    Joints are matched by what they are (bunraku inspect lists it), turns count from the same T-pose, the way
+    over the floor follows the legs' length, and the soles are on the floor.
+    """
+    from appliance.exchange.exchange_error import ExchangeError
+    from appliance.exchange.formats import read_as_told, require_known_ending, write_recording
+    from appliance.exchange.retargeting import retarget as put_on
+
+    require_known_ending(out)
+    dance, _ = read_as_told(phrase, reading)
+    other, _ = read_as_told(to / "skeleton.bvh" if to.is_dir() else to, reading)
+    try:
+        found = put_on(dance, other.skeleton)
+    except ValueError as error:
+        raise ExchangeError(
+            out, f"{error} Nothing was written. Rename joints; see bunraku inspect."
+        ) from error
+    write_recording(out, found)
+    print(
+        f"{out}: {found.seconds:.1f} s of {phrase.name} with the {len(found.skeleton)} joints of {to.name}."
+    )
 
 
 def import_(

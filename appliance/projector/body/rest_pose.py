@@ -26,8 +26,8 @@ def anatomy_of(skeleton: Skeleton) -> Anatomy:
     at_rest = Anatomy(skeleton)
     if skeleton.stance is None and not is_crowded(at_rest):
         return at_rest
-    upright = Anatomy(skeleton, _aimed(at_rest, _spine_aims(at_rest)))
-    return Anatomy(skeleton, _aimed(at_rest, {**_spine_aims(at_rest), **_limb_aims(upright)}))
+    upright = Anatomy(skeleton, aimed(at_rest, _spine_aims(at_rest)))
+    return Anatomy(skeleton, aimed(at_rest, {**_spine_aims(at_rest), **_limb_aims(upright)}))
 
 
 def is_crowded(anatomy: Anatomy) -> bool:
@@ -79,7 +79,7 @@ def _limb_aims(anatomy: Anatomy) -> dict[tuple[int, int], Array]:
     return aims
 
 
-def _aimed(standing: Anatomy, aims: dict[tuple[int, int], Array]) -> Array:
+def aimed(standing: Anatomy, aims: dict[tuple[int, int], Array]) -> Array:
     """Local rotations (J, 4) by which bones point where they should, each turned the shortest way."""
     skeleton = standing.skeleton
     towards = {joint: (child, aim) for (joint, child), aim in aims.items()}

@@ -1,0 +1,72 @@
+"""`bunraku retarget`: the same dance on another skeleton, with other names, lengths and zero pose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from appliance.exchange.formats import read_recording
+from appliance.exchange.retargeting import leg_m, lowest_m, retarget
+from appliance.pose.bvh import write_bvh
+from appliance.pose.quaternion import Array
+from appliance.pose.recording import Recording
+from appliance.pose.stage_frame import in_stage_frame
+from tests.command import Command
+from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of
+
+LIMBS = (("upper arm", "forearm"), ("forearm", "hand"), ("thigh", "shin"), ("shin", "foot"))
+
+
+def ways(dance: Recording) -> dict[str, Array]:
+    """Unit vectors (N, 3) along each limb."""
+    places, _ = dance.skeleton.forward_kinematics(dance.poses, dance.roots)
+    found = {}
+    for side in ("left", "right"):
+        for start, end in LIMBS:
+            roles = dance.skeleton.roles
+            bone = places[:, roles[f"{side} {end}"]] - places[:, roles[f"{side} {start}"]]
+            found[f"{side} {start}"] = bone / np.linalg.norm(bone, axis=-1, keepdims=True)
+    return found
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_limbs_point_the_same_way_on_every_skeleton(convention: str) -> None:
+    dance, _ = in_stage_frame(dance_of("Mixamo", seconds=3.0))
+    target, _ = in_stage_frame(as_the_system_writes(dance_of(convention, 3.0, seed=1), convention))
+    found = retarget(dance, target.skeleton)
+    assert found.skeleton.names == target.skeleton.names and len(found) == len(dance)
+    meant = ways(dance)
+    for limb, way in ways(found).items():
+        degrees = np.degrees(np.arccos(np.clip((way * meant[limb]).sum(axis=-1), -1, 1)))
+        assert degrees.max() < 8.0, limb
+    soles = lowest_m(found.skeleton, *found.skeleton.forward_kinematics(found.poses, found.roots))
+    assert np.abs(soles).max() < 0.02
+
+
+def test_a_taller_dancer_walks_further_and_there_and_back_is_the_same_dance() -> None:
+    dance, _ = in_stage_frame(dance_of("Mixamo", seconds=3.0))
+    tall = replace(dance.skeleton, offsets=dance.skeleton.offsets * 1.2)
+    found = retarget(dance, tall)
+    assert leg_m(tall) == pytest.approx(1.2 * leg_m(dance.skeleton))
+    np.testing.assert_allclose(np.ptp(found.roots[:, 0]), 1.2 * np.ptp(dance.roots[:, 0]), rtol=0.01)
+    back = retarget(found, dance.skeleton)
+    ours, _ = dance.skeleton.forward_kinematics(dance.poses, dance.roots)
+    theirs, _ = back.skeleton.forward_kinematics(back.poses, back.roots)
+    np.testing.assert_allclose(theirs, ours, atol=0.02)
+
+
+def test_the_command_writes_it_and_refuses_unknown_names(tmp_path: Path, bunraku: Command) -> None:
+    phrase, other = tmp_path / "phrase.bvh", tmp_path / "other.bvh"
+    dance = dance_of("Mixamo", seconds=2.0)
+    write_bvh(phrase, dance)
+    write_bvh(other, as_the_system_writes(dance_of("LAFAN", 2.0), "LAFAN"))
+    bunraku("retarget", phrase, "--to", other, "--out", tmp_path / "out.bvh")
+    assert "LeftArm" in read_recording(tmp_path / "out.bvh").skeleton.names
+    nameless = replace(dance.skeleton, names=tuple(f"bone{j}" for j in range(len(dance.skeleton))))
+    write_bvh(other, replace(dance, skeleton=nameless))
+    refused = bunraku("retarget", phrase, "--to", other, "--out", tmp_path / "no.bvh", status=2)
+    assert "no joint that is known as" in refused.err
+    assert not (tmp_path / "no.bvh").exists()
