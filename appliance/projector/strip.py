@@ -20,7 +20,6 @@ from appliance.show.look import LookConfig
 COLUMNS, ROWS = 5, 2
 PICTURE = (320, 400)  # pixels of one instant
 VIGNETTE = 0.0  # pictures side by side need no black around them
-COLOURS = 256  # in the file: 160 kB instead of 800, and no more than 2 of 255 off
 
 
 def render_strip(
@@ -71,5 +70,4 @@ def _save(out: Path, picture: Image) -> None:
             f"Pictures need Pillow ({error}). Install it: pip install 'bunraku[pictures]'.", NO_DISPLAY
         ) from error
     out.parent.mkdir(parents=True, exist_ok=True)
-    few = Files.fromarray(picture).quantize(COLOURS, method=Files.Quantize.MAXCOVERAGE, kmeans=2)
-    few.save(out, optimize=True)
+    Files.fromarray(picture).save(out, optimize=True)
