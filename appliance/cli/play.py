@@ -258,7 +258,7 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
         stage.admission.sentence(),
     ]
     lines += stage.parts.complaints
-    lines += map(str, show.idle_hands())
+    lines += map(str, show.doubtful_hands())
     if emulate:
         lines.append(_REHEARSAL)
     else:

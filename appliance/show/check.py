@@ -106,7 +106,7 @@ def _show(directory: Path) -> Iterator[Finding]:
             show.require_moving(joints)
         except ConfigError as error:
             yield from map(_error, error.problems)
-    for problem in show.idle_hands():
+    for problem in show.doubtful_hands():
         yield Finding(problem.file, problem.line, problem.message, problem.cure, "warning")
     for name, path in show.phrases.items():
         yield from _phrase(show, name, path)

@@ -171,7 +171,27 @@ class Show:
         if problems:
             raise ConfigError(problems)
 
-    def idle_hands(self) -> list[Problem]:
+    def doubtful_hands(self) -> list[Problem]:
+        """Hands that do something else than leading the body: warnings."""
+        return [*self._idle_hands(), *self._turning_the_figure()]
+
+    def _turning_the_figure(self) -> list[Problem]:
+        """Hands on the root, which all else hangs on: the network hardly minds where a figure faces."""
+        skeleton = self.skeleton
+        above = [j for j, parent in enumerate(skeleton.parents) if parent == 0]
+        highest = max(above, key=lambda j: float(skeleton.offsets[j][1]), default=0)
+        words = (
+            f"'{skeleton.names[0]}' is the root of the skeleton: a hand there turns the whole figure, and "
+            "the rest of the body hardly answers."
+        )
+        cure = f"To lead the body hold '{skeleton.names[highest]}'; to turn the figure leave it as it is."
+        return [
+            self.file.problem(("hands", place, "joint"), words, cure)
+            for place, hand in enumerate(self.config.hands)
+            if hand.joint == skeleton.names[0] and hand.kind not in ("kept", "springs")
+        ]
+
+    def _idle_hands(self) -> list[Problem]:
         """Places where hands hold joints although no iteration is interactive: they move nothing.
 
         A show may begin like this on purpose, so this is a warning. A cue without hands says `hands: []`.

@@ -264,3 +264,15 @@ def test_pack_refuses_a_show_that_cannot_be_danced(tiny_show: Path, tmp_path: Pa
     (show / "puppet.onnx").write_bytes(b"nonsense")
     assert "puppet.onnx" in bunraku("pack", show, status=2).err
     assert (show / "SHA256SUMS").read_text() == before
+
+
+@pytest.mark.parametrize(("joint", "warned"), [("Hips", True), ("Chest", False)])
+def test_a_hand_on_the_hips_turns_the_figure_and_both_commands_say_so(
+    tmp_path: Path, bunraku: Command, joint: str, warned: bool
+) -> None:
+    show = packed_show(tmp_path, hands=[{"turning": {}, "joint": joint}])
+    play = ("play", "--alone", "--show", show, "--box", write_box(tmp_path), "--seconds", "0.2")
+    for command in (("check", show), play):
+        said = bunraku(*command).out
+        assert ("'Hips' is the root of the skeleton: a hand there turns the whole figure" in said) == warned
+        assert ("To lead the body hold 'Chest'" in said) == warned
