@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import NamedTuple
 
 from appliance.box.block import BlockReader, BlockWriter
 from appliance.pose.foreign_file import plain_json
 
+FOLDER = "material"  # in the runtime folder: what was made, as files
 FILE, KIND = "made_motion", "made_motion"
 KEPT_FILE, KEPT_KIND = "kept_motions", "kept_motions"
 _LARGEST, _LARGEST_KEPT = 4096, 8192
@@ -87,6 +89,7 @@ class KeptNamesReader:
 
 def forget_made_motion(folder: Path) -> None:
     """A show that ended as it should leaves nothing for the next one to take up."""
+    shutil.rmtree(folder / FOLDER, ignore_errors=True)
     (folder / FILE).unlink(missing_ok=True)
     (folder / KEPT_FILE).unlink(missing_ok=True)
 

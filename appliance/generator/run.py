@@ -13,7 +13,7 @@ from pathlib import Path
 
 from appliance.box.fallback import Fallbacks
 from appliance.box.log_writer import LogWriter
-from appliance.box.made_motion import MadeMotion, MadeMotionWriter
+from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionWriter
 from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.runtime_folder import Claim, runtime_folder
@@ -23,7 +23,6 @@ from appliance.dancer.grounding import GroundingError
 from appliance.dancer.loop import Loop
 from appliance.dancer.material.maker import Maker
 from appliance.dancer.material.material_file import (
-    FOLDER,
     SUFFIX,
     Material,
     parsed_recipe,
@@ -46,6 +45,7 @@ from appliance.show_control.orders import Order, OrderInbox
 
 _LOOK_S = 0.05
 _NICE = 10
+_REST_S = 0.2  # from one motion to the next, at least
 _FILES = 4  # the newest: the stage may still open the one before
 _MOST_NUMBERS = 10_000_000  # exact in the track's float32
 _WRONG = (MotionNetworkError, GroundingError, PhraseError, BvhError, OSError, LookupError, ValueError)
@@ -64,11 +64,12 @@ class Generator:
         self._loops: dict[str, Loop] = {}
         grounded = config.motion.grounded
         self._maker = Maker(show.skeleton, show.motion_networks, self._loop_of, grounded)
-        self.kept = KeptMotions(folder, box.state_folder, show.skeleton.names, config.motion.sources)
+        taken = tuple(name for name in config.motion.sources if name not in config.motion.kept)
+        self.kept = KeptMotions(folder, box.state_folder, show.skeleton.names, taken)
         self._writer = MadeMotionWriter(folder)
         self._told: list[str] | None = None
         self._wish: Wish | None = None  # what was made last was made for it
-        self._recipe, self._returns, self._failed = "", 0, ""
+        self._recipe, self._returns, self._rests_until = "", 0, 0.0
         self._number = 1000 + int(time.time()) % _MOST_NUMBERS
 
     def look(self, state_reader: ShowStateReader, now: float) -> bool:
@@ -86,12 +87,15 @@ class Generator:
             return False
         self._adopt(wish, str(health.get("made", "")))
         is_used = bool(self._recipe) and health.get("made") == self._recipe
+        if wish != self._wish and now < self._rests_until:
+            return False  # a hand draws over the map: the newest point counts
         if wish != self._wish:
             self._returns = 0
         elif not (is_used and wish.is_new_at_return):
             return False
         else:
             self._returns += 1
+        self._rests_until = now + _REST_S
         self._make(wish, at_once=wish != self._wish)
         self._wish = wish
         return True

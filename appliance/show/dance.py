@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from appliance.show.config_error import did_you_mean
 from appliance.show.motion_sources import GranularConfig, PathConfig, VaryConfig
@@ -80,6 +80,12 @@ class MotionConfig(Section):
     vary: VaryConfig | None = key("The source `vary`: the phrase danced anew at every return.", None)
     granular: GranularConfig | None = key("The source `granular`: a walk through what the dancer does.", None)
     path: PathConfig | None = key("The source `path`: a path through the dancer's poses that wobbles.", None)
+    kept: list[Annotated[str, Field(min_length=1, max_length=64)]] = key(
+        "Names of motions that were kept on the box (`/motion/keep`) and that cues of this show call. Until one "
+        "is there the last phrase plays on.",
+        [],
+        length=(0, 16),
+    )
     source: str = key(
         "What the show starts from: `main`, a name under phrases, `live`, `vary`, `granular` or `path`. The "
         "phrase plays until what is made ahead is there.",
@@ -103,6 +109,13 @@ class MotionConfig(Section):
 
     @model_validator(mode="after")
     def _names_that_are_there(self) -> MotionConfig:
+        for place, name in enumerate(self.kept):
+            if self.sources.count(name) > 1 or name in (LIVE, *MADE):
+                cure = "Keep the motion by another name."
+                raise refusal(f"'{name}' names something else too.", cure, at=("kept", place))
+            if not self.made_sources:
+                cure = "Add `vary`, `granular` or `path` under motion."
+                raise refusal("A show without a source that is made ahead has no generator.", cure, at="kept")
         if self.source not in self.sources:
             raise refusal(
                 f"The show starts from '{self.source}', which it does not have.",
@@ -111,11 +124,11 @@ class MotionConfig(Section):
             )
         for name in (self.granular.from_, self.granular.to) if self.granular else ():
             if name is not None and name not in self.files:
-                place = "from" if name == self.granular.from_ else "to"  # type: ignore[union-attr]
+                key_of = "from" if name == self.granular.from_ else "to"  # type: ignore[union-attr]
                 raise refusal(
                     f"There is no phrase '{name}' to walk along.",
                     did_you_mean(name, list(self.files)),
-                    at=("granular", place),
+                    at=("granular", key_of),
                 )
         return self
 
@@ -139,7 +152,7 @@ class MotionConfig(Section):
     @property
     def sources(self) -> tuple[str, ...]:
         """What the puppet can start from, by the names that cues call, the one at the start first."""
-        return (*self.files, *([LIVE] if self.live else []), *self.made_sources)
+        return (*self.files, *([LIVE] if self.live else []), *self.made_sources, *self.kept)
 
     @property
     def made_sources(self) -> dict[str, VaryConfig | GranularConfig | PathConfig]:

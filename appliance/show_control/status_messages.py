@@ -98,7 +98,7 @@ def _cues(status: Status, observer: StageObserver, now: float) -> Iterator[Messa
 
 
 def _phrases(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
-    for name in (*observer.facts.phrases, *observer.kept()) if observer.facts else ():
+    for name in dict.fromkeys((*observer.facts.phrases, *observer.kept())) if observer.facts else ():
         yield "/phrases/phrase", name, int(name == status.phrase)
 
 

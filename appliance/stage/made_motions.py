@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from appliance.box.made_motion import MadeMotion, MadeMotionReader
+from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionReader
 from appliance.dancer.loop import Loop
-from appliance.dancer.material.material_file import FOLDER, read_material
+from appliance.dancer.material.material_file import read_material
 from appliance.dancer.motion_source import Playback
 from appliance.show.show import Show
 from appliance.show_control.orders import Order

@@ -27,7 +27,7 @@ class Bench:
         self.show, self.folder = load_show(show), folder
         self.declared = ShowState(show=self.show.config.name)
         self.health: dict[str, Any] = {"base": "main", "made": ""}
-        self._closed = False
+        self._closed, self._now = False, time.monotonic()
         self.fallbacks = Fallbacks(OF_THE_GENERATOR)
         self._writer, self._reader = ShowStateWriter(folder), ShowStateReader(folder)
         self.made = MadeMotionReader(folder)
@@ -44,7 +44,8 @@ class Bench:
 
     def recipe(self) -> dict[str, Any]:
         """Look once; the recipe of what was made last."""
-        self.generator.look(self._reader, time.monotonic())
+        self._now += 1.0  # it rests between two motions
+        self.generator.look(self._reader, self._now)
         made = self.made.read()
         return {} if made is None else dict(json.loads(made.recipe))
 

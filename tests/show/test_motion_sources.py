@@ -26,6 +26,7 @@ def test_a_source_whose_network_is_missing_is_refused_with_its_line(tmp_path: Pa
         ({"source": "quiet"}, "starts from 'quiet'"),
         ({"granular": {"from": "main", "to": "quiet"}}, "no phrase 'quiet'"),
         ({"phrases": {"vary": "phrase.bvh"}}, "'vary' is what"),
+        ({"kept": ["path"]}, "names something else"),
     ],
 )
 def test_what_does_not_fit_is_refused(tmp_path: Path, motion: dict[str, Any], why: str) -> None:
@@ -34,6 +35,9 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, motion: dict[str, Any], wh
 
 
 def test_a_cue_names_the_parameters_that_it_changes_and_no_others(tmp_path: Path) -> None:
+    called = {"name": "again", "phrase": "anna"}
+    kept = load_show(write_show_with_sources(tmp_path, {"kept": ["anna"]}, cues=[called]))
+    assert kept.config.names["phrase"][-1] == "anna"
     cue = {"name": "wild", "phrase": "vary", "motion": {"vary": {"sigma": 2.0}}}
     show = load_show(write_show_with_sources(tmp_path, {"source": "granular"}, cues=[cue]))
     assert show.config.cues[0].model_dump(mode="json")["motion"] == {"vary": {"sigma": 2.0}}

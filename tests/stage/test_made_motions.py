@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from appliance.box.made_motion import MadeMotion, MadeMotionWriter
+from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionWriter
 from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.dancer.material.maker import Maker
-from appliance.dancer.material.material_file import FOLDER, Material, recipe_text, write_material
+from appliance.dancer.material.material_file import Material, recipe_text, write_material
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show, load_show
 from appliance.stage import fallback as rows

@@ -15,7 +15,7 @@ from appliance.box.durable import write_whole
 from appliance.dancer.loop import Loop, Placement
 from appliance.pose.foreign_file import opened, plain_json
 
-FOLDER, SUFFIX = "material", ".material"
+SUFFIX = ".material"
 LARGEST = 64 * 2**20  # bytes: ten minutes of a figure of 43 joints are 22 MB
 
 _MAGIC = b"bunraku material 1\n"
