@@ -81,8 +81,8 @@ class MotionConfig(Section):
     granular: GranularConfig | None = key("The source `granular`: a walk through what the dancer does.", None)
     path: PathConfig | None = key("The source `path`: a path through the dancer's poses that wobbles.", None)
     kept: list[Annotated[str, Field(min_length=1, max_length=64)]] = key(
-        "Names of motions that were kept on the box (`/motion/keep`) and that cues of this show call. Until one "
-        "is there the last phrase plays on.",
+        "Names of motions that were kept on the box (`/motion/keep`) and that cues of this show call. Until "
+        "one is there the last phrase plays on.",
         [],
         length=(0, 16),
     )
@@ -122,13 +122,13 @@ class MotionConfig(Section):
                 did_you_mean(self.source, self.sources),
                 at="source",
             )
-        for name in (self.granular.from_, self.granular.to) if self.granular else ():
-            if name is not None and name not in self.files:
-                key_of = "from" if name == self.granular.from_ else "to"  # type: ignore[union-attr]
+        ends = {"from": self.granular.from_, "to": self.granular.to} if self.granular else {}
+        for end, phrase in ends.items():
+            if phrase is not None and phrase not in self.files:
                 raise refusal(
-                    f"There is no phrase '{name}' to walk along.",
-                    did_you_mean(name, list(self.files)),
-                    at=("granular", key_of),
+                    f"There is no phrase '{phrase}' to walk along.",
+                    did_you_mean(phrase, list(self.files)),
+                    at=("granular", end),
                 )
         return self
 
