@@ -31,6 +31,7 @@ class Body:
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton
         rest, world = skeleton.forward_kinematics(skeleton.standing, np.zeros(3))
+        self._upright = quaternion.inverse(world)
         self.height = float(np.ptp(np.vstack([rest, self._ends(rest, world)]), axis=0).max()) or 1.0
         self._trunk = self._trunk_joints()
         self._radius = self.height * np.clip(
@@ -56,7 +57,8 @@ class Body:
         for joint, limb in self._webs():
             parts.append((positions[joint], positions[limb], 0.9 * radius[joint], radius[limb], joint))
         if self._head is not None:
-            parts += self._head_cones(positions[self._head], world[self._head])
+            turn = quaternion.multiply(world[self._head], self._upright[self._head])
+            parts += self._head_cones(positions[self._head], turn)
         start, end, first, last, moved_by = zip(*parts, strict=True)
         return Cones(np.array(start), np.array(end), np.array(first), np.array(last), np.array(moved_by))
 

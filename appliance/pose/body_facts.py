@@ -19,6 +19,7 @@ STANDING_PERCENTILE = (
     90.0  # of the heights from sole to crown: the dancer stands upright in a tenth of the time
 )
 HANGING_SHARE = 0.5  # of a metre of height that a metre of lower hands is worth in a standing pose
+LIMB_ENDS = ("neck", "head", "hand", "foot", "toe")
 PLANTED_PERCENTILE = 5.0  # of the heights of the lowest sole: the floor
 
 
@@ -81,7 +82,10 @@ def with_stance(recording: Recording) -> Skeleton:
 
 
 def standing_pose(recording: Recording) -> NDArray[np.float64]:
-    """(J, 4): the recorded pose that stands tallest with the lowest hands, turned to the front."""
+    """(J, 4): the recorded pose that stands tallest with the lowest hands, turned to the front.
+
+    Neck, head, hands and feet as they mostly are: a look aside at that moment is no part of the body.
+    """
     skeleton = recording.skeleton
     every = max(1, round(recording.fps / SAMPLES_A_SECOND))
     positions = sampled_positions(recording)
@@ -91,6 +95,9 @@ def standing_pose(recording: Recording) -> NDArray[np.float64]:
     low = positions[:, hands, 1].mean(axis=-1) - positions[:, 0, 1] if hands else np.zeros(len(tall))
     best = int(np.argmax(tall - HANGING_SHARE * low))
     pose: NDArray[np.float64] = recording.poses[best * every].astype(np.float64).copy()
+    for role, joint in skeleton.roles.items():
+        if role.rpartition(" ")[2] in LIMB_ENDS:
+            pose[joint] = quaternion.blend(recording.poses[::every, joint], np.ones(len(positions)))
     front = fronts(skeleton, positions[best : best + 1])
     if front is not None:
         turn = quaternion.from_axis_angle([0.0, 1.0, 0.0], -np.arctan2(front[0, 0], front[0, 1]))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from appliance.outputs.shared_frame import Facts
+from appliance.pose.body import Body
 from appliance.pose.body_facts import rest_positions, stands, with_stance
 from appliance.pose.bvh import read_bvh
 from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
@@ -64,3 +65,15 @@ def test_the_neutral_arm_is_that_of_the_stance() -> None:
     joint = skeleton.names[skeleton.roles["left upper arm"]]
     hanging = hanging_orientation(skeleton, joint)
     np.testing.assert_allclose(hanging, skeleton.stance[skeleton.index(joint)], atol=1e-3)
+
+
+def test_a_strip_s_head_is_on_top_whatever_the_zero_pose() -> None:
+    heads = []
+    for convention in ("Mixamo", "LAFAN"):
+        written = as_the_system_writes(dance_of(convention, seconds=3.0), convention)
+        dance, _ = in_stage_frame(written)
+        positions, world = dance.skeleton.forward_kinematics(dance.poses[0], dance.roots[0])
+        cones = Body(dance.skeleton).cones(positions, world)
+        ours = cones.joint == dance.skeleton.head
+        heads.append(cones.end[ours] - positions[dance.skeleton.head])
+    np.testing.assert_allclose(heads[0], heads[1], atol=0.03)
