@@ -11,7 +11,7 @@ from appliance.box.show_state import ShowState
 from appliance.show_control.acknowledgements import Acknowledgements
 from appliance.show_control.command import PONG, REPLY, SENSORS_REPLY, STREAMS, Command, command
 from appliance.show_control.key_file import KeyFile
-from appliance.show_control.live_input import HEARD, LiveInput
+from appliance.show_control.live_input import LiveInput, is_live
 from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.orders import Order, Place
 from appliance.show_control.packet import Message, messages_in, readable
@@ -99,7 +99,7 @@ class CommandHandler:
                 self._refuse(f"{address} is an answer, no command.")
                 continue
             try:
-                if address in HEARD:
+                if is_live(address):
                     self._live.hear(address, arguments, self._observer.facts, now)
                     continue
                 if address in once:

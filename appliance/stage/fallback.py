@@ -92,6 +92,12 @@ SOURCE_LATE = Fallback(
     "over again when it is back. Of a live dancer check the program that sends it, and the network; of vary, "
     "granular and path the generator: journalctl -u bunraku-generator.",
 )
+POSE_REFUSED = Fallback(
+    "pose-refused",
+    "Poses of a live dancer were refused: another number of joints, or rotations that are none. The figure "
+    "goes on from the last good one, and after half a second from the phrase. Check the skeleton in the "
+    "program that sends it.",
+)
 OF_THE_STAGE = (
     *(SENSOR_SILENT, READING_REFUSED, PACKET_REFUSED, CABLE_AWAY, ADDRESS_ABSENT, NOT_LET_IN),
     *(TICK_LATE, TICK_SKIPPED, OVER_BUDGET, ITERATIONS_LOWERED, NETWORK_FAILED),
@@ -104,5 +110,6 @@ OF_THE_STAGE = (
         STAGE_RESTARTED,
         POWER_CUT,
         SOURCE_LATE,
+        POSE_REFUSED,
     ),
 )

@@ -100,6 +100,7 @@ class Watch:
         every.hold(rows.SOURCE_LATE.name, self._is_source_late)
         every.follow(rows.READING_REFUSED.name, counts.get("norm", 0), now)
         every.follow(rows.PACKET_REFUSED.name, sum(counts.get(one, 0) for one in _FOREIGN), now)
+        every.follow(rows.POSE_REFUSED.name, self._parts.live_refused, now)
         every.follow(rows.TICK_LATE.name, health.late, now)
         every.follow(rows.TICK_SKIPPED.name, health.skipped, now)
         every.follow(rows.OVER_BUDGET.name, health.over_budget, now)

@@ -18,6 +18,7 @@ from appliance.show.show import load_show
 from appliance.show.sources import LIVE
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
+from appliance.stage.health import Health
 from appliance.stage.stage_parts import StageParts, assemble
 from appliance.stage.watch import Watch
 from tests.bundles import FIGURE, write_show
@@ -138,6 +139,18 @@ def test_a_guest_with_another_figure_is_not_believed(parts: StageParts, joints: 
     stream.coming = LivePose(1.0, (math.nan,) * 3, pose(0.1, joints))
     assert parts.hear_live() is None
     assert parts.live_refused == 1
+
+
+def test_poses_that_are_not_believed_are_told(parts: StageParts) -> None:
+    stream, watch = Stream(), Watch(parts, FITS)
+    parts.live_inbox = stream
+    for length in (0.0, math.nan, 1.0, 2.0):
+        rotations = (length * np.frombuffer(pose(0.1), np.float32)).tobytes()
+        stream.coming = LivePose(1.0, (math.nan,) * 3, rotations)
+        parts.hear_live()
+    watch.check(4.0, Health())
+    fallen = {one.name: one for one in watch.fallbacks.happened(4.0)}
+    assert fallen[rows.POSE_REFUSED.name].times == 3 and fallen[rows.POSE_REFUSED.name].active
 
 
 def test_the_newest_pose_comes_whole_and_once(tmp_path: Path) -> None:

@@ -1,0 +1,91 @@
+"""A dancer by the Virtual Motion Capture protocol (protocol.vmc.info), bone by bone, for this figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from appliance.outputs.osc.humanoid import humanoid_bones
+from appliance.pose.skeleton import Skeleton
+
+PREFIX = "/VMC/Ext/"
+BONE, ROOT = f"{PREFIX}Bone/Pos", f"{PREFIX}Root/Pos"
+_HIPS = "Hips"
+
+Quaternion = tuple[float, float, float, float]  # w, x, y, z
+Vector = tuple[float, float, float]
+
+
+class VmcInput:
+    """Collects the bones of a frame; what comes of them is a pose of the skeleton.
+
+    Unity's axes are left-handed: X is mirrored, so (x, y, z, w) becomes (w, x, -y, -z). Rotations count from
+    a T-pose and are relative to the next bone above: joints between two bones stay at rest, and so do those
+    without a bone. Nothing in the protocol ends a frame: it is whole when all bones of the frame before have
+    come, or one of them comes again.
+    """
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self._joint_of = humanoid_bones(skeleton.names)
+        self._rotations = [1.0, 0.0, 0.0, 0.0] * len(skeleton)
+        self._root: tuple[Vector, Quaternion] = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+        self._hips: tuple[Vector, Quaternion] = self._root
+        self._knows_hips = False
+        self._came: set[str] = set()
+        self._whole: set[str] = set()
+
+    def hear(self, address: str, arguments: Sequence[object]) -> tuple[Vector, list[float]] | None:
+        """One message; the hips' place in metres (not numbers: unknown) and all joints' w, x, y, z in the
+        skeleton's order once a frame is whole, else None. Raises ValueError with one clear sentence."""
+        if address not in (BONE, ROOT):
+            return None
+        name, place, turned = _parsed(address, arguments)
+        if address == ROOT:
+            self._root = place, turned
+            return None
+        whole = None
+        if name in self._came:  # the next frame has begun
+            whole = None if self._came == self._whole else self._pose()
+            self._whole, self._came = self._came, set()
+        self._came.add(name)
+        self._take(name, place, turned)
+        return self._pose() if self._came == self._whole else whole
+
+    def _take(self, name: str, place: Vector, turned: Quaternion) -> None:
+        if name == _HIPS:
+            self._hips, self._knows_hips = (place, turned), True
+        elif (joint := self._joint_of.get(name)) is not None:
+            self._rotations[4 * joint : 4 * joint + 4] = turned
+
+    def _pose(self) -> tuple[Vector, list[float]]:
+        (root, root_turned), (hips, hips_turned) = self._root, self._hips
+        joint = self._joint_of[_HIPS]
+        self._rotations[4 * joint : 4 * joint + 4] = _multiplied(root_turned, hips_turned)
+        reach = _rotated(root_turned, hips)
+        place = (root[0] + reach[0], root[1] + reach[1], root[2] + reach[2])
+        return place if self._knows_hips else (math.nan,) * 3, list(self._rotations)
+
+
+def _parsed(address: str, arguments: Sequence[object]) -> tuple[str, Vector, Quaternion]:
+    """Name, position and rotation in the box's axes. A root may have scale and offset behind them."""
+    name, *numbers = arguments or ("",)
+    values = [float(one) for one in numbers[:7] if isinstance(one, int | float)]
+    if not isinstance(name, str) or len(values) != 7 or not all(map(math.isfinite, values)):
+        raise ValueError(f"{address} takes a name and seven numbers: x, y, z, and a rotation as x, y, z, w.")
+    x, y, z, turn_x, turn_y, turn_z, w = values
+    return name[:1].upper() + name[1:], (-x, y, z), (w, turn_x, -turn_y, -turn_z)
+
+
+def _multiplied(a: Quaternion, b: Quaternion) -> Quaternion:
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
+
+
+def _rotated(turned: Quaternion, vector: Vector) -> Vector:
+    back = (turned[0], -turned[1], -turned[2], -turned[3])
+    _, x, y, z = _multiplied(_multiplied(turned, (0.0, *vector)), back)
+    return x, y, z
