@@ -13,7 +13,7 @@ from appliance.box.fallback import Fallback, Fallbacks, Fallen, fallen
 from appliance.box.record import Record
 from appliance.pose.foreign_file import kept_json, plain_json
 
-WHO = ("lights", "projector", "keeper", "console", "generator")
+WHO = ("lights", "projector", "keeper", "console", "generator", "sound")
 BEAT_S, LATE_S = 1.0, 5.0
 _LARGEST = 8192
 _CHOSEN = "chosen.json"
@@ -43,6 +43,11 @@ DIED = {
         "console-died",
         "The page's process died or hangs. The audience sees nothing of it, and browsers come back by "
         "themselves within seconds. If it goes on, look at its messages: journalctl -u bunraku-console.",
+    ),
+    "sound": Fallback(
+        "sound-died",
+        "The sound's process died or hangs. The strings are silent, and it is started again within two "
+        "seconds. If it goes on, look at its messages: journalctl -u bunraku-sound.",
     ),
 }
 STAGE_HUNG = Fallback(

@@ -48,6 +48,7 @@ _MODULES = {  # in each a function or a group of the command's name
     "provision": "appliance.cli.sensors.commands",
     "sensors": "appliance.cli.sensors.commands",
     "lights": "appliance.cli.lights_commands",
+    "sound": "appliance.cli.sound",
     "preflight": _HERE,
     "firewall": "appliance.cli.firewall",
     "version": _HERE,

@@ -44,6 +44,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     "lights test": ("bunraku lights test --show my_show --box box.yaml --fixture wash --attribute dimmer",),
     "lights show": ("bunraku lights show --show my_show --out rig.png",),
     "lights convert": ("bunraku lights convert fixture.json --out my_show/profiles/fixture.yaml",),
+    "sound": ("bunraku sound --box box.yaml", "bunraku sound out/tonight --file tonight.wav"),
     "emulate": (
         "bunraku emulate --sensor left-wrist --seconds-per-turn 5",
         "bunraku emulate --sensor left-wrist=dance --sensor head=still --network bad",
@@ -100,6 +101,7 @@ OTHER_WORDS: dict[str, tuple[str, ...]] = {
     "provision": ("pair", "register", "enrol", "wifi", "key", "keys", "setup"),
     "sensors": ("sensor", "wearable", "wearables", "devices", "imu", "neutral", "strobe"),
     "lights": ("light", "dmx", "rig", "fixtures", "lamps"),
+    "sound": ("audio", "strings", "music", "wav", "speaker"),
     "emulate": ("emulator", "simulate", "simulator", "fake", "mock"),
     "measure": ("latency", "benchmark", "bench", "jitter", "speed"),
     "inspect": ("identify", "recognise", "recordings", "file", "joints"),

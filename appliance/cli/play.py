@@ -205,6 +205,10 @@ def _companions(
             (*bunraku, "lights", *named),
             "The lights stay as they are for a moment.",
         )
+    if window and show.config.strings and (box.path is None or box.sound):
+        yield Companion(
+            "The process for the sound", (*bunraku, "sound", *named), "The strings are silent for a moment."
+        )
     if window:
         yield Companion(
             "The projector",

@@ -15,6 +15,7 @@ from appliance.show.osc import OscConfig
 from appliance.show.posistagenet import PosiStageNetConfig
 from appliance.show.projector import ProjectorConfig
 from appliance.show.section import Ipv4, LocalFile, Section, key, part, refusal, refuse_repeats
+from appliance.show.sound import SoundConfig
 from appliance.show.validation import validated
 from appliance.show.yaml_file import YamlFile, read_yaml
 
@@ -131,6 +132,7 @@ class BoxConfig(Section):
     console: ConsoleConfig | None = key("The page for technicians; null: none.", ConsoleConfig())
     lights: VenueLightsConfig = part(VenueLightsConfig)
     projector: ProjectorConfig = part(ProjectorConfig)
+    sound: SoundConfig | None = key("The sound card for a show's strings; null: none.", None)
     runtime: LocalFile | None = key(
         "Folder where the box's processes meet, relative to the box file; a folder in memory. "
         "null: the one that systemd gives, else one of the user's own.",

@@ -20,6 +20,7 @@ from appliance.show.hand import HandConfig
 from appliance.show.lights import LightsConfig
 from appliance.show.look import LookConfig, looks_by_name
 from appliance.show.section import Section, key, part, refusal, refuse_repeats
+from appliance.show.sound import StringsConfig
 from appliance.show.springs import SpringsConfig, springs_by_name
 from appliance.show.validation import validated
 from appliance.show.yaml_file import YamlFile, read_yaml
@@ -49,6 +50,7 @@ class ShowConfig(Section):
         length=(0, 32),
     )
     lights: LightsConfig = part(LightsConfig)
+    strings: StringsConfig | None = key("Strings that the dance plays (`bunraku sound`); null: none.", None)
     cues: list[CueConfig] = key("What show control can call up by name, in order.", [], length=(0, 200))
 
     @field_validator("hands")

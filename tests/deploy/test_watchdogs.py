@@ -111,7 +111,12 @@ def test_a_projector_that_waits_takes_the_display_that_comes(
 
 @pytest.mark.parametrize(
     ("command", "box_file"),
-    [("control", "control: null\n"), ("console", "console: null\n"), ("lights", "outputs: {dmx: []}\n")],
+    [
+        ("control", "control: null\n"),
+        ("console", "console: null\n"),
+        ("lights", "outputs: {dmx: []}\n"),
+        ("sound", "sound: null\n"),
+    ],
 )
 def test_what_a_box_file_has_no_use_for_ends_well_and_is_not_tried_again(
     supervisor: Supervisor, tmp_path: Path, command: str, box_file: str

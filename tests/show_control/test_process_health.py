@@ -46,7 +46,7 @@ def test_a_process_tells_its_fallbacks(folder: Path) -> None:
 
 def test_lights_projector_and_keeper_that_die_are_counted(folder: Path) -> None:
     processes = ProcessHealth(folder)
-    for who in ("lights", "projector", "keeper", "console"):
+    for who in ("lights", "projector", "keeper", "console", "sound"):
         first = ProcessHealthWriter(folder, who, Fallbacks(()))
         first.publish_health(10.0)
         first.close()  # and never says that it ends

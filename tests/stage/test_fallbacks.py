@@ -20,6 +20,7 @@ from appliance.sensor.link import SensorReading
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, SerialConfig
 from appliance.show.osc import OscConfig
 from appliance.show.show import load_show
+from appliance.sound.fallback import OF_THE_SOUND
 from appliance.stage import fallback as rows
 from appliance.stage.admission import Admission
 from appliance.stage.fallback import OF_THE_STAGE
@@ -229,6 +230,7 @@ EVERY = {
         *OF_THE_LIGHTS,
         *OF_THE_PROJECTOR,
         *OF_THE_GENERATOR,
+        *OF_THE_SOUND,
         *OF_THE_COMPANY,
     )
 }

@@ -1,0 +1,36 @@
+"""The strings of show.yaml and the sound card of box.yaml."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from appliance.show.section import Section, key
+
+Name = Annotated[str, Field(min_length=1, max_length=64)]
+
+
+class StringsConfig(Section):
+    """Strings that the dance plays: one for each bone, driven by its motion, coupled where bones meet."""
+
+    cues: list[Name] = key("Cues in which they sound; []: always.", [], length=(0, 200))
+    base_hz: float = key("Pitch of the longest bone; shorter ones are higher.", 110.0, within=(30, 1000))
+    partials: int = key("How many partials each string has.", 6, within=(1, 12))
+    brightness: float = key("How loud each partial is beside the one below it.", 0.6, within=(0, 1))
+    decay_s: float = key("Seconds in which a string falls by 60 dB.", 3.0, within=(0.05, 30))
+    coupling: float = key("How strongly strings of bones that meet sound along.", 0.02, within=(0, 0.2))
+    volume: float = key("How loud they are.", 0.5, within=(0, 1))
+
+
+class SoundConfig(Section):
+    """Where the strings are heard (`bunraku sound`)."""
+
+    device: str | int | None = key(
+        "The sound card: (part of) its name, or its number; null: the system's own choice.", None
+    )
+    channels: Literal[2, 8] = key("Loudspeakers: a pair, or eight in a ring around the stage.", 2)
+    rate: int = key("Samples a second.", 48000, within=(22050, 96000))
+    block: int = key(
+        "Samples computed at once: fewer answer sooner, more drop out later.", 256, within=(64, 1024)
+    )

@@ -1,0 +1,148 @@
+"""The sound's process: shared frame and show state in, strings out through the sound card."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.box.fallback import Fallbacks
+from appliance.box.log_writer import LogWriter
+from appliance.box.notify import Notifier
+from appliance.box.process_health import ProcessHealthWriter
+from appliance.box.runtime_folder import Claim, runtime_folder
+from appliance.box.show_state import ShowState, ShowStateReader
+from appliance.box.stop_signals import stop_signals
+from appliance.outputs.frame_reader import FrameReader
+from appliance.show.box import BoxConfig, load_box
+from appliance.show.config_error import ConfigError, NotAskedForError, Problem
+from appliance.show.show import load_show
+from appliance.show.sound import SoundConfig, StringsConfig
+from appliance.sound.card import Card
+from appliance.sound.fallback import CARD_AWAY, DROPOUTS, OF_THE_SOUND, STAGE_UNSEEN
+from appliance.sound.instrument import Instrument
+
+LOOK_S = 0.005  # how often frame and show state are read: panic is heard a block later
+LOST_S = 0.5  # without a frame: as the projector
+_REPORT_S = 1.0
+
+
+def level(state: ShowState, strings: StringsConfig, now: float, age_s: float) -> float:
+    """0..1: how loud the strings are: master and fades of the show, its cue, and whether the stage dances."""
+    in_cue = not strings.cues or state.cue in strings.cues
+    return state.level(now) if in_cue and age_s < LOST_S else 0.0
+
+
+class Sound:
+    """The strings of the show that the stage dances; another show gives other strings."""
+
+    def __init__(
+        self,
+        config: SoundConfig,
+        stage: FrameReader,
+        show_state: ShowStateReader,
+        say: Callable[[str], None],
+        fallbacks: Fallbacks,
+    ) -> None:
+        self.instrument: Instrument | None = None
+        self._config, self._stage, self._show_state = config, stage, show_state
+        self._say, self._fallbacks = say, fallbacks
+        self._strings = StringsConfig()
+        self._generation: int | None = None
+        self._tick, self._seen_at = -1, 0.0
+        self._trouble = ""
+
+    def look(self, now: float) -> None:
+        """Take the newest frame and the show state; monotonic seconds."""
+        frame = self._stage.newest(now)
+        if self._stage.generation != self._generation and self._stage.facts is not None:
+            self._generation = self._stage.generation
+            self._begin(self._stage.facts.show_directory)
+        if self.instrument is None:
+            return
+        if frame is not None and frame.tick != self._tick:
+            self._tick, self._seen_at = frame.tick, frame.left
+            self.instrument.dance(frame.positions, frame.frame_time)
+        age_s = now - self._seen_at
+        if age_s >= LOST_S:
+            self.instrument.rest()
+        self._fallbacks.set(STAGE_UNSEEN.name, age_s >= LOST_S)
+        self.instrument.level = level(self._show_state.read(), self._strings, now, age_s)
+
+    def report(self, card: Card, now: float) -> None:
+        """Once a second: what has changed about the card."""
+        self._fallbacks.follow(DROPOUTS.name, card.dropouts, now)
+        self._fallbacks.set(CARD_AWAY.name, card.trouble)
+        if card.trouble != self._trouble:
+            self._trouble = card.trouble
+            self._say(card.trouble or "The sound card is back, and the strings sound.")
+
+    def _begin(self, directory: Path) -> None:
+        try:
+            show = load_show(directory)
+        except ConfigError as error:
+            self._say(f"{error}\nThe strings stay silent until the stage dances another show.")
+            self.instrument = None
+            return
+        strings = show.config.strings
+        self.instrument = None if strings is None else Instrument(show.skeleton, strings, self._config)
+        self._strings = strings or StringsConfig()
+        name = show.config.name
+        count = 0 if self.instrument is None else len(self.instrument.strings.bones)
+        self._say(f"{name}: {count} strings." if count else f"{name} has no `strings:`, and is silent.")
+
+
+def require_sound(box: BoxConfig) -> SoundConfig:
+    """The box's sound. Raises NotAskedForError where the box file wants none."""
+    if box.sound is None:
+        file = box.path or Path("box.yaml")
+        cure = "Write `sound: {}` for the system's own sound card."
+        raise NotAskedForError([Problem(file, 0, "This box file asks for no sound.", cure)])
+    return box.sound
+
+
+def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
+    """Play the strings of the show that the stage dances, until a signal comes.
+
+    by_hand: without a box file the system's own sound card is meant.
+
+    Raises NotAskedForError, CardError where the sound library is missing, RuntimeFolderError.
+    """
+    box = load_box(box_file)
+    config = SoundConfig() if by_hand and box_file is None else require_sound(box)
+    with stop_signals() as stopped, ExitStack() as opened:
+        speaker = LogWriter()
+        opened.callback(speaker.close)
+        folder = runtime_folder(box)
+        opened.callback(Claim(folder, "sound").close)
+        notifier, stage, show_state = Notifier(), FrameReader(folder), ShowStateReader(folder)
+        fallbacks = Fallbacks(OF_THE_SOUND)
+        process_health = ProcessHealthWriter(folder, "sound", fallbacks)
+        for one in (notifier, stage, show_state, process_health):
+            opened.callback(one.close)
+        sound = Sound(config, stage, show_state, speaker.say, fallbacks)
+        card = Card(config, lambda frames: _rendered(sound, frames, config.channels))
+        opened.callback(card.close)
+        notifier.ready("The strings follow the stage.")
+        report_at = 0.0
+        while not stopped():
+            now = time.monotonic()
+            sound.look(now)
+            if sound.instrument is not None:
+                card.look(now)
+            notifier.ping(now)
+            process_health.publish_health(now)
+            if now >= report_at:
+                report_at = now + _REPORT_S
+                sound.report(card, now)
+            time.sleep(LOOK_S)
+        process_health.end(time.monotonic())
+
+
+def _rendered(sound: Sound, frames: int, channels: int) -> NDArray[np.float32]:
+    instrument = sound.instrument
+    return np.zeros((frames, channels), np.float32) if instrument is None else instrument.render(frames)
