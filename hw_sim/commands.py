@@ -51,7 +51,7 @@ def emulate(
     count: Annotated[
         int | None,
         typer.Option(
-            min=1, max=MOST_SENSORS, help="Emulate the first COUNT sensors of the key file; else all."
+            min=1, max=MOST_SENSORS, help="Emulate the first COUNT sensors of the key file. Default: all."
         ),
     ] = None,
     motion: Annotated[MotionKind, typer.Option(help="How the sensors move.")] = MotionKind.turning,

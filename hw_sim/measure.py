@@ -37,7 +37,7 @@ def measure(
         Path | None, typer.Option(help="Write measure.png and measure.json into this folder.")
     ] = None,
     show: Annotated[
-        Path | None, typer.Option(help="Show bundle; left out: the one that comes with the box.")
+        Path | None, typer.Option(help="Show bundle. Default: the one that comes with the box.")
     ] = None,
     box: Annotated[
         Path | None, typer.Option(help="box.yaml of the venue: its limits and real-time settings.")

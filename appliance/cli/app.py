@@ -97,13 +97,13 @@ def play(
     show: ShowFolder = None,
     box: BoxFile = None,
     seconds: Annotated[
-        float | None, typer.Option(min=0.1, help="Stop after this time; left out: never.")
+        float | None, typer.Option(min=0.1, help="Stop after this time. Default: never.")
     ] = None,
     emulate: Annotated[
         bool, typer.Option("--emulate", help="Start emulated sensors, over real sockets.")
     ] = False,
     journal: Annotated[
-        Path | None, typer.Option(help="Folder for the flight recorder; left out: the box file's.")
+        Path | None, typer.Option(help="Folder for the flight recorder. Default: the box file's.")
     ] = None,
     filmstrip: Annotated[
         Path | None, typer.Option(help="At the end draw what was danced into this PNG.")

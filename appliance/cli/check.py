@@ -38,7 +38,7 @@ _PATIENCE_S = 60.0  # a user can wait longer than a box at power-on
 
 def check(
     show: Annotated[
-        Path | None, typer.Argument(help="Show bundle; left out: the show that comes with the box.")
+        Path | None, typer.Argument(help="Show bundle. Default: the show that comes with the box.")
     ] = None,
     box: BoxFile = None,
 ) -> None:

@@ -96,20 +96,21 @@ def import_(
         Path | None, typer.Option(help="BVH with the skeleton that the points belong to, by their names.")
     ] = None,
     fps: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Frames a second of the points.")] = 50.0,
-    unit: Annotated[Unit | None, typer.Option(help="Unit of the points; left out: by the size.")] = None,
+    unit: Annotated[
+        Unit | None, typer.Option(help="Unit of the points. Default: guessed from the size.")
+    ] = None,
     up: Annotated[Up, typer.Option(help="The axis that points upwards.")] = Up.y,
     gap: Annotated[
         float, typer.Option(min=0.0, help="Seconds without a point that are crossed in a straight line.")
     ] = 0.5,
     picture: Annotated[
-        Path | None, typer.Option(help="PNG of poses from the dance; left out: beside --out.")
+        Path | None, typer.Option(help="PNG of poses from the dance. Default: beside --out.")
     ] = None,
 ) -> None:
     """Turn positions of points or joints into a recording: a skeleton is fitted to them and follows them.
 
-    Bones are as long as the points mostly are apart. What hangs on what follows from the names (LeftArm,
-    l_wrist, RightKnee ...), from parents in --names, or from --like. A point that is missing is NaN or an
-    empty field. At the end it says how far the figure is from the points, in centimetres.
+    A bone is as long as the usual distance between its points. The hierarchy comes from the names (LeftArm,
+    l_wrist, RightKnee ...), from parents in --names, or from --like. A missing point is NaN or an empty field. At the end it says how far the figure is from the points, in centimetres.
     """
     from appliance.cli.pictures import RecordedDance, draw_dance
     from appliance.exchange.formats import require_known_ending, write_recording

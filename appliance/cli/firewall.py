@@ -39,7 +39,7 @@ def firewall(
     chosen: ChosenFile = None,
     access_point: Annotated[
         list[str] | None,
-        typer.Option(help="Network card of the access point that the sensors join; several."),
+        typer.Option(help="Network card of the access point that the sensors join; repeatable."),
     ] = None,
 ) -> None:
     """Print rules for nft that let in what the box file opens, and nothing else."""

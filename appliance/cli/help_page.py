@@ -103,7 +103,8 @@ def _value(option: Any, context: Any) -> str:
         return kind if len(kind) <= _LONGEST_CHOICE else "NAME"
     if "path" in kind.lower():
         words = (option.help or "").lower()
-        return "FOLDER" if words.startswith(("folder", "show", "another folder")) else "FILE"
+        is_folder = words.startswith(("folder", "show")) or "into this folder" in words
+        return "FOLDER" if is_folder else "FILE"
     return "NUMBER" if re.search(r"int|float", kind.lower()) else "TEXT"
 
 

@@ -27,7 +27,7 @@ _TROUBLES = ("late", "skipped", "failed")
 journal = command_group("List what the flight recorder holds, or export it to a stick.", needs_command=True)
 
 Recorded = Annotated[
-    Path | None, typer.Option("--journal", help="Folder or exported file; left out: the box file's folder.")
+    Path | None, typer.Option("--journal", help="Folder or exported file. Default: the box file's folder.")
 ]
 
 
@@ -37,7 +37,7 @@ def list_journal(
     chosen: ChosenFile = None,
     recorded: Recorded = None,
     events: Annotated[
-        bool, typer.Option("--events", help="And what was ordered and said, in order.")
+        bool, typer.Option("--events", help="Also list what was ordered and said, in order.")
     ] = False,
 ) -> None:
     """List the runs in a journal: when, how long, what was late, how often the network failed."""
@@ -92,7 +92,7 @@ def write_stretch(
     recorded: Recorded = None,
     start: Annotated[float, typer.Option(help="Second of the run.")] = 0.0,
     seconds: Annotated[float, typer.Option(min=0.02)] = 10.0,
-    out: Annotated[Path | None, typer.Option(help="A BVH or glTF file; left out: frames to stdout.")] = None,
+    out: Annotated[Path | None, typer.Option(help="A BVH or glTF file. Default: frames to stdout.")] = None,
 ) -> None:
     """Write a stretch of a run for the page."""
     from appliance.exchange.formats import write_recording
@@ -115,13 +115,13 @@ def write_stretch(
 
 @journal.command("export")
 def export_journal(
-    to: Annotated[Path | None, typer.Argument(help="Folder or file; left out: the stick.")] = None,
+    to: Annotated[Path | None, typer.Argument(help="Folder or file. Default: the stick.")] = None,
     box: ThisBoxFile = None,
     chosen: ChosenFile = None,
     recorded: Recorded = None,
     bvh: Annotated[Path | None, typer.Option(help="Write what was danced into this BVH file.")] = None,
     glb: Annotated[
-        Path | None, typer.Option(help="And into this one for Blender, three.js, TouchDesigner.")
+        Path | None, typer.Option(help="Write it into this glTF file, for Blender, three.js, TouchDesigner.")
     ] = None,
 ) -> None:
     """Write the journal into one file that replay, filmstrip and list read, on a stick for example.

@@ -23,11 +23,13 @@ from appliance.show.box import load_box
 
 def keep(
     box: BoxFile = None,
-    journal: Annotated[Path | None, typer.Option(help="Another folder than the box file's.")] = None,
-    minutes: Annotated[float | None, typer.Option(min=0.1, help="How much of it is kept.")] = None,
+    journal: Annotated[
+        Path | None, typer.Option(help="Folder for the journal, instead of the box file's.")
+    ] = None,
+    minutes: Annotated[float | None, typer.Option(min=0.1, help="How many minutes of it to keep.")] = None,
     chosen: ChosenFile = None,
 ) -> None:
-    """Carry the journal and the place of the dance from memory to the disk, which may be slow or broken."""
+    """Write the journal and the place of the dance to disk, so that a slow disk never holds up the dance."""
     config = load_box(box_of(box, chosen))
     runtime = runtime_folder(config)
     with (

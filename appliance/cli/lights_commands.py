@@ -17,7 +17,7 @@ lights = command_group("Light the rig by the dance; walk through it, look at it,
 def light(
     context: typer.Context,
     show: Annotated[
-        Path | None, typer.Option(help="Show bundle; left out: the one that the stage dances.")
+        Path | None, typer.Option(help="Show bundle. Default: the one that the stage dances.")
     ] = None,
     box: BoxFile = None,
     chosen: ChosenFile = None,
@@ -34,9 +34,7 @@ def light(
 def walk_through(
     show: ShowFolder = None,
     box: BoxFile = None,
-    fixture: Annotated[
-        list[str] | None, typer.Option(help="This fixture alone; may be given several times.")
-    ] = None,
+    fixture: Annotated[list[str] | None, typer.Option(help="This fixture alone; repeatable.")] = None,
     attribute: Annotated[str | None, typer.Option(help="This attribute alone; `aim` for heads.")] = None,
     seconds: Annotated[float, typer.Option(min=0.1, max=600, help="How long each attribute moves.")] = 3.0,
 ) -> None:
@@ -53,9 +51,7 @@ def show_rig(
     show: ShowFolder = None,
     box: BoxFile = None,
     out: Annotated[Path, typer.Option(help="The picture.")] = Path("rig.png"),
-    mapping: Annotated[
-        str | None, typer.Option(help="Heads as in this mapping; left out: the first.")
-    ] = None,
+    mapping: Annotated[str | None, typer.Option(help="Heads as in this mapping. Default: the first.")] = None,
     at: Annotated[float, typer.Option(min=0.0, help="Second of the phrase that is shown.")] = 2.0,
 ) -> None:
     """Print the patch as a table and draw the rig: fixtures, dancer, where the heads point."""
@@ -68,7 +64,7 @@ def show_rig(
 def convert(
     fixture: Annotated[Path, typer.Argument(help="A fixture of the Open Fixture Library, as JSON.")],
     out: Annotated[
-        Path | None, typer.Option(help="The profile; left out: beside the file, ending with .yaml.")
+        Path | None, typer.Option(help="The profile. Default: beside the file, ending with .yaml.")
     ] = None,
 ) -> None:
     """Turn a fixture of the Open Fixture Library into a profile, for the folder `profiles` of a show."""

@@ -8,13 +8,13 @@ from typing import Annotated
 import typer
 
 ShowFolder = Annotated[
-    Path | None, typer.Option("--show", help="Show bundle; left out: the show that comes with the box.")
+    Path | None, typer.Option("--show", help="Show bundle. Default: the show that comes with the box.")
 ]
 BoxFile = Annotated[
-    Path | None, typer.Option("--box", help="box.yaml of the venue; left out: everything on this machine.")
+    Path | None, typer.Option("--box", help="box.yaml of the venue. Default: everything on this machine.")
 ]
 ThisBoxFile = Annotated[
-    Path | None, typer.Option("--box", help="box.yaml of the venue; left out: this box's.")
+    Path | None, typer.Option("--box", help="box.yaml of the venue. Default: this box's.")
 ]
 ChosenFile = Annotated[
     Path | None,
@@ -22,7 +22,7 @@ ChosenFile = Annotated[
         "--chosen", help="Show and box file that `bunraku preflight` chose: /run/bunraku/chosen.json."
     ),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="For programs.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 def command_group(help_text: str, needs_command: bool = False) -> typer.Typer:

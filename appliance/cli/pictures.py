@@ -48,7 +48,7 @@ class RecordedDance:
 @reading_options
 def filmstrip(
     recording: Annotated[Path, typer.Argument(help="A BVH recording, or the journal of a run.")],
-    out: Annotated[Path | None, typer.Option(help="The PNG; left out: beside the recording.")] = None,
+    out: Annotated[Path | None, typer.Option(help="The PNG. Default: beside the recording.")] = None,
     start: Annotated[
         float, typer.Option(help="Second at which the pictures begin; negative: counted from the end.")
     ] = 0.0,

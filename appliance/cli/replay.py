@@ -27,14 +27,16 @@ def replay(
     journal: Annotated[
         Path, typer.Argument(help="Folder of a journal, a segment in it, or an exported file.")
     ],
-    show: Annotated[Path | None, typer.Option(help="Show bundle; left out: where it was then.")] = None,
+    show: Annotated[
+        Path | None, typer.Option(help="Show bundle. Default: the one that was danced then.")
+    ] = None,
     from_s: Annotated[float, typer.Option("--from", min=0.0, help="Second of a run to begin at.")] = 0.0,
     tolerance: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Degrees that a joint may be off; 0: every bit must be the same."),
+        typer.Option(min=0.0, help="Degrees that a joint may be off; 0: not a single bit may differ."),
     ] = None,
 ) -> int:
-    """Dance a journal again through the same tick, and say which is the first that differs."""
+    """Dance a journal again, step by step as it was recorded, and report the first tick that differs."""
     outcomes = [
         _replay(run, show, from_s, tolerance, readable(f"Run {number} of '{run.header['show']}'"))
         for number, run in enumerate(read_journal(journal).runs, 1)

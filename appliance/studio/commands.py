@@ -81,7 +81,7 @@ def train(
         typer.Option(
             min=0,
             max=128,
-            help="Poses of a window, for granular; lstm-mixtures: that it looks back, 10 to 128.",
+            help="Poses in a window, for granular; how many lstm-mixtures looks back, 10 to 128.",
             show_default="8, of sequences 128, lstm-mixtures 32",
         ),
     ] = 0,
@@ -226,7 +226,7 @@ def export(
     phrase: Phrase = None,
     name: Annotated[str | None, typer.Option(help="Name of the show. Default: the folder's name.")] = None,
 ) -> None:
-    """Turn a checkpoint into a show: network file, quantization gate, report, skeleton, phrase, checksums."""
+    """Make a show from a checkpoint: network, report, skeleton, phrase, checksums."""
     with clear_errors("export"):
         from appliance.studio import export_command
 

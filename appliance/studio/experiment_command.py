@@ -17,12 +17,12 @@ def experiment(
     out: Annotated[Path, typer.Option(help="Folder for the page, the strips, the BVH and the figures.")],
     show: Annotated[
         Path | None,
-        typer.Option(help="Show whose network dances; left out: the show that comes with the box."),
+        typer.Option(help="Show whose network dances. Default: the show that comes with the box."),
     ] = None,
     recordings: Annotated[
         Path | None,
         typer.Option(
-            help="Folder that the excerpts come from, takes kept apart first; left out: the show's phrase."
+            help="Folder that the excerpts come from, takes kept apart first. Default: the show's phrase."
         ),
     ] = None,
     excerpts: Annotated[
@@ -35,12 +35,12 @@ def experiment(
         ),
     ] = None,
     joint: Annotated[
-        str | None, typer.Option(help="What the hand holds; left out: the left upper arm.")
+        str | None, typer.Option(help="What the hand holds. Default: the left upper arm.")
     ] = None,
     trace: Annotated[
         Path | None,
         typer.Option(
-            help="CSV of a worn sensor: seconds, w, x, y, z; left out: how the liveliest excerpt moves it."
+            help="CSV of a worn sensor: seconds, w, x, y, z. Default: how the liveliest excerpt moves it."
         ),
     ] = None,
     pictures: Annotated[bool, typer.Option(help="Draw the filmstrips, most of the time it takes.")] = True,

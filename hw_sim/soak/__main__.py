@@ -25,7 +25,7 @@ def main(
     minutes: Annotated[float, typer.Option(min=0.1, help="How long it dances.")] = 60.0,
     out: Annotated[Path, typer.Option(help="Folder for soak.json, soak.csv, soak.png.")] = Path("out/soak"),
     show: Annotated[
-        Path | None, typer.Option(help="Show bundle; left out: the one that comes with the box.")
+        Path | None, typer.Option(help="Show bundle. Default: the one that comes with the box.")
     ] = None,
     load: Annotated[bool, typer.Option(help="Load the machine with stress-ng, a minute each.")] = True,
     seed: Annotated[int, typer.Option(help="The same seed gives the same evening.")] = 1,

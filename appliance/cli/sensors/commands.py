@@ -19,21 +19,21 @@ class Fusion(StrEnum):
 
 
 KeyFile = Annotated[
-    Path | None, typer.Option("--keys", help="Key file, instead of --box; left out: sensors.keys.")
+    Path | None, typer.Option("--keys", help="Key file, instead of --box. Default: sensors.keys.")
 ]
 Port = Annotated[
-    str | None, typer.Option(help="Serial port of the wearable; left out: the only one that is plugged in.")
+    str | None, typer.Option(help="Serial port of the wearable. Default: the only one that is plugged in.")
 ]
 Network = Annotated[
-    str | None, typer.Option(help="Name of the box's Wi-Fi network (2.4 GHz); left out: by cable only.")
+    str | None, typer.Option(help="Name of the box's Wi-Fi network (2.4 GHz). Default: by cable only.")
 ]
 PasswordFile = Annotated[
     Path | None,
-    typer.Option(help="Its first line is the network's password, - for standard input; left out: asked for."),
+    typer.Option(help="Its first line is the network's password, - for standard input. Default: asked for."),
 ]
 FusionKind = Annotated[
     Fusion | None,
-    typer.Option(help="imuplus: no compass, for stages with steel; ndof: with one. Left out: as it is."),
+    typer.Option(help="imuplus: no compass, for stages with steel; ndof: with one. Default: unchanged."),
 ]
 Axes = Annotated[
     str | None, typer.Option(metavar="MAP,SIGN", help="How the IMU sits: two hexadecimal registers, 24,00.")
@@ -81,25 +81,25 @@ def list_them(
 
 @sensors.command()
 def strobe(name: Name, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
-    """Let a sensor's light flash for 10 s, to find it in a drawer."""
+    """Flash a sensor's light for 10 s, to find it in a drawer."""
     _send("/sensors/strobe", name, box, keys)
 
 
 @sensors.command()
 def neutral(name: NameOrAll = None, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
-    """Take the neutral pose again: how the sensor sits on the dancer, who stands still now."""
+    """Take the neutral pose again: the dancer must stand still, facing the front."""
     _send("/sensors/neutral", name, box, keys)
 
 
 @sensors.command()
 def heading(name: NameOrAll = None, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
-    """Reset the heading alone: the dancer faces the front now."""
+    """Reset the heading alone: the dancer must face the front."""
     _send("/sensors/heading", name, box, keys)
 
 
 @sensors.command()
 def replace(
-    broken: Annotated[str, typer.Argument(help="The name to be taken over.")],
+    broken: Annotated[str, typer.Argument(help="The sensor to replace; the new one takes its name.")],
     spare: Annotated[
         str | None, typer.Argument(help="A spare that was provisioned before: no cable is needed.")
     ] = None,
@@ -136,7 +136,7 @@ def replace(
 
 @sensors.command()
 def revoke(name: Name, box: ThisBoxFile = None, keys: KeyFile = None) -> None:
-    """Let a stolen or lost sensor in no more: its key is removed."""
+    """Lock out a stolen or lost sensor: its key is removed."""
     from appliance.cli.sensors.box_keys import box_keys_of, edit_keys
 
     words = f"{name} is revoked: its key opens nothing any more. To use it again, provision it again."
@@ -159,7 +159,7 @@ def rename(
 
 @sensors.command("reload")
 def read_again(box: ThisBoxFile = None, keys: KeyFile = None) -> None:
-    """Let the running box read the key file that you changed by hand."""
+    """Make the running box read the key file again, after you changed it by hand."""
     from appliance.cli.sensors.box_keys import box_keys_of, clear_errors, reload_and_say
     from appliance.sensor.keys import load_keys
 
