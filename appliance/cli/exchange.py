@@ -110,7 +110,8 @@ def import_(
     """Turn positions of points or joints into a recording: a skeleton is fitted to them and follows them.
 
     A bone is as long as the usual distance between its points. The hierarchy comes from the names (LeftArm,
-    l_wrist, RightKnee ...), from parents in --names, or from --like. A missing point is NaN or an empty field. At the end it says how far the figure is from the points, in centimetres.
+    l_wrist, RightKnee ...), from parents in --names, or from --like. A missing point is NaN or an empty
+    field. At the end it says how far the figure is from the points, in centimetres.
     """
     from appliance.cli.pictures import RecordedDance, draw_dance
     from appliance.exchange.formats import require_known_ending, write_recording
