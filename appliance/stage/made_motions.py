@@ -40,8 +40,9 @@ class MadeMotions:
             return None
         dances, newest = self._motion.made, self._reader.read()
         before, self._place = self._place, (self._motion.number, self._motion.position_s)
-        same, second = before[0] == self._place[0], self._place[1]
-        self._returned = self._returned or (dances is not None and same and second < before[1] - _ROUND_S)
+        if dances is not None and before[0] == self._place[0]:
+            back_s = before[1] - self._place[1]
+            self._returned |= (back_s if self._motion.rate >= 0 else -back_s) > _ROUND_S
         is_here = dances is not None and dances.name == wanted
         if newest is None or newest.name != wanted or newest is self._tried:
             self.is_late = not is_here and now - self._since > LATE_S

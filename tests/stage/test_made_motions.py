@@ -136,6 +136,20 @@ def test_what_is_made_for_the_return_waits_for_it_and_what_is_not_does_not(
     assert number.made.number == 1003 and dance.parts.source == "vary"
 
 
+def test_backwards_a_return_is_the_other_end(
+    dance_of: Callable[..., Dance], writer: MadeMotionWriter, tmp_path: Path
+) -> None:
+    dance = dance_of(rate=-1.0)
+    declare(tmp_path, "vary")
+    dance.make(writer, True, number=1001)
+    dance.run(0.5)
+    dance.make(writer, False, number=1002, seed=2)
+    dance.run(0.5)
+    assert dance.parts.motion.made is not None and dance.parts.motion.made.number == 1001
+    dance.run(3.0)
+    assert dance.parts.motion.made.number == 1002
+
+
 def test_a_show_may_start_from_it(dance_of: Callable[..., Dance], writer: MadeMotionWriter) -> None:
     dance = dance_of(source="vary")
     dance.make(writer, True, number=1001)

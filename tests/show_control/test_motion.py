@@ -1,0 +1,80 @@
+"""Commands about motion that is made ahead: their bounds, what they declare, and who keeps."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from appliance.box.made_motion import MadeMotionWriter
+from appliance.box.show_state import ShowState
+from appliance.show.sources import MOST_POINTS, PARAMETERS
+from appliance.show_control.command import command
+from appliance.show_control.show_state_commands import DECLARATIONS
+from appliance.show_control.stage_observer import StageObserver
+from tests.show_control.doubles import facts
+
+SOURCES = ("main", "quiet", "vary", "granular", "path")
+NOW = 100.0
+
+
+def declared(address: str, *arguments: Any, **more: Any) -> tuple[ShowState, str]:
+    """What a command declares in a show with all sources."""
+    before = more.pop("before", ShowState(show="A test"))
+    asked = command(address, arguments)
+    return DECLARATIONS[address](before, asked, facts(**{"phrases": SOURCES} | more), NOW)
+
+
+@pytest.mark.parametrize("source", PARAMETERS)
+def test_each_parameter_is_declared_within_its_bounds(source: str) -> None:
+    for name, about in PARAMETERS[source].items():
+        address = f"/motion/{source}/{name}"
+        state, words = declared(address, about.most, 3.0)
+        assert state.dance[f"motion {source} {name}"][2] == (about.most, 3.0) and name in words
+        for wrong in ((about.most + 1,), (about.least - 1,), (), (about.least, 100.0), ("far",)):
+            with pytest.raises(ValueError, match=address):
+                declared(address, *wrong)
+
+
+def test_points_of_the_map_come_in_pairs_between_0_and_1() -> None:
+    for count in (0, 1, MOST_POINTS):
+        state, words = declared("/motion/path", *[0.25, 0.75] * count)
+        assert state.dance["motion path points"][2] == (0.25, 0.75) * count and words
+    with pytest.raises(ValueError, match="has no y"):
+        declared("/motion/path", 0.5, 0.5, 0.5)
+    for wrong in ((0.5, 1.5), [0.5] * (2 * MOST_POINTS + 1)):
+        with pytest.raises(ValueError, match=r"takes .*\.\.\."):
+            declared("/motion/path", *wrong)
+
+
+def test_again_counts_on() -> None:
+    once, _ = declared("/motion/again")
+    twice, _ = declared("/motion/again", before=once)
+    assert [state.dance["motion again"][2] for state in (once, twice)] == [(1.0,), (2.0,)]
+
+
+def test_a_show_without_the_source_is_told_so() -> None:
+    for address, arguments in {
+        "/motion/vary/sigma": (1.0,),
+        "/motion/path": (0.5, 0.5),
+        "/motion/again": (),
+    }.items():
+        with pytest.raises(ValueError, match="source"):
+            declared(address, *arguments, phrases=("main",))
+
+
+def test_a_cue_declares_the_parameters_that_it_names_with_its_fade() -> None:
+    cue = {"name": "wild", "phrase": "vary", "motion": {"vary": {"sigma": 2.0}}, "fade_s": 8.0}
+    state, _ = declared("/cue", "wild", cues=(cue,))
+    assert state.dance["motion vary sigma"][2] == (2.0, 8.0)
+    assert state.dance["phrase"][1:] == ("vary", (8.0,))
+    assert [name for name in state.dance if name.startswith("motion")] == ["motion vary sigma"]
+
+
+def test_kept_motions_are_known_by_name(tmp_path: Path) -> None:
+    with closing(MadeMotionWriter(tmp_path)) as writer, closing(StageObserver(tmp_path)) as observer:
+        assert observer.kept() == ()
+        writer.write_kept(["anna", "bert"])
+        assert observer.kept() == ("anna", "bert")
