@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
 import time
 from collections.abc import Callable
@@ -45,6 +46,7 @@ from appliance.show_control.orders import Order, OrderInbox
 
 _LOOK_S = 0.05
 _NICE = 10
+_TAKEN_S = 5.0  # what is to be danced at once and is not taken over until then is made again
 _REST_S = 0.2  # from one motion to the next, at least
 _FILES = 4  # the newest: the stage may still open the one before
 _MOST_NUMBERS = 10_000_000  # exact in the track's float32
@@ -69,7 +71,8 @@ class Generator:
         self._writer = MadeMotionWriter(folder)
         self._told: list[str] | None = None
         self._wish: Wish | None = None  # what was made last was made for it
-        self._recipe, self._returns, self._rests_until = "", 0, 0.0
+        self._recipe, self._returns = "", 0
+        self._rests_until, self._taken_by = 0.0, math.inf
         self._number = 1000 + int(time.time()) % _MOST_NUMBERS
 
     def look(self, state_reader: ShowStateReader, now: float) -> bool:
@@ -89,14 +92,16 @@ class Generator:
         is_used = bool(self._recipe) and health.get("made") == self._recipe
         if wish != self._wish and now < self._rests_until:
             return False  # a hand draws over the map: the newest point counts
+        is_unseen = not is_used and now > self._taken_by
         if wish != self._wish:
             self._returns = 0
-        elif not (is_used and wish.is_new_at_return):
-            return False
-        else:
+        elif is_used and wish.is_new_at_return:
             self._returns += 1
-        self._rests_until = now + _REST_S
-        self._make(wish, at_once=wish != self._wish)
+        elif not is_unseen:
+            return False
+        at_once = wish != self._wish or is_unseen
+        self._rests_until, self._taken_by = now + _REST_S, now + _TAKEN_S if at_once else math.inf
+        self._make(wish, at_once)
         self._wish = wish
         return True
 

@@ -9,12 +9,14 @@ from appliance.dancer.loop import Loop
 from appliance.dancer.material.material_file import read_material
 from appliance.dancer.motion_source import Playback
 from appliance.show.show import Show
+from appliance.show.sources import GRANULAR, VARY
 from appliance.show_control.orders import Order
 from appliance.stage.stage_parts import StageParts
 
 LATE_S = 3.0  # after which a source that was called and has not come is late
 MELT_S = 1.0  # from one variation to the next
 ORDER = "made"
+_ANEW = (VARY, GRANULAR)  # another one at every return
 _ROUND_S = 0.5  # back by more than this, a loop has come round
 
 
@@ -28,31 +30,27 @@ class MadeMotions:
         self._reader, self._folder, self._joints = MadeMotionReader(folder), folder / FOLDER, joints
         self._motion = motion
         self._wanted, self._since = "", 0.0
-        self._place, self._returned = (0, 0.0), False  # number of the loop, second in it
+        self._place = (0, 0.0)  # number of the loop, second in it
         self._tried: MadeMotion | None = None
         self.is_late = False
 
     def order(self, wanted: str, fade_s: float, now: float) -> Order | None:
         """The order to dance what was made, once it is time; wanted: a source or a kept motion, or ""."""
         if wanted != self._wanted:
-            self._wanted, self._since, self._returned, self.is_late = wanted, now, False, False
+            self._wanted, self._since, self.is_late = wanted, now, False
         if not wanted:
             return None
         dances, newest = self._motion.made, self._reader.read()
         before, self._place = self._place, (self._motion.number, self._motion.position_s)
-        if dances is not None and before[0] == self._place[0]:
-            back_s = before[1] - self._place[1]
-            self._returned |= (back_s if self._motion.rate >= 0 else -back_s) > _ROUND_S
+        back_s = before[1] - self._place[1] if before[0] == self._place[0] else 0.0
+        returned = (back_s if self._motion.rate >= 0 else -back_s) > _ROUND_S
         is_here = dances is not None and dances.name == wanted
         if newest is None or newest.name != wanted or newest is self._tried:
-            self.is_late = not is_here and now - self._since > LATE_S
+            self.is_late |= returned and wanted in _ANEW if is_here else now - self._since > LATE_S
             return None
-        if is_here and dances is not None and newest.recipe == dances.recipe:
-            self._returned = False
+        if is_here and not (newest.at_once or returned):
             return None
-        if is_here and not (newest.at_once or self._returned):
-            return None
-        self._tried, self._returned, self.is_late = newest, False, False
+        self._tried, self.is_late = newest, False
         return Order(ORDER, (MELT_S if is_here else fade_s,), newest.recipe)
 
     def loop(self, recipe: str) -> Loop:

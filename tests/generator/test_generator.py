@@ -43,6 +43,17 @@ def test_one_variation_ahead_and_no_more(bench: Benches, tmp_path: Path) -> None
     assert len(list((one.folder / "material").iterdir())) <= 4
 
 
+def test_what_the_stage_could_not_take_over_is_made_again(bench: Benches, tmp_path: Path) -> None:
+    one = bench(write_show_with_sources(tmp_path / "show"))
+    one.declare(phrase=("path", NO_FADE))
+    first = one.recipe()
+    made = [one.recipe()["number"] for _ in range(8)]
+    assert made[:3] == [first["number"]] * 3 and made[-1] != first["number"]
+    assert len(set(made)) == 2, "once in five seconds"
+    number = one.dance()["number"]
+    assert {one.recipe()["number"] for _ in range(8)} == {number}
+
+
 def test_a_generator_that_was_killed_goes_on_where_it_was(bench: Benches, tmp_path: Path) -> None:
     show = write_show_with_sources(tmp_path / "show")
     one = bench(show)

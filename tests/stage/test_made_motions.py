@@ -132,8 +132,12 @@ def test_what_is_made_for_the_return_waits_for_it_and_what_is_not_does_not(
     dance.make(writer, True, number=1003, sigma=2.0)
     dance.run(0.1)
     assert number.made.number == 1003
-    dance.run(7.0)  # nothing more comes: the last one plays on
-    assert number.made.number == 1003 and dance.parts.source == "vary"
+    assert dance.late() == 0
+    dance.run(4.0)  # nothing more comes: the last one plays on, and that is told
+    assert number.made.number == 1003 and dance.parts.source == "vary" and dance.late() == 1
+    dance.make(writer, False, number=1004, seed=3)
+    dance.run(3.2)
+    assert number.made.number == 1004
 
 
 def test_backwards_a_return_is_the_other_end(
@@ -142,7 +146,7 @@ def test_backwards_a_return_is_the_other_end(
     dance = dance_of(rate=-1.0)
     declare(tmp_path, "vary")
     dance.make(writer, True, number=1001)
-    dance.run(0.5)
+    dance.run(1.0)  # it begins at the phrase's start, and comes from its end at once
     dance.make(writer, False, number=1002, seed=2)
     dance.run(0.5)
     assert dance.parts.motion.made is not None and dance.parts.motion.made.number == 1001
