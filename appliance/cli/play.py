@@ -252,6 +252,7 @@ def _introduction(stage: Stage, emulate: bool, control: socket.socket | None) ->
     show = stage.show
     hands = ", ".join(
         f"{hand.sensor or hand.kind} hold{'' if hand.springs else 's'} {hand.joint}"
+        + ("" if hand.from_start else " when a cue says so")
         for hand in show.config.hands
     )
     receivers = ", ".join(map(_receiver, stage.parts.outputs.receivers)) or "no receiver"

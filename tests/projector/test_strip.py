@@ -21,7 +21,7 @@ from tests.bundles import FIGURE, swaying_phrase, write_show
 from tests.recorder.night import Night
 
 WIDTH, HEIGHT = PICTURE
-LARGEST_BYTES = 600_000
+LARGEST_BYTES = 1_500_000
 
 
 def pictures_of(path: Path) -> list[np.ndarray]:
