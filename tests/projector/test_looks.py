@@ -18,6 +18,7 @@ from tests.projector.skeletons import mixamo, point, toy
 
 MOST_GPU_BYTES = 25e6
 MOST_DRAW_CALLS = 20
+MOST_STEP = 165  # of 255 from one pixel to the next across an outline
 
 
 @pytest.fixture
@@ -82,6 +83,17 @@ def test_cross_fade_mixes_the_two_pictures(
         pixels = np.frombuffer(target.read(components=4), np.uint8).reshape(SIZE[1], SIZE[0], 4)
         expected = (1 - mix) * whole[before] + mix * whole[now]
         assert np.abs(pixels[::-1, :, :3] - expected).max() <= 2
+
+
+def test_outline_of_ink_is_smooth(dance: Recording, gl: moderngl.Context) -> None:
+    """Along an outline there are tones between ink and paper; a hard edge has nearly none."""
+    plain = {"ink": LookConfig(name="ink", style="ink", trail_s=0.0, figure="#000000", background="#ffffff")}
+    size = 1280, 720
+    with renderer(gl, dance.skeleton, plain, size) as made:
+        picture = draw_still(gl, made, moment_of(dance, AT_S), "ink", size)[100:620, 500:900, 1].astype(int)
+    step = np.abs(np.diff(picture, axis=1)).max(axis=1)
+    assert picture.min() < 60 and picture.max() > 200
+    assert np.median(step[step > 40]) < MOST_STEP
 
 
 def test_unknown_look_is_the_first(dance: Recording, drawing: tuple[moderngl.Context, Renderer]) -> None:

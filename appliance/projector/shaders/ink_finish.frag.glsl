@@ -11,7 +11,14 @@ uniform vec3 accent_colour;
 uniform vec3 air_colour;
 uniform vec3 held_colour;
 uniform float fog;
+uniform vec2 texel;
 #include wall
+
+// A mean of the pixels around: in a coarser picture an outline is steps, which would be drawn as such.
+vec4 soft(vec2 at) {
+    return (texture(picture, at + texel * vec2(0.0, 0.8)) + texture(picture, at + texel * vec2(-0.7, -0.4))
+          + texture(picture, at + texel * vec2(0.7, -0.4))) / 3.0;
+}
 
 void main() {
     vec4 sheet = texture(paper, uv);
@@ -21,8 +28,9 @@ void main() {
     vec2 at = uv + (sheet.rg - 0.5) * reach;
     vec4 wet = texture(wet_picture, at);
     if (wet.r + wet.g + wet.b > 0.004) {
-        vec4 ink = texture(picture, at);
-        float body = smoothstep(0.30, 0.42, 0.6 * wet.r + 0.4 * ink.r + 0.25 * rough);
+        vec4 ink = soft(at);
+        float full = 0.6 * wet.r + 0.4 * ink.r + 0.25 * rough, edge = max(0.06, 0.7 * fwidth(full));
+        float body = smoothstep(0.36 - edge, 0.36 + edge, full);
         float dried = 1.0 - smoothstep(0.45, 0.8, wet.r);
         float covers = clamp(body * (ink.r + 0.15 * dried + 0.40 * rough + 0.04), 0.0, 1.0);
         float echo = smoothstep(0.02, 0.7, 0.55 * wet.g + 0.45 * ink.g) * (0.68 + 0.75 * rough);

@@ -67,6 +67,7 @@ class Ink:
             "held_colour": np.sqrt(colours.held),
             "air_colour": np.sqrt(look.exposure * colours.background),
             "paper": self._paper(look, scene.aspect).texture,
+            "texel": (1 / picture.size[0], 1 / picture.size[1]),
             "reach": (PULL / scene.aspect, PULL),
             "fog": look.fog,
         }
