@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import ipaddress
+import json
 import os
 import socket
 import sys
@@ -48,7 +49,9 @@ def serve(context: typer.Context, box: BoxFile = None, chosen: ChosenFile = None
     descriptor = open_console_port(config.console).detach()
     print(f"The page: {address_of(descriptor)}. Its PIN: bunraku console pin.", flush=True)
     os.set_inheritable(descriptor, True)
-    command = console_command(config, descriptor, kept_in(config), journal=config.journal.folder)
+    command = console_command(
+        config, descriptor, kept_in(config), journal=config.journal.folder, chosen=chosen
+    )
     os.execv(command[0], command)  # a fresh process, which loads only what the page needs
 
 
@@ -81,6 +84,14 @@ def revoke(
     if not _devices(box).revoke(device):
         raise StageError(f"There is no device {device}. List them: bunraku console devices")
     print(f"{device} is forgotten.")
+
+
+@console.command("about", hidden=True)
+def tell_about(box: BoxFile = None, chosen: ChosenFile = None) -> None:
+    """Print what this box is, as JSON for the page."""
+    from appliance.release.about import about
+
+    print(json.dumps(about(chosen, box)))
 
 
 def open_console_port(console: ConsoleConfig, or_any: bool = False) -> socket.socket:
@@ -117,9 +128,10 @@ def console_command(
     kept: Path,
     control: tuple[str, int] | None = None,
     journal: Path | None = None,
+    chosen: Path | None = None,
 ) -> tuple[str, ...]:
     """How to start the page of a box whose port is open. control: where commands arrive in fact; journal:
-    where one is kept in fact.
+    where one is kept in fact; chosen: what the preflight chose, on an installed box.
 
     Raises StageError.
     """
@@ -140,6 +152,7 @@ def console_command(
         names=tuple(console.names),
         rehearsal=console.rehearsal,
         journal=None if journal is None else str(journal.resolve()),
+        about=_named(box, chosen),
     )
     return sys.executable, "-m", "appliance.console", settings.packed()
 
@@ -169,6 +182,13 @@ def page_companion(
 def kept_in(box: BoxConfig) -> Path:
     """The file with PIN and devices: where the box keeps what it learns, else until the machine is off."""
     return (box.state_folder or _runtime(box)) / _KEPT
+
+
+def _named(box: BoxConfig, chosen: Path | None) -> tuple[str, ...]:
+    """Options by which a command finds the same box."""
+    if chosen is not None:
+        return "--chosen", str(chosen.resolve())
+    return () if box._file is None else ("--box", str(box.file.path.resolve()))
 
 
 def _devices(box: Path | None) -> Devices:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
-import sys
 import tempfile
 import time
 from collections.abc import AsyncIterator
@@ -13,7 +11,8 @@ from pathlib import Path
 
 from aiohttp import web
 
-LARGEST = 8 << 20  # bytes of an answer
+from appliance.console.child import answer_of
+
 LONGEST_S = 20.0  # of the dance at once
 _PATIENCE_S = 60.0  # for reading half an hour
 _FRESH_S = 5.0
@@ -84,24 +83,4 @@ class Happened:
             raise web.HTTPNotFound(
                 text="This box keeps no journal. Write `journal: {folder: journal}` into its box file."
             )
-        reader = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "appliance.cli", "journal", what, "--journal", self._journal, *options),
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-        )
-        try:
-            async with asyncio.timeout(_PATIENCE_S):
-                said, troubles = await reader.communicate()
-        except TimeoutError:
-            raise web.HTTPServiceUnavailable(text="Reading the journal took too long.") from None
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                reader.kill()
-        if reader.returncode:
-            words = troubles.decode(errors="replace").strip().rpartition("\n")[2]
-            raise web.HTTPNotFound(text=words.removeprefix("bunraku: ") or "The journal cannot be read.")
-        if len(said) > LARGEST:
-            raise web.HTTPServiceUnavailable(text="That is too much at once.")
-        return said
+        return await answer_of("journal", what, "--journal", self._journal, *options, patience_s=_PATIENCE_S)

@@ -15,6 +15,7 @@ from aiohttp import web
 from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealth, ProcessHealthWriter
+from appliance.console.about import About
 from appliance.console.box_view import BoxView
 from appliance.console.desk import Desk
 from appliance.console.devices import Devices
@@ -50,8 +51,8 @@ async def _serve(settings: Settings) -> int:
     guard, desk = Guard(settings.viewers, settings.names, devices), Desk(settings.control)
     box = BoxView(desk, stage, ProcessHealth(folder))
     health, notifier = ProcessHealthWriter(folder, "console", Fallbacks(())), Notifier()
-    happened = Happened(settings.journal)
-    app = Server(guard, devices, desk, stage, box, watchers, happened, settings.rehearsal).app()
+    happened, about = Happened(settings.journal), About(settings.about)
+    app = Server(guard, devices, desk, stage, box, watchers, happened, about, settings.rehearsal).app()
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=_LAST_REQUESTS_S, keepalive_timeout=30.0)
     await runner.setup()
     listening = socket.socket(fileno=settings.descriptor)

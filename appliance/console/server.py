@@ -11,6 +11,7 @@ from typing import Any
 
 from aiohttp import web
 
+from appliance.console.about import About
 from appliance.console.box_view import BoxView
 from appliance.console.desk import Desk, NoAnswerError
 from appliance.console.devices import DIGITS, LONGEST_NAME, Devices, WrongPins
@@ -42,9 +43,10 @@ class Server:
         box: BoxView,
         watchers: Watchers,
         happened: Happened,
+        about: About,
         rehearsal: bool,
     ) -> None:
-        self._happened, self._rehearsal = happened, rehearsal
+        self._happened, self._about, self._rehearsal = happened, about, rehearsal
         self._guard, self._devices, self._desk = guard, devices, desk
         self._stage, self._box, self._watchers = stage, box, watchers
         self._wrong_pins, self._languages = WrongPins(), languages()
@@ -60,6 +62,7 @@ class Server:
                 web.get("/watch", self._watch),
                 web.get("/api/show", self._show),
                 web.get("/api/me", self._me),
+                web.get("/api/box", self._about.serve),
                 web.get("/api/happened", self._happened.timeline),
                 web.get("/api/happened/stretch", self._happened.stretch),
                 web.get("/api/happened/dance.{ending}", self._happened.download),

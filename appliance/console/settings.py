@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 class Settings:
     """The port's socket is open already: `descriptor`. control: where commands arrive; None: nowhere.
 
-    journal: its folder; None: none is kept.
+    journal: its folder; None: none is kept. about: options of `bunraku console about` that name this box.
     folder: where the box's processes meet. kept: the file with PIN and remembered devices. viewers, names,
     rehearsal: as in the box file.
     """
@@ -23,6 +23,7 @@ class Settings:
     names: tuple[str, ...] = ()
     rehearsal: bool = True
     journal: str | None = None
+    about: tuple[str, ...] = ()
 
     def packed(self) -> str:
         """As one argument of a command line; there are no secrets in it."""
@@ -39,5 +40,6 @@ class Settings:
                 "control": None if control is None else (str(control[0]), int(control[1])),
                 "viewers": tuple(values["viewers"]),
                 "names": tuple(values["names"]),
+                "about": tuple(values["about"]),
             }
         )

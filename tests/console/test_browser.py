@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import socket
 import time
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -222,6 +224,39 @@ def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> Non
     assert dance.seconds > 1.0
     press(tab, '[data-page="tonight"]')
     expect(tab.locator("#again")).to_be_hidden()
+
+
+def test_the_box_tells_its_release_and_addresses(tab: Tab, venue: tuple[Box, Page]) -> None:
+    press(tab, '[data-page="box"]')
+    expect(tab.locator("#box-release")).to_contain_text(version("bunraku"))
+    expect(tab.locator("#box-release")).to_contain_text(venue[0].box_file.name)
+    expect(tab.locator("#box-network")).to_contain_text(socket.gethostname())
+    expect(tab.locator("#box-clock")).to_contain_text("Clock of the box: ")
+    expect(tab.locator("#box-shows-part")).to_be_hidden()
+
+
+def test_the_box_tells_which_shows_it_has(tab: Tab) -> None:
+    """As an installed box answers, with names that no page may take for its own text."""
+    told = {
+        "shows": [{"source": "<b>stick</b>", "good": False}, {"source": "comes with the box", "good": True}],
+        "refused": ["show.yaml:3: no such key."],
+        "aside": ["It was too slow."],
+        "box_file": "/data/box.yaml",
+        "version": "2.0",
+        "release": "2.0",
+        "releases": ["1.9", "2.0"],
+        "host": "stage",
+        "addresses": [["eth0", "192.0.2.7"]],
+    }
+    tab.route("**/api/box", lambda route: route.fulfill(json=told))
+    press(tab, '[data-page="box"]')
+    dances, instead = (tab.locator("#box-shows li").nth(place) for place in (0, 1))
+    expect(dances).to_contain_text("<b>stick</b>chosen at power-on · has not danced here yet")
+    expect(instead).to_contain_text("dances if the one above does not · has danced here")
+    expect(tab.locator("#box-refused li")).to_have_text(["show.yaml:3: no such key.", "It was too slow."])
+    expect(tab.locator("#box-releases li")).to_have_text(["1.9", "2.0dances"])
+    expect(tab.locator("#box-rollback")).to_be_visible()
+    expect(tab.locator("#box-network")).to_contain_text("192.0.2.7")
 
 
 def recorded(box: Box) -> Run:

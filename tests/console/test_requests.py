@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import socket
+from importlib.metadata import version
 from pathlib import Path
 from urllib.parse import urlparse
 
@@ -140,6 +141,19 @@ def test_whatever_comes_as_a_body_is_refused(page: Page, chance: random.Random, 
             if answer.status == 429:
                 break
     assert page.post("/api/command", b"x" * (LARGEST_REQUEST + 1)).status == 413
+    assert page.get("/status").status == 200
+
+
+def test_the_box_tells_what_it_is(page: Page) -> None:
+    told = page.get("/api/box").value
+    assert told["box_file"] == str(page.box_file.resolve())
+    assert told["version"] == version("bunraku") and told["host"] == socket.gethostname()
+    assert told["shows"] == [], "nothing was chosen at power-on here"
+
+
+def test_a_box_file_that_is_gone_is_no_fault_of_the_page(page: Page) -> None:
+    page.box_file.unlink()
+    assert page.get("/api/box").status == 200
     assert page.get("/status").status == 200
 
 

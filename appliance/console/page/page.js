@@ -1,4 +1,5 @@
 // The page: which part is shown, what the box says, and the buttons of the night.
+import { readAbout, showClock } from "./about.js";
 import { Box } from "./box.js";
 import { showChoices } from "./choices.js";
 import { Dance } from "./dance.js";
@@ -24,6 +25,7 @@ function show(page) {
   scrollTo(0, 0);
   if (known === "happened") readHappened();
   else stopHappened();
+  if (known === "box") readAbout();
   box.showFrames(known === "dance" && byId("show-dance").checked);
 }
 
@@ -141,6 +143,7 @@ box.addEventListener("value", () => {
   tonight(box.value);
   showSensors(byId("cards"), box.value, words);
   showPicture(box.value);
+  showClock(box.value);
   showRehearsal(box.value, dance.show);
   dance.follow(box.value);
   document.body.dataset.heard = box.value.time;

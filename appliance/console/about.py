@@ -1,0 +1,30 @@
+"""What the box is: its shows, release and addresses, read by a process of its own when a browser asks."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+from aiohttp import web
+
+from appliance.console.child import answer_of
+
+_PATIENCE_S = 60.0
+_FRESH_S = 10.0
+
+
+class About:
+    """Read at most once in 10 s, whoever asks. options: which box is meant, as a command line has it."""
+
+    def __init__(self, options: tuple[str, ...]) -> None:
+        self._options = options
+        self._reading = asyncio.Lock()
+        self._read, self._read_at = b"", -_FRESH_S
+
+    async def serve(self, request: web.Request) -> web.Response:
+        """As JSON: release/about.py."""
+        async with self._reading:
+            if time.monotonic() - self._read_at > _FRESH_S:
+                self._read = await answer_of("console", "about", *self._options, patience_s=_PATIENCE_S)
+                self._read_at = time.monotonic()
+        return web.Response(body=self._read, content_type="application/json")

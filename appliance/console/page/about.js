@@ -1,0 +1,52 @@
+// Box: which show dances and which would instead, release, addresses, clock.
+import { language, words } from "./words.js";
+
+const byId = (id) => document.getElementById(id);
+
+export async function readAbout() {
+  byId("box-said").textContent = words("box_reading");
+  let answer = null;
+  try {
+    answer = await fetch("/api/box");
+  } catch { /* said below */ }
+  byId("box-all").hidden = !answer?.ok;
+  byId("box-said").textContent = answer?.ok ? "" : answer ? await answer.text() : words("no_page");
+  if (answer?.ok) tell(await answer.json());
+}
+
+function tell(box) {
+  byId("box-shows-part").hidden = box.shows.length === 0;
+  byId("box-shows").replaceChildren(...box.shows.map((show, place) => item(
+    show.source, `${words(place ? "box_instead" : "box_dances")} · ${words(show.good ? "box_good" : "box_new")}`)));
+  const refused = [...box.refused, ...box.aside];
+  byId("box-refused-part").hidden = refused.length === 0;
+  byId("box-refused").replaceChildren(...refused.map((sentence) => item(sentence, "")));
+  byId("box-release").replaceChildren(
+    pair(words("box_version"), box.version), pair(words("box_file"), box.box_file ?? words("box_no_file")));
+  byId("box-releases").replaceChildren(...box.releases.map((name) => item(name, name === box.release ? words("box_current") : "")));
+  byId("box-rollback").hidden = box.releases.indexOf(box.release) < 1;
+  byId("box-network").replaceChildren(
+    pair(words("box_host"), box.host),
+    ...box.addresses.map(([name, address]) => pair(name, address)));
+}
+
+// The box's clock, which a Pi without a network has wrong.
+export function showClock(value) {
+  byId("box-clock").textContent = `${words("box_time")}: ${new Date(1000 * value.time).toLocaleString(language, { hourCycle: "h23" })}`;
+}
+
+function item(said, below) {
+  const line = document.createElement("li"), small = document.createElement("small");
+  line.textContent = said;
+  small.textContent = below;
+  if (below) line.append(small);
+  return line;
+}
+
+function pair(term, meaning) {
+  const both = document.createElement("div"), dt = document.createElement("dt"), dd = document.createElement("dd");
+  dt.textContent = term;
+  dd.textContent = meaning;
+  both.append(dt, dd);
+  return both;
+}

@@ -1,0 +1,61 @@
+"""What the box says of itself: its shows, its releases, its addresses."""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+from pathlib import Path
+
+import pytest
+
+from appliance.release import about as module
+from appliance.release.about import about, addresses, releases
+from appliance.release.choice import Aside, Choice, Pair
+
+
+def test_the_shows_stand_in_the_order_in_which_they_are_tried(tmp_path: Path) -> None:
+    venue = tmp_path / "venue.yaml"
+    pairs = Pair(box=venue, id="a+b", source="from the stick"), Pair(good=True)
+    chosen = tmp_path / "chosen.json"
+    Choice(pairs, ("show.yaml:3: wrong.",), (Aside("c+", "It did not dance."),)).write(chosen)
+    told = about(chosen, None, tmp_path)
+    assert told["shows"] == [
+        {"source": "from the stick", "good": False},
+        {"source": "comes with the box", "good": True},
+    ]
+    assert (told["refused"], told["aside"]) == (["show.yaml:3: wrong."], ["It did not dance."])
+    assert told["box_file"] == str(venue)
+    json.dumps(told)
+
+
+@pytest.mark.parametrize("content", [None, "", "{", "[]", '{"pairs": 3}'])
+def test_no_whole_choice_is_no_show(tmp_path: Path, content: str | None) -> None:
+    chosen = tmp_path / "chosen.json"
+    if content is not None:
+        chosen.write_text(content)
+    assert about(chosen, None, tmp_path)["shows"] == []
+
+
+def test_releases_stand_in_the_order_in_which_they_came(tmp_path: Path) -> None:
+    for name, number in (("0.9", "12"), ("1.0", "2"), ("1.1.part", "13"), ("torn", "x")):
+        folder = tmp_path / "releases" / name
+        folder.mkdir(parents=True)
+        (folder / "number").write_text(number)
+    (tmp_path / "current").symlink_to("releases/0.9")
+    assert releases(tmp_path) == ["1.0", "0.9"]
+    assert about(None, None, tmp_path)["release"] == "0.9"
+    assert about(None, None, tmp_path / "nothing")["release"] is None
+
+
+def test_only_addresses_that_others_can_use(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    table = tmp_path / "if_inet6"
+    table.write_text(
+        "00000000000000000000000000000001 01 80 10 80       lo\n"
+        "fe800000000000000000000000000001 02 40 20 80     eth0\n"
+        "20010db8000000000000000000000007 02 40 00 80     eth0\n"
+    )
+    monkeypatch.setattr(module, "_IPV6", table)
+    found = addresses()
+    assert ("eth0", "2001:db8::7") in found
+    assert not any(ipaddress.ip_address(one).is_loopback for _, one in found)
+    assert not any(one.startswith("fe80") for _, one in found)
