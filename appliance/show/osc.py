@@ -21,7 +21,7 @@ PROGRAMS: Mapping[str, Mapping[str, Any]] = {
     "mocap-analysis": {"port": 9007, "messages": ["pos_world"], "scale": 100.0},
     "clustering": {"port": 9007, "messages": ["rot_local", "rot_world", "pos_world"], "scale": 100.0},
     "classifier": {"port": 9007, "messages": ["pos_local", "rot_local"], "scale": 100.0},
-    "vae-rnn": {"port": 9002, "messages": ["rot_local"], "ends": True},
+    "vae-rnn": {"port": 9007, "messages": ["rot_local"], "ends": True},
     "ray-marching": {"port": 9004, "messages": ["pos_world", "rot_world"], "scale": 100.0, "axes": _Z_UP},
     "supercollider": {"port": 9005, "messages": ["pos_world"], "prefix": "/mocap/joint", "axes": _Z_UP},
 }

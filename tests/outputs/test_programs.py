@@ -138,6 +138,14 @@ def test_euler_angles_turn_about_x_then_y_then_z(skeleton: Skeleton, frame: Join
     assert np.degrees(quaternion.angle_between(turned, frame.pose)).max() < 0.1
 
 
+@pytest.mark.parametrize(
+    ("name", "port"),
+    [("mocap-analysis", 9007), ("classifier", 9007), ("vae-rnn", 9007), ("ray-marching", 9004)],
+)
+def test_a_program_is_sent_to_the_port_in_its_source(name: str, port: int) -> None:
+    assert OscConfig.model_validate({"program": name}).port == port
+
+
 def test_a_key_beside_the_program_counts_more(tmp_path: Path) -> None:
     box = tmp_path / "box.yaml"
     box.write_text("outputs: {osc: [{program: classifier, port: 9100, scale: 1}]}")
