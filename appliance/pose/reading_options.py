@@ -12,8 +12,9 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
-from appliance.pose.bvh import read_bvh
+from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.recording import Recording
+from appliance.pose.skeleton import UnknownJointError
 from appliance.pose.stage_frame import FACINGS, UPS, Guess, Reading, in_stage_frame
 
 T = TypeVar("T")
@@ -68,10 +69,20 @@ def first_fit(by_pattern: Mapping[str, Any], name: str) -> Any:
 def read_upright(path: Path, options: ReadingOptions = AS_THE_FILES_SAY) -> tuple[Recording, list[Guess]]:
     """A BVH file in the stage's frame, and what was changed; the side that the dance faces is left as it is.
 
-    Raises BvhError, OSError, or UnknownJointError for a root that it does not have.
+    Raises BvhError, also for a root that it does not have, or OSError.
     """
     recording = read_bvh(path, true_fps=options.fps_of(path.stem))
-    return in_stage_frame(recording, options.reading_of(path.stem), turn_dance=False)
+    return brought_in(path, recording, options.reading_of(path.stem), turn_dance=False)
+
+
+def brought_in(
+    path: Path, recording: Recording, reading: Reading, *, turn_dance: bool = True
+) -> tuple[Recording, list[Guess]]:
+    """A recording of this file in the stage's frame. Raises BvhError for a root that it does not have."""
+    try:
+        return in_stage_frame(recording, reading, turn_dance=turn_dance)
+    except UnknownJointError as error:
+        raise BvhError(path, 1, f"{error} Give another --root.") from error
 
 
 def reading_options(command: Callable[..., T]) -> Callable[..., T]:

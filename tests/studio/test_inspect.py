@@ -60,6 +60,8 @@ def test_every_guess_can_be_overruled(tmp_path: Path) -> None:
     assert any("times the present one" in doubt for doubt in found["doubts"])
     refused = bunraku("inspect", file, "--up", "w")
     assert refused.exit_code == 2 and "'w' is not one of y, z" in said(refused)
+    refused = bunraku("inspect", file, "--root", "pelvs")
+    assert refused.exit_code == 2 and "Did you mean 'pelvis'? Give another --root." in said(refused)
 
 
 def test_what_is_not_recognised_is_asked(tmp_path: Path) -> None:

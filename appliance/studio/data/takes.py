@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from appliance.pose import quaternion
 from appliance.pose.bvh import leading_tpose_frames, read_bvh
+from appliance.pose.reading_options import brought_in
 from appliance.pose.recording import Recording
-from appliance.pose.stage_frame import in_stage_frame
 from appliance.studio.data.capture_errors import (
     MARKED,
     CaptureError,
@@ -98,7 +98,7 @@ def read_take(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
         recording = recording.without_first(TPOSE_FRAMES)
     if not len(recording):
         raise DatasetError(f"{file.name} has no pose but its T-pose. Remove the file.")
-    recording, guesses = in_stage_frame(recording, catalogue.reading_of(file.stem))
+    recording, guesses = brought_in(file, recording, catalogue.reading_of(file.stem))
     resampled = recording.resampled(FPS)
     sound = np.ones(len(resampled), dtype=bool)
     take = catalogue.take_of(file.stem)
