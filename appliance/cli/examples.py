@@ -11,6 +11,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     ),
     "control": ("bunraku control --box box.yaml",),
     "console": ("bunraku console --box box.yaml",),
+    "console about": ("bunraku console about --box box.yaml",),
     "console pin": ("bunraku console pin", "bunraku console pin --new"),
     "console devices": ("bunraku console devices",),
     "console revoke": ("bunraku console revoke 3",),

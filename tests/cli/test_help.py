@@ -34,7 +34,7 @@ ALL = sorted(paths(whole()))
 
 
 def test_every_command_has_an_example_and_its_place() -> None:
-    assert sorted(EXAMPLES) == ALL
+    assert sorted(EXAMPLES) == ALL, "appliance/cli/examples.py has an example for each command, and no other"
     assert set(OTHER_WORDS) == set(ORDER)
 
 
