@@ -18,6 +18,7 @@ from appliance.box.parent_death import was_told
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.projector.projector_error import NO_DISPLAY, ProjectorError
+from appliance.projector.raw_stream import take_over_stdout
 from appliance.projector.run import Options, Run
 from appliance.projector.window import Kind, Size
 from appliance.release.choice import box_of
@@ -36,6 +37,9 @@ def project(
         str | None, typer.Option(metavar="WIDTHxHEIGHT", help="On no display, in this size.")
     ] = None,
     frames: Annotated[Path | None, typer.Option(help="Write each picture as a PNG into this folder.")] = None,
+    raw: Annotated[
+        bool, typer.Option("--raw", help="With --offscreen: raw pictures to standard output, for a pipe.")
+    ] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after this time.")] = None,
     info: Annotated[bool, typer.Option("--info", help="Figures on the wall and on the terminal.")] = False,
     wait: Annotated[
@@ -48,7 +52,13 @@ def project(
 ) -> int:
     """Show what the stage dances, on a projector: before it starts, while it dances and when it is back."""
     options = parse_options(window, fullscreen, offscreen, frames, seconds, info)
-    return project_show(box_of(box, chosen), replace(options, stamps=stamp), wait)
+    if raw and (offscreen is None or sys.stdout.isatty()):
+        raise typer.BadParameter(
+            "--raw needs --offscreen WIDTHxHEIGHT and a pipe: its pictures are no text. "
+            "For instance: bunraku project --offscreen 1280x720 --raw | ffmpeg ..."
+        )
+    pictures = take_over_stdout() if raw else None
+    return project_show(box_of(box, chosen), replace(options, stamps=stamp, raw=pictures), wait)
 
 
 def parse_options(

@@ -32,6 +32,7 @@ from appliance.projector.loop import Projector
 from appliance.projector.pacing import USUAL_RATE, Pacing
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, NO_PLACE, ProjectorError
+from appliance.projector.raw_stream import RawStream
 from appliance.projector.resolution import Resolution
 from appliance.projector.stamp import stamp
 from appliance.projector.watchdog import Patience, end_process, guarded
@@ -48,7 +49,7 @@ _JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
 class Options:
     """The options of the command line. kind None: as the box file says; frames: a folder for PNGs.
 
-    stamps: draw when the dance left the stage into each picture's corner.
+    stamps: draw when the dance left the stage into each picture's corner; raw: a descriptor for raw pictures.
     """
 
     kind: Kind | None = None
@@ -57,6 +58,7 @@ class Options:
     seconds: float | None = None
     shows_info: bool = False
     stamps: bool = False
+    raw: int | None = None
 
 
 class Run:
@@ -73,6 +75,9 @@ class Run:
             opened.callback(self._window.close)
             self.context = GlContext(self._window)
             opened.callback(self.context.close)
+            self._raw = None if options.raw is None else RawStream(options.raw)
+            if self._raw is not None:
+                opened.callback(self._raw.close)
             self._file = AlignmentFile(alignment_folder(box), config, say)
             opened.callback(self._file.close)
             self._controls = Controls(self._file.alignment, self._file.keep, options.shows_info)
@@ -140,7 +145,7 @@ class Run:
 
     def _show_pictures(self, stopped: Callable[[], bool], notifier: Notifier) -> None:
         begun = reported = time.monotonic()
-        while not stopped() and not self._controls.is_over:
+        while not stopped() and not self._controls.is_over and not (self._raw and self._raw.is_closed):
             now = self._pacing.wait_for_next()
             if self._options.seconds is not None and now - begun >= self._options.seconds:
                 return
@@ -161,6 +166,8 @@ class Run:
             stamp(screen, left_stage)
         if self._options.frames is not None:
             self._write_png(self._options.frames, screen.read(viewport=(0, 0, *size), components=4), size)
+        if self._raw is not None:
+            self._raw.offer(screen.read(viewport=(0, 0, *size), components=4), size)
         self.context.finish()  # else the driver queues pictures, and each is older when shown
         drawn = time.monotonic()
         self._window.show()
