@@ -11,7 +11,7 @@ from appliance.show.config_error import Problem, did_you_mean
 from appliance.show.section import Axes, Ipv4, Section, each_axis_once, key, refusal, refuse_repeats
 from appliance.show.yaml_file import Location, YamlFile
 
-Dialect = Literal["ai-toolbox", "joint", "vmc"]
+Dialect = Literal["ai-toolbox", "joint", "vmc", "features"]
 Message = Literal["pos_local", "pos_world", "rot_local", "rot_world"]
 Program = Literal["mocap-analysis", "clustering", "classifier", "vae-rnn", "ray-marching", "supercollider"]
 Prefix = Annotated[str, Field(pattern=r"^(/[A-Za-z0-9_.-]+)+$")]
@@ -46,8 +46,8 @@ class OscConfig(Section):
         length=(1, 4),
     )
     prefix: Prefix = key(
-        "ai-toolbox: the address before a list's name; /mocap/joint for older programs, /mocap/1/joint for "
-        "a second dancer.",
+        "ai-toolbox, features: the address before a list's name; /mocap/joint for older programs, "
+        "/mocap/1/joint for a second dancer.",
         "/mocap/0/joint",
     )
     joints: list[str] = key(
@@ -89,7 +89,10 @@ class OscConfig(Section):
     @model_validator(mode="after")
     def _keys_of_its_dialect(self) -> OscConfig:
         if self.dialect != "ai-toolbox":
-            foreign = [name for name in _OF_ONE_DIALECT if name in self.model_fields_set]
+            shared = ("prefix",) if self.dialect == "features" else ()
+            foreign = [
+                name for name in _OF_ONE_DIALECT if name in self.model_fields_set and name not in shared
+            ]
             if self.program is not None or foreign:
                 name = "program" if self.program is not None else foreign[0]
                 raise refusal(

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.osc.ai_toolbox import AiToolbox
+from appliance.outputs.osc.features import Features
 from appliance.outputs.osc.joint import Joint
 from appliance.outputs.osc.vmc import Vmc
 from appliance.pose.skeleton import Skeleton
@@ -23,6 +24,7 @@ class Encoder(Protocol):
 
 DIALECTS: dict[str, Callable[[Skeleton, OscConfig], Encoder]] = {
     "ai-toolbox": AiToolbox,
+    "features": Features,
     "joint": lambda skeleton, _: Joint(skeleton),
     "vmc": lambda skeleton, _: Vmc(skeleton),
 }

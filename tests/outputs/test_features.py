@@ -1,0 +1,105 @@
+"""Features: motions whose numbers are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.osc.features import PAUSE_S, WINDOW, Features
+from appliance.pose.skeleton import Skeleton
+from appliance.show.osc import OscConfig
+from hw_sim.osc_receiver import decode
+
+JOINTS, STEP_S = 3, 0.02
+FIGURE = Skeleton(("a", "b", "c"), (-1, 0, 1), np.zeros((JOINTS, 3)))
+PLACES = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0]])
+Way = Callable[[float], NDArray[np.float64]]
+
+
+class Dancer:
+    """All joints go the same way."""
+
+    def __init__(self, way: Way, prefix: str = "/mocap/0/joint") -> None:
+        self._way, self._frame = way, JointFrame(JOINTS)
+        self._features = Features(FIGURE, OscConfig(dialect="features", prefix=prefix))
+
+    def at(self, second: float, late: bool = False) -> dict[str, NDArray[np.float64]]:
+        self._frame.frame_time, self._frame.late = 100.0 + second, late
+        self._frame.positions[:] = PLACES + self._way(second)
+        messages = [decode(bytes(one))[0] for one in self._features.encode(self._frame)]
+        return {address: np.array(values, float) for address, values in messages}
+
+    def dance(self, frames: int) -> dict[str, NDArray[np.float64]]:
+        for tick in range(frames):
+            found = self.at(tick * STEP_S)
+        return found
+
+
+def straight(second: float) -> NDArray[np.float64]:
+    return np.array([0.5 * second, 0.0, 0.0])
+
+
+def falling(second: float) -> NDArray[np.float64]:
+    return np.array([0.0, -second * second, 0.0])  # 2 m/s2
+
+
+def there_and_back(second: float) -> NDArray[np.float64]:
+    return np.array([0.0, 0.0, 0.1 - abs(0.1 - (second % 0.2))])
+
+
+def circling(second: float) -> NDArray[np.float64]:
+    return np.array([np.cos(4 * second), 0.0, np.sin(4 * second)])
+
+
+@pytest.mark.parametrize("frames", [WINDOW // 2, WINDOW, 2 * WINDOW + 3])
+def test_a_steady_way_is_direct_and_without_acceleration(frames: int) -> None:
+    found = Dancer(straight).dance(frames)
+    speeds = found["/mocap/0/joint/velocity"].reshape(JOINTS, 3)
+    np.testing.assert_allclose(speeds, np.tile([0.5, 0, 0], (JOINTS, 1)), atol=1e-4)
+    assert found["/mocap/0/qom"] == pytest.approx([0.5], abs=1e-4)
+    assert found["/mocap/0/weight_effort"] == pytest.approx([0.25], abs=1e-3)
+    assert found["/mocap/0/space_effort"] == pytest.approx([1.0], abs=1e-3)
+    assert found["/mocap/0/time_effort"][0] < 0.02
+
+
+def test_acceleration_and_jerk_are_those_of_the_motion() -> None:
+    found = Dancer(falling).dance(2 * WINDOW)
+    np.testing.assert_allclose(found["/mocap/0/joint/acceleration"].reshape(-1, 3)[1], [0, -2, 0], atol=0.01)
+    assert found["/mocap/0/time_effort"] == pytest.approx([2.0], abs=0.02)
+    jerked = Dancer(circling).dance(2 * WINDOW)
+    sizes = np.linalg.norm(jerked["/mocap/0/joint/jerk"].reshape(-1, 3), axis=1)
+    np.testing.assert_allclose(sizes, 64.0, rtol=0.02)  # radius 1 m, 4 rad/s
+    assert jerked["/mocap/0/flow_effort"] == pytest.approx([64.0], rel=0.02)
+
+
+def test_there_and_back_is_indirect_and_standing_still_is_not() -> None:
+    assert Dancer(there_and_back).dance(3 * WINDOW)["/mocap/0/space_effort"][0] > 3.0
+    still = Dancer(lambda _: np.zeros(3)).dance(2 * WINDOW)
+    assert still["/mocap/0/space_effort"] == pytest.approx([1.0])
+    assert still["/mocap/0/qom"] == [0.0]
+
+
+def test_bounds_hold_all_joints() -> None:
+    found = Dancer(lambda _: np.array([0.0, 1.0, 0.0])).dance(2)
+    np.testing.assert_allclose(found["/mocap/0/bbox"], [0, 1, 0, 1, 3, 0], atol=1e-6)
+    *centre, radius = found["/mocap/0/bsphere"]
+    np.testing.assert_allclose(centre, [1 / 3, 5 / 3, 0], atol=1e-6)
+    assert radius == pytest.approx(np.hypot(1 / 3, 4 / 3), abs=1e-6)
+
+
+def test_a_late_frame_repeats_the_numbers_and_a_pause_begins_anew() -> None:
+    dancer = Dancer(straight)
+    before = dancer.dance(WINDOW)
+    late = dancer.at(WINDOW * STEP_S, late=True)
+    assert all((late[name] == before[name]).all() for name in before)
+    after = dancer.at(WINDOW * STEP_S + 2 * PAUSE_S)
+    assert not after["/mocap/0/joint/velocity"].any() and after["/mocap/0/weight_effort"] == [0.0]
+
+
+def test_older_pieces_get_their_prefix() -> None:
+    found = Dancer(straight, "/mocap/joint").dance(2)
+    assert {"/mocap/joint/velocity", "/mocap/qom"} < set(found)
