@@ -167,6 +167,13 @@ def test_grid_corner_mark_and_figures_only_on_demand(show: Show) -> None:
     assert figures[:12].any() and not figures[12:].any()
 
 
+def test_the_grid_is_clear_on_white_paper(show: Show) -> None:
+    controls = Controls(Alignment(), lambda _: None)
+    controls.set_grid(True)
+    light = show(flat(255), controls=controls)[..., 0].astype(int)
+    assert np.percentile(light, 95) - np.percentile(light, 30) > 120
+
+
 def test_the_grid_of_two_projectors_meets(show: Show) -> None:
     """Where both light the wall they show the same line."""
     controls = Controls(Alignment(), lambda _: None)

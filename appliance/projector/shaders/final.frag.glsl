@@ -91,6 +91,7 @@ void main() {
 #endif
 #ifdef MARKS
     vec2 across = vec2(part.x + uv.x * part.y, uv.y);
+    light *= 1.0 - 0.65 * grid;  // else its lines are lost on paper
     light = mix(light, vec3(0.9), grid * seen * grid_lines(across, pixel_size * vec2(part.y, 1.0)));
     float ring = abs(distance(wall, marker.xy) - marker.z);
     if (marker.z > 0.0) light = mix(light, vec3(1.0, 0.6, 0.1), 1.0 - clamp(ring - 2.0, 0.0, 1.0));
