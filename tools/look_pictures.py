@@ -11,12 +11,14 @@ import numpy as np
 from appliance.pose.bvh import read_bvh
 from appliance.pose.recording import Recording
 from appliance.projector.context import offscreen
+from appliance.projector.moment import Floats
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.still import FINER, Image, draw_still, moment_of, shrink
 from appliance.show.bundle import default_show_path
 from appliance.show.look import STYLES, CameraConfig, LookConfig
 
 SIZE = 864, 486
+HELD, COLOURS = "lShldr", 256
 UPRIGHT, TOGETHER_S = (320, 400), 49.6  # of the four looks beside each other
 SHOW = default_show_path()
 CHALK = LookConfig(
@@ -51,17 +53,22 @@ def draw_looks(folder: Path) -> list[Path]:
         renderer.release()
         paths.append(folder / "looks.png")
         Files.fromarray(_side_by_side(ctx, recording)).save(paths[-1], optimize=True)
+        holds = np.zeros(len(recording.skeleton), np.float32)
+        holds[recording.skeleton.index(HELD)] = 1.0
+        paths.append(folder / "looks-held.png")
+        held = Files.fromarray(_side_by_side(ctx, recording, holds))
+        held.quantize(COLOURS, method=Files.Quantize.MAXCOVERAGE, kmeans=2).save(paths[-1], optimize=True)
     return paths
 
 
-def _side_by_side(ctx: moderngl.Context, recording: Recording) -> Image:
-    """Four looks of one instant, upright, beside each other."""
+def _side_by_side(ctx: moderngl.Context, recording: Recording, holds: Floats | None = None) -> Image:
+    """Four looks of one instant, upright, beside each other; holds: (J,) how firmly joints are held."""
     size = UPRIGHT[0] * FINER, UPRIGHT[1] * FINER
     looks: dict[str, LookConfig] = {
         style: LookConfig(name=style, style=style, vignette=0.2) for style in STYLES[:4]
     }
     renderer = Renderer(ctx, size, recording.skeleton, looks)
-    moment = moment_of(recording, TOGETHER_S)
+    moment = moment_of(recording, TOGETHER_S, holds)
     pictures = [shrink(draw_still(ctx, renderer, moment, style, size)) for style in looks]
     renderer.release()
     return np.hstack(pictures)
