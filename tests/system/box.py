@@ -51,7 +51,7 @@ class Box(Process):
         return Wearables(list(self.keys.values()), self.sensors, **options)
 
     def frames(self, count: int) -> list[list[Any]]:
-        """The next `count` frame messages: tick, frame time, sensor sequence, late."""
+        """The next `count` frame messages: tick, second, sensor sequence, late, rest of the second."""
         found: list[list[Any]] = []
 
         def has_all() -> bool:
