@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,10 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
 INK, FAINT = "#efe6d8", "#9a948c"
+_MORE_SCRIPTS = (
+    *("Noto Sans CJK JP", "Noto Sans CJK SC", "WenQuanYi Zen Hei", "IPAGothic", "Droid Sans Fallback"),
+    *("Noto Sans Arabic", "Noto Sans Hebrew", "Noto Sans Devanagari", "Noto Sans Thai"),
+)
 
 
 class MissingPicturesError(RuntimeError):
@@ -128,11 +134,25 @@ def draw_rows(
     axes.imshow(np.clip(stage.floor, 0, 1), **place, zorder=0)
     _draw_trails(axes, stage.trails)
     axes.imshow(np.clip(straight(stage.figures), 0, 1), **place, zorder=2)
-    _write(axes, stage, title, coloured)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    canvas(figure).print_png(path)
+    with every_script():
+        _write(axes, stage, title, coloured)
+        canvas(figure).print_png(path)
     return path
+
+
+@contextmanager
+def every_script() -> Iterator[None]:
+    """Words in the scripts of the fonts that are installed; a sign that none of them has is an empty box."""
+    import matplotlib
+    from matplotlib import font_manager
+
+    there = set(font_manager.get_font_names())
+    families = ["DejaVu Sans", *(name for name in _MORE_SCRIPTS if name in there)]
+    with matplotlib.rc_context({"font.family": families}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        yield
 
 
 def _matplotlib() -> tuple[Any, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -13,7 +14,7 @@ from appliance.pose.body import Body, Cones
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
-COLUMN_PX, TILE_PX = 176, 320  # figures stand closer than their arms reach: tiles overlap
+COLUMN_PX, TILE_PX = 176, 320  # figures stand closer than their arms reach: tiles overlap; at least
 MARGIN_PX, HEADER_PX, FOOTER_PX = 56, 104, 44
 HEIGHT_PX = 300  # of the figure in its rest pose
 AZIMUTH, ELEVATION = np.radians(32), np.radians(11)
@@ -57,7 +58,10 @@ class Stage:
         above = self._highest(rows)
         self.floor_px = round(above * self.scale * np.cos(ELEVATION)) + 24
         self.row_px = self.floor_px + FOOTER_PX + 34
-        width = 2 * MARGIN_PX + max(columns * COLUMN_PX, 3 * COLUMN_PX)
+        reach_px = math.ceil(self._widest(rows) * self.scale) + MARGIN_PX // 2
+        self.tile_px = max(TILE_PX, 2 * reach_px)
+        self.margin_px = max(MARGIN_PX, reach_px - COLUMN_PX // 2)
+        width = 2 * self.margin_px + max(columns * COLUMN_PX, 3 * COLUMN_PX)
         self.floor = np.tile(BACKDROP, (HEADER_PX + self.row_px * len(rows), width, 1))
         self.figures = np.zeros((*self.floor.shape[:2], 4))
         for number, row in enumerate(rows):
@@ -71,6 +75,17 @@ class Stage:
             reaches.append(float(positions[..., 1].max()) - self._floor(row))
         return max(reaches) + 0.09 * self.body.height
 
+    def _widest(self, rows: Sequence[Row]) -> float:
+        """How far a joint is seen beside the middle of its figure, at most, metres."""
+        widest = 0.0
+        for row in rows:
+            for one in filter(None, (row, row.behind)):
+                here = one.roots[one.chosen] * [1, 0, 1]
+                positions, _ = self.skeleton.forward_kinematics(one.poses[one.chosen], one.roots[one.chosen])
+                seen = (positions - here[:, None]) @ _view().T
+                widest = max(widest, float(np.abs(seen[..., 0]).max()))
+        return widest
+
     def _floor(self, row: Row) -> float:
         """Height of the floor, metres: where the lowest joint of most instants is."""
         positions, _ = self.skeleton.forward_kinematics(row.poses[row.chosen], row.roots[row.chosen])
@@ -81,7 +96,7 @@ class Stage:
         self.floor[rows] = _empty_stage(self.floor.shape[1], self.row_px, self.floor_px)
         floor = self._floor(row)
         for column, index in enumerate(row.chosen):
-            centre = MARGIN_PX + (column + 0.5) * COLUMN_PX
+            centre = self.margin_px + (column + 0.5) * COLUMN_PX
             self._figure(row, int(index), centre, floor, rows)
             self._trail(row, int(index), centre, floor, top)
             stamp = row.stamps[column] if row.stamps else f"{index / self.fps:.1f} s"
@@ -91,8 +106,8 @@ class Stage:
 
     def _figure(self, row: Row, index: int, centre: float, floor: float, rows: slice) -> None:
         """Lay one figure, its shadow and the ghost behind it into their layers."""
-        left = round(centre - TILE_PX / 2)
-        frame = Frame(TILE_PX, self.row_px, centre - left, self.floor_px, self.scale)
+        left = round(centre - self.tile_px / 2)
+        frame = Frame(self.tile_px, self.row_px, centre - left, self.floor_px, self.scale)
         if row.behind is not None:
             ghost = self._cones(row.behind, index, floor)
             dim = np.tile(row.behind.colour, (len(ghost.joint), 1))

@@ -190,5 +190,6 @@ def _are_alike(one: tuple[Skeleton, Looks], other: tuple[Skeleton, Looks]) -> bo
         one[0].same_joints(other[0])
         and np.array_equal(one[0].offsets, other[0].offsets)
         and one[0].ends == other[0].ends
+        and np.array_equal(one[0].standing, other[0].standing)
         and list(one[1].items()) == list(other[1].items())
     )

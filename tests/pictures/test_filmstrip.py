@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -244,3 +245,27 @@ def test_without_matplotlib_the_message_says_what_to_install(tmp_path: Path) -> 
     assert "pip install 'bunraku[pictures]'" in done.stdout
     assert "The show itself runs without it" in done.stdout
     assert not (tmp_path / "never.png").exists()
+
+
+def test_a_wide_pose_is_not_cut(tmp_path: Path) -> None:
+    """Arms stretched along the row, at both ends of it: nothing of the figure touches the picture's edge."""
+    skeleton = Skeleton(
+        ("hip", "chest", "lShldr", "lHand", "rShldr", "rHand"),
+        (-1, 0, 1, 2, 1, 4),
+        np.array([[0, 0, 0], [0, 0.5, 0], [0.2, 0, 0], [1.4, 0, 0], [-0.2, 0, 0], [-1.4, 0, 0]], float),
+    )
+    poses = np.tile(quaternion.IDENTITY, (3, 6, 1)).astype(float)
+    stage = Stage(skeleton, [Row(poses, np.zeros((3, 3)), np.arange(3))], 50.0)
+    assert stage.figures[..., 3].any()
+    assert not stage.figures[:, :4, 3].any() and not stage.figures[:, -4:, 3].any()
+
+
+def test_a_title_in_any_script_is_drawn_without_a_warning(tmp_path: Path) -> None:
+    poses, skeleton = (
+        np.tile(quaternion.IDENTITY, (4, 2, 1)).astype(float),
+        Skeleton(("hip", "head"), (-1, 0), np.array([[0, 0, 0], [0, 1.5, 0]], float)),
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        draw_filmstrip(tmp_path / "a.png", skeleton, poses, np.zeros((4, 3)), 50.0, title="文楽 רקדן")
+    assert (tmp_path / "a.png").exists()
