@@ -7,12 +7,14 @@ import numpy as np
 
 from appliance.projector.picture.looks.palette import Palette
 from appliance.projector.picture.scene import Easel, Scene
+from appliance.projector.picture.shadow import Shadow
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 
 NEAR, FAR = 180, 60  # lines of the glow's pictures
 FAR_GAIN = 2.0  # the far glow is faint
+OVERHEAD = np.array([0.0, 1.0, 0.0])  # straight below it the figure lights the floor
 
 
 class Glow:
@@ -23,6 +25,7 @@ class Glow:
         self._shrink = easel.drawing("screen", "glow_shrink")
         self._blur = easel.drawing("screen", "glow_blur")
         self._air = easel.drawing("air", "light_air")
+        self._shadow = Shadow(easel)
 
     def spread(self, picture: Target, name: str, lines: int, gain: float = 1.0) -> Target:
         """A small, soft copy of a picture, `gain` times as bright."""
@@ -51,6 +54,8 @@ class Glow:
             "far_glow": far.texture,
             "air": air.texture,
             "noise": easel.noise,
+            **self._shadow.on_floor(scene, OVERHEAD),
+            "figure_light": colours.figure,
             "heart": view.on_picture(np.array([view.ground[0], 0.5, view.ground[1]])),
             "air_colour": colours.background,
             "fog": look.fog,

@@ -38,6 +38,14 @@ class Shadow:
         seen = BODY_SHARE * depth.pixels
         self._depth.draw(easel.tally, seen, poses | {"projection": lamp_projection})
         depth.forget_depth()
+        lamps = {"lamp_depth": depth.texture, "lamp_projection": lamp_projection}
+        return lamps | self.on_floor(scene, lamp)
+
+    def on_floor(self, scene: Scene, lamp: Array) -> dict[str, Any]:
+        """Draw the floor's shadow alone."""
+        ctx, easel = self._easel.ctx, self._easel
+        root = scene.poses.positions[0, 0].astype(float)
+        poses = {"poses": easel.poses.texture, "row": 0, "holds": easel.holds.texture, "held": 0.0}
         middle = root[[0, 2]] - 0.5 * lamp[[0, 2]] / lamp[1]
         on_floor = {"lamp": lamp, "middle": middle, "reach": REACH}
         first, second = (easel.canvas(name, (CAST_SIDE, CAST_SIDE)) for name in ("cast", "cast blurred"))
@@ -48,13 +56,7 @@ class Shadow:
         ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         ctx.enable_only(moderngl.NOTHING)
         easel.blur(self._blur, first, second, (SPREAD / CAST_SIDE, SPREAD / CAST_SIDE))
-        return {
-            "lamp_depth": depth.texture,
-            "lamp_projection": lamp_projection,
-            "floor_shadow": first.texture,
-            "middle": middle,
-            "reach": REACH,
-        }
+        return {"floor_shadow": first.texture, "middle": middle, "reach": REACH}
 
 
 def _orthographic(lamp: Array, centre: Array) -> Array:
