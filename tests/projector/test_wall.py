@@ -27,7 +27,9 @@ ALIGNMENTS = {
     "all": Alignment(PINNED, True, 1.4),
 }
 MOST_GPU_BYTES = 25e6
-MOST_PI4_MS = 16.0  # of the GPU, less than a picture of 60 Hz; the processor's share comes before it and is not counted here
+MOST_PI4_MS = (
+    16.0  # of the GPU, less than a picture of 60 Hz lasts; the processor's share is not counted here
+)
 
 
 @pytest.mark.parametrize("name", ALIGNMENTS)

@@ -40,9 +40,16 @@ class Glow:
         return first
 
     def finish(
-        self, scene: Scene, look: LookConfig, colours: Palette, picture: Target, opacity: float, wall: Wall
+        self,
+        scene: Scene,
+        look: LookConfig,
+        colours: Palette,
+        picture: Target,
+        opacity: float,
+        wall: Wall,
+        mirror: float = 1.0,
     ) -> None:
-        """Lay the picture with its glow onto the wall."""
+        """Lay the picture with its glow onto the wall; mirror: how clear the floor mirrors it, dull as it is."""
         easel, view = self._easel, scene.view
         near = self.spread(picture, "near glow", NEAR)
         far = self.spread(near, "far glow", FAR, FAR_GAIN)
@@ -55,7 +62,8 @@ class Glow:
             "air": air.texture,
             "noise": easel.noise,
             **self._shadow.on_floor(scene, OVERHEAD),
-            "figure_light": colours.figure,
+            "figure_light": look.shadow * colours.figure,
+            "mirror": mirror * look.shadow,
             "heart": view.on_picture(np.array([view.ground[0], 0.5, view.ground[1]])),
             "air_colour": colours.background,
             "fog": look.fog,

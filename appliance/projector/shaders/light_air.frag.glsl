@@ -11,6 +11,7 @@ uniform sampler2D floor_shadow;
 uniform vec2 middle;
 uniform float reach;
 uniform vec3 figure_light;
+uniform float mirror;
 uniform mat3 axes;
 uniform vec2 slopes;
 uniform vec3 air_colour;
@@ -52,7 +53,7 @@ void main() {
     if (ray.y < -1e-3) {
         vec3 at = eye - ray * (eye.y / ray.y);
         float worn = 0.7 + 0.6 * texture(noise, at.xz * 0.4).r;
-        reflected = worn * (2.0 * mirrored(at) + 0.3 * figure_light * lit_below(at.xz));
+        reflected = worn * (2.5 * mirror * mirrored(at) + 0.38 * figure_light * lit_below(at.xz));
         vec2 off = at.xz - ground;
         on_floor = exp(-dot(off, off) * 2.4);
     }

@@ -45,7 +45,7 @@ class Lines:
             if share > 0:
                 self._figure(scene, look, colours, picture, side, share)
         picture.forget_depth()
-        self._glow.finish(scene, look, colours, picture, opacity, wall)
+        self._glow.finish(scene, look, colours, picture, opacity, wall, mirror=0.0)
 
     def _figure(
         self, scene: Scene, look: LookConfig, colours: Palette, picture: Target, side: float, share: float
