@@ -49,7 +49,7 @@ class Glow:
         wall: Wall,
         mirror: float = 1.0,
     ) -> None:
-        """Lay the picture with its glow onto the wall; mirror: how clear the floor mirrors it, dull as it is."""
+        """Lay the picture with its glow onto the wall; mirror: how clear the floor mirrors it."""
         easel, view = self._easel, scene.view
         near = self.spread(picture, "near glow", NEAR)
         far = self.spread(near, "far glow", FAR, FAR_GAIN)
