@@ -26,7 +26,9 @@ STARTS_WITHIN_S = 60.0
 ENDS_WITHIN_S = 10.0
 FRAME = b"/bunraku/frame\0"
 PRIORITY = 50  # below the box's: the receiver's clock readings matter, the box's ticks matter more
-PORTS = range(20000, 32000)  # below Linux' net.ipv4.ip_local_port_range
+# Below Linux' net.ipv4.ip_local_port_range; FIRST:STEP is this process's share of them, beside others.
+_FIRST, _STEP = map(int, os.environ.get("BUNRAKU_PORTS", "0:1").split(":"))
+PORTS = range(20000, 32000)[_FIRST::_STEP]
 _CHANCE = random.SystemRandom()  # unseeded, so that two runs at once choose different ports
 STEP_EVERY_S = 0.6
 STEP_DEGREES = 40.0

@@ -43,8 +43,9 @@ def pytest_configure(config: pytest.Config) -> None:
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
             os.environ.setdefault(name, "1")
         # Its own share of the ports, so that no other worker takes one between choice and use.
-        share = slice(int(worker.removeprefix("gw")), None, int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))
-        hw_sim.peers.PORTS = hw_sim.peers.PORTS[share]
+        first, step = int(worker.removeprefix("gw")), int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+        hw_sim.peers.PORTS = hw_sim.peers.PORTS[first::step]
+        os.environ["BUNRAKU_PORTS"] = f"{first}:{step}"  # for the processes that it starts
 
 
 @pytest.hookimpl(optionalhook=True)

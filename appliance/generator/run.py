@@ -186,8 +186,8 @@ def run_generator(directory: Path | None, box_file: Path | None) -> None:
     Raises ConfigError for a show or box file that is broken, RuntimeFolderError without a place to meet.
     """
     box = load_box(box_file)
-    if os.nice(0) == 0:
-        os.nice(_NICE)  # the dance goes first
+    with contextlib.suppress(OSError):  # the dance goes first; an installed box sets it by the unit
+        os.setpriority(os.PRIO_PROCESS, 0, max(_NICE, os.getpriority(os.PRIO_PROCESS, 0)))
     with stop_signals() as stopped, ExitStack() as opened:
         speaker = LogWriter()
         opened.callback(speaker.close)

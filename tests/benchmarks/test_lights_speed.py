@@ -70,4 +70,5 @@ def _frame(skeleton: Skeleton, number: int) -> SeenFrame:
     root = np.array([np.sin(number / 30), 0.9, np.cos(number / 30)], np.float32)
     positions, world = skeleton.forward_kinematics(pose, root)
     seconds = number * 0.02
-    return SeenFrame(number, seconds, seconds, False, -1, 0.0, pose, world, positions, root)
+    holds = np.zeros(len(positions), np.float32)
+    return SeenFrame(number, seconds, seconds, False, -1, 0.0, pose, world, positions, root, holds)

@@ -66,7 +66,7 @@ def test_the_simulation_imports_and_the_other_sensors_work_without_the_library(t
         "import hw_sim.commands; from hw_sim.__main__ import main;"
         f"main(['emulate', '--keys', {str(tmp_path / 'k')!r}, '--seconds', '0.1', *sys.argv[1:]])"
     )
-    for options, status in (([], 0), (["--firmware"], 2)):
+    for options, status in (([], 1), (["--firmware"], 2)):
         command = [sys.executable, "-c", "import sys;" + script, *options]
         ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
         assert ended.returncode == status, ended.stderr

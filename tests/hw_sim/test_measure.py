@@ -73,7 +73,7 @@ def test_a_show_that_does_not_dance_is_refused_with_the_box_s_own_words(tmp_path
     (show / "puppet.onnx").write_text("nonsense")
     done = measure("--show", str(show), "--seconds", "4")
     assert done.returncode == 2
-    assert "cannot read this network" in done.stderr
+    assert "This show cannot be danced" in done.stderr and "puppet.onnx" in done.stderr
 
 
 def test_a_box_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
