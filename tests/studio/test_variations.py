@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import random
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from appliance.dancer.material.cyclic import hann_mean
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
 from appliance.studio.evaluation.coders import load_checkpoint
@@ -166,3 +168,15 @@ def test_what_cannot_be_varied_is_named(
 def test_a_phrase_or_free_is_asked_for(model: Path, tmp_path: Path) -> None:
     result = bunraku("vary", "--model", model / "checkpoint.pt", "--out", tmp_path)
     assert result.exit_code == 2 and "PHRASE" in result.stderr
+
+
+def test_windows_of_a_spin_join_whatever_their_signs(chance: random.Random) -> None:
+    """A joint that turns five times a second, decoded with either sign: blended it turns as evenly."""
+    length, hop, count = 32, 8, 20
+    ticks = (count - 1) * hop + length
+    spin = quaternion.from_axis_angle([0, 1, 0], 2 * np.pi * 5 / 50 * np.arange(ticks))[:, None]
+    starts = np.arange(count) * hop
+    windows = np.stack([chance.choice((-1, 1)) * spin[start : start + length] for start in starts])
+    danced = hann_mean(variations.aligned_windows(windows, starts, ticks), starts, ticks)
+    steps = np.degrees(quaternion.angle_between(danced[1:], danced[:-1]))
+    np.testing.assert_allclose(steps, 36.0, atol=0.1)

@@ -18,9 +18,15 @@ from appliance.studio.evaluation.coders import Poses
 
 
 @torch.no_grad()
-def decoded(autoencoder: Autoencoder, path: Latents, facing: Array | None = None) -> Poses:
-    """Latents (W, Z) -> windows (W, T, M, 4); facing: (W, 4), left out: ahead."""
-    windows = autoencoder.decode(torch.from_numpy(path))
+def decoded(
+    autoencoder: Autoencoder, path: Latents, facing: Array | None = None, is_raw: bool = False
+) -> Poses:
+    """Latents (W, Z) -> windows (W, T, M, 4); facing: (W, 4), left out: ahead.
+
+    is_raw: quaternions as the network gives them, the longer the more certain it is.
+    """
+    decode = autoencoder.decode_raw if is_raw else autoencoder.decode
+    windows = decode(torch.from_numpy(path))
     if facing is not None:
         windows = autoencoder.with_heading(windows, torch.from_numpy(facing.astype(np.float32)))
     made: Poses = windows.numpy()

@@ -1,7 +1,8 @@
 """Variations: a phrase's latents moved, mixed with another's, or sampled, and decoded into motion.
 
 A phrase longer than the model's window is covered by overlapping windows, all moved by the same noise, and
-blended by Hann weights and SLERP.
+blended by Hann weights and by how certain the network is of each rotation: in a fast spin windows contradict
+each other.
 """
 
 from __future__ import annotations
@@ -11,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from appliance.dancer.material import latent_paths
+from appliance.dancer.material.cyclic import Starts, hann_mean
 from appliance.dancer.material.latent_paths import Latents
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.granular.granular import decoded, encoded, to_the_end
+from appliance.studio.granular.granular import decoded, encoded
 from appliance.studio.studio_error import StudioError
 
 OVERLAP = 4  # windows that know a pose
@@ -73,4 +75,17 @@ def hop_of(autoencoder: Autoencoder) -> int:
 
 
 def _danced(autoencoder: Autoencoder, phrase: EncodedPhrase, path: Latents) -> Poses:
-    return to_the_end(decoded(autoencoder, path, phrase.facing[: len(path)]), hop_of(autoencoder))
+    hop = hop_of(autoencoder)
+    windows = decoded(autoencoder, path, phrase.facing[: len(path)], is_raw=True)
+    starts, ticks = np.arange(len(windows)) * hop, (len(windows) - 1) * hop + windows.shape[1]
+    return hann_mean(aligned_windows(quaternion.continuous(windows, axis=1), starts, ticks), starts, ticks)
+
+
+def aligned_windows(windows: Array, starts: Starts, ticks: int) -> Poses:
+    """Windows (W, T, M, 4) at these starts, each joint's sign as in those before, where they overlap."""
+    total = np.zeros((ticks, *windows.shape[2:]))
+    for window, start in zip(windows, starts, strict=True):
+        before = total[start : start + len(window)]
+        window[:, np.sum(before * window, axis=(0, -1)) < 0] *= -1
+        before += window
+    return windows.astype(np.float32)
