@@ -30,6 +30,12 @@ def spare_the_collector() -> None:
     gc.disable()
 
 
+def give_way(niceness: int) -> None:
+    """The dance goes first, also without real-time rights; an installed box says so in the process's unit."""
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, max(niceness, os.getpriority(os.PRIO_PROCESS, 0)))
+
+
 def enter_realtime(priority: int) -> tuple[str, ...]:
     """Give the calling thread real-time settings; returns, in words, what could not be had. Never raises.
 

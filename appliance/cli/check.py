@@ -24,8 +24,6 @@ from appliance.show.bundle import (
 from appliance.show.check import not_as_packed, verify_bundle
 from appliance.show.config_error import ConfigError
 from appliance.show.cues import too_much
-from appliance.show.osc import osc_misfits
-from appliance.show.posistagenet import misfits
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import misplaced, unwired
 from appliance.stage.admission import Admission
@@ -133,12 +131,7 @@ def _refuse_motion_networks(show: Show) -> None:
 
 def _refuse_misfits(show: Show, box: BoxConfig) -> None:
     """Raises ConfigError where the box file names joints or fixtures that do not fit this show."""
-    names = show.skeleton.names
-    problems = [
-        *misfits(box.outputs.posistagenet, names, box.file),
-        *osc_misfits(box.outputs.osc, names, box.file),
-        *misplaced(show, box),
-    ]
+    problems = [*box.output_misfits(show.skeleton.names), *misplaced(show, box)]
     if problems:
         raise ConfigError(problems)
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from appliance.box.clock import TICK_S
@@ -18,6 +17,7 @@ from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions, rea
 from appliance.pose.recording import Recording
 from appliance.projector.projector_error import ProjectorError
 from appliance.recorder.reading import read_journal
+from appliance.recorder.record import holds_of
 from appliance.show.look import looks_by_name
 from appliance.show.show import load_show
 from appliance.stage.stage_error import StageError
@@ -77,13 +77,9 @@ def load_dance(source: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> Reco
             print(f"{source.name}: {guess.sentence()}.", file=sys.stderr)
         return RecordedDance(recording, None, source.stem)
     journal = read_journal(source)
-    held = [journal.skeleton.index(hand["joint"]) for hand in journal.header["hands"]]
     ticks = journal.ticks
-    holds = np.zeros(ticks["pose"].shape[:2], np.float32)
-    holds[:, held] = ticks["weights"]
-    return RecordedDance(
-        Recording(journal.skeleton, ticks["pose"], ticks["root"], 1.0 / TICK_S), holds, source.stem
-    )
+    danced = Recording(journal.skeleton, ticks["pose"], ticks["root"], 1.0 / TICK_S)
+    return RecordedDance(danced, holds_of(journal.header, ticks), source.stem)
 
 
 def draw_dance(dance: RecordedDance, out: Path) -> Path:

@@ -14,7 +14,7 @@ _FRESH_S = 10.0
 
 
 class About:
-    """Read at most once in 10 s, whoever asks. options: which box is meant, as a command line has it."""
+    """Reads at most once in 10 s, however many browsers ask. options: the command's, which name the box."""
 
     def __init__(self, options: tuple[str, ...]) -> None:
         self._options = options

@@ -20,7 +20,7 @@ _ENDINGS = {"bvh": "text/plain", "glb": "model/gltf-binary"}
 
 
 class Happened:
-    """One reader at a time, whoever asks: a browser can take no processor from the dance by asking often.
+    """Runs one reader at a time: browsers that ask often take no processor from the dance.
 
     journal: its folder; None: this box keeps none.
     """

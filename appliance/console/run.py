@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import os
 import signal
 import socket
 import time
@@ -15,6 +13,7 @@ from aiohttp import web
 from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealth, ProcessHealthWriter
+from appliance.box.realtime import give_way
 from appliance.console.about import About
 from appliance.console.box_view import BoxView
 from appliance.console.desk import Desk
@@ -30,15 +29,14 @@ TICK_S = 0.02
 _REFRESH_S = 1.0
 _PULSE_S = 0.1
 _IDLE_S = 0.2  # how often the stage is looked for while no browser shows the dance
-_NICER = 10  # the dance goes first, also without real-time rights
+_NICER = 10
 _LAST_REQUESTS_S = 0.5
 _WAITING_CONNECTIONS = 64
 
 
 def run_console(settings: Settings) -> int:
     """Serve the page until SIGTERM or Ctrl-C; the exit status. Raises OSError where it has no place."""
-    with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, 0, max(_NICER, os.getpriority(os.PRIO_PROCESS, 0)))
+    give_way(_NICER)
     return asyncio.run(_serve(settings))
 
 

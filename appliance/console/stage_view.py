@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import struct
 from pathlib import Path
 from typing import Any, Literal
 
 from appliance.box.ring_file import RingFileReader
 from appliance.outputs.frame_layout import (
+    BROWSER_HEAD,
     FACTS,
     FILE,
     FORMAT,
@@ -21,8 +21,6 @@ from appliance.outputs.frame_layout import (
 )
 from appliance.pose.foreign_file import plain_json
 
-# Tick, flags, joints; then world rotations (w, x, y, z), positions and holds, float32.
-FRAME = struct.Struct("<dII")
 STALE_S = 0.5
 _LOOK_S = 0.1
 
@@ -55,7 +53,7 @@ class StageView:
         if len(payload) != self._layout.bytes:
             return None
         tick, self._frame_time, _, _, _, flags, joints = FRAME_HEAD.unpack_from(payload)
-        return FRAME.pack(tick, flags & LATE, joints) + payload[self._layout.world_at :]
+        return BROWSER_HEAD.pack(tick, flags & LATE, joints) + payload[self._layout.world_at :]
 
     def state(self, now: float) -> Literal["absent", "fresh", "stale"]:
         """stale: its newest frame is older than half a second, or it died."""

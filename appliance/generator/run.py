@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import math
-import os
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -17,6 +16,7 @@ from appliance.box.log_writer import LogWriter
 from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionWriter
 from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealthWriter
+from appliance.box.realtime import give_way
 from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
 from appliance.box.stop_signals import stop_signals
@@ -186,8 +186,7 @@ def run_generator(directory: Path | None, box_file: Path | None) -> None:
     Raises ConfigError for a show or box file that is broken, RuntimeFolderError without a place to meet.
     """
     box = load_box(box_file)
-    with contextlib.suppress(OSError):  # the dance goes first; an installed box sets it by the unit
-        os.setpriority(os.PRIO_PROCESS, 0, max(_NICE, os.getpriority(os.PRIO_PROCESS, 0)))
+    give_way(_NICE)
     with stop_signals() as stopped, ExitStack() as opened:
         speaker = LogWriter()
         opened.callback(speaker.close)

@@ -11,6 +11,8 @@ HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
 LATE = 1  # flag
 # Tick, frame time, when it left the stage, the sensor's sequence and its arrival, flags, joints.
 FRAME_HEAD = struct.Struct("<qddqdII")
+# For browsers: tick, flags, joints; then world rotations (w, x, y, z), positions and holds, float32.
+BROWSER_HEAD = struct.Struct("<dII")
 
 
 class FrameLayout:

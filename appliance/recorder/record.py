@@ -120,6 +120,14 @@ def layout_of(facts: dict[str, Any]) -> np.dtype[np.void]:
     return np.dtype([(name, form, tuple(shape)) for name, form, shape in facts["record"]])
 
 
+def holds_of(header: dict[str, Any], ticks: np.ndarray[Any, np.dtype[np.void]]) -> np.ndarray:
+    """(N, J): how firmly a hand held each joint in ticks (N,) of a run with these facts, 0 to 1."""
+    skeleton = skeleton_of(header)
+    holds = np.zeros((len(ticks), len(skeleton)), np.float32)
+    holds[:, [skeleton.index(hand["joint"]) for hand in header["hands"]]] = ticks["weights"]
+    return holds
+
+
 def skeleton_of(facts: dict[str, Any]) -> Skeleton:
     """The figure that danced."""
     return Skeleton(

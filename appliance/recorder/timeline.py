@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from appliance.outputs.frame_layout import BROWSER_HEAD
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import Run
-from appliance.recorder.record import LATE, NOT_FINITE
+from appliance.recorder.record import LATE, NOT_FINITE, holds_of
 
 MOST_BINS, MOST_EVENTS = 240, 400
 EVERY = 2  # ticks from one frame of a stretch to the next
-_HEAD = struct.Struct("<dII")  # tick, flags, joints: as console/stage_view.py sends the live dance
 
 
 def timeline(number: int, run: Run) -> dict[str, Any]:
@@ -84,10 +84,10 @@ def stretch(run: Run, start_s: float, seconds: float) -> Iterator[bytes]:
     }
     text = json.dumps(facts).encode()
     yield struct.pack("<I", len(text)) + text
-    held = [skeleton.index(hand["joint"]) for hand in run.header["hands"]]
-    for row in ticks[chosen]:
-        positions, world = skeleton.forward_kinematics(row["pose"], row["root"])
-        holds = np.zeros(len(skeleton), np.float32)
-        holds[held] = row["weights"]
-        head = _HEAD.pack(row["tick"], int(row["flags"]) & LATE, len(skeleton))
-        yield head + b"".join(part.astype("<f4").tobytes() for part in (world, positions, holds))
+    part = ticks[chosen]
+    positions, world = skeleton.forward_kinematics(part["pose"], part["root"])
+    holds = holds_of(run.header, part)
+    for place, tick in enumerate(part):
+        head = BROWSER_HEAD.pack(tick["tick"], int(tick["flags"]) & LATE, len(skeleton))
+        arrays = (world[place], positions[place], holds[place])
+        yield head + b"".join(array.astype("<f4").tobytes() for array in arrays)

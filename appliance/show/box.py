@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 from pydantic import PrivateAttr, field_validator, model_validator
 
+from appliance.show.config_error import Problem
 from appliance.show.console import ConsoleConfig
 from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
 from appliance.show.lights import VenueLightsConfig
-from appliance.show.osc import OscConfig
-from appliance.show.posistagenet import PosiStageNetConfig
+from appliance.show.osc import OscConfig, osc_misfits
+from appliance.show.posistagenet import PosiStageNetConfig, misfits
 from appliance.show.projector import ProjectorConfig
 from appliance.show.section import Ipv4, LocalFile, Section, key, part, refusal, refuse_repeats
 from appliance.show.sound import SoundConfig
@@ -161,6 +163,14 @@ class BoxConfig(Section):
                 at=("control", "port"),
             )
         return self
+
+    def output_misfits(self, joints: Sequence[str]) -> list[Problem]:
+        """Where its outputs do not fit a skeleton with these joints."""
+        outputs = self.outputs
+        return [
+            *misfits(outputs.posistagenet, joints, self.file),
+            *osc_misfits(outputs.osc, joints, self.file),
+        ]
 
     @property
     def file(self) -> YamlFile:

@@ -7,9 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from appliance.show.config_error import Problem, did_you_mean
-from appliance.show.section import Axes, Ipv4, Section, each_axis_once, key, refusal, refuse_repeats
-from appliance.show.yaml_file import Location, YamlFile
+from appliance.show.config_error import Problem
+from appliance.show.posistagenet import unknown_joints
+from appliance.show.section import Axes, Ipv4, Section, key, refusal, refuse_repeats
+from appliance.show.yaml_file import YamlFile
 
 Dialect = Literal["ai-toolbox", "joint", "vmc", "features"]
 Message = Literal["pos_local", "pos_world", "rot_local", "rot_world"]
@@ -81,11 +82,6 @@ class OscConfig(Section):
         refuse_repeats(names, "'{value}' stands here twice.", "Remove one.")
         return names
 
-    @field_validator("axes")
-    @classmethod
-    def _each_axis_once(cls, axes: Axes) -> Axes:
-        return each_axis_once(axes)
-
     @model_validator(mode="after")
     def _keys_of_its_dialect(self) -> OscConfig:
         if self.dialect != "ai-toolbox":
@@ -105,11 +101,8 @@ class OscConfig(Section):
 
 def osc_misfits(receivers: Sequence[OscConfig], joints: Sequence[str], file: YamlFile) -> list[Problem]:
     """Joints that a skeleton with these `joints` does not have; file: the box file of the receivers."""
-    problems = []
-    for place, receiver in enumerate(receivers):
-        for number, joint in enumerate(receiver.joints):
-            if joint not in joints:
-                here: Location = ("outputs", "osc", place, "joints", number)
-                message = f"The show's skeleton has no joint '{joint}'."
-                problems.append(file.problem(here, message, did_you_mean(joint, joints)))
-    return problems
+    return [
+        problem
+        for place, receiver in enumerate(receivers)
+        for problem in unknown_joints(receiver.joints, joints, ("outputs", "osc", place), file)
+    ]

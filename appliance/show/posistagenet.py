@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from appliance.show.config_error import Problem, did_you_mean
-from appliance.show.section import Axes, Ipv4, Section, each_axis_once, key, refuse_repeats
+from appliance.show.section import Axes, Ipv4, Section, key, refuse_repeats
 from appliance.show.yaml_file import Location, YamlFile
 
 LAST_TRACKER = 65535
@@ -54,21 +54,25 @@ class PosiStageNetConfig(Section):
         refuse_repeats(joints, "The joint '{value}' stands here twice.", "Remove one.")
         return joints
 
-    @field_validator("axes")
-    @classmethod
-    def _each_axis_once(cls, axes: Axes) -> Axes:
-        return each_axis_once(axes)
+
+def unknown_joints(
+    named: Sequence[str], joints: Sequence[str], here: Location, file: YamlFile
+) -> list[Problem]:
+    """Of the joints that an output names under `joints`, those that a skeleton with `joints` lacks."""
+    problems = []
+    for number, joint in enumerate(named):
+        if joint not in joints:
+            message = f"The show's skeleton has no joint '{joint}'."
+            problems.append(file.problem((*here, "joints", number), message, did_you_mean(joint, joints)))
+    return problems
 
 
 def misfits(outputs: Sequence[PosiStageNetConfig], joints: Sequence[str], file: YamlFile) -> list[Problem]:
     """What does not fit a skeleton with these joints; file: the box file that the outputs stand in."""
-    problems = []
+    problems: list[Problem] = []
     for place, output in enumerate(outputs):
         here: Location = ("outputs", "posistagenet", place)
-        for number, joint in enumerate(output.joints):
-            if joint not in joints:
-                message = f"The show's skeleton has no joint '{joint}'."
-                problems.append(file.problem((*here, "joints", number), message, did_you_mean(joint, joints)))
+        problems += unknown_joints(output.joints, joints, here, file)
         last = output.first_tracker + len(output.joints or joints) - 1
         if last > LAST_TRACKER:
             message = f"Trackers are numbered up to {LAST_TRACKER}, and these would end at {last}."

@@ -114,14 +114,15 @@ def _axis(axis: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 Direction = Literal["x", "-x", "y", "-y", "z", "-z"]
-Axes = Annotated[tuple[Direction, Direction, Direction], Field(strict=False)]
 
 
-def each_axis_once(axes: Axes) -> Axes:
-    """The receiver's axes, of which each of the box's is one."""
+def _each_axis_once(axes: tuple[Direction, Direction, Direction]) -> tuple[Direction, Direction, Direction]:
     if sorted(axis[-1] for axis in axes) != ["x", "y", "z"]:
         raise refusal("Each of x, y and z is needed once.", "Write for instance [x, -z, y].")
     return axes
+
+
+Axes = Annotated[tuple[Direction, Direction, Direction], Field(strict=False), AfterValidator(_each_axis_once)]
 
 
 def _ipv4(host: str) -> str:

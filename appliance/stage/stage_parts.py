@@ -33,8 +33,6 @@ from appliance.sensor.neutral import Mounting
 from appliance.sensor.state import restored_reading
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import ConfigError
-from appliance.show.osc import osc_misfits
-from appliance.show.posistagenet import misfits
 from appliance.show.show import Show
 from appliance.show.sources import LIVE
 from appliance.stage.admission import Admission, admit
@@ -284,11 +282,7 @@ def _phrase(show: Show, path: Path, preparations: PhraseCache) -> tuple[Recordin
 
 
 def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:
-    names = show.skeleton.names
-    problems = [
-        *misfits(box.outputs.posistagenet, names, box.file),
-        *osc_misfits(box.outputs.osc, names, box.file),
-    ]
+    problems = box.output_misfits(show.skeleton.names)
     if problems:
         raise ConfigError(problems)
     return Outputs(box.outputs, show.skeleton)

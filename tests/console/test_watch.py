@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 from aiohttp import ClientSession, ClientWebSocketResponse, WSMsgType
 
-from appliance.console.stage_view import FRAME
 from appliance.console.watchers import LONGEST_MESSAGE, MOST
+from appliance.outputs.frame_layout import BROWSER_HEAD
 from appliance.outputs.frame_reader import FrameReader
 from hw_sim.peers import HOST
 from tests.bundles import write_show
@@ -68,8 +68,8 @@ def test_a_browser_gets_the_pose_that_leaves_the_box(venue: tuple[Box, Page]) ->
             until = time.monotonic() + PATIENCE_S
             while equal < 20 and time.monotonic() < until:
                 frame = await next_frame(browser)
-                tick, _, joints = FRAME.unpack_from(frame)
-                numbers = np.frombuffer(frame, "<f4", -1, FRAME.size)
+                tick, _, joints = BROWSER_HEAD.unpack_from(frame)
+                numbers = np.frombuffer(frame, "<f4", -1, BROWSER_HEAD.size)
                 assert len(numbers) == 8 * joints
                 for seen in reader.frames(10, time.monotonic()):
                     if seen.tick == tick:
