@@ -42,7 +42,7 @@ def draw(out: Path) -> None:
 def _strip(out: Path, setting: str) -> Path:
     show = load_show(default_show_path())
     parts = assemble(show, BOX)
-    springs = parts.springs
+    springs = parts.first.springs
     if springs is None:
         raise SystemExit("The default show has no springs among its hands.")
     springs.settings, springs.enabled = {one.name: one for one in built_in()}, bool(setting)

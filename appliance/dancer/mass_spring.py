@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from appliance.dancer.slow_strings import SlowStrings
 
 Vectors = NDArray[np.float64]  # (N, 3), world frame
 
 SUBSTEPS = 10
 SUBSTEP_S = 0.02 / SUBSTEPS
 FASTEST_M_S = 30.0
+# How far a bone may be stretched beyond its rest vector's length when a tick begins. Bounding velocities alone can
+# feed a stretched spring: symplectic Euler keeps an energy with a term of position times velocity.
+STRETCHED_M = 3.0
 # A substep is stable while the frequency of the stiffest mode is below 2 / SUBSTEP_S. By Gershgorin's theorem
 # a mass at the end of several bones is safe when the stiffness of each is below this share of mass / bones.
 _STABLE = 0.5
@@ -27,6 +33,7 @@ class MassSpring:
     parent gets their opposites, so that no momentum arises. Damping draws its velocity towards that of the
     flow around it. Semi-implicit (symplectic) Euler, the damping integrated exactly.
 
+    carried (N,): newtons a metre that each bone's springs may have.
     positions, velocities (N, 3): metres, metres a second, world frame. rest (N, 3): rest vectors, metres.
     """
 
@@ -39,6 +46,7 @@ class MassSpring:
         self._bones_of[0, 0] = 0.0
         for node, parent in enumerate(parents[1:], 1):
             self._bones_of[node, parent] = -1.0
+        self._nodes_of = np.linalg.inv(self._bones_of + np.diag(np.eye(count)[0]))  # and back, the first as it is
         self._bones, self._push, self._drift = np.empty((3, count, 3))
         self._squares, self._pull = np.empty((2, count, 1))
         self.set_parameters(*(np.full(count, value) for value in (1.0, 1000.0, 100.0, 1.0)))
@@ -53,6 +61,7 @@ class MassSpring:
         if self._anchored:
             carried[0] = np.inf
         most = np.minimum(carried, carried[np.maximum(self._parents, 0)])
+        self.carried = np.minimum(most, 1e9)
         wanted = np.asarray(stiffness, float) + np.asarray(directional, float)
         share = np.minimum(1.0, most / np.maximum(wanted, 1e-9))
         self.stiffness, self.directional = stiffness * share, directional * share
@@ -68,9 +77,12 @@ class MassSpring:
         self.positions[:] = positions
         self.velocities[:] = 0.0
 
-    def step(self, anchor: Vectors, flow: Vectors, acceleration: Vectors) -> None:
+    def step(
+        self, anchor: Vectors, flow: Vectors, acceleration: Vectors, strings: SlowStrings | None = None
+    ) -> None:
         """One tick of 20 ms: the anchor moves evenly to (3,); flow (N, 3): velocity of what surrounds each
         mass, metres a second; acceleration (N, 3) or (3,): of gravity. `rest` is in force the whole tick.
+        strings: those that the bones draw, and that pull them back.
         """
         positions, moves, bones = self.positions, self.velocities, self._bones
         lengths = np.sqrt(np.einsum("nk,nk->n", self.rest, self.rest))[:, None]
@@ -80,6 +92,7 @@ class MassSpring:
         if self._anchored:
             self._drift[0] = 0.0
             moves[0] = (anchor - positions[0]) / (SUBSTEPS * SUBSTEP_S)
+        self._bound_stretch(lengths)
         np.maximum(moves, -FASTEST_M_S, out=moves)
         np.minimum(moves, FASTEST_M_S, out=moves)
         np.multiply(moves, SUBSTEP_S, out=moves)  # metres a substep: spares an operation in each
@@ -97,8 +110,26 @@ class MassSpring:
             np.multiply(moves, self._kept, out=moves)
             np.add(moves, self._push, out=moves)
             np.add(moves, self._drift, out=moves)
+            if strings is not None:
+                np.matmul(self._pushes, strings.pull(), out=self._push)
+                np.add(moves, self._push, out=moves)
+                np.matmul(self._bones_of, moves, out=bones)
+                strings.follow(bones)
             np.add(positions, moves, out=positions)
+        if strings is not None:
+            strings.bound()
         np.divide(moves, SUBSTEP_S, out=moves)
+
+    def _bound_stretch(self, lengths: NDArray[np.float64]) -> None:
+        """Shortens bones that are stretched by more than STRETCHED_M; what hangs on them comes along."""
+        np.matmul(self._bones_of, self.positions, out=self._bones)
+        lasting = lengths + STRETCHED_M
+        squares = np.einsum("nk,nk->n", self._bones, self._bones)[:, None]
+        if np.all(squares <= lasting**2):
+            return
+        self._bones *= np.minimum(1.0, lasting / np.sqrt(np.maximum(squares, _SHORTEST_M2)))
+        self._bones[0] = self.positions[0]
+        np.matmul(self._nodes_of, self._bones, out=self.positions)
 
     def energy(self, gravity: Vectors | None = None) -> float:
         """Joules: of motion, of both kinds of springs, and in a field of gravity (3,), metres a second^2."""

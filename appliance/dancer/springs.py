@@ -10,15 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.dancer.forward_kinematics import Figure
-from appliance.dancer.mass_spring import FASTEST_M_S, MassSpring, Vectors
+from appliance.dancer.glide import TICK_S
+from appliance.dancer.mass_spring import FASTEST_M_S, SUBSTEP_S, MassSpring, Vectors
 from appliance.dancer.puppeteers import Puppeteer, WornSensor
 from appliance.dancer.slerp import FloatArray
+from appliance.dancer.slow_strings import SlowStrings
+from appliance.dancer.springs_parameters import SpringsParameters
 from appliance.pose import quaternion
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.skeleton import Skeleton
+from appliance.show.sound import StringsConfig
 from appliance.show.springs import Region, SpringsConfig
 
-TICK_S = 0.02
 JUMP_M = 0.25  # an anchor that moves further in a tick has jumped: the masses are carried along
 FARTHEST = 2.0  # times the body's reach that a mass may be from the anchor, along each axis
 _FASTEST_PHRASE_M_S = 10.0
@@ -38,8 +41,8 @@ class Springs(Puppeteer):
     to 5 m/s. What is held are joints with a bone below them; joints at the ends are masses only.
 
     regions: of each mass, and of the bone that leads to it. joints: those that are held; orientations
-    (len(joints), 4): local, written by each pull. setting: the name in force; wind (3,) m/s and gravity
-    m/s^2 stay until another setting is called up.
+    (len(joints), 4): local, written by each pull. setting: the name in force; what `turn` turns stays until
+    another setting is called up. With feedback, strings that the bones draw pull them back.
     """
 
     def __init__(
@@ -52,9 +55,12 @@ class Springs(Puppeteer):
         setting: str,
         weight: float = 1.0,
         others: Sequence[Puppeteer] = (),
+        strings: StringsConfig | None = None,
     ) -> None:
         """figure: stands in the puppet's last pose at each pull; moving: joints that the network moves;
-        others: the show's other hands. Raises ValueError where nothing hangs below the joint."""
+        others: the show's other hands; strings: the show's.
+
+        Raises ValueError where nothing hangs below the joint."""
         super().__init__(joint, weight)
         self.settings, self._puppet, self._phrase = settings, figure, Figure(skeleton)
         below = skeleton.descendants(skeleton.index(joint))
@@ -62,7 +68,9 @@ class Springs(Puppeteer):
         parents = [_nearest(skeleton, place, nodes) for place in nodes]
         self._nodes: NDArray[np.intp] = np.array(nodes)
         self.regions = tuple(_regions(skeleton, nodes, parents))
+        self._is = SpringsParameters(self.regions)
         self._body = MassSpring(parents)
+        self._strings = SlowStrings(skeleton, nodes, strings or StringsConfig(), SUBSTEP_S)
         self._bones_of = np.eye(len(nodes)) - np.eye(len(nodes))[np.maximum(parents, 0)]
 
         taken = [other.joint for other in others]
@@ -88,16 +96,36 @@ class Springs(Puppeteer):
         self._pose: FloatArray = np.tile(quaternion.IDENTITY, (len(skeleton), 1))
         self._root: FloatArray = np.zeros(3, np.float32)
         self._pulls, self._begun = 0, False
-        self.wind, self.gravity = np.zeros(3), 0.0
         self.call(setting, kicks=False)
 
-    def call(self, name: str, kicks: bool = True) -> None:
-        """Put a setting in force. Raises KeyError for one that there is not."""
-        self.setting, self._is_of = name, self.settings[name]
-        self.wind[:], self.gravity = self._is_of.wind, self._is_of.gravity
+    @property
+    def wind(self) -> Vectors:
+        """(3,) m/s, without the storm."""
+        return self._is.wind
+
+    @property
+    def gravity(self) -> float:
+        """Downwards, m/s^2."""
+        return self._is.gravity
+
+    @property
+    def feedback(self) -> float:
+        """0..1: how strongly strings pull their bones back now."""
+        return self._is.feedback
+
+    def call(self, name: str, seconds: float = 0.0, kicks: bool = True) -> None:
+        """Go over to a setting in these seconds. Raises KeyError for one that there is not."""
+        self.setting = name
+        self._is.call(self.settings[name], seconds)
         self._apply()
         if kicks:
-            self.kick(self._is_of.kick)
+            self.kick(self.settings[name].kick)
+
+    def turn(self, knob: str, values: Sequence[float], seconds: float = 0.0) -> None:
+        """Turn one of springs_parameters.KNOBS: wind (x, y, z m/s), gravity (m/s^2), stiffness (a factor),
+        feedback, storm and gate (0..1)."""
+        self._is.turn(knob, values, seconds)
+        self._apply()
 
     def kick(self, velocity: Sequence[float]) -> None:
         """Add a velocity (x, y, z), metres a second, to every mass."""
@@ -110,7 +138,8 @@ class Springs(Puppeteer):
     def state(self) -> dict[str, Any]:
         return super().state() | {
             "setting": self.setting,
-            "field": [*self.wind.tolist(), self.gravity],
+            "parameters": self._is.state(),
+            "strings": self._strings.modes.view(np.float64).copy(),
             "masses": np.stack([self._body.positions, self._body.velocities, self._before]),
             "turned": self._turned.copy(),
             "pulls": [self._pulls, self._begun],
@@ -118,33 +147,39 @@ class Springs(Puppeteer):
 
     def restore(self, state: dict[str, Any]) -> None:
         super().restore(state)
-        self.call(state["setting"], kicks=False)
-        *self.wind[:], self.gravity = state["field"]
+        self.setting = state["setting"]
+        self._is.restore(state["parameters"])
+        self._apply()
+        self._strings.modes.view(np.float64)[:] = state["strings"]
         self._body.positions[:], self._body.velocities[:], self._before[:] = state["masses"]
         self._turned[:] = state["turned"]
         self._pulls, self._begun = state["pulls"]
 
     def energy(self) -> float:
-        """Joules in motion and springs."""
-        return self._body.energy()
+        """Joules in motion, springs and strings."""
+        return self._body.energy() + self._strings.energy()
 
     def _point(self, orientation: FloatArray, now: float, elapsed: float) -> None:
         if not (self.enabled or self.is_holding):
             self._begun = False  # at rest, and at no cost, until it is to hold again
             return
+        if self._is.step():
+            self._apply()
         self._phrase.set_pose(self._pose, self._root)
         stands = self._phrase.positions[self._nodes].astype(np.float64)
         body = self._body
         if not self._begun or not np.isfinite(body.positions).all():
             self._begun = True
             body.begin(stands)
+            self._strings.still()
             self._before[:] = stands
         jumped = stands[0] - self._before[0]
         if float(jumped @ jumped) > JUMP_M * JUMP_M:
             body.positions += jumped
             self._before += jumped
         self._rest(stands)
-        body.step(stands[0], self._surroundings(stands), np.array((0.0, -self.gravity, 0.0)))
+        strings = self._strings if self._is.feedback > 0.0 else None
+        body.step(stands[0], self._surroundings(stands), np.array((0.0, -self.gravity, 0.0)), strings)
         np.maximum(body.positions, stands[0] - self._most, out=body.positions)
         np.minimum(body.positions, stands[0] + self._most, out=body.positions)
         self._before[:] = stands
@@ -154,24 +189,21 @@ class Springs(Puppeteer):
 
     def _rest(self, stands: Vectors) -> None:
         """Write where bones are drawn to: in length the phrase's, in direction between it and the puppet."""
-        follow, rest = self._is_of.follow, self._body.rest
+        follow, rest = self._is.follow, self._body.rest
         np.matmul(self._bones_of, stands, out=rest)
         lengths = np.sqrt((rest * rest) @ _SUM)
         rest += follow * (self._bones_of @ (self._puppet.positions[self._nodes] - stands))
         rest *= lengths / np.maximum(np.sqrt((rest * rest) @ _SUM), _SMALLEST)
 
     def _apply(self) -> None:
-        """Give the masses the numbers of the setting in force."""
-        own = [self._is_of.region(region) for region, _ in self.regions]
-        turning = [self._is_of.region(region) for _, region in self.regions]
-        self._damping = np.array([[region.damping] for region in own])
-        self._drag = self._damping + self._is_of.air
-        self._body.set_parameters(
-            np.array([region.mass for region in own]),
-            np.array([region.stiffness for region in turning]),
-            np.array([region.directional_stiffness for region in turning]),
-            self._drag[:, 0],
-        )
+        """Give masses and strings the numbers of this moment."""
+        is_now = self._is
+        self._damping = is_now.damping[:, None]
+        self._drag = self._damping + is_now.air
+        self._body.set_parameters(is_now.mass, is_now.stiffness, is_now.directional, self._drag[:, 0])
+        self._strings.tune(is_now.feedback, self._body.mass, self._body.carried / 4)
+        if is_now.feedback <= 0.0:
+            self._strings.still()
 
     def _surroundings(self, stands: Vectors) -> Vectors:
         """Velocity (N, 3) towards which each mass is damped: of the phrase's motion, and of the air."""
@@ -180,11 +212,11 @@ class Springs(Puppeteer):
         np.maximum(self._flow, -_FASTEST_PHRASE_M_S, out=self._flow)
         np.minimum(self._flow, _FASTEST_PHRASE_M_S, out=self._flow)
         np.multiply(self._flow, self._damping, out=self._flow)
-        air = self._is_of.air * (self.wind * _gust(self._pulls * TICK_S, self._is_of.gusts))
+        air: Vectors = self._is.air * (self._is.blow * _gust(self._pulls * TICK_S, self._is.gusts))
         self._flow += air
         stirred = self._stirred()
-        if self._is_of.stir:
-            self._flow += self._is_of.air * _cross(stirred[None], self._body.positions - stands[0])
+        if self._is.stir:
+            self._flow += self._is.air * _cross(stirred[None], self._body.positions - stands[0])
         self._flow /= np.maximum(self._drag, _SMALLEST)
         return self._flow
 
@@ -196,7 +228,7 @@ class Springs(Puppeteer):
                 turn = quaternion.multiply(worn.orientation, quaternion.inverse(self._turned[place]))
                 total += 2.0 * float(np.copysign(1.0, turn[0])) / TICK_S * turn[1:]
             self._turned[place] = worn.orientation
-        return np.clip(self._is_of.stir * total, -20.0, 20.0)
+        return np.clip(self._is.stir * total, -20.0, 20.0)
 
     def _turn(self, stands: Vectors) -> None:
         """Write the orientations that turn the phrase's bones to where the masses are.

@@ -74,6 +74,12 @@ class SpringsConfig(Section):
         0.0,
         within=(0, 4),
     )
+    feedback: float = key(
+        "How strongly the strings (`strings:`) pull back the bones that draw them: 0 not at all, 1 as firmly "
+        "as a spring at which the mass alone swings 2.5 times a second.",
+        0.0,
+        within=(0, 1),
+    )
     kick: Wind = key(
         "Velocity that every mass gets when the setting is called up (x, y, z), metres a second.",
         (0.0, 0.0, 0.0),
@@ -85,23 +91,40 @@ class SpringsConfig(Section):
         return region
 
 
-def _setting(name: str, trunk: float, limbs: float, damping: float, **more: object) -> SpringsConfig:
-    """The trunk's and the limbs' directional stiffness, newtons a metre."""
-    regions = {
-        "trunk": RegionConfig(mass=2.0, directional_stiffness=trunk, damping=damping),
-        "head": RegionConfig(directional_stiffness=limbs * 1.5, damping=damping),
-        "arms": RegionConfig(mass=0.8, directional_stiffness=limbs, damping=damping),
-        "legs": RegionConfig(mass=1.5, directional_stiffness=limbs * 2, damping=damping),
-    }
-    return SpringsConfig(name=name, **regions, **more)  # type: ignore[arg-type]
+def _region(directional: float, damping: float, mass: float = 1.0) -> RegionConfig:
+    return RegionConfig(mass=mass, directional_stiffness=directional, damping=damping)
 
 
 def built_in() -> list[SpringsConfig]:
     """Loose: swings after each movement, and hangs; stiff: overshoots a little; storm: blown about."""
     return [
-        _setting("loose", 300.0, 12.0, 1.5, gravity=1.5, stir=0.5),
-        _setting("stiff", 1200.0, 250.0, 6.0),
-        _setting("storm", 200.0, 15.0, 1.0, wind=(9.0, 1.0, 4.0), gusts=1.0, air=2.0, stir=1.0),
+        SpringsConfig(
+            name="loose",
+            trunk=_region(300.0, 1.5, 2.0),
+            head=_region(18.0, 1.5),
+            arms=_region(12.0, 1.5, 0.8),
+            legs=_region(24.0, 1.5, 1.5),
+            gravity=1.5,
+            stir=0.5,
+        ),
+        SpringsConfig(
+            name="stiff",
+            trunk=_region(1200.0, 6.0, 2.0),
+            head=_region(375.0, 6.0),
+            arms=_region(250.0, 6.0, 0.8),
+            legs=_region(500.0, 6.0, 1.5),
+        ),
+        SpringsConfig(
+            name="storm",
+            trunk=_region(200.0, 1.0, 2.0),
+            head=_region(22.5, 1.0),
+            arms=_region(15.0, 1.0, 0.8),
+            legs=_region(30.0, 1.0, 1.5),
+            wind=(9.0, 1.0, 4.0),
+            gusts=1.0,
+            air=2.0,
+            stir=1.0,
+        ),
     ]
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from appliance.box.realtime import thread_priority
 from appliance.show.sound import SoundConfig
 
 RETRY_S = 1.0
+_ALSA = "libasound.so.2"
 
 
 class CardError(OSError):
@@ -20,22 +24,19 @@ class CardError(OSError):
 class Card:
     """Plays what `render` gives, in PortAudio's own thread. `look` opens it again after it was away.
 
-    trouble: why it is silent, else "". dropouts: blocks that came too late.
+    trouble: why it is silent, else ""; is_missing: because this system has no sound at all. dropouts: blocks
+    that came too late. refused: why the thread has no real-time priority, else "".
     """
 
-    def __init__(self, config: SoundConfig, render: Callable[[int], NDArray[np.float32]]) -> None:
-        """Raises CardError where the library is missing: trying again would not help."""
-        try:
-            import sounddevice
-        except (ImportError, OSError) as error:
-            raise CardError(
-                f"The sound library is not here ({error}). Nothing sounds. Install the Debian package "
-                "libportaudio2, and `pip install bunraku[sound]`."
-            ) from error
-        self._library, self._config, self._render = sounddevice, config, render
+    def __init__(
+        self, config: SoundConfig, render: Callable[[int], NDArray[np.float32]], priority: int | None = None
+    ) -> None:
+        """priority: real-time, of PortAudio's thread; None: as the process has it."""
+        self._config, self._render, self._priority = config, render, priority
+        self._library: Any = None
         self._stream: Any = None
         self._tries_at = 0.0
-        self.trouble, self.dropouts = "", 0
+        self.trouble, self.dropouts, self.is_missing, self.refused = "", 0, False, ""
 
     def look(self, now: float) -> None:
         """Open the card where it is not; call it often. Monotonic seconds."""
@@ -50,10 +51,20 @@ class Card:
         self._drop("")
 
     def _open(self) -> None:
-        library, config = self._library, self._config
+        """Raises CardError where the library is missing: trying again would not help."""
+        config, self.is_missing = self._config, not _has_sound()
+        if self.is_missing:
+            self.trouble = (
+                "This system has no sound: ALSA, through which Linux reaches sound cards, is not configured. "
+                "The strings are silent, and are looked for each second. Install the Debian package "
+                "libasound2-data, or remove `sound:` from the box file."
+            )
+            return
         try:
+            library = self._library or _loaded()
             library._terminate()  # PortAudio lists the cards once, when it starts
             library._initialize()
+            self._library = library
             stream = library.OutputStream(
                 samplerate=config.rate,
                 blocksize=config.block // 32 * 32,
@@ -64,7 +75,9 @@ class Card:
                 callback=self._fill,
             )
             stream.start()
-        except (library.PortAudioError, ValueError, OSError) as error:
+        except CardError:
+            raise
+        except Exception as error:  # PortAudio's own class is not known before it is loaded
             self.trouble = (
                 f"No sound card plays {config.channels} channels at {config.rate} Hz ({error}). The strings "
                 "are silent. Plug one in, or give another `sound:` in the box file."
@@ -73,6 +86,8 @@ class Card:
         self._stream, self.trouble = stream, ""
 
     def _fill(self, out: NDArray[np.float32], frames: int, time: Any, status: Any) -> None:
+        if self._priority is not None:  # in the thread that has to have it
+            self.refused, self._priority = thread_priority(self._priority), None
         self.dropouts += bool(status.output_underflow)
         out[:] = self._render(frames)
 
@@ -82,3 +97,30 @@ class Card:
             self._stream.abort(ignore_errors=True)
             self._stream.close(ignore_errors=True)
         self._stream = None
+
+
+def _loaded() -> Any:
+    try:
+        import sounddevice
+    except (ImportError, OSError) as error:
+        raise CardError(
+            f"The sound library is not here ({error}). Nothing sounds. Install the Debian package "
+            "libportaudio2, and `pip install bunraku[sound]`."
+        ) from error
+    return sounddevice
+
+
+def _has_sound() -> bool:
+    """Whether PortAudio may start: where ALSA's configuration names no devices it aborts."""
+    try:
+        alsa = ctypes.CDLL(_ALSA)
+    except OSError:
+        return True  # another system's sound; without any PortAudio says so itself
+    alsa.snd_config_search.argtypes = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p
+    alsa.snd_config_update_free_global()  # it remembers what it once read
+    with contextlib.suppress(ValueError):
+        return alsa.snd_config_update() < 0 or (
+            bool(top := ctypes.c_void_p.in_dll(alsa, "snd_config").value)
+            and alsa.snd_config_search(top, b"pcm", None) == 0
+        )
+    return True

@@ -9,6 +9,11 @@ CARD_AWAY = Fallback(
     "The sound card is away: the strings are silent, and sound again as soon as it is back. Plug it in, or "
     "give another `sound: {device: ...}` in the box file.",
 )
+NO_CARD = Fallback(
+    "no-sound-card",
+    "This system has no sound at all: the strings are silent, and are looked for each second. Install the "
+    "Debian package libasound2-data, or remove `sound:` from the box file.",
+)
 DROPOUTS = Fallback(
     "sound-dropouts",
     "The sound card got its samples too late, and crackled. Give `sound: {block: ...}` a larger number in "
@@ -19,4 +24,4 @@ STAGE_UNSEEN = Fallback(
     "No frame came from the stage for half a second: the strings fade out, and sound again as soon as it "
     "dances. See what the stage says.",
 )
-OF_THE_SOUND = (CARD_AWAY, DROPOUTS, STAGE_UNSEEN)
+OF_THE_SOUND = (CARD_AWAY, NO_CARD, DROPOUTS, STAGE_UNSEEN)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -14,8 +14,9 @@ from appliance.box.fallback import Fallbacks
 from appliance.box.log_writer import LogWriter
 from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealthWriter
+from appliance.box.realtime import share_the_interpreter
 from appliance.box.runtime_folder import Claim, runtime_folder
-from appliance.box.show_state import ShowState, ShowStateReader
+from appliance.box.show_state import ShowStateReader, part_of_fade
 from appliance.box.stop_signals import stop_signals
 from appliance.outputs.frame_reader import FrameReader
 from appliance.show.box import BoxConfig, load_box
@@ -23,7 +24,7 @@ from appliance.show.config_error import ConfigError, NotAskedForError, Problem
 from appliance.show.show import load_show
 from appliance.show.sound import SoundConfig, StringsConfig
 from appliance.sound.card import Card
-from appliance.sound.fallback import CARD_AWAY, DROPOUTS, OF_THE_SOUND, STAGE_UNSEEN
+from appliance.sound.fallback import CARD_AWAY, DROPOUTS, NO_CARD, OF_THE_SOUND, STAGE_UNSEEN
 from appliance.sound.instrument import Instrument
 
 LOOK_S = 0.005  # how often frame and show state are read: panic is heard a block later
@@ -31,10 +32,25 @@ LOST_S = 0.5  # without a frame: as the projector
 _REPORT_S = 1.0
 
 
-def level(state: ShowState, strings: StringsConfig, now: float, age_s: float) -> float:
-    """0..1: how loud the strings are: master and fades of the show, its cue, and whether the stage dances."""
-    in_cue = not strings.cues or state.cue in strings.cues
-    return state.level(now) if in_cue and age_s < LOST_S else 0.0
+class Entrance:
+    """How far the strings have come in, 0..1: into one of their cues and out of it over that cue's fade."""
+
+    def __init__(self) -> None:
+        self._cue: str | None = None
+        self._from = self._to = 1.0
+        self._since = self._fade_s = 0.0
+
+    def share(self, cue: str, cues: Sequence[str], fades: Mapping[str, float], now: float) -> float:
+        """cues: those in which they sound, [] all; fades: seconds of each cue's fade."""
+        if cue != self._cue:
+            is_first, here = self._cue is None, self._at(now)
+            self._cue, self._to = cue, float(not cues or cue in cues)
+            self._from, self._since = self._to if is_first else here, now
+            self._fade_s = fades.get(cue, 0.0)
+        return self._at(now)
+
+    def _at(self, now: float) -> float:
+        return self._from + (self._to - self._from) * part_of_fade(now, self._since, self._fade_s)
 
 
 class Sound:
@@ -51,7 +67,8 @@ class Sound:
         self.instrument: Instrument | None = None
         self._config, self._stage, self._show_state = config, stage, show_state
         self._say, self._fallbacks = say, fallbacks
-        self._strings = StringsConfig()
+        self._strings, self._entrance = StringsConfig(), Entrance()
+        self._fades: dict[str, float] = {}
         self._generation: int | None = None
         self._tick, self._seen_at = -1, 0.0
         self._trouble = ""
@@ -61,6 +78,7 @@ class Sound:
         frame = self._stage.newest(now)
         if self._stage.generation != self._generation and self._stage.facts is not None:
             self._generation = self._stage.generation
+            self._fades = {str(cue["name"]): float(cue["fade_s"]) for cue in self._stage.facts.cues}
             self._begin(self._stage.facts.show_directory)
         if self.instrument is None:
             return
@@ -71,12 +89,23 @@ class Sound:
         if age_s >= LOST_S:
             self.instrument.rest()
         self._fallbacks.set(STAGE_UNSEEN.name, age_s >= LOST_S)
-        self.instrument.level = level(self._show_state.read(), self._strings, now, age_s)
+        state = self._show_state.read()
+        entered = self._entrance.share(state.cue, self._strings.cues, self._fades, now)
+        loud = state.level(now) * state.strings_level(now) * entered
+        self.instrument.level = loud if age_s < LOST_S else 0.0
 
     def report(self, card: Card, now: float) -> None:
         """Once a second: what has changed about the card."""
         self._fallbacks.follow(DROPOUTS.name, card.dropouts, now)
-        self._fallbacks.set(CARD_AWAY.name, card.trouble)
+        self._fallbacks.set(CARD_AWAY.name, "" if card.is_missing else card.trouble)
+        self._fallbacks.set(NO_CARD.name, card.is_missing)
+        if card.refused:
+            self._say(
+                f"No real-time priority for the sound ({card.refused}). The strings sound; on a busy "
+                "machine one block in a hundred came 9 ms late instead of 1, and crackled. Allow it with "
+                "LimitRTPRIO= in the unit."
+            )
+            card.refused = ""
         if card.trouble != self._trouble:
             self._trouble = card.trouble
             self._say(card.trouble or "The sound card is back, and the strings sound.")
@@ -125,8 +154,10 @@ def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
         for one in (notifier, stage, show_state, process_health):
             opened.callback(one.close)
         sound = Sound(config, stage, show_state, speaker.say, fallbacks)
-        card = Card(config, lambda frames: _rendered(sound, frames, config.channels))
+        priority = box.realtime.priority // 2 if box.realtime.enabled else None  # the dance goes first
+        card = Card(config, lambda frames: _rendered(sound, frames, config.channels), priority)
         opened.callback(card.close)
+        share_the_interpreter()
         notifier.ready("The strings follow the stage.")
         report_at = 0.0
         while not stopped():

@@ -9,14 +9,11 @@ from numpy.typing import NDArray
 
 from appliance.pose.skeleton import Skeleton
 from appliance.show.sound import StringsConfig
+from appliance.show.string_pitches import decays, string_pitches
 
 Samples = NDArray[np.floating[Any]]
 
 STEP = 32  # samples from one push of the strings to the next: 1500 pushes a second at 48 kHz
-_SHORTEST = 0.15  # of the longest bone: shorter ones, like fingers, have no string
-_MOST = 24  # strings
-_SEMITONES = np.array([0, 2, 4, 7, 9])  # pentatonic: any of them sound together
-_LN_1000 = 6.9078  # 60 dB
 _HIGHEST = 0.45  # of the sample rate
 
 
@@ -31,13 +28,9 @@ class Strings:
     """
 
     def __init__(self, skeleton: Skeleton, config: StringsConfig, rate: int, seed: int = 0) -> None:
-        lengths = np.linalg.norm(skeleton.offsets, axis=1)
-        lengths[0] = 0.0
-        long = [j for j in np.argsort(-lengths) if lengths[j] > _SHORTEST * lengths.max()][:_MOST]
-        joints = sorted(int(joint) for joint in long)
-        self.bones = np.array([(skeleton.parents[joint], joint) for joint in joints]).reshape(-1, 2)
-        self.hertz = _pitches(lengths[joints], config.base_hz)
-        self.places: Samples = np.arange(len(joints)) * (2 * np.pi / max(len(joints), 1))
+        self.bones, self.hertz = string_pitches(skeleton, config.base_hz)
+        count = len(self.bones)
+        self.places: Samples = np.arange(count) * (2 * np.pi / max(count, 1))
         self._random = np.random.default_rng(seed)
         meet = (self.bones[:, None, :, None] == self.bones[None, :, None, :]).any(axis=(2, 3))
         frequencies, shares, gains = [], [], []
@@ -48,10 +41,10 @@ class Strings:
             squares, vectors = np.linalg.eigh(stiffness + np.diag(ties.sum(axis=1)) - ties)
             frequencies.append(np.sqrt(np.maximum(squares, 1.0)))
             shares.append(vectors)
-            gains.append(np.full(len(joints), config.brightness ** (partial - 1)))
+            gains.append(np.full(count, config.brightness ** (partial - 1)))
         turning = np.concatenate(frequencies)
         audible = turning < 2 * np.pi * _HIGHEST * rate
-        decay = _LN_1000 / config.decay_s * np.sqrt(turning / turning.min())
+        decay = decays(turning, turning.min(), config.decay_s)
         poles = (-decay + 1j * turning) / rate
         self.frequencies = turning / (2 * np.pi)
         self._from_strings = np.concatenate(shares, axis=1) * np.concatenate(gains) * audible
@@ -60,10 +53,6 @@ class Strings:
         self._ahead = np.exp(poles * STEP)
         self._ringing = np.exp(np.outer(poles, np.arange(STEP)))
         self._loudness = config.volume * np.sqrt(decay / rate * STEP)
-
-    def pluck(self, strings: Samples) -> None:
-        """Push the strings (B,) once."""
-        self._state += 1j * (strings @ self._from_strings)
 
     def still(self) -> None:
         """Stop all strings at once."""
@@ -95,14 +84,3 @@ def around(places: Samples, channels: int) -> Samples:
     apart = np.abs((apart + np.pi) % (2 * np.pi) - np.pi)
     gains: Samples = np.cos(np.minimum(apart * channels / 4, np.pi / 2))
     return gains
-
-
-def _pitches(lengths: Samples, base_hz: float) -> Samples:
-    """Hertz of bones of these lengths: inverse to the length, on a pentatonic scale above the base."""
-    if not len(lengths):
-        return np.zeros(0)
-    above = 12 * np.log2(lengths.max() / lengths)
-    scale = (_SEMITONES + 12 * np.arange(5)[:, None]).ravel()
-    nearest = scale[np.argmin(np.abs(above[:, None] - scale), axis=1)]
-    hertz: Samples = base_hz * 2.0 ** (nearest / 12)
-    return hertz

@@ -21,13 +21,14 @@ def parts() -> Iterator[StageParts]:
     default: Path = default_show_path()
     box = BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[]))
     made = assemble(load_show(default), box)
-    made.starts_from(0.0)
+    for puppet in made.puppets:
+        puppet.start(0.0)
     yield made
     made.close()
 
 
 def test_springs(measured: Callable[..., Any], parts: StageParts) -> None:
-    springs = parts.springs
+    springs = parts.first.springs
     assert springs is not None
     springs.enabled = True
     now = iter(range(10**9))
@@ -38,7 +39,7 @@ def test_springs(measured: Callable[..., Any], parts: StageParts) -> None:
 
 
 def test_the_puppet(measured: Callable[..., Any], parts: StageParts) -> None:
-    hands, window = parts.hands, parts.puppet.select(parts.motion.window())
+    hands, window = parts.hands, parts.first.puppet.select(parts.motion.window())
     measured("ten iterations of the puppet", GROUP, reference=True)(
-        lambda: parts.puppet.dance(window, hands.mask, hands.targets, hands.weights, 10, 9)
+        lambda: parts.first.puppet.dance(window, hands.mask, hands.targets, hands.weights, 10, 9)
     )

@@ -169,7 +169,8 @@ def test_they_go_on_from_their_state_bit_for_bit() -> None:
     one, other = Dance("windy"), Dance("calm")
     one.springs.kick((1.0, -2.0, 3.0))
     one.tick(30)
-    one.springs.wind[:] = 1.0, 2.0, 3.0
+    one.springs.turn("wind", (1.0, 2.0, 3.0), 1.0)
+    one.springs.turn("feedback", (1.0,))
     other.hands.restore(one.hands.state())
     other.now = one.now
     assert np.array_equal(one.tick(50), other.tick(50))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 import time
 import wave
@@ -21,7 +23,7 @@ from appliance.show.sound import SoundConfig, StringsConfig
 from appliance.sound.card import Card
 from appliance.sound.fallback import OF_THE_SOUND
 from appliance.sound.render_file import render_file
-from appliance.sound.run import LOST_S, Sound, level, require_sound
+from appliance.sound.run import Entrance, Sound, require_sound
 from tests.bundles import FIGURE, swaying_phrase, write_show
 
 PATIENCE_S = 60.0
@@ -35,21 +37,42 @@ def until(holds: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def test_how_loud_the_strings_are() -> None:
-    strings, state = StringsConfig(cues=["strings"]), ShowState(cue="strings", master=0.5)
-    assert level(state, strings, 1.0, 0.0) == 0.5
-    assert level(ShowState(cue="opening"), strings, 1.0, 0.0) == 0.0
-    assert level(ShowState(), StringsConfig(), 1.0, 0.0) == 1.0
-    assert level(state, strings, 1.0, LOST_S) == 0.0
-    assert level(ShowState(cue="strings", panic=True), strings, 1.0, 0.0) == 0.0
-    assert level(ShowState(cue="strings", blackout=True), strings, 1.0, 0.0) == 0.0
+def test_strings_come_in_and_go_over_the_fade_of_the_cue() -> None:
+    cues, fades, entrance = ["strings"], {"strings": 4.0, "opening": 2.0}, Entrance()
+    assert entrance.share("opening", cues, fades, 0.0) == 0.0  # the first cue that is seen: no fade
+    course = [entrance.share("strings", cues, fades, 1.0 + time) for time in (0.0, 1.0, 2.0)]
+    assert course == [0.0, 0.25, 0.5]
+    assert entrance.share("opening", cues, fades, 3.0) == 0.5  # out again from where they are
+    assert [entrance.share("opening", cues, fades, now) for now in (4.0, 5.0)] == [0.25, 0.0]
+    assert Entrance().share("opening", [], {}, 0.0) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("state", "loud"),
+    [
+        (ShowState(cue="strings", master=0.5, master_before=0.5), 0.5),
+        (ShowState(cue="strings").with_strings(0.4, 1.0, 0.0), 0.4),
+        (ShowState(cue="strings").with_strings(0.0, 9.0, 2.0), 0.5),
+        (ShowState(cue="opening"), 0.0),
+        (ShowState(cue="strings", panic=True), 0.0),
+        (ShowState(cue="strings", blackout=True), 0.0),
+    ],
+)
+def test_how_loud_the_strings_are(tmp_path: Path, state: ShowState, loud: float) -> None:
+    show = write_show(tmp_path / "show", strings={"cues": ["strings"]}, cues=[{"name": "strings"}])
+    declared = SimpleNamespace(read=lambda: state)
+    fallbacks = Fallbacks(OF_THE_SOUND)
+    sound = Sound(SoundConfig(), StageDouble(show), declared, print, fallbacks)  # type: ignore[arg-type]
+    sound.look(10.0)
+    assert sound.instrument is not None and sound.instrument.level == pytest.approx(loud)
 
 
 class StageDouble:
     """Gives the frames of a body that turns."""
 
     def __init__(self, directory: Path) -> None:
-        self.facts, self.generation = SimpleNamespace(show_directory=directory), 1
+        cues = ({"name": "strings", "fade_s": 2.0},)
+        self.facts, self.generation = SimpleNamespace(show_directory=directory, cues=cues), 1
         self.number, self.lives = 0, True
 
     def newest(self, now: float) -> Any:
@@ -154,6 +177,40 @@ def test_a_card_that_is_away_and_back(
     card.look(5.0)
     assert asked.wait(PATIENCE_S) and card.trouble == ""
     card.close()
+
+
+def test_a_system_without_sound_is_no_end_of_the_process(tmp_path: Path, null_card: None) -> None:
+    """In a process of its own: PortAudio would abort it."""
+    program = """
+import os, sys, numpy, threading
+from types import SimpleNamespace
+from appliance.box.fallback import Fallbacks
+from appliance.show.sound import SoundConfig
+from appliance.sound.card import Card
+from appliance.sound.fallback import OF_THE_SOUND
+from appliance.sound.run import Sound
+asked = threading.Event()
+def render(frames):
+    asked.set()
+    return numpy.zeros((frames, 2), numpy.float32)
+there = os.environ["ALSA_CONFIG_PATH"]
+card, fallbacks = Card(SoundConfig(), render), Fallbacks(OF_THE_SOUND)
+sound = Sound(SoundConfig(), None, None, print, fallbacks)
+os.environ["ALSA_CONFIG_PATH"] = "/nonexistent"
+card.look(0.0)
+sound.report(card, 0.0)
+print([(one.name, one.active) for one in fallbacks.happened(0.0)])
+os.environ["ALSA_CONFIG_PATH"] = there
+card.look(2.0)
+sound.report(card, 2.0)
+print(asked.wait(60.0))
+card.close()
+"""
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    said = ran.stdout.splitlines()
+    assert said[0].startswith("This system has no sound") and "libasound2-data" in said[0]
+    assert said[1:] == ["[('no-sound-card', True)]", "The sound card is back, and the strings sound.", "True"]
 
 
 def test_blocks_that_come_too_late_are_counted(null_card: None, tmp_path: Path) -> None:

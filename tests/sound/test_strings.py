@@ -16,10 +16,15 @@ ONE = Skeleton(("hip", "knee"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, -0.5, 
 ALONE = np.ones((1, 1))
 
 
+def pluck(strings: Strings, which: np.ndarray) -> None:
+    """Push strings (B,) once."""
+    strings._state += 1j * (which @ strings._from_strings)
+
+
 def plucked(config: StringsConfig, seconds: float) -> np.ndarray:
     """One string, plucked once, (samples,)."""
     strings = Strings(ONE, config, RATE)
-    strings.pluck(np.ones(1))
+    pluck(strings, np.ones(1))
     return strings.render(np.zeros((round(seconds * RATE / STEP), 1)), ALONE)[:, 0]
 
 
@@ -63,7 +68,7 @@ def test_strings_of_bones_that_meet_sound_along_and_without_coupling_they_do_not
     for coupling in (0.0, 0.1):
         strings = Strings(FIGURE, StringsConfig(coupling=coupling, partials=1, decay_s=30.0), RATE)
         first = np.eye(len(strings.bones))[0]
-        strings.pluck(first)
+        pluck(strings, first)
         others = np.diag(1.0 - first)[:, 1:]
         heard = strings.render(np.zeros((600, len(first))), others)
         assert (np.abs(heard).max() > 1e-3) == (coupling > 0)
