@@ -181,7 +181,7 @@ def test_a_key_that_arrives_damaged_is_never_saved(path: Path, monkeypatch: pyte
     take = FakeWearable._set
 
     def damaged(self: FakeWearable, what: str, value: str) -> str:
-        return take(self, what, "00" + value[2:] if what == "key" else value)
+        return take(self, what, f"{int(value[:2], 16) ^ 0xFF:02x}" + value[2:] if what == "key" else value)
 
     monkeypatch.setattr(FakeWearable, "_set", damaged)
     with FakeWearable() as fake:
