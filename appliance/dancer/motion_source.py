@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -57,21 +57,25 @@ class Playback(Played):
         self._excerpt = self._asked.cut(start_s, end_s)
         self._repertoire = Repertoire(self._asked, self._excerpt, self._fade, window)
         joints, columns = len(phrase.skeleton), self._excerpt.track.shape[1]
-        self._reader = Reader(joints)
-        self._between_heads = Slerp(joints, short=False)
-        self._entering_track = np.empty(columns, dtype=np.float32)
-        self._stream = Stream(joints, columns, window)
         self._request: tuple[Loop, float, int] | None = None
+        self._clear_memory(joints, columns)
         self._begin()
+
+    def another(self, name: str, start_s: float = 0.0) -> Playback:
+        """Before the first tick: another playback of the same phrases, which both share; it starts with
+        this phrase at this second, clamped. Raises ValueError.
+        """
+        other = copy(self)
+        other._repertoire = self._repertoire.another()
+        other._asked, loop = other._repertoire.find(name)
+        other._excerpt = loop
+        other._clear_memory(loop.poses.shape[1], loop.track.shape[1])
+        other._begin(min(max((start_s - loop.start_s) * FPS, 0.0), loop.length - 1.0))
+        return other
 
     def add(self, name: str, phrase: Recording, floor: Floor | None = None) -> None:
         """Add a phrase of the same skeleton before the first tick. Raises PhraseError."""
         self._repertoire.add(name, phrase, floor)
-
-    @property
-    def phrases(self) -> tuple[str, ...]:
-        """Names of all phrases, the show's first phrase first."""
-        return self._repertoire.names
 
     @property
     def made(self) -> Made | None:
@@ -145,20 +149,14 @@ class Playback(Played):
         return True
 
     def enter(self, recipe: str, loop: Loop, fade_s: float) -> None:
-        """Switch within fade_s to a loop that was made ahead: in step with the phrase that it follows, else
-        from its start. Raises ValueError, LookupError or TypeError for no recipe.
+        """Switch within fade_s to a loop that was made ahead: in step with the phrase that it follows or the
+        loop that it goes on from, else from its start. Raises ValueError, LookupError or TypeError for no
+        recipe.
         """
         made = self._repertoire.take(recipe, loop)
-        begin = self._in_step(loop) if made.phrase == self.base else 0.0
+        here, position, _ = self._request or (self._head.loop, self._head.position, 0)
+        begin = self._in_step(loop) if made.phrase == self.base else made.begin_after(here, position)
         self._excerpt, self._request = loop, (loop, begin, max(0, round(fade_s * FPS)))
-
-    def loop_of(self, name: str) -> Loop:
-        """The whole loop of a phrase. Raises ValueError."""
-        return self._repertoire.find(name)[1]
-
-    def make_by(self, make: Callable[[str], Loop]) -> None:
-        """Who makes the loops that a state names by their recipes."""
-        self._repertoire.make = make
 
     def _in_step(self, loop: Loop) -> float:
         """The frame of a loop at the second that is reached, also by what is still to come."""
@@ -240,6 +238,11 @@ class Playback(Played):
         self._on_the_way, self._entered_at = state["entered"]
         self.jumped = state["jumped"]
         self._stream.restore(state)
+
+    def _clear_memory(self, joints: int, columns: int) -> None:
+        self._reader, self._between_heads = Reader(joints), Slerp(joints, short=False)
+        self._entering_track = np.empty(columns, dtype=np.float32)
+        self._stream = Stream(joints, columns, self._window)
 
     def _begin(self, position: float = 0.0, standing: tuple[float, float, float] | None = None) -> None:
         """Stand at a frame of the phrase, with a full window; `standing`: there on the stage."""

@@ -13,6 +13,7 @@ FPS = 50.0
 # of its soles while they stand (as many as the skeleton has), the phrase's number and the second in it.
 X, Y, Z, LIFT, STANDING = range(5)
 NUMBER, AT = -2, -1
+SHARED = 48  # frames that an improvisation has in common with the loop that it goes on from
 
 
 class PhraseError(ValueError):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from appliance.dancer.loop import Loop
 from appliance.dancer.repertoire import Repertoire
 from appliance.dancer.slerp import FloatArray
 from appliance.dancer.stream import Stream
@@ -12,6 +15,19 @@ class Played:
 
     _repertoire: Repertoire
     _stream: Stream
+
+    @property
+    def phrases(self) -> tuple[str, ...]:
+        """Names of all phrases, the show's first phrase first."""
+        return self._repertoire.names
+
+    def loop_of(self, name: str) -> Loop:
+        """The whole loop of a phrase. Raises ValueError."""
+        return self._repertoire.find(name)[1]
+
+    def make_by(self, make: Callable[[str], Loop]) -> None:
+        """Who makes the loops that a state names by their recipes."""
+        self._repertoire.make = make
 
     def window(self) -> FloatArray:
         """The next poses (window, J, 4) of the motion, without sign jumps; valid until advance()."""

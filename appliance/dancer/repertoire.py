@@ -4,30 +4,42 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from appliance.dancer.grounding import Floor
 from appliance.dancer.loop import Loop, Placement
-from appliance.dancer.phrase import FPS, NUMBER, Phrase, PhraseError
+from appliance.dancer.phrase import FPS, NUMBER, SHARED, Phrase, PhraseError
 from appliance.dancer.reading_head import ReadingHead
 from appliance.pose.recording import Recording
 from appliance.show.config_error import did_you_mean
-from appliance.show.sources import GRANULAR, MAIN
+from appliance.show.sources import GRANULAR, IMPROVISE, MAIN
 
 FIRST_MADE = 1000  # numbers of loops that were made ahead; phrases have lower ones
 _MADE_KEPT = 6  # of the newest: a crossfade and the window know four at most
 
 
 class Made(NamedTuple):
-    """A loop that was made ahead. phrase: the one whose seconds it follows; "": it has its own."""
+    """A loop that was made ahead. phrase: the one whose seconds it follows; "": it has its own. after: the
+    number of the loop that it goes on from, and the second of that where it begins; None: from none.
+    """
 
     recipe: str
     name: str
     phrase: str
     number: int
     loop: Loop
+    after: tuple[int, float] | None = None
+
+    def begin_after(self, here: Loop, position: float) -> float:
+        """The frame with which it begins after this frame of a loop: in step, where it goes on from there."""
+        first = -self.loop.start_s * FPS
+        if self.after is None or round(float(here.track[0, NUMBER])) != self.after[0]:
+            return first
+        ahead = (here.start_s - self.after[1]) * FPS + position
+        return first + ahead if 0.0 <= ahead <= SHARED else first
 
 
 class Repertoire:
@@ -47,6 +59,12 @@ class Repertoire:
         self._made: dict[int, Made] = {}
         self.make = _unmade
 
+    def another(self) -> Repertoire:
+        """A repertoire of the same phrases, which both share, and of nothing that was made ahead."""
+        other = copy(self)
+        other._made = {}
+        return other
+
     def add(self, name: str, recording: Recording, floor: Floor | None) -> None:
         """Add a phrase. Raises PhraseError."""
         if not recording.skeleton.same_joints(self._skeleton):
@@ -65,11 +83,13 @@ class Repertoire:
         """Take in a loop that was made ahead. Raises ValueError, LookupError or TypeError for no recipe."""
         values = json.loads(recipe)
         kind = values.get("of", values)
-        phrase = "" if kind.get("points") or kind["source"] == GRANULAR else str(kind["phrase"])
+        own = kind.get("points") or kind["source"] in (GRANULAR, IMPROVISE)
+        phrase = "" if own else str(kind["phrase"])
+        after = (int(values["after"]), float(values["from_s"])) if "after" in values else None
         name, number = str(values.get("name") or values["source"]), int(values["number"])
         if loop.track.shape[1] != self._phrases[MAIN][1].track.shape[1] or number < FIRST_MADE:
             raise ValueError("It was made for another floor, or another show.")
-        made = self._made[number] = Made(recipe, name, phrase, number, loop)
+        made = self._made[number] = Made(recipe, name, phrase, number, loop, after)
         for old in [*self._made][:-_MADE_KEPT]:
             del self._made[old]
         return made

@@ -23,12 +23,7 @@ _READERS: dict[str, Callable[[Path], Recording]] = {".glb": read_glb, ".npz": re
 ENDINGS = (".bvh", *_WRITERS)
 
 
-def read_recording(path: Path) -> Recording:
-    """All of a recording, in the stage's frame. Raises ExchangeError or BvhError, which name the file."""
-    return read_as_told(path, AS_THE_FILES_SAY)[0]
-
-
-def read_as_told(path: Path, reading: ReadingOptions) -> tuple[Recording, list[Guess]]:
+def read_as_told(path: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> tuple[Recording, list[Guess]]:
     """All of a recording, and what was changed. reading: of a BVH file; the others are in metres, Y up.
 
     Raises ExchangeError or BvhError, which name the file.

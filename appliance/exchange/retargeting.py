@@ -10,11 +10,8 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.roles import missing_roles, places_of
 from appliance.pose.skeleton import Skeleton
-from appliance.projector.body.rest_pose import aimed
+from appliance.pose.t_pose import t_pose
 
-_UP = np.array([0.0, 1.0, 0.0])
-_SIDE = np.array([1.0, 0.0, 0.0])
-_FOOT = np.array([0.0, -0.35, 1.0])  # from the ankle to the toes
 FLOOR_PERCENTILE = 5.0  # of the lowest sole's heights over the dance
 
 
@@ -40,26 +37,6 @@ def retarget(dance: Recording, target: Skeleton) -> Recording:
     places, turned = target.forward_kinematics(poses, roots)
     roots[:, 1] += np.maximum(lifts, 0.0) - lowest_m(target, places, turned)
     return Recording(target, quaternion.continuous(poses), roots, dance.fps)
-
-
-def t_pose(skeleton: Skeleton) -> Anatomy:
-    """A skeleton with its spine upright, its arms to the sides, its legs down and its feet to the front."""
-    aims: dict[tuple[int, int], Array] = {}
-    roles = skeleton.roles
-
-    def aim(start: str, end: str, way: Array) -> None:
-        if start in roles and end in roles and skeleton.parents[roles[end]] == roles[start]:
-            aims[roles[start], roles[end]] = way
-
-    for start, end in (("hips", "spine"), ("spine", "chest"), ("chest", "neck"), ("neck", "head")):
-        aim(start, end, _UP)
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        aim(f"{side} upper arm", f"{side} forearm", sign * _SIDE)
-        aim(f"{side} forearm", f"{side} hand", sign * _SIDE)
-        aim(f"{side} thigh", f"{side} shin", -_UP)
-        aim(f"{side} shin", f"{side} foot", -_UP)
-        aim(f"{side} foot", f"{side} toe", _FOOT)
-    return Anatomy(skeleton, aimed(Anatomy(skeleton), aims))
 
 
 def leg_m(skeleton: Skeleton) -> float:

@@ -6,10 +6,11 @@ import contextlib
 import ctypes
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from appliance.box.fallback import Fallbacks
 from appliance.box.log_writer import LogWriter
@@ -27,11 +28,13 @@ from appliance.dancer.material.material_file import (
     SUFFIX,
     Material,
     parsed_recipe,
+    read_material,
     recipe_text,
     write_material,
 )
 from appliance.dancer.material.motion_network import MotionNetworkError
-from appliance.dancer.phrase import NUMBER, Phrase, PhraseError
+from appliance.dancer.material.prompt import end_of, prompt_of
+from appliance.dancer.phrase import FPS, NUMBER, Phrase, PhraseError
 from appliance.dancer.phrase_cache import MEMORY, PhraseCache
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE, OF_THE_GENERATOR
 from appliance.generator.kept_motions import KeptMotions
@@ -41,14 +44,16 @@ from appliance.pose.bvh import BvhError
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError
 from appliance.show.show import Show, load_show
-from appliance.show.sources import KEPT, MAIN
+from appliance.show.sources import IMPROVISE, KEPT, MAIN
 from appliance.show_control.orders import Order, OrderInbox
 
 _LOOK_S = 0.05
 _NICE = 10
 _TAKEN_S = 5.0  # what is to be danced at once and is not taken over until then is made again
 _REST_S = 0.2  # from one motion to the next, at least
+_AHEAD_S = 1.2  # until an improvisation is made that is wanted at once
 _FILES = 4  # the newest: the stage may still open the one before
+_EACH = ("seed", "number", "after", "from_s", "prompt")
 _MOST_NUMBERS = 10_000_000  # exact in the track's float32
 _WRONG = (MotionNetworkError, GroundingError, PhraseError, BvhError, OSError, LookupError, ValueError)
 
@@ -128,7 +133,7 @@ class Generator:
             return
         recipe, own = parsed_recipe(danced), wish.recipe
         returns = recipe.get("seed", 0) - own.get("seed", 0)
-        if {**recipe, "seed": 0, "number": 0} == {**own, "seed": 0, "number": 0} and 0 <= returns < AGAIN:
+        if _character(recipe) == _character(own) and 0 <= returns < AGAIN:
             self._wish, self._recipe, self._returns = wish, danced, returns
 
     def _make(self, wish: Wish, at_once: bool) -> None:
@@ -137,11 +142,13 @@ class Generator:
         recipe = {**wish.recipe, "number": self._number}
         if "seed" in recipe:
             recipe["seed"] += self._returns
-        text = recipe_text(recipe)
         try:
+            if recipe["source"] == IMPROVISE:
+                recipe |= self._going_on(at_once)
+            text, file = recipe_text(recipe), self._file(self._number)
             loop = self._numbered(wish.name) if recipe["source"] == KEPT else self._maker.make(recipe)
-            write_material(self._file(self._number), Material(text, loop), self._show.skeleton.names)
-            self._writer.write(MadeMotion(text, self._file(self._number).name, wish.name, at_once))
+            write_material(file, Material(text, loop), self._show.skeleton.names)
+            self._writer.write(MadeMotion(text, file.name, wish.name, at_once, recipe.get("from_s")))
         except _WRONG as error:
             self._fallbacks.set(NOT_MADE.name, f"{wish.name}: {error} The last phrase plays on.")
             return
@@ -149,6 +156,25 @@ class Generator:
         self._recipe = text
         give_back_memory()
         self._forget_old()
+
+    def _going_on(self, at_once: bool) -> dict[str, Any]:
+        """What an improvisation goes on from: a moment that is soon danced, or the end of another one."""
+        health = self._stage.health() or {}
+        name, danced = str(health.get("base", MAIN)), str(health.get("made", ""))
+        if danced:
+            number = int(parsed_recipe(danced)["number"])
+            loop = read_material(self._file(number), self._show.skeleton.names).loop
+        else:
+            number, loop = [*self._show.phrases].index(name), self._loop_of(name)
+        frame = float(end_of(loop))
+        if at_once:
+            told_at = float(health.get("looked_at", time.monotonic()))
+            ahead_s = _AHEAD_S + time.monotonic() - told_at
+            frame = round((float(health.get("position_s", 0.0)) + ahead_s - loop.start_s) * FPS)
+            frame = frame % loop.period
+        network = self._maker.network(IMPROVISE)
+        prompt = prompt_of(loop, frame, self._show.skeleton, network, network.places)
+        return {"after": number, "from_s": round(loop.start_s + frame / FPS, 2), "prompt": prompt}
 
     def _numbered(self, name: str) -> Loop:
         """A kept motion under the number of now."""
@@ -178,6 +204,11 @@ class Generator:
             self._loops = {MAIN: self._loops[MAIN]} if MAIN in self._loops else {}  # bounds the memory
             self._loops[name] = phrase.cut(*part)
         return self._loops[name]
+
+
+def _character(recipe: Mapping[str, Any]) -> dict[str, Any]:
+    """What is alike in the motions that are made for one wish."""
+    return {name: value for name, value in recipe.items() if name not in _EACH}
 
 
 def run_generator(directory: Path | None, box_file: Path | None) -> None:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from appliance.box.show_state import MOTION, Part, ShowState
 from appliance.show.show import ShowConfig
-from appliance.show.sources import GRANULAR, KEPT, MADE, PARAMETERS, PATH, POINTS
+from appliance.show.sources import GRANULAR, IMPROVISE, KEPT, MADE, PARAMETERS, PATH, POINTS
 
 STEP_S = 1.5  # of a fade: each step is a motion of its own, melted into the one before
 AGAIN = 1000  # how far `again` counts the seed on: each return counts it on by one
@@ -58,7 +58,7 @@ class Wishes:
         if name == GRANULAR:
             section = self._sections[name]
             recipe |= {"from": getattr(section, "from_", None), "to": getattr(section, "to", None)}
-        else:
+        elif name != IMPROVISE:
             recipe["phrase"] = base
         points = dance.get(f"{MOTION}{PATH} {POINTS}", (0, "", ()))[2]
         if name == PATH and points:

@@ -102,7 +102,7 @@ def reading_options(command: Callable[..., T]) -> Callable[..., T]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
         for name, (annotation, default) in _OPTIONS.items()
     ]
-    run.__signature__ = own.replace(parameters=[*kept, *added])  # type: ignore[attr-defined]
+    vars(run)["__signature__"] = own.replace(parameters=[*kept, *added])  # what inspect.signature looks at
     run.__annotations__ = {one.name: one.annotation for one in (*kept, *added)}
     return run
 

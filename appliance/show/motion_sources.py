@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field, model_serializer
 
 from appliance.show.section import BundleFile, Section, key
-from appliance.show.sources import GRANULAR, PARAMETERS, PATH, VARY
+from appliance.show.sources import GRANULAR, IMPROVISE, PARAMETERS, PATH, VARY
 
 
 def _parameter(source: str, name: str, default: Any = ...) -> Any:
@@ -58,6 +58,15 @@ class PathConfig(Section):
     seed: int = _parameter(PATH, "seed")
 
 
+class ImproviseConfig(Section):
+    """The dance goes on from what was just danced, move after move, and never comes back."""
+
+    network: BundleFile = _network("improviser")
+    temperature: float = _parameter(IMPROVISE, "temperature")
+    seconds: float = _parameter(IMPROVISE, "seconds")
+    seed: int = _parameter(IMPROVISE, "seed")
+
+
 class _Changes(Section):
     """What a cue leaves out stays as it is."""
 
@@ -93,9 +102,18 @@ class PathChanges(_Changes):
     seed: int | None = _parameter(PATH, "seed", None)
 
 
+class ImproviseChanges(_Changes):
+    """Of the source improvise."""
+
+    temperature: float | None = _parameter(IMPROVISE, "temperature", None)
+    seconds: float | None = _parameter(IMPROVISE, "seconds", None)
+    seed: int | None = _parameter(IMPROVISE, "seed", None)
+
+
 class MotionChanges(_Changes):
     """Parameters of the sources, reached over the cue's fade."""
 
     vary: VaryChanges | None = key("Of the source `vary`.", None)
     granular: GranularChanges | None = key("Of the source `granular`.", None)
     path: PathChanges | None = key("Of the source `path`.", None)
+    improvise: ImproviseChanges | None = key("Of the source `improvise`.", None)

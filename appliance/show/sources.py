@@ -1,4 +1,4 @@
-"""Names of what the puppet can start from, beside those that a show gives its phrases."""
+"""Names that cues and commands know beside those that a show gives: sources of motion, no card."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 MAIN = "main"  # the phrase that the show starts with
 LIVE = "live"  # a live dancer's motion capture, in place of a phrase
-VARY, GRANULAR, PATH = "vary", "granular", "path"  # made ahead by the generator
-MADE = (VARY, GRANULAR, PATH)
+VARY, GRANULAR, PATH, IMPROVISE = "vary", "granular", "path", "improvise"  # made ahead by the generator
+MADE = (VARY, GRANULAR, PATH, IMPROVISE)
+NO_CARD = "none"  # takes a card off
 KEPT = "kept"  # of a recipe: a motion that was kept, under a name of its own
 
 
@@ -44,6 +45,13 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     PATH: {
         "wobble": Parameter("How far a path or a point wobbles, in standard deviations of poses.", 0.3, 0, 2),
         "frequency": Parameter("How often a second it does so.", 0.5, 0.05, 4),
+        "seed": _SEED,
+    },
+    IMPROVISE: {
+        "temperature": Parameter(
+            "How freely it draws: 1 as it learned, 0 always the likeliest, above 1 wilder.", 1.0, 0, 2
+        ),
+        "seconds": Parameter("How long it dances on from one prompt; then it goes on from there.", 20, 5, 60),
         "seed": _SEED,
     },
 }

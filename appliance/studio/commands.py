@@ -12,7 +12,14 @@ from typing import Annotated
 import typer
 
 from appliance.pose.reading_options import ReadingOptions, reading_options
-from appliance.studio import experiment_command, granular_command, inspect_command, path_command, vary_command
+from appliance.studio import (
+    experiment_command,
+    granular_command,
+    improvise_command,
+    inspect_command,
+    path_command,
+    vary_command,
+)
 from appliance.studio.clear_errors import INTERRUPTED, clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -55,6 +62,8 @@ Phrase = Annotated[
     Path | None,
     typer.Option(help="BVH that the show plays. Default: the one in --out, else an excerpt of a recording."),
 ]
+Name = Annotated[str | None, typer.Option(help="Name of the show. Default: the folder's name.")]
+Hand = Annotated[str | None, typer.Option(help="Joint of the first hand. Default: left upper arm.")]
 
 
 @app.command()
@@ -111,6 +120,10 @@ def train(
         Path | None,
         typer.Option(help="checkpoint.pt of the dancer in whose latents an improviser (moves) goes on."),
     ] = None,
+    start: Annotated[
+        Path | None,
+        typer.Option("--from", help="Show or checkpoint.pt whose network the training begins with."),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the training in --out.")] = False,
     threads: Annotated[int, typer.Option(min=0, help="CPU cores to use. 0: all.")] = 0,
     device: Annotated[Device, typer.Option(help="auto: the GPU, if there is one.")] = Device.auto,
@@ -125,10 +138,8 @@ def train(
         typer.Option(help="Files without capture errors, whatever they look like ('solo_*'); repeatable."),
     ] = None,
     phrase: Phrase = None,
-    name: Annotated[str | None, typer.Option(help="Name of the show. Default: the folder's name.")] = None,
-    hand: Annotated[
-        str | None, typer.Option(help="Joint of the first hand. Default: left upper arm.")
-    ] = None,
+    name: Name = None,
+    hand: Hand = None,
     *,
     reading: ReadingOptions,
 ) -> None:
@@ -158,6 +169,7 @@ def train(
                 learning_rate=learning_rate,
                 full_precision=full_precision,
                 puppet=puppet,
+                start=start,
                 resume=resume,
                 threads=threads,
                 device=device.value,
@@ -219,82 +231,27 @@ def evaluate(
 
 
 @app.command()
+@reading_options
 def export(
     checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a training.")],
     out: Annotated[Path, typer.Option(help="Folder of the show; show.yaml and phrase.bvh in it are kept.")],
     recordings: Recordings = None,
     phrase: Phrase = None,
-    name: Annotated[str | None, typer.Option(help="Name of the show. Default: the folder's name.")] = None,
+    name: Name = None,
+    hand: Hand = None,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Make a show from a checkpoint: network, report, skeleton, phrase, checksums."""
     with clear_errors("export"):
         from appliance.studio import export_command
 
-        export_command.run(checkpoint, out, recordings, phrase, name)
-
-
-@app.command()
-def improvise(
-    out: Annotated[Path, typer.Option(help="The phrase, a BVH file; report and picture go beside it.")],
-    checkpoint: Annotated[
-        Path | None,
-        typer.Argument(help="checkpoint.pt of a dancer; left out with --model.", show_default=False),
-    ] = None,
-    model: Annotated[
-        Path | None,
-        typer.Option(help="checkpoint.pt of bunraku train --model improviser, instead of training one."),
-    ] = None,
-    recordings: Annotated[
-        Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
-    ] = None,
-    seconds: Annotated[float, typer.Option(min=2.0, max=600.0, help="Approximate length.")] = 90.0,
-    seed: Annotated[int, typer.Option(help="Another seed gives another dance.")] = 1,
-    minutes: Annotated[float, typer.Option(min=0.01, help="Training time of the improviser.")] = 12.0,
-    steps: Annotated[int, typer.Option(min=0, help="Training steps, instead of --minutes.")] = 0,
-    temperature: Annotated[
-        float, typer.Option(min=0.05, max=2.0, help="1: as free as the training; less: closer to habits.")
-    ] = 1.2,
-    prompt: Annotated[
-        Path | None, typer.Option(help="BVH to continue, for --seconds, instead of an endless phrase.")
-    ] = None,
-    prompt_end: Annotated[
-        float | None, typer.Option("--from", min=1.0, help="Second of the prompt to continue from.")
-    ] = None,
-    dances: Annotated[int, typer.Option(min=1, help="How many dances to choose the phrase from.")] = 16,
-    dance_minutes: Annotated[float, typer.Option(min=0.05, help="Length of each dance.")] = 4.0,
-    threads: Annotated[int, typer.Option(min=0, help="CPU cores to use. 0: all.")] = 0,
-) -> None:
-    """Train an improviser on a dancer's recordings and let it make an endless phrase.
-
-    The improviser is stored beside the phrase. If its training was stopped, the same command continues it.
-    A trained one dances at once, and another --seed gives another phrase. With --prompt it continues a
-    recording. The published network (--model, lstm-mixtures) makes no endless phrase: it continues the
-    prompt, or a recorded moment that --seed chooses.
-    """
-    with clear_errors("improvise"):
-        from appliance.studio.improviser import improvisation
-        from appliance.studio.improviser.phrase import PhraseOptions
-
-        done = improvisation.run(
-            improvisation.ImproviseOptions(
-                checkpoint=checkpoint,
-                out=out,
-                recordings=recordings,
-                model=model,
-                minutes=minutes,
-                steps=steps,
-                threads=threads,
-                phrase=PhraseOptions(seconds, seed, temperature, dances, dance_minutes),
-                prompt=prompt,
-                prompt_end=prompt_end,
-            )
-        )
-    if not done:
-        raise typer.Exit(INTERRUPTED)
+        export_command.run(checkpoint, out, recordings, phrase, name, hand, reading)
 
 
 app.add_typer(inspect_command.app)
 app.add_typer(experiment_command.app)
 app.add_typer(granular_command.app)
+app.add_typer(improvise_command.app)
 app.add_typer(vary_command.app)
 app.add_typer(path_command.app)

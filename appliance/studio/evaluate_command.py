@@ -14,7 +14,7 @@ from rich.table import Table
 
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.roles import held_joints
-from appliance.studio.data.dataset import Take, load_dataset
+from appliance.studio.data.dataset import Take, load_folder
 from appliance.studio.data.remembered import remembered_reading
 from appliance.studio.evaluation import puppetry, puppetry_report
 from appliance.studio.evaluation.answer_picture import draw_answer
@@ -46,10 +46,10 @@ def run(options: EvaluateOptions) -> None:
     console = Console(stderr=True)
     iterations = _checked(options)
     coder = open_coder(options.network)
-    reading = options.reading.over(remembered_reading(options.network))
+    trained = remembered_reading(options.network)
     joints = _held_joints(coder, options.joints) if options.hands else []
-    takes = load_takes(options.recordings, coder, reading)
-    hands = load_takes(options.hands, coder, reading)
+    takes = load_takes(options.recordings, coder, options.reading, trained)
+    hands = load_takes(options.hands, coder, options.reading, trained)
     for take in (*takes, *hands):
         console.print(_about(take), highlight=False)
 
@@ -58,7 +58,8 @@ def run(options: EvaluateOptions) -> None:
 
     answer = {}
     if options.reference is not None:
-        measurements = _measurements(console, coder, takes, hands, options.reference)
+        told = options.reading.over(trained.options)
+        measurements = _measurements(console, coder, takes, hands, options.reference, told)
         answer = _answer(console, measurements, joints, iterations)
         if options.picture is not None:
             usual = puppetry.usual_iterations(iterations)
@@ -89,11 +90,16 @@ def _checked(options: EvaluateOptions) -> list[Iterations]:
 
 
 def _measurements(
-    console: Console, coder: Coder, takes: Sequence[Take], hands: Sequence[Take], folder: Path
+    console: Console,
+    coder: Coder,
+    takes: Sequence[Take],
+    hands: Sequence[Take],
+    folder: Path,
+    reading: ReadingOptions,
 ) -> list[Measurement]:
     """Every phrase with a hand of another take, and the training takes as reference."""
     pairs = pair_up(takes, hands)
-    known = apart_from(load_dataset(folder), (*takes, *hands))
+    known = apart_from(load_folder(folder, reading), (*takes, *hands))
     if not known:
         raise StudioError(
             f"{folder} has no recording beside the phrases and the hands. "

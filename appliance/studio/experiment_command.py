@@ -7,12 +7,14 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.studio.clear_errors import clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
 
 @app.command()
+@reading_options
 def experiment(
     out: Annotated[Path, typer.Option(help="Folder for the page, the strips, the BVH and the figures.")],
     show: Annotated[
@@ -44,6 +46,8 @@ def experiment(
         ),
     ] = None,
     pictures: Annotated[bool, typer.Option(help="Draw the filmstrips, most of the time it takes.")] = True,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Dance the experiments of 'Puppeteering an AI' and hold what comes out against the paper's claims.
 
@@ -64,5 +68,6 @@ def experiment(
                 joint=joint,
                 trace=trace,
                 pictures=pictures,
+                reading=reading,
             )
         )

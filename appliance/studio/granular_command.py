@@ -7,12 +7,14 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.studio.clear_errors import clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
 
 @app.command()
+@reading_options
 def granular(
     checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a training.")],
     out: Annotated[Path, typer.Option(help="The phrase, a BVH file; its figures and picture lie beside it.")],
@@ -47,6 +49,8 @@ def granular(
             min=0.0, max=1.0, help="The network on its own motion, with this share of --from mixed in."
         ),
     ] = None,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Make an endless phrase out of a dancer's latents alone: Granular Dance.
 
@@ -72,5 +76,6 @@ def granular(
                 mix=mix,
                 offset=offset,
                 feedback=feedback,
+                reading=reading,
             )
         )

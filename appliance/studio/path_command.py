@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.studio.clear_errors import clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -18,6 +19,7 @@ Moved = Annotated[
 
 
 @app.command()
+@reading_options
 def path(
     model: Model,
     out: Annotated[Path, typer.Option(help="The dance, a BVH file; its figures and picture lie beside it.")],
@@ -38,6 +40,8 @@ def path(
     start: Annotated[float, typer.Option(min=0.0, help="Second of the phrase to begin at.")] = 0.0,
     seconds: Annotated[float, typer.Option(min=0.5, max=600.0, help="How long the dance is.")] = 10.0,
     recordings: Moved = None,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Make a dance of a path through the space of a dancer's poses ('Beyond Imitation').
 
@@ -50,16 +54,19 @@ def path(
     with clear_errors("path"):
         from appliance.studio.pose_space.path import PathOptions, run
 
-        run(PathOptions(model, out, phrase, recordings, wobble, draw, seed, start, seconds))
+        run(PathOptions(model, out, phrase, recordings, wobble, draw, seed, start, seconds, reading))
 
 
 @app.command(name="map")
+@reading_options
 def map_(
     files: Annotated[list[Path], typer.Argument(help="BVH recordings to lay over the map.")],
     model: Model,
     out: Annotated[Path, typer.Option(help="Folder for the page, the pictures and the sheet to draw on.")],
     seconds: Annotated[float, typer.Option(min=1.0, help="How much of each recording.")] = 60.0,
     recordings: Moved = None,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Draw the space of a dancer's poses as a map, with recordings as paths over it.
 
@@ -69,4 +76,4 @@ def map_(
     with clear_errors("map"):
         from appliance.studio.pose_space.pose_map import MapOptions, run
 
-        run(MapOptions(model, out, tuple(files), recordings, seconds))
+        run(MapOptions(model, out, tuple(files), recordings, seconds, reading))

@@ -7,24 +7,32 @@ from pathlib import Path
 
 import numpy as np
 
+from appliance.dancer.material.steps import floor_under
 from appliance.pose import quaternion
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
-from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import FPS, Dataset
+from appliance.studio.data.remembered import Remembered
 from appliance.studio.evaluation.coders import MovedJoints, Poses
 from appliance.studio.evaluation.evaluation import load_takes
 from appliance.studio.improviser.footing import plant_feet
-from appliance.studio.improviser.steps import floor_under
 from appliance.studio.studio_error import StudioError
 
 
 def excerpt_of(
-    file: Path, start_s: float, seconds: float, coder: MovedJoints, skeleton: Skeleton
+    file: Path,
+    start_s: float,
+    seconds: float,
+    coder: MovedJoints,
+    dataset: Dataset,
+    reading: ReadingOptions = AS_THE_FILES_SAY,
 ) -> Recording:
-    """A part of a BVH file at 50 Hz, its floor at height 0. Raises StudioError for another skeleton, or where
-    it is too short.
+    """A part of a BVH file at 50 Hz, its floor at height 0, read as asked, else as the dataset was.
+
+    Raises StudioError for another skeleton than the dataset's, or where it is too short.
     """
-    (take,) = load_takes([file], coder)
+    skeleton = dataset.skeleton
+    (take,) = load_takes([file], coder, reading, Remembered(dataset.catalogue.reading, skeleton))
     recording = take.recording
     if not recording.skeleton.same_joints(skeleton):
         raise StudioError(f"{file} has another skeleton than the recordings that the model was trained on.")

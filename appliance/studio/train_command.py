@@ -11,6 +11,7 @@ import torch
 from rich.console import Console
 from torch import nn
 
+from appliance.dancer.material.improvising import MOVE
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.autoencoder.models import MODELS, AnySettings, settings_for, settings_from
 from appliance.studio.autoencoder.training import Settings, Training
@@ -19,14 +20,16 @@ from appliance.studio.data import sources
 from appliance.studio.data.dataset import WINDOW
 from appliance.studio.data.sources import Sources
 from appliance.studio.disk_room import require_room
-from appliance.studio.evaluation.coders import load_checkpoint, load_state
+from appliance.studio.evaluation.coders import load_checkpoint, load_puppet, load_state
 from appliance.studio.evaluation.findings import MASKED_PICTURE, few_data, findings, require_windows
 from appliance.studio.evaluation.masked import draw_masked
+from appliance.studio.export.improviser_network import export_improviser
 from appliance.studio.export.motion_network import FILES, export_motion
 from appliance.studio.export.release import Request, release
+from appliance.studio.going_on import open_start, require_same_joints, settings_of
 from appliance.studio.improviser import own_output
+from appliance.studio.improviser.improviser_training import ImproviserTraining
 from appliance.studio.improviser.learning import AnyTraining, train_until_done, training_for
-from appliance.studio.improviser.moves import MOVE
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesTraining
 from appliance.studio.processes import Processes, joined
 from appliance.studio.studio_error import StudioError
@@ -54,6 +57,7 @@ class TrainOptions:
     learning_rate: float = 0.0
     full_precision: bool = False
     puppet: Path | None = None
+    start: Path | None = None
     resume: bool = False
     threads: int = 0
     device: str = "auto"
@@ -83,6 +87,9 @@ def _train(options: TrainOptions, device: str, processes: Processes) -> bool:
     console = Console(stderr=True, quiet=not processes.leads)
     checkpoint = options.out / "checkpoint.pt"
     settings, source, state = _settings_and_source(options, checkpoint)
+    start = None if options.start is None else open_start(options.start)
+    if start is not None:
+        settings = settings_of(start, settings, options)
     if processes.leads:
         require_room(options.out)
     dataset = source.load(reading_progress(console))
@@ -93,10 +100,18 @@ def _train(options: TrainOptions, device: str, processes: Processes) -> bool:
     training: Training | AnyTraining
     if isinstance(settings, Settings):
         require_windows(dataset, settings.batch, settings.window)
-        training = Training(dataset, settings, device, processes)
+        if start is not None and options.start is not None:
+            require_same_joints(start, dataset, options.start)
+        begin = None if start is None else start.autoencoder
+        training = Training(dataset, settings, device, processes, begin)
     else:
         training = training_for(settings, dataset, _puppet(options, state), device, processes)
     training.origin |= source.as_state()
+    begun_with = (
+        options.start.resolve().name if options.start else (state or {}).get("origin", {}).get("from")
+    )
+    if begun_with:
+        training.origin["from"] = begun_with
     if state is not None:
         training.restore(state)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -132,6 +147,8 @@ def _finish(
             coder = load_checkpoint(checkpoint)[0]
             file = export_motion(coder, training.dataset, settings.model, options.out)
             console.print(f"{file}: a show that holds it dances from it live (docs/variations.md, On stage).")
+        if isinstance(training, ImproviserTraining):
+            _export_improviser(training, checkpoint, console)
         console.print(f"{checkpoint} is ready. What it is for: {MODELS[settings.model].use}.")
     elif training.settings.window != WINDOW:
         console.print(
@@ -145,6 +162,16 @@ def _finish(
         for line in few_data(training.dataset):
             console.print(line, highlight=False)
         console.print(f"{options.out} is a show. Dance it: bunraku play --show {show} --emulate")
+
+
+def _export_improviser(training: ImproviserTraining, checkpoint: Path, console: Console) -> None:
+    """improviser.onnx beside the checkpoint, if the dancer is of a kind that the box's sources take."""
+    coder = load_puppet(Path(training.origin["puppet"]))[0]
+    try:
+        file = export_improviser(training.averaged, coder.autoencoder, coder.joints, checkpoint.parent)
+        console.print(f"{file}: a show that holds it improvises live (docs/variations.md, On stage).")
+    except StudioError as error:
+        console.print(f"No improviser.onnx for a show: {error}")
 
 
 def choose_device(wanted: str) -> str:
@@ -164,7 +191,8 @@ def _settings_and_source(
             raise StudioError(f"{options.out} has no checkpoint.pt to resume. Omit --resume.")
         state = load_state(checkpoint)
         settings = settings_from(state["settings"])
-        return _paced(settings, options), sources.remembered(state, options.recordings, checkpoint), state
+        source = sources.remembered(state, options.recordings, checkpoint, options.reading)
+        return _paced(settings, options), source, state
     if checkpoint.exists():
         raise StudioError(
             f"{options.out} already has a training. Continue it with --resume, or give another --out."
@@ -185,7 +213,7 @@ def _settings_and_source(
     )
     if options.recordings is None:
         assert options.puppet is not None
-        source = sources.remembered(load_state(options.puppet), None, options.puppet)
+        source = sources.remembered(load_state(options.puppet), None, options.puppet, options.reading)
         return _paced(settings, options), source, None
     source = sources.given(
         options.recordings, options.catalogue, options.held_out, options.reading, options.keep

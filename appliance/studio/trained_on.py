@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import track
 
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.data import sources
 from appliance.studio.data.dataset import Dataset
 from appliance.studio.evaluation.coders import TorchCoder, load_checkpoint
@@ -21,9 +22,10 @@ def trained_on(
     state: dict[str, Any],
     recordings: Path | None,
     console: Console,
+    reading: ReadingOptions = AS_THE_FILES_SAY,
 ) -> Dataset:
     """recordings: their folder, if they have moved. Raises StudioError where other joints move in them."""
-    dataset = sources.remembered(state, recordings, checkpoint).load(reading_progress(console))
+    dataset = sources.remembered(state, recordings, checkpoint, reading).load(reading_progress(console))
     if list(dataset.moving_names) != list(joints):
         raise StudioError(
             f"{checkpoint} moves {', '.join(joints)}; the recordings move "
@@ -33,13 +35,17 @@ def trained_on(
 
 
 def open_model(
-    model: str, checkpoint: Path, recordings: Path | None, console: Console
+    model: str,
+    checkpoint: Path,
+    recordings: Path | None,
+    console: Console,
+    reading: ReadingOptions = AS_THE_FILES_SAY,
 ) -> tuple[TorchCoder, Dataset]:
     """A checkpoint of `train --model` and its recordings. Raises StudioError for one of another model."""
     coder, state = load_checkpoint(checkpoint)
     if state["settings"].get("model") != model:
         raise StudioError(f"{checkpoint} is no {model} model. Train one with: bunraku train --model {model}.")
-    return coder, trained_on(checkpoint, coder.joints, state, recordings, console)
+    return coder, trained_on(checkpoint, coder.joints, state, recordings, console, reading)
 
 
 def reading_progress(console: Console) -> Any:

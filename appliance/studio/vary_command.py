@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from appliance.pose.reading_options import ReadingOptions, reading_options
 from appliance.studio.clear_errors import clear_errors
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -22,6 +23,7 @@ class Region(StrEnum):
 
 
 @app.command()
+@reading_options
 def vary(
     model: Annotated[Path, typer.Option(help="checkpoint.pt of bunraku train --model sequence.")],
     out: Annotated[Path, typer.Option(help="Folder for the variations, their strip and their figures.")],
@@ -56,6 +58,8 @@ def vary(
     recordings: Annotated[
         Path | None, typer.Option(help="Folder with the dancer's BVH recordings, if they have moved.")
     ] = None,
+    *,
+    reading: ReadingOptions,
 ) -> None:
     """Make variations of a phrase: other timing and expression, or something new with an element kept.
 
@@ -84,5 +88,6 @@ def vary(
                 share=share,
                 regions=tuple(one.value for one in region or ()),
                 on_map=on_map,
+                reading=reading,
             )
         )

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from appliance.exchange.exchange_error import ExchangeError
-from appliance.exchange.formats import ENDINGS, read_recording, write_recording
+from appliance.exchange.formats import ENDINGS, read_as_told, write_recording
 from appliance.exchange.glb_file import GlbBuffer, GlbFile
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
@@ -58,7 +58,7 @@ def assert_same_dance(found: Recording, meant: Recording, ending: str) -> None:
 def test_a_dance_comes_back(figure: str, ending: str, tmp_path: Path) -> None:
     meant = with_ends(moved(FIGURES[figure], seconds=2.0, fps=59.94))
     write_recording(tmp_path / f"dance{ending}", meant)
-    assert_same_dance(read_recording(tmp_path / f"dance{ending}"), meant, ending)
+    assert_same_dance(read_as_told(tmp_path / f"dance{ending}")[0], meant, ending)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -69,7 +69,7 @@ def test_bones_that_stretch_come_back(ending: str, tmp_path: Path) -> None:
     stretched[:, 3] *= 1.0 + 0.2 * np.sin(np.arange(count) / 9)[:, None]
     stretched[:, 0] = 0.0
     write_recording(tmp_path / f"dance{ending}", replace(rigid, translations=stretched))
-    found = read_recording(tmp_path / f"dance{ending}").translations
+    found = read_as_told(tmp_path / f"dance{ending}")[0].translations
     assert found is not None
     np.testing.assert_allclose(found[:, 1:], stretched[:, 1:], atol=1e-5)
 
@@ -90,7 +90,7 @@ def test_any_rotations_come_back(
     meant = Recording(figure, poses, chance.normal(size=(frames, 3)), fps)
     path = tmp_path_factory.mktemp("any") / f"dance{ending}"
     write_recording(path, meant)
-    found = read_recording(path)
+    found = read_as_told(path)[0]
     # Euler angles with six digits: at gimbal lock they say less
     assert np.degrees(quaternion.angle_between(found.poses, meant.poses)).max() < 0.01
     assert found.fps == pytest.approx(fps, rel=1e-6)
@@ -111,7 +111,7 @@ def test_real_dances_come_back(recordings_dir: Path, tmp_path: Path) -> None:
     meant = read_bvh(path, true_fps=60, drop_tpose=True).excerpt(0.0, 5.0)
     for ending in ENDINGS:
         write_recording(tmp_path / f"dance{ending}", meant)
-        assert_same_dance(read_recording(tmp_path / f"dance{ending}"), meant, ending)
+        assert_same_dance(read_as_told(tmp_path / f"dance{ending}")[0], meant, ending)
 
 
 def test_the_command_as_it_is_installed(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_a_file_of_blender_s_kind(tmp_path: Path) -> None:
             ],
         },
     )
-    found = read_recording(tmp_path / "foreign.glb")
+    found = read_as_told(tmp_path / "foreign.glb")[0]
     assert found.skeleton.names == ("Hips", "Spine")
     np.testing.assert_allclose(found.roots, np.tile([0.0, 0.95, 0.0], (3, 1)), atol=1e-6)
     places, _ = found.skeleton.forward_kinematics(found.poses, found.roots)
@@ -228,7 +228,7 @@ def test_damaged_files_are_refused_in_words(ending: str, tmp_path: Path, bunraku
     for data in spoilt[3:5]:
         path.write_bytes(data)
         with pytest.raises(ExchangeError):
-            read_recording(path)
+            read_as_told(path)[0]
     assert not (tmp_path / "out.bvh").exists() or ending == ".csv"
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.exchange.formats import read_recording
+from appliance.exchange.formats import read_as_told
 from appliance.exchange.retargeting import leg_m, lowest_m, retarget
 from appliance.pose.bvh import write_bvh
 from appliance.pose.quaternion import Array
@@ -64,7 +64,7 @@ def test_the_command_writes_it_and_refuses_unknown_names(tmp_path: Path, bunraku
     write_bvh(phrase, dance)
     write_bvh(other, as_the_system_writes(dance_of("LAFAN", 2.0), "LAFAN"))
     bunraku("retarget", phrase, "--to", other, "--out", tmp_path / "out.bvh")
-    assert "LeftArm" in read_recording(tmp_path / "out.bvh").skeleton.names
+    assert "LeftArm" in read_as_told(tmp_path / "out.bvh")[0].skeleton.names
     nameless = replace(dance.skeleton, names=tuple(f"bone{j}" for j in range(len(dance.skeleton))))
     write_bvh(other, replace(dance, skeleton=nameless))
     refused = bunraku("retarget", phrase, "--to", other, "--out", tmp_path / "no.bvh", status=2)

@@ -6,11 +6,15 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from appliance.generator import wish as wishes
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
+from appliance.pose import quaternion
+from appliance.pose.bvh import read_bvh
 from appliance.show_control.orders import Order
+from tests.command import Command
 from tests.generator.conftest import Bench
 from tests.sources import write_motion_network, write_show_with_sources
 from tests.system.processes import wait_until
@@ -41,6 +45,35 @@ def test_one_variation_ahead_and_no_more(bench: Benches, tmp_path: Path) -> None
     assert one.recipe()["source"] == "path"
     assert one.dance() == one.recipe(), "a path loops: the next one comes when another is asked for"
     assert len(list((one.folder / "material").iterdir())) <= 4
+
+
+def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: Path) -> None:
+    show = write_show_with_sources(tmp_path / "show")
+    one = bench(show)
+    one.health |= {"position_s": 0.5, "looked_at": time.monotonic()}
+    one.declare(phrase=("improvise", NO_FADE))
+    first = one.recipe()
+    assert first["source"] == "improvise" and first["after"] == 0
+    assert 0.5 < first["from_s"] < 3.0 and one.made.read().from_s == first["from_s"]  # type: ignore[union-attr]
+    second = one.dance()
+    made = one.made.read()
+    assert made is not None and not made.at_once
+    assert second["after"] == first["number"] and second["seed"] == first["seed"] + 1
+    assert 2.0 < second["from_s"] < 4.5 and second["prompt"] != first["prompt"]
+    one.health["position_s"] = 1.0
+    one.declare(motion_improvise_temperature=("", (0.25,)))
+    third = one.recipe()
+    assert third["temperature"] == 0.25 and third["after"] == first["number"]
+    assert one.made.read().at_once and third["from_s"] > 1.0  # type: ignore[union-attr]
+    one.dance()
+    health = one.health
+    one.close()  # killed
+    other = bench(show)
+    other.health = health
+    other.declare(phrase=("improvise", NO_FADE), motion_improvise_temperature=("", (0.25,)))
+    fourth = other.recipe()
+    assert fourth["after"] == third["number"] and fourth["seed"] == third["seed"] + 1
+    assert not other.made.read().at_once  # type: ignore[union-attr]
 
 
 def test_what_the_stage_could_not_take_over_is_made_again(bench: Benches, tmp_path: Path) -> None:
@@ -87,7 +120,9 @@ def test_parameters_reach_their_value_in_steps(
     assert recipe["points"] == [0.25, 0.75] and recipe["wobble"] == 0.3
 
 
-def test_a_kept_motion_outlives_the_power(bench: Benches, tmp_path: Path) -> None:
+def test_a_kept_motion_outlives_the_power_and_is_written_as_a_file(
+    bench: Benches, tmp_path: Path, bunraku: Command
+) -> None:
     show = write_show_with_sources(tmp_path / "show")
     one = bench(show)
     keep = Order("keep", text="anna")
@@ -109,6 +144,17 @@ def test_a_kept_motion_outlives_the_power(bench: Benches, tmp_path: Path) -> Non
     recipe = other.recipe()
     assert recipe["source"] == "kept" and recipe["of"] == kept
     assert other.dance()["number"] == recipe["number"], "it loops"
+    settings = tmp_path / "box.yaml"
+    settings.write_text("state: state\n")
+    here = ["--show", show, "--box", settings]
+    assert "anna: 3.0 s of vary (phrase main, seed 1, sigma 1.0)" in bunraku("kept", *here).out
+    bunraku("kept", "anna", "--out", tmp_path / "anna.bvh", *here)
+    written = read_bvh(tmp_path / "anna.bvh")
+    danced = other.generator.kept.material("anna").loop
+    turned = quaternion.angle_between(written.poses, danced.poses[:-1])
+    assert len(written) == danced.length and np.degrees(turned).max() < 0.1
+    assert np.abs(written.roots - danced.track[:-1, :3]).max() < 1e-4
+    assert "Did you mean 'anna'" in bunraku("kept", "ana", *here, status=2).err
 
 
 def test_a_disk_that_takes_nothing_is_told(bench: Benches, tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def write_known(folder: Path, *names: str) -> list[Path]:
 def test_the_cmu_dances_are_known_by_names_and_sizes(tmp_path: Path) -> None:
     files = write_known(tmp_path, "cmu_dance")
     found = find_catalogue(tmp_path, files)
-    assert found.fps_of("salsa_09") == 60 and found.fps_of("indian_04") == 120
+    assert found.reading.fps_of("salsa_09") == 60 and found.reading.fps_of("indian_04") == 120
     assert found.take_of("salsa_09") == found.take_of("salsa_24")
     assert "mocap.cs.cmu.edu" in found.acknowledgement
     with files[0].open("ab") as stream:
@@ -54,7 +54,7 @@ def test_fighters_and_dancers_are_known_alone_and_together(tmp_path: Path) -> No
     assert find_catalogue(tmp_path, fighters).held_out == ("martial_04",)
     both = find_catalogue(tmp_path, [*fighters, *dancers])
     assert set(both.held_out) == {*alone.held_out, "martial_04"}
-    assert both.fps_of("salsa_01") == 60 and both.fps_of("martial_03") == 120
+    assert both.reading.fps_of("salsa_01") == 60 and both.reading.fps_of("martial_03") == 120
     assert both.acknowledgement == alone.acknowledgement
     own = tmp_path / "martial_99.bvh"
     own.touch()

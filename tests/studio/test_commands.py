@@ -49,7 +49,7 @@ def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:
         "60 steps on the CPU (1 threads)",
         "degrees on held-out takes",
         "computes what was trained",
-        "the bundle contains a recording",
+        "The bundle contains a recording",
     ):
         assert expected in words, expected
 

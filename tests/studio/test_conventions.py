@@ -1,4 +1,4 @@
-"""Twelve systems' files through every door: inspect, filmstrip, VMC; two of them: train, evaluate, play."""
+"""Twelve systems' files through every door; two (--long: all) are also trained on, evaluated and played."""
 
 from __future__ import annotations
 
@@ -62,10 +62,12 @@ def test_a_file_of_every_system_is_a_dancer(tmp_path: Path, convention: str, bun
     assert (tmp_path / "strip.png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("convention", ["LAFAN", "Unreal"])
+@pytest.mark.parametrize("convention", CONVENTIONS)
 def test_a_system_s_recordings_become_a_show_that_dances(
-    tmp_path: Path, convention: str, bunraku: Command
+    tmp_path: Path, convention: str, bunraku: Command, long_run: bool
 ) -> None:
+    if convention not in ("LAFAN", "Unreal") and not long_run:
+        pytest.skip("every system's: --long")
     folder, show = tmp_path / "recordings", tmp_path / "show"
     for take in range(2):
         write(folder / f"take_{take}.bvh", convention, 6.0, seed=take)
@@ -83,3 +85,7 @@ def test_a_system_s_recordings_become_a_show_that_dances(
     poses, roots = danced.ticks["pose"].astype(float), danced.ticks["root"].astype(float)
     assert_a_dancer(danced.skeleton, poses, roots)
     assert (danced.skeleton.stance is not None) == (convention == "LAFAN")
+    for look in ("plaster", "lines", "ink", "cloud", "veil") if long_run else ():
+        picture = tmp_path / f"{look}.png"
+        bunraku("filmstrip", show / "phrase.bvh", "--seconds", "1", "--look", look, "--out", picture)
+        assert picture.stat().st_size > 10_000

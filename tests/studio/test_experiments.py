@@ -16,7 +16,6 @@ from PIL import Image
 
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
-from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import default_show_path
@@ -27,7 +26,6 @@ from appliance.studio.data.regions import regions_of
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.experiments.claims import claims, pauses
 from appliance.studio.experiments.excerpts import FRAMES, Excerpt, choose, measured, named
-from appliance.studio.experiments.experiment import read_trace
 from appliance.studio.experiments.families import CONDITIONS, Condition, Trial, usual_trace
 from appliance.studio.experiments.page import write_page
 from appliance.studio.studio_error import StudioError
@@ -217,34 +215,6 @@ def test_every_family_is_danced_as_long_as_its_hand_needs(takes: list[Take]) -> 
     assert np.degrees(first) < 1.0, "five seconds are one turn"
     kept = trial.dances[Condition("kept", (1, 1))].poses
     np.testing.assert_allclose(np.abs((kept * trial.once.phrase).sum(-1)), 1.0, atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("seconds,w,x,y,z\n0,1,0,0\n", "line 2: a row has seconds and a quaternion"),
-        ("0,1,0,0,0\n0.02,0,0,0,0\n", "line 2"),
-        ("0,1,0,0,0\n0.02,nan,0,0,0\n", "line 2"),
-        ("0.02,1,0,0,0\n0.01,1,0,0,0\n", "line 2: 0.01 s comes after 0.02 s"),
-        ("", "has no trace"),
-    ],
-)
-def test_a_wrong_trace_is_told_with_its_line(tmp_path: Path, text: str, words: str) -> None:
-    file = tmp_path / "trace.csv"
-    file.write_text(text)
-    with pytest.raises(StudioError, match=words):
-        read_trace(file)
-
-
-def test_a_trace_is_read_at_the_ticks(tmp_path: Path) -> None:
-    file = tmp_path / "trace.csv"
-    times = np.arange(0, 2, 0.01)
-    half = np.radians(45 * times)
-    rows = [f"{t},{np.cos(h)},{np.sin(h)},0,0" for t, h in zip(times, half, strict=True)]
-    file.write_text("seconds,w,x,y,z\n" + "\n".join(rows) + "\n")
-    found: Array = read_trace(file)
-    assert len(found) == 100
-    np.testing.assert_allclose(2 * np.degrees(np.arccos(found[:, 0])), 90 * np.arange(100) / FPS, atol=0.05)
 
 
 def test_the_command_writes_page_strips_recordings_and_figures_of_two_networks_side_by_side(

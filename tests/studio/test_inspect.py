@@ -13,7 +13,8 @@ from appliance.pose.reading_options import ReadingOptions
 from appliance.studio.data.catalogue import Catalogue
 from appliance.studio.data.remembered import KEY, reading_facts, remembered_reading
 from appliance.studio.inspection import zero_pose
-from tests.pose.conventions import as_the_system_writes, dance_of, scaled, skeleton_of
+from tests.pose.conventions import as_the_system_writes, dance_of, skeleton_of
+from tests.pose.other_frames import scaled
 from tests.studio.conftest import bunraku
 from tests.studio.test_commands import said
 
@@ -85,9 +86,9 @@ def test_masked_frames_are_named_drawn_and_kept_on_demand(tmp_path: Path) -> Non
 
 def test_a_show_keeps_how_its_recordings_were_read(tmp_path: Path) -> None:
     told = Catalogue().with_options(ReadingOptions(up={"*": "z"}, true_fps={"a_*": 60.0}))
-    assert told.fps_of("a_1") == 60.0 and told.reading_of("b").up == "z"
+    assert told.reading.fps_of("a_1") == 60.0 and told.reading.reading_of("b").up == "z"
     (tmp_path / "report.json").write_text(json.dumps({KEY: reading_facts(told)}))
-    kept = remembered_reading(tmp_path / "puppet.onnx")
+    kept = remembered_reading(tmp_path / "puppet.onnx").options
     assert kept.up == {"*": "z"} and kept.fps_of("a_2") == 60.0
     assert ReadingOptions(up={"*": "y"}).over(kept).reading_of("c").up == "y"
 

@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 import torch
 
-from appliance.dancer.material.motion_network import MotionNetwork, map_facts
+from appliance.dancer.material.improviser_network import ImproviserNetwork
+from appliance.dancer.material.improvising import improvised
+from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError, map_facts
 from appliance.pose import quaternion
 from appliance.studio.autoencoder.architectures import build
 from appliance.studio.autoencoder.autoencoder import Autoencoder
+from appliance.studio.export import improviser_network as export
+from appliance.studio.export.improviser_network import export_improviser
 from appliance.studio.export.motion_network import write_motion_network
 from appliance.studio.granular.granular import encoded
+from appliance.studio.improviser.improviser import Improviser
+from appliance.studio.improviser.moves import MovesShape
 from appliance.studio.studio_error import StudioError
 from tests.studio.tiny import moving, skeleton, swaying
 
@@ -50,3 +56,29 @@ def test_the_file_encodes_and_decodes_as_it_was_trained(tmp_path: Path, window: 
 def test_a_network_that_the_box_does_not_take_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StudioError, match="mlp alone"):
         write_motion_network(untrained("lstm", 32), NAMES, tmp_path / "model.onnx")
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+def test_an_improvisers_file_goes_on_as_it_was_trained(tmp_path: Path, layers: int) -> None:
+    autoencoder = untrained("mlp", 8)
+    improviser = Improviser(MovesShape(8, 6, 4, 4, 24), 12, layers, 2).requires_grad_(False)
+    improviser.scale.learn(torch.randn(200, 12, generator=torch.Generator().manual_seed(1)))
+    path = export_improviser(improviser, autoencoder, NAMES, tmp_path)
+    network = ImproviserNetwork(path, skeleton().names)
+    heard = torch.randn(2, 19, 12, generator=torch.Generator().manual_seed(2))
+    for temperature in (0.0, 1.0):
+        trained = improviser.improvise(heard, 3, temperature, 7).numpy()
+        assert np.abs(improvised(network, heard.numpy(), 3, temperature, 7) - trained).max() < 0.02
+    with pytest.raises(MotionNetworkError, match="kind 'motion'"):
+        MotionNetwork(path, skeleton().names)
+
+
+def test_an_improviser_that_was_not_exported_as_trained_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    improviser = Improviser(MovesShape(8, 6, 4, 4, 24), 12, 1, 2).requires_grad_(False)
+    improviser.scale.learn(torch.randn(200, 12))
+    monkeypatch.setattr(export, "FARTHEST", 0.01)  # a fault of the graph: its moves hardly move
+    with pytest.raises(StudioError, match="differs from the trained one"):
+        export_improviser(improviser, untrained("mlp", 8), NAMES, tmp_path)
+    assert not (tmp_path / "improviser.onnx").exists()

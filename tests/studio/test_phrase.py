@@ -12,13 +12,15 @@ import torch
 
 from appliance.dancer.grounding import survey
 from appliance.dancer.loop import is_closed, turns_about_y, yaws
+from appliance.dancer.material.carrying import smoothed
+from appliance.dancer.material.improviser_network import ImproviserNetwork
 from appliance.dancer.motion_source import Playback
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.data.dataset import Take, load_dataset
-from appliance.studio.improviser.footing import plant_feet, smoothed
+from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.improvisation import ImproviseOptions, run
 from appliance.studio.improviser.naturalness import Yardstick, distances, measure
 from appliance.studio.improviser.pace import pace
@@ -26,7 +28,7 @@ from appliance.studio.improviser.phrase import STAGE_M, PhraseOptions, closed_lo
 from appliance.studio.improviser.stretches import best_stretches
 from appliance.studio.standing import measure_standing
 from tests.studio.conftest import bunraku
-from tests.studio.tiny import moving, swaying, write_recordings
+from tests.studio.tiny import moving, skeleton, swaying, write_recordings
 
 
 def take_of(recording: Recording, name: str) -> Take:
@@ -287,6 +289,7 @@ def test_an_improviser_is_trained_by_train_and_continues_a_prompt_like_its_own(
     arguments = ["--model", "improviser", "--steps", 2, "--threads", 1, "--out", tmp_path / "moves"]
     result = bunraku("train", "--puppet", checkpoint[0], "--recordings", checkpoint[1], *arguments)
     assert result.exit_code == 0, result.output
+    assert ImproviserNetwork(tmp_path / "moves/improviser.onnx", skeleton().names).latent
     write_bvh(tmp_path / "prompt.bvh", strolling(6.0))
     asked = ["--prompt", tmp_path / "prompt.bvh", "--seconds", 2, "--recordings", checkpoint[1]]
     model = tmp_path / "moves" / "checkpoint.pt"

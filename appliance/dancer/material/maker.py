@@ -1,4 +1,4 @@
-"""Maker: a recipe becomes a loop: a phrase varied, a walk through what a dancer does, a path over the map.
+"""Maker: a recipe becomes a loop: a phrase varied, a walk, a path over the map, or an improvisation.
 
 The same recipe gives the same loop, bit for bit, on the same machine with the same versions: a replay makes
 what was danced again.
@@ -6,7 +6,8 @@ what was danced again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,24 +16,34 @@ import numpy as np
 from appliance.dancer.grounding import Floor, survey
 from appliance.dancer.loop import Loop, Placement
 from appliance.dancer.material import latent_paths
+from appliance.dancer.material.carrying import carried
 from appliance.dancer.material.cyclic import Cycle, Starts, even_starts
+from appliance.dancer.material.improviser_network import ImproviserNetwork
+from appliance.dancer.material.improvising import MOVE, improvised
 from appliance.dancer.material.motion_network import MotionNetwork, Poses
 from appliance.dancer.material.pose_paths import even_path, wobbled
+from appliance.dancer.material.prompt import CLOSING, closing_frame, homed, unpacked_steps
+from appliance.dancer.material.steps import HOP, Steps, danced_again, motion_of
 from appliance.dancer.phrase import FPS, X, Z
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.show.sources import GRANULAR, KEPT, MAIN, PATH, VARY
+from appliance.show.sources import GRANULAR, IMPROVISE, KEPT, MAIN, PATH, VARY
 
 GRANULAR_S, POINT_S = 20.0, 12.0  # of a walk; of a point or a stroke of the map, there and back
 Recipe = Mapping[str, Any]
 
 
+def open_network(source: str, file: Path, joints: Sequence[str]) -> MotionNetwork:
+    """The network of a source. Raises MotionNetworkError."""
+    return (ImproviserNetwork if source == IMPROVISE else MotionNetwork)(file, joints)
+
+
 class Maker:
     """Makes loops of a show. loop_of: the whole loop of a phrase by its name.
 
-    networks: the files of the sources' networks by source; each is read when it is first needed.
+    networks: the files of the sources' networks by source; each is read when it is needed.
     """
 
     def __init__(
@@ -50,9 +61,12 @@ class Maker:
         """Raises MotionNetworkError, and LookupError or ValueError for a recipe that is none of this show."""
         if recipe["source"] == KEPT:
             return self.make({**recipe["of"], "number": recipe["number"]})
-        network = self._network(recipe["source"])
-        make = {VARY: self._varied, GRANULAR: self._walked, PATH: self._path}[recipe["source"]]
-        cycle, poses = make(network, recipe)
+        network = self.network(recipe["source"])
+        if isinstance(network, ImproviserNetwork):
+            cycle, poses = self._improvised(network, recipe)
+        else:
+            make = {VARY: self._varied, GRANULAR: self._walked, PATH: self._path}[recipe["source"]]
+            cycle, poses = make(network, recipe)
         floor = self._floor(cycle, poses)
         lifts, heights = (None, None) if floor is None else (floor.lifts, floor.rest_heights)
         return cycle.loop(poses, lifts, heights, recipe["number"])
@@ -100,6 +114,22 @@ class Maker:
         windows = _facing(network.decode(moved), facing)
         return cycle, cycle.blended(windows, starts, network.places)
 
+    def _improvised(self, network: ImproviserNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
+        """What the dancer goes on with after the recipe's prompt; its end leads into its start."""
+        heard = unpacked_steps(recipe["prompt"], network.features)
+        moves = math.ceil(recipe["seconds"] * FPS / HOP / MOVE)
+        danced = improvised(network, heard[None], moves, recipe["temperature"], recipe["seed"])[0]
+        main = self._loop_of(MAIN)
+        together = Steps.of_features(np.concatenate([heard, danced]))
+        poses, roots = motion_of(network, together, main.poses[0], network.places)
+        poses = danced_again(network, poses, network.places).astype(np.float32)
+        count = closing_frame(poses[:, network.places])
+        track = np.repeat(main.track[:1], count, axis=0)
+        dance = Recording(self._skeleton, poses[:count].astype(float), roots[:count], FPS)
+        track[:, X : Z + 1] = homed(carried(dance, cyclic=False).roots)
+        cycle = Cycle.of(Loop(poses[:count], track, CLOSING, -CLOSING / FPS))
+        return cycle, cycle.poses
+
     def _on_the_spot(self, seconds: float) -> Cycle:
         """A dancer that stays in its place, as high as the show's phrase on the mean, in its first pose."""
         main = self._loop_of(MAIN)
@@ -116,10 +146,12 @@ class Maker:
             return None
         return survey(Recording(self._skeleton, poses, cycle.track[:-1, X : Z + 1], FPS))
 
-    def _network(self, source: str) -> MotionNetwork:
+    def network(self, source: str) -> MotionNetwork:
+        """The network of a source. Raises MotionNetworkError, LookupError."""
         file = self._files[source]
         if file not in self._networks:
-            self._networks[file] = MotionNetwork(file, self._skeleton.names)
+            self._networks.clear()  # one in memory, of 8 to 30 MB, is enough
+            self._networks[file] = open_network(source, file, self._skeleton.names)
         return self._networks[file]
 
 

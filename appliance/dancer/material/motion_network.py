@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +34,8 @@ class MotionNetwork:
     network of poses, where the map's 0 to 1 lies: its middle (Z,), directions (2, Z), low and high (2,).
     """
 
+    kind = "motion"
+
     def __init__(self, path: Path, skeleton_joints: Sequence[str]) -> None:
         """Raises MotionNetworkError."""
         import onnxruntime
@@ -51,8 +53,13 @@ class MotionNetwork:
             self.joints = tuple(moving_joints(facts))
             self.rest = rest_pose(facts, len(self.joints)).astype(np.float32)
             self.window, self.latent = int(facts["bunraku.window"]), int(facts["bunraku.latent"])
-            if facts.get("bunraku.kind") != "motion" or not 1 <= self.window <= LONGEST_WINDOW:
-                raise ValueError("it encodes no motion")
+            if facts.get("bunraku.kind") != self.kind or not 1 <= self.window <= LONGEST_WINDOW:
+                raise ValueError(f"it is no network of the kind '{self.kind}'")
+            self._idle = {  # the parts of the file that a run does not need get the least
+                one.name: np.zeros([size if isinstance(size, int) else 1 for size in one.shape], np.float32)
+                for one in self._session.get_inputs()
+            }
+            self._take_facts(facts)
             self.places = [list(skeleton_joints).index(name) for name in self.joints]
             self.ground = _ground(facts.get("bunraku.map", ""), self.latent)
         except Exception as error:  # onnxruntime has its own exception for each way to be broken
@@ -65,9 +72,8 @@ class MotionNetwork:
         level = np.array(windows, dtype=np.float32)
         level[:, :, 0] = quaternion.multiply(quaternion.inverse(facing)[:, None], windows[:, :, 0])
         level = quaternion.aligned(level, self.rest)
-        nothing = np.zeros((1, self.latent), np.float32)
         parts = [
-            self._session.run(["coded"], {"windows": part, "latents": nothing})[0]
+            self._run(["coded"], windows=part)[0]
             for part in np.array_split(level, -(-len(level) // MOST_AT_ONCE))
         ]
         return np.concatenate(parts), facing
@@ -77,15 +83,21 @@ class MotionNetwork:
 
         Raises MotionNetworkError where it gives no sound poses.
         """
-        nothing = np.tile(self.rest, (1, self.window, 1, 1))
         parts = [
-            self._session.run(["decoded"], {"windows": nothing, "latents": part.astype(np.float32)})[0]
+            self._run(["decoded"], latents=part.astype(np.float32))[0]
             for part in np.array_split(latents, -(-len(latents) // MOST_AT_ONCE))
         ]
         windows: Poses = np.concatenate(parts)
         if not np.isfinite(windows).all():
             raise MotionNetworkError("The network gives poses that are not numbers.")
         return windows
+
+    def _take_facts(self, facts: Mapping[str, str]) -> None:
+        """What a file of this kind says besides. Raises ValueError, LookupError."""
+
+    def _run(self, outputs: list[str], **inputs: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+        found: list[NDArray[np.float32]] = self._session.run(outputs, {**self._idle, **inputs})
+        return found
 
 
 def map_facts(middle: Array, directions: Array, low: Array, high: Array) -> str:

@@ -28,7 +28,6 @@ _LATER_POSES = 8  # at most, of the second dance of a pair
 _DISTURBED_JOINTS = 0.15
 _WILD_SPEED = 0.06  # half angles (radians) a pose of hands that no dancer had: about a turn a second
 _WEAK_SHARE, _FULL_SHARE = 0.25, 0.45  # of the lessons: with 2 passes, with the most; the others lie between
-_FULL_PROGRESS = 0.4  # of the training, when the most passes are reached: an untrained network would diverge
 _SEARCH_EVERY = 16  # lessons between two searches for what the wandering windows are pulled to
 _PULL_AGE = 10  # passes until a wandering window is pulled with full strength
 
@@ -39,6 +38,7 @@ class AnswerSettings:
 
     step: float = 0.6  # towards the answer in one pass
     passes: int = 10  # at most, the last one without hands
+    full_progress: float = 0.4  # of the training, when these are reached: an untrained network would diverge
     reserve: int = 1024  # dances with answers that are searched for together
     uses: int = 2  # of each dance, with different numbers of passes
     light: float = 0.4  # weights between 0 and 1
@@ -104,7 +104,9 @@ class Answers:
 
     def _passes(self, progress: float) -> int:
         """2, the maximum, or any number in between; the maximum grows at the beginning."""
-        most = 2 + round((self._settings.passes - 2) * min(progress / _FULL_PROGRESS, 1.0))
+        settings = self._settings
+        grown = min(progress / settings.full_progress, 1.0) if settings.full_progress else 1.0
+        most = 2 + round((settings.passes - 2) * grown)
         kind = float(torch.rand(()))
         if kind < _WEAK_SHARE:
             return 2

@@ -91,8 +91,14 @@ class Training(TrainingLoop[Report]):
     saved = ("autoencoder", "averaged", "critic", "optimizer", "critic_optimizer")
 
     def __init__(
-        self, dataset: Dataset, settings: Settings, device: str = "cpu", processes: Processes = ALONE
+        self,
+        dataset: Dataset,
+        settings: Settings,
+        device: str = "cpu",
+        processes: Processes = ALONE,
+        start: Autoencoder | None = None,
     ) -> None:
+        """start: a network of the settings' architecture and sizes that the training goes on from."""
         super().__init__(settings, processes, torch.device(device))
         torch.manual_seed(settings.seed)
         self.settings, self.dataset = settings, dataset
@@ -109,6 +115,8 @@ class Training(TrainingLoop[Report]):
         )
         self.autoencoder = Autoencoder(network, shape, rest).to(self.device)
         network.start_at(rest.float().flatten().to(self.device))
+        if start is not None:
+            self.autoencoder.load_state_dict(start.state_dict())
         self.averaged = copy.deepcopy(self.autoencoder).requires_grad_(False).eval()
         self.critic = PriorCritic(shape.latent).to(self.device)
         self.body = rotation.MovingSkeleton(dataset.skeleton, dataset.moving, torch.tensor(still)).to(

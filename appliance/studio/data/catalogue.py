@@ -10,8 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from appliance.pose.reading_options import ReadingOptions, first_fit
-from appliance.pose.stage_frame import Reading
+from appliance.pose.reading_options import ReadingOptions
 from appliance.show.section import Section, refusal
 from appliance.show.validation import validated
 from appliance.show.yaml_file import read_yaml
@@ -44,19 +43,15 @@ class Catalogue:
     facing: dict[str, str] = field(default_factory=dict)
     root: dict[str, str] = field(default_factory=dict)
 
-    def fps_of(self, name: str) -> float | None:
-        rate: float | None = first_fit(self.true_fps, name)
-        return rate
-
-    def reading_of(self, name: str) -> Reading:
-        """Unit, axes and root of a recording, as far as they are known."""
-        found = (first_fit(one, name) for one in (self.metres_per_unit, self.up, self.facing, self.root))
-        return Reading(*found)
+    @property
+    def reading(self) -> ReadingOptions:
+        """How the recordings are read, as far as it is known."""
+        known = {name: getattr(self, name) for name in READ_FROM_FILES}
+        return ReadingOptions(**known, all_frames=ALWAYS in self.keep.get("*", ()))
 
     def with_options(self, options: ReadingOptions) -> Catalogue:
         """With what the command line says, which comes first."""
-        own = ReadingOptions(**{name: getattr(self, name) for name in READ_FROM_FILES})
-        all_of_it = options.over(own)
+        all_of_it = options.over(self.reading)
         return replace(
             self,
             **{name: getattr(all_of_it, name) for name in READ_FROM_FILES},

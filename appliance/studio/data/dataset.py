@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose import quaternion
+from appliance.pose.reading_options import ReadingOptions
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.capture_errors import find_capture_errors
 from appliance.studio.data.catalogue import Catalogue, find_catalogue, read_catalogue, recordings_in
@@ -33,6 +34,7 @@ __all__ = [
     "Take",
     "find_catalogue",
     "load_dataset",
+    "load_folder",
     "load_take",
     "mean_pose",
     "mirrored",
@@ -55,6 +57,7 @@ class Dataset:
     moving: tuple[int, ...]
     training: tuple[Take, ...]
     held_out: tuple[Take, ...]
+    catalogue: Catalogue = field(default_factory=Catalogue)  # how they were read
 
     @property
     def takes(self) -> list[Take]:
@@ -112,7 +115,12 @@ def load_dataset(
             "Every frame is masked as a capture error: nothing is left to train on. "
             "Name sound files with --keep."
         )
-    return Dataset(skeleton, moving, training, held_out)
+    return Dataset(skeleton, moving, training, held_out, catalogue)
+
+
+def load_folder(folder: Path, reading: ReadingOptions) -> Dataset:
+    """As load_dataset; what reading says comes before a catalogue that lists the files."""
+    return load_dataset(folder, find_catalogue(folder, recordings_in(folder)).with_options(reading))
 
 
 def _kept_apart(takes: Sequence[Take], catalogue: Catalogue) -> tuple[tuple[Take, ...], tuple[Take, ...]]:

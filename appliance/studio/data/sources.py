@@ -53,8 +53,16 @@ def given(
     return Sources(recordings, replace(known, held_out=tuple(held_out)) if held_out else known)
 
 
-def remembered(state: dict[str, Any], recordings: Path | None, checkpoint: Path) -> Sources:
-    """Sources that a checkpoint was trained on; recordings: their folder, if they have moved since."""
+def remembered(
+    state: dict[str, Any],
+    recordings: Path | None,
+    checkpoint: Path,
+    reading: ReadingOptions = AS_THE_FILES_SAY,
+) -> Sources:
+    """Sources that a checkpoint was trained on, read as they were then but for what reading says.
+
+    recordings: their folder, if they have moved since.
+    """
     origin = state.get("origin") or {}
     if recordings is None and "recordings" not in origin:
         raise StudioError(f"{checkpoint} does not name its training recordings. Give --recordings.")
@@ -62,6 +70,7 @@ def remembered(state: dict[str, Any], recordings: Path | None, checkpoint: Path)
     if not folder.is_dir():
         raise StudioError(f"The recordings are no longer in {folder}. Give their folder with --recordings.")
     if "catalogue" not in origin:
-        return given(folder)
+        return given(folder, reading=reading)
     known = {"facing": {"*": "z"}, **origin["catalogue"]}  # trainings of before turned no recording
-    return Sources(folder, Catalogue(**{**known, "held_out": tuple(known["held_out"])}))
+    catalogue = Catalogue(**{**known, "held_out": tuple(known["held_out"])})
+    return Sources(folder, catalogue.with_options(reading))

@@ -92,13 +92,13 @@ def load_take(file: Path, catalogue: Catalogue, usual: Mapping[str, Pose] | None
 def read_take(file: Path, catalogue: Catalogue) -> tuple[Take, Recording]:
     """A take in which nothing is masked, and its recording at the rate at which it was captured."""
     header = read_bvh(file)
-    fps = catalogue.fps_of(file.stem) or header.fps
+    fps = catalogue.reading.fps_of(file.stem) or header.fps
     recording = replace(header, fps=fps)
     if leading_tpose_frames(recording):
         recording = recording.without_first(TPOSE_FRAMES)
     if not len(recording):
         raise DatasetError(f"{file.name} has no pose but its T-pose. Remove the file.")
-    recording, guesses = brought_in(file, recording, catalogue.reading_of(file.stem))
+    recording, guesses = brought_in(file, recording, catalogue.reading.reading_of(file.stem))
     resampled = recording.resampled(FPS)
     sound = np.ones(len(resampled), dtype=bool)
     take = catalogue.take_of(file.stem)

@@ -21,6 +21,7 @@ from appliance.studio.data.dataset import (
     load_take,
     window_starts,
 )
+from appliance.studio.data.remembered import NOTHING, Remembered
 from appliance.studio.evaluation.coders import Coder, MovedJoints, Poses
 from appliance.studio.studio_error import StudioError
 
@@ -72,15 +73,18 @@ class Evaluation:
 
 
 def load_takes(
-    files: Sequence[Path], coder: MovedJoints, reading: ReadingOptions = AS_THE_FILES_SAY
+    files: Sequence[Path],
+    coder: MovedJoints,
+    reading: ReadingOptions = AS_THE_FILES_SAY,
+    trained: Remembered = NOTHING,
 ) -> list[Take]:
     """Recordings as training reads them: at their true rate, T-pose dropped, capture errors masked, 50 Hz.
 
-    What reading says comes before a catalogue that lists the file.
+    What reading says comes first, then what training was told, then a catalogue that lists the file.
     """
     takes = []
     for file in files:
-        known = find_catalogue(file.parent, [file]).with_options(reading)
+        known = find_catalogue(file.parent, [file]).with_options(trained.options_for(file, reading))
         takes.append(load_take(file, known, dict(zip(coder.joints, coder.rest, strict=True))))
     return takes
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -62,10 +63,12 @@ def print_answer(console: Console, found: dict[str, Any]) -> None:
 def table(found: dict[str, Any]) -> Table:
     """A row for each joint and K/J, hands that turn, and the dance without a hand."""
     made = Table(
-        title="Does the hand move the body? Degrees; plausibility, energy, roughness: the phrase is 1"
+        title="Does the hand move the body? Degrees; plausibility, energy, roughness: the phrase is 1",
+        box=SIMPLE_HEAD,
     )
     for heading in COLUMNS:
-        made.add_column(heading, justify="left" if heading == "held" else "right")
+        is_name = heading == "held"
+        made.add_column(heading, justify="left" if is_name else "right", no_wrap=is_name)
     for joint in joints_of(found):
         for key, row in iterations_of(found[joint]).items():
             made.add_row(joint, key.replace("_", "/"), *_row(row))

@@ -44,6 +44,7 @@ def write_up(
         "training": {
             "minutes": round(state["seconds"] / 60, 2),
             "steps": state["step"],
+            **{name: state["origin"][name] for name in ("from",) if name in state.get("origin", {})},
             **{name: state["settings"][name] for name in LISTED},
             "takes": sorted(take.name for take in dataset.training),
             "held_out": sorted(take.name for take in dataset.held_out),

@@ -25,6 +25,8 @@ from appliance.studio.evaluation.pictures import (
 )
 
 STRIP_SHARE = 0.58  # height of the filmstrip by its width
+LETTERS_IN_A_ROW = 160  # of joints' names; more run into each other
+SLANTED: dict[str, Any] = {"rotation": 40, "ha": "right", "rotation_mode": "anchor"}
 
 
 def draw_report(
@@ -67,7 +69,8 @@ def _by_joint(axes: Any, report: dict[str, Any]) -> None:
     places = np.arange(len(once))
     axes.bar(places - 0.2, list(often.values()), 0.4, color=SLATE, label="coded ten times")
     axes.bar(places + 0.2, list(once.values()), 0.4, color=VERMILION, label="coded once")
-    axes.set_xticks(places, list(once), color=INK)
+    crowded = sum(map(len, once)) > LETTERS_IN_A_ROW
+    axes.set_xticks(places, list(once), color=INK, **(SLANTED if crowded else {}))
     _titled(axes, "Which joints it knows best (mean error in degrees)")
     _legend(axes)
 

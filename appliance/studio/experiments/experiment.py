@@ -20,10 +20,12 @@ from appliance.pictures.filmstrip import Strip, draw_strips, held_throughout
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.quaternion import Array
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.roles import held_joints
 from appliance.show.show import load_show
 from appliance.studio.data.catalogue import recordings_in
-from appliance.studio.data.dataset import FPS, Take, load_dataset
+from appliance.studio.data.dataset import FPS, Take, load_folder
+from appliance.studio.data.remembered import remembered_reading
 from appliance.studio.evaluation.coders import Coder, open_coder
 from appliance.studio.evaluation.evaluation import load_takes
 from appliance.studio.experiments.claims import Claim, claims
@@ -78,6 +80,7 @@ class ExperimentOptions:
     joint: str | None = None
     trace: Path | None = None
     pictures: bool = True
+    reading: ReadingOptions = AS_THE_FILES_SAY
 
 
 def run(options: ExperimentOptions) -> None:
@@ -203,10 +206,11 @@ def _joint(wanted: str | None, coder: Coder) -> str:
 def _takes(options: ExperimentOptions, coder: Coder) -> list[Take]:
     """Where the excerpts come from: recordings, those kept apart from training, else the show's phrase."""
     if options.recordings is None:
-        return load_takes([load_show(options.show).phrase], coder)
+        return load_takes([load_show(options.show).phrase], coder, options.reading)
+    trained = remembered_reading(options.show)
     if options.excerpts is not None:
-        return load_takes(recordings_in(options.recordings), coder)
-    dataset = load_dataset(options.recordings)
+        return load_takes(recordings_in(options.recordings), coder, options.reading, trained)
+    dataset = load_folder(options.recordings, options.reading.over(trained.options))
     return list(dataset.held_out or dataset.training)
 
 

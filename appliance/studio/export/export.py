@@ -39,20 +39,18 @@ def export(
 
     body = Graph("pass_", main.constants)
     layers = Layers(int8)
-    share = body.op("Gather", shares, "iteration", axis=0)
     network = autoencoder.network
     if isinstance(network, Conditional):
         told = emit.condition(main, network, shape, x, goal, weight, gates)
         first, last = (body.op("Gather", biases, "iteration", axis=0) for biases in told)
-        own = body.op("Gather", share, main.constant("own", [0], np.int64), axis=-1)
-        seen = body.op("Mul", "x", own)
+        own = main.op("Gather", shares, main.constant("own", [0], np.int64), axis=-1)
+        seen = body.op("Mul", "x", body.op("Gather", own, "iteration", axis=0))
     else:
         first = last = ""
-        seen = _slerp(body, "x", goal, share)
+        seen = _slerp(body, "x", goal, body.op("Gather", shares, "iteration", axis=0))
     latent = emit.encode(body, layers, network, shape, seen, "latent_out", first)
     raw = emit.decode(body, layers, network, shape, latent, last)
     body.op("LpNormalization", raw, out="x_out", axis=-1, p=2)
-    body.op("Identity", "going_on", out="going_on_out")
     loop = helper.make_graph(
         body.nodes,
         "one_coding_iteration",
@@ -63,7 +61,7 @@ def export(
             info("latent_in", [1, shape.latent]),
         ],
         [
-            info("going_on_out", [], TensorProto.BOOL),
+            info("going_on", [], TensorProto.BOOL),  # handed on
             info("x_out", [shape.window, shape.joints, 4]),
             info("latent_out", [1, shape.latent]),
         ],

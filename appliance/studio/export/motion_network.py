@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import onnx
@@ -53,6 +54,23 @@ def write_motion_network(
     """Inputs: windows (W, T, M, 4) that face ahead, in the rest pose's hemisphere; latents (V, Z). Outputs:
     coded (W, Z), decoded (V, T, M, 4), not yet of unit length. Raises StudioError for an LSTM.
     """
+    graph = Graph()
+    ports = coder_nodes(graph, Layers(int8=False), autoencoder)
+    model = checked_model(graph, ports, motion_facts(autoencoder, joints) | {"map": ground})
+    path.write_bytes(model.SerializeToString())
+    return model
+
+
+class Port(NamedTuple):
+    """An input or output of a file: many (the name of how many) arrays of these sizes."""
+
+    name: str
+    many: str
+    sizes: list[int]
+
+
+def coder_nodes(graph: Graph, layers: Layers, autoencoder: Autoencoder) -> tuple[list[Port], list[Port]]:
+    """Nodes of an mlp's encoder and decoder; its inputs and outputs. Raises StudioError for other kinds."""
     shape, network = autoencoder.shape, autoencoder.network
     encoder, decoder = network.encoder, network.decoder
     if not isinstance(encoder, networks.MlpEncoder) or not isinstance(decoder, networks.MlpDecoder):
@@ -60,57 +78,64 @@ def write_motion_network(
             "The box's sources of motion take networks of the kind mlp alone: train the model with its "
             "default network."
         )
-    graph, layers = Graph(), Layers(int8=False)
     basis = graph.constant("curves", encoder.time.curves.numpy())
-    steps = graph.op("Reshape", "windows", _sizes(graph, -1, shape.window, shape.pose))
+    steps = graph.op("Reshape", "windows", sizes_of(graph, -1, shape.window, shape.pose))
     amounts = graph.op("MatMul", basis, steps)
-    flat = graph.op("Reshape", amounts, _sizes(graph, -1, shape.curves * shape.pose))
+    flat = graph.op("Reshape", amounts, sizes_of(graph, -1, shape.curves * shape.pose))
     coded = emit.dense_stack(graph, layers, encoder.stack, flat, "encoder")
     first, last = (graph.constant(f"at_{at}", [at], np.int64) for at in (0, shape.latent))
     graph.op("Slice", coded, first, last, graph.constant("last_axis", [1], np.int64), out="coded")
     drawn = emit.dense_stack(graph, layers, decoder.stack, "latents", "decoder")
-    drawn = graph.op("Reshape", drawn, _sizes(graph, -1, shape.curves, shape.pose))
+    drawn = graph.op("Reshape", drawn, sizes_of(graph, -1, shape.curves, shape.pose))
     back = graph.op("MatMul", graph.constant("curves_back", decoder.time.curves.numpy().T), drawn)
-    graph.op("Reshape", back, _sizes(graph, -1, shape.window, shape.joints, 4), out="decoded")
-    model = _model(graph, autoencoder)
-    facts = {
+    graph.op("Reshape", back, sizes_of(graph, -1, shape.window, shape.joints, 4), out="decoded")
+    window = [shape.window, shape.joints, 4]
+    return (
+        [Port("windows", "w", window), Port("latents", "v", [shape.latent])],
+        [Port("coded", "w", [shape.latent]), Port("decoded", "v", window)],
+    )
+
+
+def motion_facts(autoencoder: Autoencoder, joints: Sequence[str]) -> dict[str, str]:
+    """What the box must know of an autoencoder."""
+    return {
         "kind": "motion",
         "joints": ",".join(joints),
-        "window": str(shape.window),
-        "latent": str(shape.latent),
+        "window": str(autoencoder.shape.window),
+        "latent": str(autoencoder.shape.latent),
         "rest": json.dumps(np.round(autoencoder.rest.cpu().numpy().astype(float), 7).tolist()),
-        "map": ground,
     }
-    for key, value in facts.items():
-        entry = model.metadata_props.add()
-        entry.key, entry.value = f"bunraku.{key}", value
-    onnx.checker.check_model(model)
-    path.write_bytes(model.SerializeToString())
-    return model
 
 
-def _model(graph: Graph, autoencoder: Autoencoder) -> onnx.ModelProto:
+def checked_model(
+    graph: Graph, ports: tuple[list[Port], list[Port]], facts: dict[str, str]
+) -> onnx.ModelProto:
     """Large constants are stored in 16 bits and widened when the file is loaded."""
-    shape, nodes, stored = autoencoder.shape, [], []
+    nodes: list[onnx.NodeProto] = []
+    stored: list[onnx.TensorProto] = []
     for name, value in graph.constants.items():
         if value.dtype == np.float32 and value.size > _SMALL:
             stored.append(numpy_helper.from_array(value.astype(np.float16), f"{name}.16"))
             nodes.append(helper.make_node("Cast", [f"{name}.16"], [name], to=TensorProto.FLOAT))
         else:
             stored.append(numpy_helper.from_array(np.array(value, order="C"), name))
-    window = [shape.window, shape.joints, 4]
-    inputs = [_many("windows", "w", window), _many("latents", "v", [shape.latent])]
-    outputs = [_many("coded", "w", [shape.latent]), _many("decoded", "v", window)]
+    inputs, outputs = ([_many(*port) for port in side] for side in ports)
     made = helper.make_graph([*nodes, *graph.nodes], "bunraku_motion", inputs, outputs, stored)
     opsets = [helper.make_opsetid("", OPSET), helper.make_opsetid(MICROSOFT, 1)]
-    return helper.make_model(made, opset_imports=opsets, ir_version=8, producer_name="bunraku")
+    model = helper.make_model(made, opset_imports=opsets, ir_version=8, producer_name="bunraku")
+    for key, fact in facts.items():
+        entry = model.metadata_props.add()
+        entry.key, entry.value = f"bunraku.{key}", fact
+    onnx.checker.check_model(model)
+    return model
 
 
 def _many(name: str, count: str, sizes: list[int]) -> onnx.ValueInfoProto:
     return info(name, [count, *sizes])  # type: ignore[list-item]  # a dimension left open has a name
 
 
-def _sizes(graph: Graph, *sizes: int) -> str:
+def sizes_of(graph: Graph, *sizes: int) -> str:
+    """A shape as a constant."""
     return graph.constant("shape_" + "x".join(map(str, sizes)), sizes, np.int64)
 
 

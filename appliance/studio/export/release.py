@@ -18,17 +18,18 @@ from appliance.pose import quaternion
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
-from appliance.studio.data.dataset import Dataset, Take, find_catalogue, load_take
-from appliance.studio.data.remembered import KEY, reading_facts
+from appliance.studio.data.dataset import Dataset, Take
+from appliance.studio.data.remembered import KEY, Remembered, reading_facts
 from appliance.studio.data.sources import Sources
-from appliance.studio.evaluation.coders import OnnxCoder, Poses, TorchCoder, load_puppet
-from appliance.studio.evaluation.evaluation import evaluate, fitting_hop
+from appliance.studio.evaluation.coders import MovedJoints, OnnxCoder, Poses, TorchCoder, load_puppet
+from appliance.studio.evaluation.evaluation import evaluate, fitting_hop, load_takes
 from appliance.studio.evaluation.own_answer import own_answer
 from appliance.studio.evaluation.pictures import longest_sound
 from appliance.studio.evaluation.puppetry_report import print_answer
 from appliance.studio.evaluation.report import write_up
 from appliance.studio.evaluation.report_picture import draw_report
 from appliance.studio.export import packing
+from appliance.studio.export.chosen_phrase import choose_phrase
 from appliance.studio.export.export import export
 from appliance.studio.export.gate import judge, median_ms, sample_windows
 from appliance.studio.studio_error import StudioError
@@ -92,16 +93,13 @@ def release(request: Request, dataset: Dataset, console: Console) -> dict[str, A
     packing.write_skeleton(request.out, dataset.skeleton, _shown_pose(dataset))
     about = "what the show starts from; another: bunraku export --phrase FILE"
     if request.phrase is not None:
-        packing.write_phrase(request.out, _given_phrase(request.phrase, request.source, dataset))
+        packing.write_phrase(request.out, _given_phrase(request.phrase, coder, dataset))
         about = f"made of {request.phrase.name}"
     elif not (request.out / "phrase.bvh").exists():
-        phrase, take = _excerpt(dataset)
+        phrase, about, report["phrase"] = _own_phrase(dataset)
         packing.write_phrase(request.out, phrase)
-        say(
-            f"phrase.bvh is {phrase.seconds:.0f} s of the recording {take}: the bundle contains a recording. "
-            f"{_PHRASE_OF_ITS_OWN}"
-        )
-        about = f"an excerpt of the recording {take}. {_PHRASE_OF_ITS_OWN}"
+        say(f"phrase.bvh is {about}. The bundle contains a recording. {_PHRASE_OF_ITS_OWN}")
+        about = f"{about}. {_PHRASE_OF_ITS_OWN}"
     joint, doubt = first_hand(dataset.skeleton, coder.joints, request.hand)
     if doubt:
         say(doubt)
@@ -206,15 +204,29 @@ def _difference(coder: TorchCoder, exported: OnnxCoder, windows: Poses) -> float
     return difference
 
 
-def _given_phrase(file: Path, source: Sources, dataset: Dataset) -> Recording:
+def _given_phrase(file: Path, coder: MovedJoints, dataset: Dataset) -> Recording:
     """The phrase in a BVH file. Raises StudioError if its skeleton is not the recordings'."""
-    beside = file.resolve().parent == source.recordings.resolve()
-    phrase = load_take(file, source.catalogue if beside else find_catalogue(file.parent, [file])).recording
+    trained = Remembered(dataset.catalogue.reading, dataset.skeleton)
+    phrase = load_takes([file], coder, trained=trained)[0].recording
     if not phrase.skeleton.same_joints(dataset.skeleton):
         raise StudioError(
             f"{file} does not have the skeleton of the recordings. Give a phrase with the same skeleton."
         )
     return phrase
+
+
+def _own_phrase(dataset: Dataset) -> tuple[Recording, str, dict[str, Any]]:
+    """The phrase of a show that was given none, what it is in words, and for the report."""
+    chosen = choose_phrase(dataset)
+    if chosen is None:
+        phrase, take = _excerpt(dataset)
+        words = f"{phrase.seconds:.0f} s of the recording {take}: none is long enough for a phrase that loops"
+        return phrase, words, {"recording": take}
+    words = (
+        f"{chosen.recording} from {chosen.from_s:.1f} to {chosen.to_s:.1f} s, the stretch of the recordings "
+        "that loops best"
+    )
+    return chosen.phrase, words, chosen.as_json()
 
 
 def _excerpt(dataset: Dataset) -> tuple[Recording, str]:

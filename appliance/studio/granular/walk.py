@@ -10,6 +10,7 @@ from rich.console import Console
 
 from appliance.dancer.material import latent_paths
 from appliance.pose import quaternion
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.dance_files import write_dance
 from appliance.studio.data.dataset import FPS, Dataset, Take
@@ -41,6 +42,7 @@ class GranularOptions:
     mix: float = 0.5
     offset: float = 0.0
     feedback: float | None = None
+    reading: ReadingOptions = AS_THE_FILES_SAY
 
 
 def run(options: GranularOptions) -> None:
@@ -48,7 +50,9 @@ def run(options: GranularOptions) -> None:
     console = Console(stderr=True)
     coder, state = load_checkpoint(options.checkpoint)
     autoencoder = coder.autoencoder
-    dataset = trained_on(options.checkpoint, coder.joints, state, options.recordings, console)
+    dataset = trained_on(
+        options.checkpoint, coder.joints, state, options.recordings, console, options.reading
+    )
     if options.hop > autoencoder.shape.window:
         most = autoencoder.shape.window
         raise StudioError(

@@ -11,6 +11,8 @@ import numpy as np
 import torch
 from rich.console import Console
 
+from appliance.dancer.material.steps import Steps, floor_under
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.dance_files import write_dance
@@ -32,7 +34,6 @@ from appliance.studio.improviser.naturalness import Yardstick, measure
 from appliance.studio.improviser.phrase import PhraseOptions, make_phrase, verdict
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesSettings, load_pose_improviser
 from appliance.studio.improviser.prompt import Follower, MovesFollower, continued
-from appliance.studio.improviser.steps import Steps, floor_under
 from appliance.studio.standing_dance import excerpt_of
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
@@ -55,6 +56,7 @@ class ImproviseOptions:
     phrase: PhraseOptions = field(default_factory=PhraseOptions)
     prompt: Path | None = None
     prompt_end: float | None = None  # seconds of the prompt; None: all of it
+    reading: ReadingOptions = AS_THE_FILES_SAY
 
 
 def run(options: ImproviseOptions) -> bool:
@@ -70,12 +72,14 @@ def run(options: ImproviseOptions) -> bool:
     if state is not None and state["settings"]["network"] == PoseMixturesSettings.network:
         assert options.model is not None
         published, _ = load_pose_improviser(options.model)
-        dataset = trained_on(options.model, published.joints, state, options.recordings, console)
+        dataset = trained_on(
+            options.model, published.joints, state, options.recordings, console, options.reading
+        )
         continue_prompt(options, published, published, dataset, say)
         return True
     coder, puppet_state, puppet = _puppet(options, state)
     require_room(options.out.parent)
-    dataset = trained_on(puppet, coder.joints, puppet_state, options.recordings, console)
+    dataset = trained_on(puppet, coder.joints, puppet_state, options.recordings, console, options.reading)
     steps = steps_of_dataset(coder.autoencoder, dataset)
     if state is not None and options.model is not None:
         improviser, settings, learned = load_improviser(options.model)[0], state["settings"], state["step"]
@@ -112,7 +116,7 @@ def continue_prompt(
     prompt = (
         _recorded_moment(dataset, options.phrase.seed)
         if options.prompt is None
-        else excerpt_of(options.prompt, 0.0, end, moves, dataset.skeleton)
+        else excerpt_of(options.prompt, 0.0, end, moves, dataset, options.reading)
     )
     asked = options.phrase
     made = continued(follower, dataset, prompt, asked.seconds, asked.temperature, asked.seed)

@@ -11,15 +11,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from appliance.studio.improviser.moves import BEFORE, MOVE, Moves, MovesShape, Scale
-
-NARROWEST = math.log(0.1)  # log scale; a narrower Gaussian memorises takes
-WIDEST = math.log(2.0)
-FARTHEST = 6.0  # deviations of each number of a step: recorded steps are hardly ever further from the mean
+from appliance.dancer.material.improvising import (
+    BEFORE,
+    FARTHEST,
+    NARROWEST,
+    WIDEST,
+    Numbers,
+    drawn,
+    improvised,
+)
+from appliance.studio.improviser.moves import Moves, MovesShape, Scale
 
 
 @dataclass
@@ -43,14 +49,10 @@ class Mixture:
         joined = torch.logsumexp(functional.log_softmax(self.logits, -1) + each, -1)
         return -joined / x.shape[-1]
 
-    def sample(self, temperature: float, generator: torch.Generator | None = None) -> Tensor:
+    def sample(self, temperature: float, chance: np.random.Generator) -> Tensor:
         """Samples (B, D); temperature 1: as learned, 0: the mean of the likeliest Gaussian."""
-        uniform = torch.rand(self.logits.shape, generator=generator).clamp(1e-9, 1 - 1e-7)
-        gumbel = -torch.log(-torch.log(uniform))
-        rows = torch.arange(len(self.logits))
-        chosen = (self.logits + temperature * gumbel).argmax(-1)
-        noise = torch.randn(self.means[:, 0].shape, generator=generator)
-        return self.means[rows, chosen] + temperature * torch.exp(self.log_scales[rows, chosen]) * noise
+        logits, means, log_scales = (part.numpy() for part in (self.logits, self.means, self.log_scales))
+        return torch.from_numpy(drawn(logits, means, log_scales, temperature, chance))
 
 
 State = list[tuple[Tensor, Tensor]]
@@ -76,14 +78,21 @@ class Choreographer(nn.Module):
         self, before: Tensor, code: Tensor, state: State, dropout: float = 0.0
     ) -> tuple[Mixture, State]:
         """before (B, 3, inside), the last move's code (B, code) -> the next code's distribution, memory."""
+        numbers, remembered = self.numbers(before, code, state, dropout)
+        return Mixture.of(numbers, self.mixtures), remembered
+
+    def numbers(
+        self, before: Tensor, code: Tensor, state: State, dropout: float = 0.0
+    ) -> tuple[Tensor, State]:
+        """The same; the distribution as the numbers of a Mixture, (B, K * (2 code + 1))."""
         hidden = functional.elu(self.seen(torch.cat([before.flatten(1), code], -1)))
         remembered = []
         for cell, earlier in zip(self.cells, state, strict=True):
             h, c = cell(functional.dropout(hidden, dropout, training=dropout > 0), earlier)
             remembered.append((h, c))
             hidden = hidden + h
-        out = self.head(functional.dropout(hidden, dropout, training=dropout > 0))
-        return Mixture.of(out, self.mixtures), remembered
+        out: Tensor = self.head(functional.dropout(hidden, dropout, training=dropout > 0))
+        return out, remembered
 
 
 class Improviser(nn.Module):
@@ -96,24 +105,41 @@ class Improviser(nn.Module):
         self.moves = Moves(shape)
         self.choreographer = Choreographer(shape, width, layers, mixtures)
 
-    @torch.no_grad()
     def improvise(self, primer: Tensor, moves: int, temperature: float, seed: int) -> Tensor:
         """Continue a primer (B, T, features), at least 3 + 8 steps, by (B, 8 * moves, features)."""
-        generator = torch.Generator().manual_seed(seed)
-        x = self.scale.inside(primer)
-        state = self.choreographer.start(len(x))
-        known = (x.shape[1] - BEFORE) // MOVE
-        if not known:
-            raise ValueError(f"The primer has {x.shape[1]} steps; it takes {BEFORE + MOVE} to continue from.")
-        for number in range(known):
-            at = x.shape[1] - (known - number) * MOVE
-            code, _ = self.moves.encode(x[:, at - BEFORE : at], x[:, at : at + MOVE])
-            before = x[:, at + MOVE - BEFORE : at + MOVE]
-            mixture, state = self.choreographer(before, code, state)
-        danced = []
-        for _ in range(moves):
-            code = mixture.sample(temperature, generator)
-            danced.append(self.moves.decode(before, code).clamp(-FARTHEST, FARTHEST))
-            before = danced[-1][:, -BEFORE:]
-            mixture, state = self.choreographer(before, code, state)
-        return self.scale.features(torch.cat(danced, 1))
+        return torch.from_numpy(improvised(Networks(self), primer.numpy(), moves, temperature, seed))
+
+
+class Networks:
+    """An improviser as `improvised` asks for its networks."""
+
+    def __init__(self, improviser: Improviser) -> None:
+        self._parts, choreographer = improviser, improviser.choreographer
+        self.mixtures, self._layers = choreographer.mixtures, len(choreographer.cells)
+        self.cells = 2 * self._layers * choreographer.width
+
+    @torch.no_grad()
+    def code_of(self, before: Numbers, move: Numbers) -> Numbers:
+        """See Choreographer."""
+        code: Numbers = self._parts.moves.encode(self._inside(before), self._inside(move))[0].numpy()
+        return code
+
+    @torch.no_grad()
+    def forecast(self, before: Numbers, code: Numbers, cells: Numbers) -> tuple[Numbers, Numbers]:
+        """See Choreographer."""
+        parts = torch.from_numpy(cells).chunk(2 * self._layers, dim=1)
+        state = list(zip(parts[::2], parts[1::2], strict=True))
+        numbers, state = self._parts.choreographer.numbers(
+            self._inside(before), torch.from_numpy(code), state
+        )
+        return numbers.numpy(), torch.cat([part for pair in state for part in pair], 1).numpy()
+
+    @torch.no_grad()
+    def move_of(self, before: Numbers, code: Numbers) -> Numbers:
+        """See Choreographer."""
+        move = self._parts.moves.decode(self._inside(before), torch.from_numpy(code))
+        made: Numbers = self._parts.scale.features(move.clamp(-FARTHEST, FARTHEST)).numpy()
+        return made
+
+    def _inside(self, features: Numbers) -> Tensor:
+        return self._parts.scale.inside(torch.from_numpy(features))

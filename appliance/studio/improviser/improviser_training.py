@@ -11,9 +11,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from appliance.dancer.material.improvising import BEFORE, MOVE
 from appliance.studio.autoencoder.losses import divergence, sampled
 from appliance.studio.improviser.improviser import Improviser
-from appliance.studio.improviser.moves import BEFORE, MOVE, MovesShape, Scale, move_loss
+from appliance.studio.improviser.moves import MovesShape, Scale, move_loss
 from appliance.studio.processes import Processes
 from appliance.studio.training_loop import ALONE, TrainingLoop
 

@@ -9,6 +9,8 @@ import torch
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
+from appliance.dancer.material.improvising import BEFORE, MOVE
+from appliance.dancer.material.steps import ROOT, Steps
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.training_run import stop_signals
 from appliance.studio.data.dataset import Dataset
@@ -18,9 +20,8 @@ from appliance.studio.improviser.improviser_training import (
     ImproviserSettings,
     ImproviserTraining,
 )
-from appliance.studio.improviser.moves import BEFORE, MOVE
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesSettings, PoseMixturesTraining
-from appliance.studio.improviser.steps import ROOT, Steps, steps_of_takes
+from appliance.studio.improviser.steps import steps_of_takes
 from appliance.studio.processes import Processes
 from appliance.studio.studio_error import StudioError
 from appliance.studio.training_loop import ALONE

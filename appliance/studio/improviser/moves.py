@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-MOVE = 8  # steps of a move, 0.64 s
-BEFORE = 3  # steps before it that the networks see
+from appliance.dancer.material.improvising import BEFORE, MOVE
+
 PLACE_WEIGHT = 3.0  # of the root's displacement in the loss, to a latent direction of the same variance
 
 
@@ -92,7 +92,7 @@ class Scale(nn.Module):
         return inside @ self.outward + self.middle
 
 
-class _Dense(nn.Module):
+class Dense(nn.Module):
     """Residual dense layers; each receives the code, so that none forgets it."""
 
     def __init__(self, size_in: int, code: int, size_out: int, width: int, depth: int) -> None:
@@ -121,8 +121,8 @@ class Moves(nn.Module):
         super().__init__()
         self.shape = shape
         seen, made = BEFORE * shape.inside, MOVE * shape.inside
-        self.encoder = _Dense(seen + made, 0, 2 * shape.code, shape.width, 1)
-        self.decoder = _Dense(seen, shape.code, made, shape.width, shape.depth)
+        self.encoder = Dense(seen + made, 0, 2 * shape.code, shape.width, 1)
+        self.decoder = Dense(seen, shape.code, made, shape.width, shape.depth)
 
     def encode(self, before: Tensor, move: Tensor) -> tuple[Tensor, Tensor]:
         """Mean and log variance (B, code) of the code."""

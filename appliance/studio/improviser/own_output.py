@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 from torch import Tensor
@@ -101,9 +102,10 @@ def _starts(training: PoseMixturesTraining, rest: Poses) -> Tensor:
 
 
 def _table(rows: dict[float, Row], yardstick: Yardstick, title: str) -> Table:
-    table = Table(title=title)
-    for name in ("temperature", "above 8 Hz", "longest still", "speed", "breadth", "strangeness", "slide"):
-        table.add_column(name, justify="left" if name == "temperature" else "right")
+    table = Table(title=title, box=SIMPLE_HEAD)
+    table.add_column("temperature", no_wrap=True)
+    for name in ("above 8 Hz", "longest still", "speed", "breadth", "strangeness", "slide"):
+        table.add_column(name, justify="right")
     for temperature, row in rows.items():
         table.add_row(
             f"{temperature:g}",

@@ -9,16 +9,18 @@ import numpy as np
 import torch
 
 from appliance.dancer.loop import turns_about_y, yaws
+from appliance.dancer.material.carrying import smoothed
+from appliance.dancer.material.improvising import MOVE
+from appliance.dancer.material.steps import HOP, Steps, danced_again, motion_of
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import FPS, Dataset
-from appliance.studio.improviser.footing import plant_feet, smoothed
+from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.improviser import Improviser
-from appliance.studio.improviser.moves import MOVE
 from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
-from appliance.studio.improviser.steps import HOP, Steps, danced_again, motion_of
+from appliance.studio.improviser.steps import WindowCoder
 from appliance.studio.improviser.stretches import best_stretches
 from appliance.studio.studio_error import StudioError
 
@@ -55,8 +57,9 @@ def make_phrase(
     recorded: stretches of the recordings; each dance continues one of them.
     """
     moving, still = dataset.moving, dataset.still_pose()
+    coder = WindowCoder(autoencoder)
     dances = [
-        _motion(autoencoder, dance, dataset, still) for dance in improvise(improviser, recorded, options, say)
+        _motion(coder, dance, dataset, still) for dance in improvise(improviser, recorded, options, say)
     ]
     yardstick = Yardstick.of(dataset.training, moving)
     stretches = best_stretches(dances, yardstick, options.seconds, STAGE_M, SEAM_S, options.finalists)
@@ -65,7 +68,7 @@ def make_phrase(
     best: tuple[float, Recording, Naturalness] | None = None
     for number, stretch in enumerate(stretches, 1):
         closed = closed_loop(dances[stretch.dance], stretch.first, stretch.last)
-        again = replace(closed, poses=danced_again(autoencoder, closed.poses, moving, cyclic=True))
+        again = replace(closed, poses=danced_again(coder, closed.poses, moving, cyclic=True))
         phrase = on_stage(plant_feet(on_stage(again), options.settling))
         natural = measure(phrase, yardstick)
         say(f"candidate {number} of {len(stretches)}: {verdict(natural)}")
@@ -92,8 +95,8 @@ def improvise(
     return [Steps.of_features(dance.numpy()) for dance in danced]
 
 
-def _motion(autoencoder: Autoencoder, steps: Steps, dataset: Dataset, still: Array) -> Recording:
-    poses, roots = motion_of(autoencoder, steps, still, dataset.moving)
+def _motion(coder: WindowCoder, steps: Steps, dataset: Dataset, still: Array) -> Recording:
+    poses, roots = motion_of(coder, steps, still, dataset.moving)
     return Recording(dataset.skeleton, poses, roots, FPS)
 
 

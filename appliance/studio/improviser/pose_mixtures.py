@@ -14,13 +14,14 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from appliance.dancer.material.improvising import FARTHEST
+from appliance.dancer.material.steps import ROOT, Steps
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, Dataset
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.improviser.improviser import FARTHEST, Mixture
+from appliance.studio.improviser.improviser import Mixture
 from appliance.studio.improviser.moves import Scale, StepShape
 from appliance.studio.improviser.pose_steps import pose_motion, pose_steps
-from appliance.studio.improviser.steps import ROOT, Steps
 from appliance.studio.studio_error import StudioError
 
 NARROWEST = math.log(0.01)  # log scale, of standardised numbers: neighbouring poses are hundredths apart
@@ -57,11 +58,11 @@ class PoseMixtures(nn.Module):
     @torch.no_grad()
     def improvise(self, primer: Tensor, steps: int, temperature: float, seed: int) -> Tensor:
         """Continue a primer (B, back or more, features) by (B, steps, features), on its own output."""
-        generator, shape = torch.Generator().manual_seed(seed), self.shape
+        chance, shape = np.random.default_rng(seed), self.shape
         x = self.scale.inside(primer)[:, -shape.back :]
         danced = []
         for _ in range(math.ceil(steps / shape.ahead)):
-            drawn = self(x).sample(temperature, generator).clamp(-FARTHEST, FARTHEST)
+            drawn = self(x).sample(temperature, chance).clamp(-FARTHEST, FARTHEST)
             danced.append(drawn.view(len(x), shape.ahead, shape.inside))
             x = torch.cat([x, danced[-1]], 1)[:, -shape.back :]
         return self.scale.features(torch.cat(danced, 1)[:, :steps])

@@ -9,11 +9,12 @@ import torch
 from torch import Tensor
 
 from appliance.dancer.loop import turns_about_y
+from appliance.dancer.material.steps import Steps, path_along, ways_of
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import Take
-from appliance.studio.improviser.steps import Steps, path_along, sound_stretches, ways_of
+from appliance.studio.improviser.steps import sound_stretches
 
 
 def pose_steps(recording: Recording, moving: Sequence[int], rest: Array) -> Steps:

@@ -10,15 +10,16 @@ import numpy as np
 import torch
 
 from appliance.dancer.loop import Placement, smooth, turns_about_y, yaws
+from appliance.dancer.material.improvising import BEFORE, MOVE
+from appliance.dancer.material.steps import HOP, Steps, danced_again, motion_of, steps_of
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset
 from appliance.studio.improviser.improviser import Improviser
-from appliance.studio.improviser.moves import BEFORE, MOVE
 from appliance.studio.improviser.phrase import PRIMER, STEPS_S
-from appliance.studio.improviser.steps import HOP, Steps, danced_again, motion_of, steps_of
+from appliance.studio.improviser.steps import WindowCoder
 from appliance.studio.standing_dance import standing
 from appliance.studio.studio_error import StudioError
 
@@ -60,8 +61,8 @@ class MovesFollower:
         self, prompt: Recording, dataset: Dataset, seconds: float, temperature: float, seed: int
     ) -> tuple[Recording, int, int]:
         """See Follower. Raises StudioError for a prompt that is too short."""
-        autoencoder, moving = self.autoencoder, list(dataset.moving)
-        steps = steps_of(autoencoder, prompt, moving)
+        coder, moving = WindowCoder(self.autoencoder), list(dataset.moving)
+        steps = steps_of(coder, prompt, moving)
         if len(steps) < BEFORE + MOVE:
             least = HOP * (BEFORE + MOVE + 1) + WINDOW
             raise StudioError(
@@ -72,8 +73,8 @@ class MovesFollower:
         moves = math.ceil(seconds * STEPS_S / MOVE)
         danced = self.improviser.improvise(primer, moves, temperature, seed)[0].numpy()
         together = Steps.of_features(np.concatenate([steps.features[-KNOWN:], danced]))
-        poses, roots = motion_of(autoencoder, together, prompt.poses[-1], moving)
-        poses = danced_again(autoencoder, poses, moving)
+        poses, roots = motion_of(coder, together, prompt.poses[-1], moving)
+        poses = danced_again(coder, poses, moving)
         first = HOP * (len(steps) - KNOWN + 1) + WINDOW // 2
         return Recording(prompt.skeleton, poses, roots, FPS), first, (KNOWN - 1) * HOP
 

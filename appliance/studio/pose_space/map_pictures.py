@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 from appliance.pose.quaternion import Array
 from appliance.studio.evaluation.pictures import BACKDROP, INK, new_figure, panels, save
@@ -90,15 +91,10 @@ def _spacing(places: Array) -> float:
 
 
 def _name(axes: Any, names: Sequence[str]) -> None:
-    for number, name in enumerate(names[:12]):
-        axes.text(
-            0.012,
-            0.985 - 0.035 * number,
-            name,
-            color=COLOURS[number % len(COLOURS)],
-            fontsize=9,
-            transform=axes.transAxes,
-            va="top",
-            bbox={"facecolor": BACKDROP, "edgecolor": "none", "pad": 2},
-            zorder=4,
-        )
+    """The recordings' names in one opaque box, so that no figure shows through a word."""
+    lines = [
+        Line2D([], [], color=COLOURS[number % len(COLOURS)], label=name)
+        for number, name in enumerate(names[:12])
+    ]
+    colours = {"facecolor": BACKDROP, "edgecolor": DIM, "framealpha": 1.0, "labelcolor": "linecolor"}
+    axes.legend(handles=lines, loc="upper left", fontsize=9, **colours).set_zorder(4)

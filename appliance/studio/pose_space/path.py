@@ -9,6 +9,7 @@ from rich.console import Console
 
 from appliance.dancer.material.pose_paths import even_path, wobbled
 from appliance.pictures.filmstrip import Strip, draw_strips
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.dance_files import write_recording, write_report
 from appliance.studio.data.dataset import FPS
 from appliance.studio.evaluation.dance_figures import degrees_apart, energy
@@ -37,16 +38,17 @@ class PathOptions:
     seed: int = 1
     start: float = 0.0
     seconds: float = 10.0
+    reading: ReadingOptions = AS_THE_FILES_SAY
 
 
 def run(options: PathOptions) -> None:
     """Walk, decode, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
-    coder, dataset = open_model("pose", options.model, options.recordings, console)
+    coder, dataset = open_model("pose", options.model, options.recordings, console, options.reading)
     autoencoder, moving = coder.autoencoder, list(dataset.moving)
     given = None
     if options.phrase is not None:
-        given = excerpt_of(options.phrase, options.start, options.seconds, coder, dataset.skeleton)
+        given = excerpt_of(options.phrase, options.start, options.seconds, coder, dataset, options.reading)
     if given is not None and options.wobble is not None:
         latents, facing = latents_of(autoencoder, given.poses[:, moving])
         poses = poses_of(autoencoder, wobbled(latents, *options.wobble, options.seed), facing)

@@ -13,6 +13,7 @@ import numpy as np
 from rich.console import Console
 
 from appliance.pose.quaternion import Array
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, Dataset
 from appliance.studio.pose_space import map_pictures
@@ -37,17 +38,19 @@ class MapOptions:
     files: tuple[Path, ...]
     recordings: Path | None = None
     seconds: float = 60.0
+    reading: ReadingOptions = AS_THE_FILES_SAY
 
 
 def run(options: MapOptions) -> None:
     """Project, compare, draw; raises StudioError."""
     console = Console(stderr=True)
-    coder, dataset = open_model("pose", options.model, options.recordings, console)
+    coder, dataset = open_model("pose", options.model, options.recordings, console, options.reading)
     autoencoder, moving = coder.autoencoder, list(dataset.moving)
     if len({file.stem for file in options.files}) < len(options.files):
         raise StudioError("Two of the recordings have the same name. Give each once.")
     recordings = {
-        file.stem: excerpt_of(file, 0.0, options.seconds, coder, dataset.skeleton) for file in options.files
+        file.stem: excerpt_of(file, 0.0, options.seconds, coder, dataset, options.reading)
+        for file in options.files
     }
     ground = Ground.of(autoencoder, dataset)
     found = projections(autoencoder, list(recordings.values()), moving, ground.pose_map)

@@ -6,12 +6,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
 from appliance.pictures.filmstrip import Strip, draw_strips
 from appliance.pose.quaternion import Array
+from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
 from appliance.studio.dance_files import write_recording, write_report
 from appliance.studio.data.dataset import FPS, Dataset
@@ -46,6 +48,7 @@ class VaryOptions:
     share: float = 0.5
     regions: tuple[str, ...] = ()
     on_map: Path | None = None
+    reading: ReadingOptions = AS_THE_FILES_SAY
 
 
 @dataclass(frozen=True)
@@ -64,12 +67,12 @@ class Figures:
 def run(options: VaryOptions) -> None:
     """Vary, stand, measure, write; raises StudioError."""
     console = Console(stderr=True)
-    coder, dataset = open_model("sequence", options.model, options.recordings, console)
+    coder, dataset = open_model("sequence", options.model, options.recordings, console, options.reading)
     reference = reference_of(dataset.training, dataset.moving_names)
     given = (
         None
         if options.phrase is None
-        else excerpt_of(options.phrase, options.start, options.seconds, coder, dataset.skeleton)
+        else excerpt_of(options.phrase, options.start, options.seconds, coder, dataset, options.reading)
     )
     danced = _dances(options, coder, dataset, given)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -122,7 +125,7 @@ def _draw_on_map(
 ) -> None:
     """The link of both models: the phrase and its variations as a bundle of paths over the map of poses."""
     assert options.on_map is not None
-    coder, dataset = open_model("pose", options.on_map, options.recordings, console)
+    coder, dataset = open_model("pose", options.on_map, options.recordings, console, options.reading)
     ground, paths = Ground.of(coder.autoencoder, dataset), {}
     if given is not None:
         paths["phrase"] = ground.path(given.poses[:, list(dataset.moving)])
@@ -141,9 +144,9 @@ def _dances(
     own = given.poses[:, moving].astype(np.float32)
     phrase = variations.encode_phrase(autoencoder, own)
     if options.mix is not None:
-        other = excerpt_of(options.mix, options.start, options.seconds, coder, dataset.skeleton).poses[
-            :, moving
-        ]
+        other = excerpt_of(
+            options.mix, options.start, options.seconds, coder, dataset, options.reading
+        ).poses[:, moving]
         made = {
             "mixed": variations.mixed(
                 autoencoder, phrase, variations.encode_phrase(autoencoder, other), options.share, 1
@@ -177,9 +180,10 @@ def _words(options: VaryOptions) -> str:
 
 
 def _table(figures: dict[str, Figures], natural: dict[str, Naturalness], title: str) -> Table:
-    table = Table(title=title)
-    for name in ("", "from the phrase", "of that timing", "from recorded", "energy", "above 8 Hz", "slide"):
-        table.add_column(name, justify="right" if name else "left")
+    table = Table(title=title, box=SIMPLE_HEAD)
+    table.add_column(no_wrap=True)
+    for name in ("from the phrase", "of that timing", "from recorded", "energy", "above 8 Hz", "slide"):
+        table.add_column(name, justify="right")
     for name, one in figures.items():
         table.add_row(
             name.replace("_", " "),
