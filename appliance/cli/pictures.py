@@ -25,11 +25,15 @@ from appliance.stage.stage_error import StageError
 
 @dataclass(frozen=True)
 class RecordedDance:
-    """A recording, how firmly hands held each joint in it (N, J; None: no hand did), its title."""
+    """A recording, how firmly hands held each joint in it (N, J; None: no hand did), its title.
+
+    others: of the puppets beside the first, frame by frame.
+    """
 
     recording: Recording
     holds: Array | None
     title: str
+    others: tuple[Recording, ...] = ()
 
     def part(self, start_s: float, seconds: float) -> RecordedDance:
         """`seconds` of it from a start on; a negative start counts from the end. Raises StageError."""
@@ -42,7 +46,9 @@ class RecordedDance:
             )
         first = min(round(start_s * whole.fps), len(whole))
         holds = None if self.holds is None else self.holds[first : first + len(part)]
-        return replace(self, recording=part, holds=holds)
+        end_s = start_s + max(seconds, 1.0 / whole.fps)
+        others = tuple(other.excerpt(start_s, end_s) for other in self.others)
+        return replace(self, recording=part, holds=holds, others=others)
 
 
 @reading_options
@@ -78,8 +84,18 @@ def load_dance(source: Path, reading: ReadingOptions = AS_THE_FILES_SAY) -> Reco
         return RecordedDance(recording, None, source.stem)
     journal = read_journal(source)
     ticks = journal.ticks
-    danced = Recording(journal.skeleton, ticks["pose"], ticks["root"], 1.0 / TICK_S)
-    return RecordedDance(danced, holds_of(journal.header, ticks), source.stem)
+    skeleton, fps = journal.skeleton, 1.0 / TICK_S
+    danced = Recording(skeleton, ticks["pose"], ticks["root"], fps)
+    others = ticks["others_pose"].shape[1] if "others_pose" in (ticks.dtype.names or ()) else 0
+    return RecordedDance(
+        danced,
+        holds_of(journal.header, ticks),
+        source.stem,
+        tuple(
+            Recording(skeleton, ticks["others_pose"][:, one], ticks["others_root"][:, one], fps)
+            for one in range(others)
+        ),
+    )
 
 
 def draw_dance(dance: RecordedDance, out: Path) -> Path:
@@ -100,13 +116,13 @@ def render_dance(dance: RecordedDance, out: Path, look: str, show: Path | None) 
 
     Raises ConfigError, or StageError where the look is unknown or nothing can be rendered here.
     """
-    looks = looks_by_name(() if show is None else load_show(show).config.looks)
+    looks = looks_by_name(() if show is None else load_show(show).config.looks, show)
     if look not in looks:
         raise StageError(f"There is no look '{look}'. There are: {', '.join(looks)}.")
     try:
         from appliance.projector.strip import render_strip
 
-        return render_strip(out, dance.recording, looks, look, dance.holds)
+        return render_strip(out, dance.recording, looks, look, dance.holds, dance.others)
     except ProjectorError as error:
         raise StageError(str(error)) from error
     except OSError as error:

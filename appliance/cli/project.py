@@ -40,6 +40,9 @@ def project(
     raw: Annotated[
         bool, typer.Option("--raw", help="With --offscreen: raw pictures to standard output, for a pipe.")
     ] = False,
+    key: Annotated[
+        bool, typer.Option("--key", help="Alpha in --raw and --frames: as much as each pixel shines.")
+    ] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after this time.")] = None,
     info: Annotated[bool, typer.Option("--info", help="Figures on the wall and on the terminal.")] = False,
     wait: Annotated[
@@ -58,7 +61,7 @@ def project(
             "For instance: bunraku project --offscreen 1280x720 --raw | ffmpeg ..."
         )
     pictures = take_over_stdout() if raw else None
-    return project_show(box_of(box, chosen), replace(options, stamps=stamp, raw=pictures), wait)
+    return project_show(box_of(box, chosen), replace(options, stamps=stamp, raw=pictures, is_keyed=key), wait)
 
 
 def parse_options(
@@ -109,7 +112,10 @@ def _project(
     notifier: Notifier,
     say: Callable[[str], None],
 ) -> None:
-    with closing(Run(load_box(box_file), options, say)) as run:
+    from appliance.cli.console import card_lines
+
+    box = load_box(box_file)
+    with closing(Run(box, replace(options, card=lambda: card_lines(box)), say)) as run:
         for line in run.introduction():
             say(line)
         say(f"Shown: {run.project(stopped, notifier).sentence()}.")

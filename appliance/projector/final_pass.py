@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import moderngl
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from appliance.projector.controls import Controls
 from appliance.projector.corners import homography
+from appliance.projector.masks import Masks
 from appliance.projector.page import page
 from appliance.projector.picture.drawing import Drawing
 from appliance.projector.picture.tally import Cost, Tally
-from appliance.projector.picture.wall import FLAT, Wall, flat
+from appliance.projector.picture.wall import DETAILS, FLAT, Detail, Wall, flat
 from appliance.projector.window import Size
 from appliance.show.projector import EdgeBlendConfig, ProjectorConfig
 
@@ -63,6 +64,7 @@ class FinalPass:
             Drawing(gl, "final", "final", parts=parts)
             for parts in ([], [*fixed, "DIM"], [*fixed, "DIM", "MARKS"])
         )
+        self._masks = Masks(gl, config.masks)
         self._tally = Tally()
         self._text = gl.texture((1, 1), 1)
         self._written: tuple[object, ...] = ()
@@ -77,8 +79,9 @@ class FinalPass:
         level: float,
         size: Size,
         lines: tuple[str, ...] = (),
+        detail: Detail = DETAILS[0],
     ) -> Wall:
-        """What a look draws its picture of that size onto; `draw` does the rest.
+        """What a look draws its picture of that size onto, in that detail; `draw` does the rest.
 
         That is the display itself if nothing is left to do, which saves a small computer from writing the
         picture to memory and reading it back; else a texture.
@@ -88,12 +91,13 @@ class FinalPass:
         self._is_graded = self._config.edge_blend is None and not lines and not controls.shows_grid
         if self._is_graded and size == display:
             self.resize(_NO_SIZE)
-            return Wall(screen, display, size, self._clip_from_part(controls) @ _Y_UP, scale, gamma)
+            clip_from_picture = self._clip_from_part(controls) @ _Y_UP
+            return Wall(screen, display, size, clip_from_picture, scale, gamma, detail=detail)
         self.resize(size)
         if not self._is_graded:
-            return flat(self.picture)
+            return replace(flat(self.picture), detail=detail)
         finer = 1.0 if self._config.picture else display[1] / size[1]
-        return Wall(self.picture, size, size, FLAT, scale, gamma, finer)
+        return Wall(self.picture, size, size, FLAT, scale, gamma, finer, detail)
 
     def resize(self, size: Size) -> None:
         """The size in which the scene is drawn, pixels."""
@@ -131,6 +135,10 @@ class FinalPass:
             drawing.draw(self._tally, pixels, inputs, moderngl.TRIANGLE_STRIP, 4)
         self._tally.count_bytes(4 * pixels)
 
+    def mask(self, screen: moderngl.Framebuffer, display: Size, controls: Controls) -> None:
+        """Darken what the box file's masks cover; the very last step of a picture."""
+        self._masks.draw(screen, display, self._flips(controls), controls.shows_grid)
+
     def cost(self) -> Cost:
         """The cost of the last picture's last step; nothing if a look did that itself."""
         width, height = self.picture.size
@@ -146,24 +154,28 @@ class FinalPass:
     def release(self) -> None:
         """Give the GPU's memory back."""
         self._release_picture()
-        for owned in (self._text, self._unchanged, self._dimmed, self._marked):
+        for owned in (self._masks, self._text, self._unchanged, self._dimmed, self._marked):
             owned.release()
 
     def _clip_from_part(self, controls: Controls) -> NDArray[np.float64]:
         """(3, 3) from the unit square of this display's part of the picture (y down) to clip space."""
-        across, upside_down = controls.alignment.mirror != self._config.upside_down, self._config.upside_down
-        flipped = np.diag([-1.0 if across else 1.0, -1.0 if upside_down else 1.0, 1.0])
+        across, upside_down = self._flips(controls)
+        flipped = np.diag([1.0 - 2.0 * across, 1.0 - 2.0 * upside_down, 1.0])
         flipped[:2, 2] = across, upside_down
         return np.asarray(_CLIP_FROM_DISPLAY @ flipped @ homography(controls.alignment.corners))
+
+    def _flips(self, controls: Controls) -> tuple[float, float]:
+        """1 where left and right, top and bottom of the wall are exchanged on the display."""
+        upside_down = self._config.upside_down
+        return float(controls.alignment.mirror != upside_down), float(upside_down)
 
     def _place(self, display: Size, controls: Controls) -> dict[str, Any]:
         """Where the picture lies on the display."""
         width, height = display
-        alignment, upside_down = controls.alignment, self._config.upside_down
-        wall_from_picture = np.diag([width, height, 1.0]) @ homography(alignment.corners)
+        wall_from_picture = np.diag([width, height, 1.0]) @ homography(controls.alignment.corners)
         return {
             "display": (float(width), float(height)),
-            "flips": (float(alignment.mirror != upside_down), float(upside_down)),
+            "flips": self._flips(controls),
             "picture_from_wall": np.linalg.inv(wall_from_picture),
         }
 

@@ -18,12 +18,16 @@ _LONGEST_GAP_S = 0.1  # a longer one is not bridged: the later pose simply follo
 _SLEW = 0.1  # how much faster or slower the dance may seem while the delay is corrected
 
 
-class _Seen(NamedTuple):
-    time: float
-    left: float  # when it left the stage
+class _Figure(NamedTuple):
     positions: Floats
     world: Floats
     holds: Floats
+
+
+class _Seen(NamedTuple):
+    time: float
+    left: float  # when it left the stage
+    figures: tuple[_Figure, ...]  # one for each puppet
 
 
 class Interpolation:
@@ -62,17 +66,24 @@ class Interpolation:
         after = next((k for k, seen in enumerate(self._seen) if seen.time > time_s), len(self._seen))
         trail = [seen for seen in list(self._seen)[:after] if seen.time >= time_s - TRAIL_S]
         before = self._seen[after - 1]
-        positions, world, holds = before.positions, before.world, before.holds
+        figures = before.figures
         if after < len(self._seen):
-            positions, world, holds = _between(before, self._seen[after], time_s)
-        return Moment(
-            time_s=time_s,
-            positions=positions,
-            world=world,
-            trail=[(seen.positions, seen.world) for seen in trail or [before]],
-            trail_times=[seen.time for seen in trail or [before]],
-            holds=holds,
+            figures = _between(before, self._seen[after], time_s)
+        trail = trail or [before]
+        times = [seen.time for seen in trail]
+        first, *others = (
+            Moment(
+                time_s=time_s,
+                positions=figure.positions,
+                world=figure.world,
+                trail=[(seen.figures[place].positions, seen.figures[place].world) for seen in trail],
+                trail_times=times,
+                holds=figure.holds,
+            )
+            for place, figure in enumerate(figures)
         )
+        first.others = tuple(others)
+        return first
 
     @property
     def delay_s(self) -> float:
@@ -87,7 +98,8 @@ class Interpolation:
         if frame.tick <= self._tick or (self._seen and frame.frame_time <= self._seen[-1].time):
             return
         self._tick = frame.tick
-        self._seen.append(_Seen(frame.frame_time, frame.left, frame.positions, frame.world, frame.holds))
+        figures = tuple(_Figure(one.positions, one.world, one.holds) for one in (frame, *frame.others))
+        self._seen.append(_Seen(frame.frame_time, frame.left, figures))
 
     def _follow_latency(self, now: float) -> None:
         """Follow the latency of nine in ten frames, so slowly that it does not show."""
@@ -103,13 +115,17 @@ class Interpolation:
         self._before = now
 
 
-def _between(before: _Seen, after: _Seen, time_s: float) -> tuple[Floats, Floats, Floats]:
-    """Positions (J, 3), world rotations (J, 4) and holds (J,) at a time between two frames."""
+def _between(before: _Seen, after: _Seen, time_s: float) -> tuple[_Figure, ...]:
+    """Positions (J, 3), world rotations (J, 4) and holds (J,) of each figure at a time between two frames."""
     gap_s = after.time - before.time
     if gap_s > _LONGEST_GAP_S:
-        return before.positions, before.world, before.holds
+        return before.figures
     share = np.float32((time_s - before.time) / gap_s)
-    positions = before.positions + share * (after.positions - before.positions)
-    world = quaternion.slerp(before.world, after.world, share)
-    holds = before.holds + share * (after.holds - before.holds)
-    return positions.astype(np.float32), world.astype(np.float32), holds.astype(np.float32)
+    return tuple(
+        _Figure(
+            (one.positions + share * (next_one.positions - one.positions)).astype(np.float32),
+            quaternion.slerp(one.world, next_one.world, share).astype(np.float32),
+            (one.holds + share * (next_one.holds - one.holds)).astype(np.float32),
+        )
+        for one, next_one in zip(before.figures, after.figures, strict=True)
+    )

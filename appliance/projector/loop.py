@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import Protocol
 
 import moderngl
@@ -13,15 +17,20 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.shared_frame import Facts
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.controls import Controls
+from appliance.projector.detail import affordable_detail
 from appliance.projector.final_pass import FinalPass, picture_size
 from appliance.projector.interpolation import Interpolation
 from appliance.projector.moment import Moment
 from appliance.projector.pacing import USUAL_RATE
+from appliance.projector.picture.camera import NOT_CUED, CuedCamera
+from appliance.projector.picture.cards import Cards
+from appliance.projector.picture.image_file import read_image
 from appliance.projector.picture.renderer import Renderer
-from appliance.projector.picture.wall import Wall
+from appliance.projector.picture.wall import DETAILS, Detail, Wall
 from appliance.projector.presence import STALE_S, Presence
 from appliance.projector.resolution import SHARES
 from appliance.projector.window import Size
+from appliance.show.card import CardConfig, cards_by_name
 from appliance.show.config_error import ConfigError
 from appliance.show.look import LookConfig, looks_by_name
 from appliance.show.projector import ProjectorConfig
@@ -34,7 +43,13 @@ class Painter(Protocol):
     """What draws the looks of one show."""
 
     def draw(
-        self, moment: Moment, look: str, look_before: str, mix: float, target: Wall | moderngl.Framebuffer
+        self,
+        moment: Moment,
+        look: str,
+        look_before: str,
+        mix: float,
+        target: Wall | moderngl.Framebuffer,
+        cued: CuedCamera = NOT_CUED,
     ) -> None: ...
 
     def release(self) -> None: ...
@@ -63,8 +78,10 @@ class Projector:
         self._generation = 0
         self._poses: Interpolation | None = None
         self._painter: Painter | None = None
-        self._drawn: tuple[Skeleton, Looks] | None = None  # what the painter was made for
-        self._to_draw: tuple[Skeleton, Looks] | None = None  # a show that waits for its painter
+        self._cards: Cards | None = None
+        self._drawn: ShownShow | None = None  # what the painter was made for
+        self._to_draw: ShownShow | None = None  # a show that waits for its painter
+        self._detail = DETAILS[0]
         self._is_black = False  # since that show waits
         self.shown: str | None = None  # the look of the last picture; None: none, or two that cross-fade
         self.is_preparing = False  # no watchdog counts meanwhile
@@ -98,10 +115,14 @@ class Projector:
         level = show_state.level(now) * presence
         is_drawn = self._painter is not None and moment is not None and level > 0.0
         size = picture_size(self._config, display, share)
-        wall = self._final.wall(screen, display, self._controls, level, size, lines)
+        detail = self._detail if share == 1.0 else DETAILS[0]
+        wall = self._final.wall(screen, display, self._controls, level, size, lines, detail)
         if self._painter is not None and moment is not None and is_drawn:
             mix = show_state.look_mix(now)
-            self._painter.draw(moment, show_state.look, show_state.look_before, mix, wall)
+            cued = CuedCamera(show_state.camera_before, show_state.camera, show_state.camera_mix(now))
+            self._painter.draw(moment, show_state.look, show_state.look_before, mix, wall, cued)
+            if self._cards is not None:
+                self._cards.draw(wall, show_state, now)
             self.shown = show_state.look if mix in (0.0, 1.0) else None
         show_state = self._show_state.read()  # again: this picture already shows a panic that came meanwhile
         if show_state.panic or show_state.blackout:
@@ -111,13 +132,13 @@ class Projector:
         if wall.framebuffer is not screen or not is_drawn:
             seen = min(level, show_state.level(now)) if is_drawn else 0.0
             self._final.draw(screen, display, self._controls, seen, lines)
+        self._final.mask(screen, display, self._controls)
         is_fresh = newest is not None and now - newest < STALE_S
         return self._poses.left_stage(moment) if self._poses and moment and is_drawn and is_fresh else None
 
     def release(self) -> None:
         """Give the GPU's memory back."""
-        if self._painter is not None:
-            self._painter.release()
+        self._release_show()
         self._final.release()
 
     def _moment(self, now: float) -> Moment | None:
@@ -138,7 +159,7 @@ class Projector:
 
     def _prepare(
         self,
-        show: tuple[Skeleton, Looks],
+        show: ShownShow,
         moment: Moment,
         screen: moderngl.Framebuffer,
         display: Size,
@@ -155,41 +176,114 @@ class Projector:
             self._drawn, self._to_draw = show, None
             return
         self.is_preparing = True
-        self._painter = self._make_painter(self._gl, picture_size(self._config, display), *show)
+        self._painter = self._make_painter(
+            self._gl, picture_size(self._config, display), show.skeleton, show.looks
+        )
+        self._cards = Cards(self._gl, show.cards, show.directory, self._say)
         for part in (SHARES[-1], share):
             size = picture_size(self._config, display, part)
             wall = self._final.wall(screen, display, self._controls, 1.0, size)
-            for look in show[1]:
+            for look in show.looks:
                 self._painter.draw(moment, look, look, 0.5, wall)
         self._gl.finish()
+        self._detail = self._affordable_detail(moment, show, screen, display)
         self.is_preparing = False
+
+    def _affordable_detail(
+        self, moment: Moment, show: ShownShow, screen: moderngl.Framebuffer, display: Size
+    ) -> Detail:
+        """Measured with the look that takes longest."""
+        size = picture_size(self._config, display)
+
+        def drawn(look: str, detail: Detail) -> None:
+            assert self._painter is not None
+            wall = self._final.wall(screen, display, self._controls, 1.0, size, detail=detail)
+            self._painter.draw(moment, look, look, 1.0, wall)
+            self._gl.finish()
+
+        def took_s(look: str) -> float:
+            began = time.perf_counter()
+            drawn(look, DETAILS[0])
+            return time.perf_counter() - began
+
+        dearest = max(show.looks, key=took_s)
+        return affordable_detail(partial(drawn, dearest), 1.0 / (self._config.rate or USUAL_RATE))
 
     def _switch_to(self, facts: Facts) -> None:
         self._poses = Interpolation(self._reader)
-        show = (facts.skeleton, self._looks(facts))
-        if self._drawn is not None and _are_alike(self._drawn, show):
+        show = self._shown_show(facts)
+        if self._drawn is not None and self._drawn.is_like(show):
             return
-        if self._painter is not None:
-            self._painter.release()
-        self._painter = self._drawn = None
+        self._release_show()
+        self._drawn = None
         self._presence.hide()
         self._to_draw, self._is_black = show, False
 
-    def _looks(self, facts: Facts) -> Looks:
+    def _release_show(self) -> None:
+        if self._painter is not None:
+            self._painter.release()
+        if self._cards is not None:
+            self._cards.release()
+        self._painter = self._cards = None
+
+    def _shown_show(self, facts: Facts) -> ShownShow:
+        directory = facts.show_directory
         try:
-            return looks_by_name(load_show(facts.show_directory).config.looks)
+            config = load_show(directory).config
+            looks = self._with_images(looks_by_name(config.looks, directory))
+            cards = cards_by_name(config.cards)
         except ConfigError as error:
             self._say(
                 f"{error} The audience sees the built-in looks. Correct the show, then start the stage again."
             )
-            return looks_by_name(())
+            looks, cards = looks_by_name(()), cards_by_name(())
+        names = [*(look.image for look in looks.values()), *(card.image for card in cards.values())]
+        names += [card.font for card in cards.values()]
+        changed = tuple(_changed_at(directory / name) for name in names if name is not None)
+        return ShownShow(facts.skeleton, looks, cards, directory, changed)
+
+    def _with_images(self, looks: Looks) -> Looks:
+        """The looks without the images that cannot be read."""
+        usable = dict(looks)
+        for name, look in looks.items():
+            try:
+                if look.image is not None:
+                    read_image(look.image)
+            except OSError as error:
+                self._say(
+                    f"{look.image} cannot be read as an image ({error}). The audience sees the look '{name}' "
+                    "without it. Save it anew."
+                )
+                usable[name] = look.model_copy(update={"image": None})
+        return usable
 
 
-def _are_alike(one: tuple[Skeleton, Looks], other: tuple[Skeleton, Looks]) -> bool:
-    return (
-        one[0].same_joints(other[0])
-        and np.array_equal(one[0].offsets, other[0].offsets)
-        and one[0].ends == other[0].ends
-        and np.array_equal(one[0].standing, other[0].standing)
-        and list(one[1].items()) == list(other[1].items())
-    )
+@dataclass(frozen=True)
+class ShownShow:
+    """What the projector draws of a show. changed_at: of its images and fonts."""
+
+    skeleton: Skeleton
+    looks: Looks
+    cards: Mapping[str, CardConfig]
+    directory: Path
+    changed_at: tuple[int, ...]
+
+    def is_like(self, other: ShownShow) -> bool:
+        """Whether the other one can be drawn with what was made for this one."""
+        one, another = self.skeleton, other.skeleton
+        return (
+            one.same_joints(another)
+            and np.array_equal(one.offsets, another.offsets)
+            and one.ends == another.ends
+            and np.array_equal(one.standing, another.standing)
+            and list(self.looks.items()) == list(other.looks.items())
+            and self.cards == other.cards
+            and self.changed_at == other.changed_at
+        )
+
+
+def _changed_at(path: Path) -> int:
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0

@@ -20,7 +20,8 @@ class Moment:
     positions: (J, 3); world: (J, 4) unit quaternions w, x, y, z, both interpolated to time_s;
     trail: (positions, world) at the ticks of the last TRAIL_S up to time_s, newest last, never empty;
     trail_times: when each of these was, seconds, same clock as time_s, ascending, none later than time_s;
-    holds: (J,) how firmly a hand holds each joint at time_s, 0..1; None: no hand holds any.
+    holds: (J,) how firmly a hand holds each joint at time_s, 0..1; None: no hand holds any;
+    others: the same moment of the puppets beside the first.
 
     Drawing code reads the arrays and keeps none.
     """
@@ -31,3 +32,4 @@ class Moment:
     trail: Sequence[tuple[Floats, Floats]]
     trail_times: Sequence[float]
     holds: Floats | None = None
+    others: tuple[Moment, ...] = ()

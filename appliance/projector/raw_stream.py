@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable
 
 import numpy as np
+
+from appliance.projector.stream.keying import keyed
 
 _LAST_WRITE_S = 1.0  # of the 3 s that systemd and `bunraku play` give the projector
 
@@ -20,12 +23,15 @@ def take_over_stdout() -> int:
 class RawStream:
     """Writes pictures, top row first, four bytes a pixel (red, green, blue, unused), from its own thread.
 
+    head: bytes before each, by its size; is_keyed: the fourth byte is alpha, as much as the pixel shines.
     A reader that is slower than the projector gets fewer pictures, each of them whole. is_closed: the reader
     has gone; nothing here raises.
     """
 
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
+    def __init__(
+        self, descriptor: int, head: Callable[[tuple[int, int]], bytes] | None = None, is_keyed: bool = False
+    ) -> None:
+        self._descriptor, self._head, self._is_keyed = descriptor, head, is_keyed
         self._newest: tuple[bytes, tuple[int, int]] | None = None
         self._is_there, self._is_ending = threading.Event(), False
         self.is_closed = False
@@ -55,8 +61,13 @@ class RawStream:
                 continue
             pixels, (width, height) = newest
             upright = np.frombuffer(pixels, np.uint8).reshape(height, width, 4)[::-1]
+            whole = upright.tobytes()
+            if self._is_keyed:
+                whole = keyed(whole)
             try:
-                self._write(memoryview(upright.tobytes()))
+                if self._head is not None:
+                    self._write(memoryview(self._head((width, height))))
+                self._write(memoryview(whole))
             except OSError:
                 self.is_closed = True
                 return

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import moderngl
@@ -35,6 +36,8 @@ from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, NO_PLACE, 
 from appliance.projector.raw_stream import RawStream
 from appliance.projector.resolution import Resolution
 from appliance.projector.stamp import stamp
+from appliance.projector.stream.feed import Feed
+from appliance.projector.stream.keying import keyed
 from appliance.projector.watchdog import Patience, end_process, guarded
 from appliance.projector.window import Kind, Size, Window
 from appliance.show.box import BoxConfig
@@ -49,7 +52,9 @@ _JUDGED_AFTER = 20  # pictures of the dance: then software's frame rate is known
 class Options:
     """The options of the command line. kind None: as the box file says; frames: a folder for PNGs.
 
-    stamps: draw when the dance left the stage into each picture's corner; raw: a descriptor for raw pictures.
+    stamps: draw when the dance left the stage into each picture's corner; raw: a descriptor for raw pictures;
+    is_keyed: pictures that are written have alpha, as much as they shine;
+    card: lines for the test card besides the projector's own figures, asked for once a second while it shows.
     """
 
     kind: Kind | None = None
@@ -59,6 +64,8 @@ class Options:
     shows_info: bool = False
     stamps: bool = False
     raw: int | None = None
+    is_keyed: bool = False
+    card: Callable[[], tuple[str, ...]] = tuple
 
 
 class Run:
@@ -75,9 +82,12 @@ class Run:
             opened.callback(self._window.close)
             self.context = GlContext(self._window)
             opened.callback(self.context.close)
-            self._raw = None if options.raw is None else RawStream(options.raw)
+            self._raw = None if options.raw is None else RawStream(options.raw, is_keyed=options.is_keyed)
             if self._raw is not None:
                 opened.callback(self._raw.close)
+            self._feed = None if config.stream is None else Feed(config.stream, say)
+            if self._feed is not None:
+                opened.callback(self._feed.close)
             self._file = AlignmentFile(alignment_folder(box), config, say)
             opened.callback(self._file.close)
             self._controls = Controls(self._file.alignment, self._file.keep, options.shows_info)
@@ -165,9 +175,14 @@ class Run:
         if self._options.stamps:
             stamp(screen, left_stage)
         if self._options.frames is not None:
-            self._write_png(self._options.frames, screen.read(viewport=(0, 0, *size), components=4), size)
+            pixels = screen.read(viewport=(0, 0, *size), components=4)
+            pixels = keyed(pixels) if self._options.is_keyed else pixels
+            self._write_png(self._options.frames, pixels, size)
+        read = partial(screen.read, viewport=(0, 0, *size), components=4)
         if self._raw is not None:
-            self._raw.offer(screen.read(viewport=(0, 0, *size), components=4), size)
+            self._raw.offer(read(), size)
+        if self._feed is not None:
+            self._feed.offer(now, size, read)
         self.context.finish()  # else the driver queues pictures, and each is older when shown
         drawn = time.monotonic()
         self._window.show()
@@ -233,6 +248,7 @@ class Run:
             f"stage {state}",
             f"look {self._show_state.read().look or 'of the show'}",
             f"{width}x{height}{drawn_at} {'software' if self.context.is_software else self._window.driver}",
+            *(self._options.card() if self._controls.shows_info else ()),
         )
         if self._options.shows_info:
             self._say(f"{figures.sentence()}, {width}x{height}{drawn_at}, stage {state}")

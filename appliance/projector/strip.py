@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,18 +24,25 @@ VIGNETTE = 0.0  # pictures side by side need no black around them
 
 
 def render_strip(
-    out: Path, recording: Recording, looks: Mapping[str, LookConfig], look: str, holds: Array | None = None
+    out: Path,
+    recording: Recording,
+    looks: Mapping[str, LookConfig],
+    look: str,
+    holds: Array | None = None,
+    others: Sequence[Recording] = (),
 ) -> Path:
     """Render ten instants at equal distances, the last one at the end, into `out`; returns it.
 
-    holds: (N, J) how firmly hands hold each joint, 0..1. Raises ProjectorError where nothing can be rendered
-    here, OSError where `out` cannot be written.
+    holds: (N, J) how firmly hands hold each joint, 0..1; others: the puppets beside this one. Raises
+    ProjectorError where nothing can be rendered here, OSError where `out` cannot be written.
     """
     chosen = np.unique(np.linspace(0, len(recording) - 1, COLUMNS * ROWS + 1)[1:].round().astype(int))
-    moments = [
-        moment_of(recording, last / recording.fps, None if holds is None else holds[last].astype(np.float32))
-        for last in chosen.tolist()
-    ]
+    moments = []
+    for last in chosen.tolist():
+        at_s = last / recording.fps
+        held = None if holds is None else holds[last].astype(np.float32)
+        beside = tuple(moment_of(other, at_s) for other in others)
+        moments.append(replace(moment_of(recording, at_s, held), others=beside))
     framed = {name: _framed(one) for name, one in looks.items()}
     pictures = list(_render(recording.skeleton, framed, look, moments))
     pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % COLUMNS)

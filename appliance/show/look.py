@@ -2,43 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from typing import Annotated, Literal, get_args
+from pathlib import Path
+from typing import Literal, get_args
 
-from pydantic import AfterValidator, BeforeValidator
-
-from appliance.show.section import Section, key, part, refusal
+from appliance.show.picture_file import Colour, PictureFile
+from appliance.show.section import Section, key, part
 
 Style = Literal["plaster", "lines", "ink", "cloud", "veil"]
 STYLES: tuple[Style, ...] = get_args(Style)
-
-
-def _given(value: object) -> object:
-    if value is None or isinstance(value, int):
-        raise refusal(
-            "This colour is empty: after a # YAML reads a comment, and digits alone are a number.",
-            "Write it in quotes, for instance '#f2e6d8', or leave the key out for the look's own colour.",
-        )
-    return value
-
-
-def _hexadecimal(colour: str) -> str:
-    if not re.fullmatch(r"#[0-9a-fA-F]{6}", colour):
-        raise refusal(
-            f"'{colour}' is not a colour.",
-            "Write red, green and blue in two hexadecimal digits each, in quotes: '#f2e6d8'.",
-        )
-    return colour.lower()
-
-
-Colour = Annotated[Annotated[str, AfterValidator(_hexadecimal)] | None, BeforeValidator(_given)]
+Move = Literal["still", "drift", "orbit"]
 
 
 class CameraConfig(Section):
     """From where the figure is seen. Everything is in proportion to the figure, so that any size fits."""
 
-    move: Literal["still", "drift", "orbit"] = key(
+    move: Move = key(
         "still: stays at its angle; drift: sways slowly about it; orbit: circles the figure.", "drift"
     )
     angle_deg: float = key(
@@ -70,6 +49,21 @@ class CameraConfig(Section):
     period_s: float = key("Seconds for one sway of drift or one circle of orbit.", 70.0, within=(10, 3600))
 
 
+class CameraChange(Section):
+    """The camera in a cue, whatever the look. What it leaves out stays as the look has it; {}: all does."""
+
+    move: Move | None = key("still, drift or orbit.", None)
+    angle_deg: float | None = key(
+        "0 from the front, 90 from the left of the figure.", None, within=(-180, 180)
+    )
+    elevation_deg: float | None = key("How steeply it looks down.", None, within=(-3, 70))
+    figure: float | None = key(
+        "How near: share of the picture's height that the standing figure takes.", None, within=(0.1, 0.9)
+    )
+    lens_deg: float | None = key("Angle of view: small is flat, wide is close.", None, within=(10, 75))
+    follow: float | None = key("How far it goes along with the dancer.", None, within=(0, 1))
+
+
 class HeldConfig(Section):
     """How the joint is marked that a hand holds: it grows and fades as the hand takes and releases it."""
 
@@ -90,6 +84,9 @@ class LookConfig(Section):
     light: Colour = key("The key light; what is fresh and fast.", None)
     accent: Colour = key("The rim light; what fades away.", None)
     background: Colour = key("Air and floor, or the paper. Dark ones end in true black at the edges.", None)
+    image: PictureFile | None = key(
+        "PNG or JPEG file in the bundle, behind the figure; it fills the picture.", None
+    )
     exposure: float = key("Brightness of the whole picture.", 1.0, within=(0.1, 4))
     fog: float = key("How much haze hangs in the air.", 0.5, within=(0, 1))
     shadow: float = key("How dark shadows are (plaster), how clear the floor mirrors.", 0.8, within=(0, 1))
@@ -97,17 +94,25 @@ class LookConfig(Section):
     glow: float = key("How far light spills around what is bright.", 0.6, within=(0, 1))
     density: float = key("How many strands, echoes or points; the grain of the ink.", 0.6, within=(0.1, 1))
     vignette: float = key("How far the picture fades to black towards its edges.", 0.4, within=(0, 1))
-    render_scale: float = key(
-        "Resolution that the figure is drawn at, in proportion to the picture; "
-        "smaller is softer and takes less of a small computer.",
-        0.7,
+    render_scale: float | None = key(
+        "Resolution that the figure is drawn at, in proportion to the picture; smaller is softer and takes "
+        "less of a small computer. null: 1 where the machine has time for it, else 0.7.",
+        None,
         within=(0.25, 1),
     )
     held: HeldConfig = part(HeldConfig)
     camera: CameraConfig = part(CameraConfig)
 
 
-def looks_by_name(looks: Sequence[LookConfig]) -> dict[str, LookConfig]:
-    """The looks in their order, by name; without any the built-in ones by the names of their styles."""
-    chosen = looks or [LookConfig(name=style, style=style) for style in STYLES]
+def looks_by_name(looks: Sequence[LookConfig], directory: Path | None = None) -> dict[str, LookConfig]:
+    """The looks in their order, by name; without any the built-in ones by the names of their styles.
+
+    directory: of the show; the looks' images then have their whole paths.
+    """
+    chosen = list(looks) or [LookConfig(name=style, style=style) for style in STYLES]
+    if directory is not None:
+        chosen = [
+            look.model_copy(update={"image": str(directory / look.image)}) if look.image else look
+            for look in chosen
+        ]
     return {look.name: look for look in chosen}

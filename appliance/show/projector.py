@@ -7,10 +7,13 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from appliance.show.section import Section, key
+from appliance.show.stream import StreamConfig
 
 Size = Annotated[
     tuple[Annotated[int, Field(ge=64, le=16384)], Annotated[int, Field(ge=64, le=16384)]], Field(strict=False)
 ]
+_Part = Annotated[float, Field(ge=-1, le=2)]
+_Point = Annotated[tuple[_Part, _Part], Field(strict=False)]
 
 
 class EdgeBlendConfig(Section):
@@ -25,6 +28,17 @@ class EdgeBlendConfig(Section):
         2.2,
         within=(1.0, 3.0),
     )
+
+
+class MaskConfig(Section):
+    """What of the projector's light stays dark: a door, the edge of the set. It stays when corners move."""
+
+    points: list[_Point] = key(
+        "Its corners, in order, in shares of the display's width and height from the top left.",
+        length=(3, 64),
+    )
+    dark: Literal["inside", "outside"] = key("outside: light falls inside of it alone.", "inside")
+    soft: float = key("Width of its soft edge, as a share of the display's height.", 0.01, within=(0, 0.2))
 
 
 class ProjectorConfig(Section):
@@ -51,3 +65,5 @@ class ProjectorConfig(Section):
     edge_blend: EdgeBlendConfig | None = key(
         str(EdgeBlendConfig.__doc__) + " null: one projector alone.", None
     )
+    masks: list[MaskConfig] = key("What stays dark whatever the picture shows.", [], length=(0, 16))
+    stream: StreamConfig | None = key(str(StreamConfig.__doc__) + " null: none.", None)

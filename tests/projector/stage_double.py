@@ -12,6 +12,7 @@ from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.loop import Looks
 from appliance.projector.moment import Moment
+from appliance.projector.picture.camera import NOT_CUED, CuedCamera
 from appliance.projector.picture.wall import Wall, flat
 
 SIZE = (64, 36)
@@ -59,7 +60,13 @@ class TellingPainter:
         self.looks, self.sizes, self._joints = looks, [size], len(skeleton)
 
     def draw(
-        self, moment: Moment, look: str, look_before: str, mix: float, target: Wall | moderngl.Framebuffer
+        self,
+        moment: Moment,
+        look: str,
+        look_before: str,
+        mix: float,
+        target: Wall | moderngl.Framebuffer,
+        cued: CuedCamera = NOT_CUED,
     ) -> None:
         wall = target if isinstance(target, Wall) else flat(target)
         self.sizes.append(wall.picture)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import moderngl
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.still import draw_still, moment_of
-from appliance.show.look import STYLES, LookConfig
+from appliance.show.look import STYLES, LookConfig, looks_by_name
 from tests.projector.golden_looks import AT_S, FOLDER, MEAN_LIMIT, P99_LIMIT, SIZE, difference, renderer
 from tests.projector.skeletons import mixamo, point, toy
 
@@ -115,6 +117,29 @@ def test_colours_of_the_show(dance: Recording, gl: moderngl.Context) -> None:
         )
     assert red_lines[..., 0].max() > 150 and red_lines[..., 1:].max() < 60
     assert chalk.max() > 200 and np.median(chalk) == 0
+
+
+def test_an_image_lies_behind_the_figure_and_ends_in_black(
+    dance: Recording, gl: moderngl.Context, tmp_path: Path
+) -> None:
+    """Blue on the left, red on the right; cut to the picture's shape, not squeezed."""
+    wide = np.zeros((60, 240, 3), np.uint8)
+    wide[:, :120, 2] = wide[:, 120:, 0] = 160
+    Image.fromarray(wide).save(tmp_path / "hall.png")
+    with_image = {
+        name: look.model_copy(update={"image": str(tmp_path / "hall.png")})
+        for name, look in looks_by_name(()).items()
+    }
+    plain = dict(looks_by_name(()))
+    with renderer(gl, dance.skeleton, with_image) as made, renderer(gl, dance.skeleton, plain) as bare:
+        for style in STYLES:
+            seen, without = (
+                draw_still(gl, one, moment_of(dance, AT_S), style, SIZE).astype(int) for one in (made, bare)
+            )
+            assert not seen[0].any() and not seen[:, 0].any(), style
+            left, right = seen[60:120, 70:90].mean(axis=(0, 1)), seen[60:120, 230:250].mean(axis=(0, 1))
+            assert left[2] > left[0] + 40 and right[0] > right[2] + 40, style
+            assert np.abs(seen - without).mean() > 10, style
 
 
 @pytest.mark.parametrize("skeleton", [mixamo(), toy()], ids=["mixamo", "toy"])

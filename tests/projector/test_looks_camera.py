@@ -7,7 +7,7 @@ import pytest
 
 from appliance.pose.recording import Recording
 from appliance.projector.moment import Moment
-from appliance.projector.picture.camera import View, view
+from appliance.projector.picture.camera import CuedCamera, View, view
 from appliance.projector.picture.poses import poses_of
 from appliance.projector.still import moment_of
 from appliance.show.look import CameraConfig
@@ -88,3 +88,18 @@ def test_fades_from_place_to_place_the_short_way(dance: Recording) -> None:
     before, now = CameraConfig(move="still", angle_deg=170.0), CameraConfig(move="still", angle_deg=-170.0)
     ends = [np.degrees(view(before, now, mix, 0.0, poses, 1.5).azimuth) for mix in (0.0, 0.5, 1.0)]
     assert ends == pytest.approx([170.0, 180.0, 190.0])
+
+
+def test_a_cue_moves_the_camera_whatever_the_look(dance: Recording) -> None:
+    """Softly from the looks' own place, also while the look changes; what a cue leaves out stays."""
+    poses = poses_of(moment_of(dance, 20.0), HEIGHT, SOLE)
+    before, now = CameraConfig(move="still", angle_deg=10.0), CameraConfig(move="still", angle_deg=50.0)
+    turns = []
+    for mix in (0.0, 0.5, 1.0):
+        cued = CuedCamera({}, {"angle_deg": 90.0, "elevation_deg": 40.0}, mix)
+        turns.append(view(before, now, 0.5, 0.0, poses, 1.5, cued))
+    assert np.degrees([turn.azimuth for turn in turns]) == pytest.approx([30.0, 60.0, 90.0])
+    assert np.degrees(np.arcsin([turn.back[1] for turn in turns])) == pytest.approx([7.0, 23.5, 40.0])
+    far = view(now, now, 1.0, 0.0, poses, 1.5, CuedCamera({"figure": 0.2}, {"figure": 0.2}, 1.0))
+    near = view(now, now, 1.0, 0.0, poses, 1.5)
+    assert np.linalg.norm(far.eye) > 2.5 * np.linalg.norm(near.eye)

@@ -204,6 +204,31 @@ def test_smaller_pictures_are_reported_once_and_stand_in_the_figures(
     assert set(shares) == {0.5}
 
 
+def test_the_test_card_has_lines_of_the_box_and_the_picture_of_a_show_does_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = BoxConfig(runtime=tmp_path / "run", state=tmp_path / "state")
+    drawn: list[tuple[str, ...]] = []
+    monkeypatch.setattr(
+        Projector,
+        "draw",
+        lambda *arguments: drawn.extend(
+            one for one in arguments if isinstance(one, tuple) and one and isinstance(one[0], str)
+        ),
+    )
+    for shows_info in (False, True):
+        drawn.clear()
+        options = Options(
+            "offscreen", (64, 36), seconds=3, shows_info=shows_info, card=lambda: ("pin 123456",)
+        )
+        run = Run(box, options, print)
+        try:
+            run.project(lambda: any("pin 123456" in lines for lines in drawn))
+        finally:
+            run.close()
+        assert any("pin 123456" in lines for lines in drawn) == shows_info
+
+
 def test_a_pause_of_the_whole_machine_is_not_reported_as_a_black_picture(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     run = Run(BoxConfig(runtime=folder, state=tmp_path / "state"), Options("offscreen", (64, 36)), print)

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from appliance.pose import quaternion
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.t_pose import aimed
 
 CROWDED_SHARE = 0.3  # of a limb's points that lie in another part of the body
 CLEARANCE = 0.01  # of the height, between the surfaces of two limbs
@@ -77,31 +77,3 @@ def _limb_aims(anatomy: Anatomy) -> dict[tuple[int, int], Array]:
             ahead = front - _DOWNWARDS * _UP
             aims[joint, child] = ahead if is_foot else -_UP if is_leg else side
     return aims
-
-
-def aimed(standing: Anatomy, aims: dict[tuple[int, int], Array]) -> Array:
-    """Local rotations (J, 4) by which bones point where they should, each turned the shortest way."""
-    skeleton = standing.skeleton
-    towards = {joint: (child, aim) for (joint, child), aim in aims.items()}
-    local = skeleton.standing.copy()
-    world = local.copy()
-    for joint, parent in enumerate(skeleton.parents):
-        above = world[parent] if parent >= 0 else quaternion.IDENTITY.astype(float)
-        world[joint] = quaternion.multiply(above, local[joint])
-        if joint in towards:
-            child, aim = towards[joint]
-            bone = quaternion.rotate(world[joint], skeleton.offsets[child])
-            world[joint] = quaternion.multiply(_shortest_turn(bone, aim), world[joint])
-        local[joint] = quaternion.multiply(quaternion.inverse(above), world[joint])
-    return local
-
-
-def _shortest_turn(start: Array, end: Array) -> Array:
-    """The rotation (4,) from one direction to another."""
-    a, b = start / max(float(np.linalg.norm(start)), 1e-12), end / np.linalg.norm(end)
-    axis, cosine = np.cross(a, b), float(a @ b)
-    if cosine < -0.9999:  # the opposite way: about any axis across
-        axis = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 0.0, 1.0])
-    if float(np.linalg.norm(axis)) < 1e-9:
-        return quaternion.IDENTITY.astype(float)
-    return quaternion.from_axis_angle(axis, np.arccos(np.clip(cosine, -1.0, 1.0)))

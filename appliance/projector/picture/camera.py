@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -17,6 +18,8 @@ AIM = 0.5  # height that the camera looks at, in figure heights
 ROOM = 0.82  # of the half picture that joints may use; the rest is for the flesh around them
 KNEE = 8  # how suddenly the camera draws back when a joint comes near the edge: higher is later
 NEAR, FAR = 0.2, 30.0  # figure heights
+
+Changes = Mapping[str, float | str]
 
 _AGES = (np.arange(ROWS) + 0.5) / ROWS
 _SMOOTH = np.sin(np.pi * _AGES) ** 2 / np.sum(np.sin(np.pi * _AGES) ** 2)  # 0.6 s behind, without a jolt
@@ -64,17 +67,38 @@ class _Stand(NamedTuple):
     follow: float
 
 
+class CuedCamera(NamedTuple):
+    """What cues change of the look's camera, by its keys: before, now, and 0..1 how far it is on its way."""
+
+    before: Changes
+    now: Changes
+    mix: float
+
+
+NOT_CUED = CuedCamera({}, {}, 1.0)
+
+
 def view(
-    before: CameraConfig, now: CameraConfig, mix: float, time_s: float, poses: Poses, aspect: float
+    before: CameraConfig,
+    now: CameraConfig,
+    mix: float,
+    time_s: float,
+    poses: Poses,
+    aspect: float,
+    cued: CuedCamera = NOT_CUED,
 ) -> View:
     """The camera at time_s; mix 0: as in `before`, 1: as in `now`; aspect: the picture's width / height."""
-    stand = _between(_stand(before, time_s), _stand(now, time_s), mix * mix * (3 - 2 * mix))
+    left, reached = (
+        _between(_stand(before, time_s, changes), _stand(now, time_s, changes), _eased(mix))
+        for changes in (cued.before, cued.now)
+    )
+    stand = _between(left, reached, _eased(cued.mix))
     slope = float(np.tan(stand.lens / 2))
     slopes = (slope * aspect, slope) if aspect >= 1 else (slope, slope / aspect)
     distance = 0.5 / (stand.figure * min(slopes[1], UPRIGHT * slopes[0]))
     across = np.array([np.cos(stand.azimuth), 0.0, -np.sin(stand.azimuth)])
     towards = np.array([np.sin(stand.azimuth), 0.0, np.cos(stand.azimuth)])
-    centre = (_SMOOTH[:, None] * poses.positions[:, 0]).sum(axis=0) * [1.0, 0.0, 1.0]
+    centre = (_SMOOTH[:, None] * poses.roots).sum(axis=0) * [1.0, 0.0, 1.0]
     left_behind = (1 - stand.follow) * centre
     side, depth = float(left_behind @ across), float(left_behind @ towards)
     aim = centre - across * _limited(side, max(0.1, distance * slopes[0] - 0.55))
@@ -86,7 +110,13 @@ def view(
     return View(aim + distance * back, across, up, back, slopes, centre[[0, 2]], stand.azimuth)
 
 
-def _stand(config: CameraConfig, time_s: float) -> _Stand:
+def _eased(share: float) -> float:
+    return share * share * (3 - 2 * share)
+
+
+def _stand(config: CameraConfig, time_s: float, changes: Changes) -> _Stand:
+    if changes:
+        config = config.model_copy(update=dict(changes))
     turn = 2 * np.pi * time_s / config.period_s
     azimuth, elevation = np.radians(config.angle_deg), np.radians(config.elevation_deg)
     if config.move == "orbit":

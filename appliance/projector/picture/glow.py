@@ -56,6 +56,7 @@ class Glow:
         air = easel.canvas("air", near.size)
         inputs = {
             **scene.inputs,
+            **self._easel.behind(look),
             "picture": picture.texture,
             "near_glow": near.texture,
             "far_glow": far.texture,

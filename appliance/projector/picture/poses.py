@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import moderngl
@@ -21,11 +22,41 @@ Floats = NDArray[np.float32]
 class Poses:
     """Where the joints were: row 0 now, row i ROW_S * i seconds ago; in figure heights, the floor at y = 0.
 
-    positions: (ROWS, J, 3); world: (ROWS, J, 4).
+    positions: (ROWS, J, 3); world: (ROWS, J, 4). Of several figures the joints stand one behind the other.
     """
 
     positions: Floats
     world: Floats
+    figures: int = 1
+
+    @property
+    def roots(self) -> Floats:
+        """(ROWS, 3): the figure's root; of several the middle of theirs."""
+        if self.figures == 1:
+            return self.positions[:, 0]
+        middle: Floats = self.each_root.mean(axis=1)
+        return middle
+
+    @property
+    def apart(self) -> float:
+        """How far a root is from their middle now, at most, along the floor; 0: one figure."""
+        if self.figures == 1:
+            return 0.0
+        away = self.each_root[0] - self.roots[0]
+        return float(np.hypot(away[:, 0], away[:, 2]).max())
+
+    @property
+    def each_root(self) -> Floats:
+        """(ROWS, figures, 3)."""
+        return self.positions.reshape(ROWS, self.figures, -1, 3)[:, :, 0]
+
+
+def together(poses: Sequence[Poses]) -> Poses:
+    """Several figures as one."""
+    if len(poses) == 1:
+        return poses[0]
+    positions, world = ([getattr(one, name) for one in poses] for name in ("positions", "world"))
+    return Poses(np.concatenate(positions, axis=1), np.concatenate(world, axis=1), len(poses))
 
 
 def poses_of(moment: Moment, height: float, sole: float) -> Poses:
@@ -60,14 +91,16 @@ class HoldTexture:
 
     def __init__(self, ctx: moderngl.Context, joints: int) -> None:
         self.most = 0.0  # what the most firmly held joint has
-        self.texture = ctx.texture((joints, 1), 1, dtype="f4")
+        self.texture = ctx.texture((joints, 1), 1, np.zeros(joints, np.float32).tobytes(), dtype="f4")
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
     def write(self, holds: Floats | None) -> None:
         """Bring the weights (J,) onto the GPU; None: no joint is held."""
-        self.most = 0.0 if holds is None else float(np.max(holds, initial=0.0))
+        before, self.most = self.most, 0.0 if holds is None else float(np.max(holds, initial=0.0))
         if holds is not None and self.most > 0.0:
             self.texture.write(np.ascontiguousarray(holds, np.float32))
+        elif before > 0.0:
+            self.texture.write(np.zeros(self.texture.width, np.float32))
 
     def release(self) -> None:
         self.texture.release()

@@ -9,13 +9,13 @@ import moderngl
 
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.moment import Moment
-from appliance.projector.picture.camera import view
+from appliance.projector.picture.camera import NOT_CUED, CuedCamera, view
 from appliance.projector.picture.looks.cloud import Cloud
 from appliance.projector.picture.looks.ink import Ink
 from appliance.projector.picture.looks.lines import Lines
 from appliance.projector.picture.looks.plaster import Plaster
 from appliance.projector.picture.looks.veil import Veil
-from appliance.projector.picture.poses import poses_of
+from appliance.projector.picture.poses import poses_of, together
 from appliance.projector.picture.scene import Easel, Scene
 from appliance.projector.picture.tally import Cost
 from appliance.projector.picture.wall import Wall, flat
@@ -58,7 +58,13 @@ class Renderer:
         self._styles = {style: _LOOKS[style](self._easel) for style in styles}
 
     def draw(
-        self, moment: Moment, look: str, look_before: str, mix: float, target: Wall | moderngl.Framebuffer
+        self,
+        moment: Moment,
+        look: str,
+        look_before: str,
+        mix: float,
+        target: Wall | moderngl.Framebuffer,
+        cued: CuedCamera = NOT_CUED,
     ) -> None:
         """Draw onto `target`; mix 0: only look_before, 1: only look. Unknown names: the first look.
 
@@ -69,14 +75,15 @@ class Renderer:
         now, before = self._looks.get(look, first), self._looks.get(look_before, first)
         easel = self._easel
         easel.tally.clear()
-        poses = poses_of(moment, easel.height, easel.sole)
+        figures = (moment, *moment.others)
+        each = [poses_of(one, easel.height, easel.sole) for one in figures]
+        poses = together(each)
         wall = target if isinstance(target, Wall) else flat(target)
         self._pixels = wall.picture[0] * wall.picture[1]
         self._target_bytes = 0 if wall.framebuffer is easel.ctx.screen else 4 * wall.pixels
-        seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect)
+        seen = view(before.camera, now.camera, mix, moment.time_s, poses, wall.aspect, cued)
         scene = Scene(moment.time_s, seen, poses, wall.aspect)
-        easel.poses.write(poses)
-        easel.holds.write(moment.holds)
+        easel.show(each, [one.holds for one in figures])
         layers = [(before, 1.0), (now, mix)] if 0.0 < mix < 1.0 else [(now if mix > 0 else before, 1.0)]
         for layer, opacity in layers:
             self._styles[layer.style].draw(scene, layer, opacity, wall)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,20 +15,24 @@ from numpy.typing import NDArray
 from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 from appliance.projector.body.body_mesh import body_mesh
+from appliance.projector.body.skinning import BodyMesh
 from appliance.projector.picture.body_buffers import BodyBuffers
 from appliance.projector.picture.camera import View
 from appliance.projector.picture.drawing import Drawing
+from appliance.projector.picture.image_file import read_image, texture_of
 from appliance.projector.picture.noise import SIDE, noise_pixels
-from appliance.projector.picture.poses import HoldTexture, Poses, PoseTexture
-from appliance.projector.picture.tally import Tally
+from appliance.projector.picture.poses import Floats, HoldTexture, Poses, PoseTexture
+from appliance.projector.picture.tally import BACKDROP, Tally
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.vertices import layout, packed
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
+from appliance.show.puppets import MOST_PUPPETS
 
 BODY_AREA = 0.16  # of a figure height squared that the figure covers, about
 Box = tuple[float, float, float, float]
 WHOLE: Box = (0.0, 0.0, 1.0, 1.0)
+WIDER, SPREAD_STEP, MOST_SPREAD = 1.2, 0.5, 5.0  # in a figure height from the middle; of `spread`
 FLESH = 0.16  # figure heights that the surface reaches beyond the joints at most
 
 
@@ -50,9 +55,25 @@ class Scene:
             "axes": np.stack([view.right, view.up, view.back], axis=1),
             "slopes": view.slopes,
             "ground": view.ground,
+            "spread": self.spread,
+            "stands": self._stands,
             "aspect": self.aspect,
             "time": self.time_s % 4096.0,
         }
+
+    @property
+    def _stands(self) -> list[tuple[float, float]]:
+        """x and z of where MOST_PUPPETS figures are; the last ones repeat the first."""
+        x, z = self.view.ground.tolist()
+        stands = [(x, z)]
+        if self.poses.figures > 1:
+            stands = [(float(x), float(z)) for x, _, z in self.poses.each_root[0]]
+        return (stands + [stands[0]] * MOST_PUPPETS)[:MOST_PUPPETS]
+
+    @cached_property
+    def spread(self) -> float:
+        """How much larger than around one figure the lit floor and the shadow's pictures are, in steps."""
+        return min(SPREAD_STEP * math.ceil(self.poses.apart * WIDER / SPREAD_STEP) + 1.0, MOST_SPREAD)
 
     @property
     def distance(self) -> float:
@@ -82,6 +103,18 @@ class Scene:
         return left, lower, right, upper
 
 
+class _FigureTextures:
+    """What one figure does, on the GPU."""
+
+    def __init__(self, ctx: moderngl.Context, mesh: BodyMesh, joints: int) -> None:
+        self.poses, self.holds = PoseTexture(ctx, mesh, joints), HoldTexture(ctx, joints)
+        self.inputs = {"poses": self.poses.texture, "holds": self.holds.texture}
+
+    def release(self) -> None:
+        self.poses.release()
+        self.holds.release()
+
+
 class Easel:
     """The body, its poses, the noise and the canvases: once on the GPU, for all looks."""
 
@@ -93,15 +126,30 @@ class Easel:
         self.sole = float(mesh.bind_positions[:, 1].min() - mesh.vertices[:, 1].min())
         self.bind_positions = mesh.bind_positions / mesh.height
         self.body = BodyBuffers(ctx, mesh)
-        self.poses = PoseTexture(ctx, mesh, len(skeleton))
-        self.holds = HoldTexture(ctx, len(skeleton))
+        self._figures = [_FigureTextures(ctx, mesh, len(skeleton))]
+        self._mesh, self._shown = mesh, 1
         self.noise = ctx.texture((SIDE, SIDE), 4, noise_pixels())
         self.noise.build_mipmaps()
         self.noise.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
+        self._backdrops: dict[str, moderngl.Texture] = {}
         self._canvases: dict[str, Target] = {}
         self._buffers: list[moderngl.Buffer] = []
         self._drawings: list[Drawing] = []
         self._sheets: dict[tuple[str, ...], Drawing] = {}
+
+    def show(self, poses: Sequence[Poses], holds: Sequence[Floats | None]) -> None:
+        """What the figures of the next picture do, at least one."""
+        self._shown = len(poses)
+        while len(self._figures) < self._shown:
+            self._figures.append(_FigureTextures(self.ctx, self._mesh, len(self.skeleton)))
+        for textures, one, held in zip(self._figures, poses, holds, strict=False):
+            textures.poses.write(one)
+            textures.holds.write(held)
+
+    def draw_figures(self, drawing: Drawing, pixels: float, inputs: dict[str, Any], *drawn: int) -> None:
+        """Draw what belongs to a figure once for each; pixels: of one. drawn: as Drawing takes it."""
+        for textures in self._figures[: self._shown]:
+            drawing.draw(self.tally, pixels, inputs | textures.inputs, *drawn)
 
     def vertices(self, parts: Mapping[str, Any], instanced: bool = False) -> list[tuple[Any, ...]]:
         """Bring vertices onto the GPU; returns what a vertex array is made of. instanced: one an instance."""
@@ -114,24 +162,34 @@ class Easel:
         self._buffers.append(self.ctx.buffer(values.tobytes()))
         return self._buffers[-1]
 
-    def canvas(self, name: str, size: tuple[int, int], depth: bool = False) -> Target:
+    def canvas(self, name: str, size: tuple[int, int], depth: bool = False, samples: int = 0) -> Target:
         """The canvas of that name, replaced when its size has changed."""
         known = self._canvases.get(name)
-        if known is None or known.size != size:
+        if known is None or known.size != size or known.samples != samples:
             if known:
                 known.release()
-            known = self._canvases[name] = Target(self.ctx, self.tally, size, depth)
+            known = self._canvases[name] = Target(self.ctx, self.tally, size, depth, samples)
         return known
 
     def held(self, look: LookConfig) -> dict[str, Any]:
         """The inputs of shaders that mark held joints; `held` 0 switches that off."""
-        return {"holds": self.holds.texture, "held": look.held.strength if self.holds.most > 0.0 else 0.0}
+        is_held = any(textures.holds.most > 0.0 for textures in self._figures[: self._shown])
+        return {"held": look.held.strength if is_held else 0.0}
 
-    def picture(self, wall: Wall, scale: float) -> Target:
+    def behind(self, look: LookConfig) -> dict[str, Any]:
+        """The inputs of the look's image behind the figure, if it has one."""
+        if look.image is None:
+            return {}
+        if look.image not in self._backdrops:
+            self._backdrops[look.image] = texture_of(self.ctx, read_image(look.image))
+        return {"backdrop": self._backdrops[look.image]}
+
+    def picture(self, wall: Wall, look: LookConfig) -> Target:
         """The canvas for the figure, with depth, at a share of the picture's resolution."""
-        share = min(1.0, scale * wall.finer)
+        share = min(1.0, (look.render_scale or wall.detail.scale) * wall.finer)
         width, height = (max(1, round(share * side)) for side in wall.picture)
-        return self.canvas("picture", (width, height), depth=True)
+        samples = min(wall.detail.samples, self.ctx.max_samples)
+        return self.canvas("picture", (width, height), depth=True, samples=samples)
 
     def lay(
         self, fragment: str, wall: Wall, opacity: float, inputs: dict[str, Any], box: Box = WHOLE
@@ -157,6 +215,11 @@ class Easel:
             "inverse_gamma": 1.0 / wall.gamma,
         }
         parts = ("GAMMA",) if wall.gamma != 1.0 else ()
+        backdrop = inputs.get("backdrop")
+        if backdrop is not None:
+            across = wall.aspect * backdrop.height / backdrop.width
+            inputs["cut"] = (min(1.0, across), min(1.0, 1.0 / across))
+            parts = (*parts, BACKDROP)
         inside = (box[2] - box[0]) * (box[3] - box[1])
         strip = moderngl.TRIANGLE_STRIP
         self._sheet(fragment, *parts).draw(self.tally, inside * wall.pixels, inputs, strip, 4)
@@ -197,13 +260,16 @@ class Easel:
     @property
     def gpu_bytes(self) -> int:
         """What all this takes on the GPU."""
+        images = sum(4 * image.width * image.height for image in self._backdrops.values())
         canvases = sum(canvas.bytes for canvas in self._canvases.values())
         buffers = sum(buffer.size for buffer in self._buffers)
-        return canvases + buffers + self.body.gpu_bytes + self.poses.gpu_bytes + SIDE * SIDE * 16 // 3
+        poses = sum(one.poses.gpu_bytes for one in self._figures)
+        return images + canvases + buffers + self.body.gpu_bytes + poses + SIDE * SIDE * 16 // 3
 
     def release(self) -> None:
-        shared: list[Any] = [self.body, self.poses, self.holds, self.noise]
-        for owned in (*self._drawings, *self._buffers, *self._canvases.values(), *shared):
+        shared: list[Any] = [self.body, *self._figures, self.noise]
+        shared += [*self._canvases.values(), *self._backdrops.values()]
+        for owned in (*self._drawings, *self._buffers, *shared):
             owned.release()
 
 

@@ -29,44 +29,47 @@ class Shadow:
     def draw(self, scene: Scene, lamp: Array) -> dict[str, Any]:
         """Draw both for a lamp in that direction; returns what shaders that receive shadows need."""
         ctx, easel = self._easel.ctx, self._easel
-        root = scene.poses.positions[0, 0].astype(float)
-        lamp_projection = _orthographic(lamp, np.array([root[0], max(0.5, root[1]), root[2]]))
-        depth = easel.canvas("lamp depth", (DEPTH_SIDE, DEPTH_SIDE), depth=True)
+        root, side = scene.poses.roots[0].astype(float), round(scene.spread * DEPTH_SIDE)
+        middle = np.array([root[0], max(0.5, root[1]), root[2]])
+        lamp_projection = _orthographic(lamp, middle, scene.spread * FIELD, side)
+        depth = easel.canvas("lamp depth", (side, side), depth=True)
         depth.start((1.0, 1.0, 1.0, 1.0))
         ctx.enable_only(moderngl.DEPTH_TEST)
-        poses = {"poses": easel.poses.texture, "row": 0, "holds": easel.holds.texture, "held": 0.0}
-        seen = BODY_SHARE * depth.pixels
-        self._depth.draw(easel.tally, seen, poses | {"projection": lamp_projection})
-        depth.forget_depth()
+        seen = BODY_SHARE * depth.pixels / scene.spread**2
+        inputs = {"row": 0, "held": 0.0, "projection": lamp_projection}
+        easel.draw_figures(self._depth, seen, inputs)
+        depth.finish()
         lamps = {"lamp_depth": depth.texture, "lamp_projection": lamp_projection}
         return lamps | self.on_floor(scene, lamp)
 
     def on_floor(self, scene: Scene, lamp: Array) -> dict[str, Any]:
         """Draw the floor's shadow alone."""
         ctx, easel = self._easel.ctx, self._easel
-        root = scene.poses.positions[0, 0].astype(float)
-        poses = {"poses": easel.poses.texture, "row": 0, "holds": easel.holds.texture, "held": 0.0}
+        root, side = scene.poses.roots[0].astype(float), round(scene.spread * CAST_SIDE)
         middle = root[[0, 2]] - 0.5 * lamp[[0, 2]] / lamp[1]
-        on_floor = {"lamp": lamp, "middle": middle, "reach": REACH}
-        first, second = (easel.canvas(name, (CAST_SIDE, CAST_SIDE)) for name in ("cast", "cast blurred"))
+        on_floor = {"lamp": lamp, "middle": middle, "reach": scene.spread * REACH}
+        first, second = (easel.canvas(name, (side, side)) for name in ("cast", "cast blurred"))
         first.start()
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.MAX, moderngl.MAX
-        self._cast.draw(easel.tally, BODY_SHARE * first.pixels, poses | on_floor)
+        covered = BODY_SHARE * first.pixels / scene.spread**2
+        easel.draw_figures(self._cast, covered, {"row": 0, "held": 0.0, **on_floor})
         ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         ctx.enable_only(moderngl.NOTHING)
-        easel.blur(self._blur, first, second, (SPREAD / CAST_SIDE, SPREAD / CAST_SIDE))
-        return {"floor_shadow": first.texture, "middle": middle, "reach": REACH}
+        easel.blur(self._blur, first, second, (SPREAD / side, SPREAD / side))
+        return {"floor_shadow": first.texture, "middle": middle, "reach": on_floor["reach"]}
 
 
-def _orthographic(lamp: Array, centre: Array) -> Array:
-    """(4, 4) from figure heights to the lamp's picture; it moves in whole pixels, so that edges stay calm."""
+def _orthographic(lamp: Array, centre: Array, field: float, side: int) -> Array:
+    """(4, 4) from figure heights to the lamp's picture of that many pixels, which shows `field` around the
+    centre; it moves in whole pixels, so that edges stay calm.
+    """
     right = np.cross([0.0, 1.0, 0.0], lamp)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(lamp, right), lamp])
-    pixel = 2 * FIELD / DEPTH_SIDE
+    pixel = 2 * field / side
     middle = np.round(axes @ centre / pixel) * pixel
     look = np.eye(4)
-    look[:3, :3], look[:3, 3] = axes / FIELD, -middle / FIELD
+    look[:3, :3], look[:3, 3] = axes / field, -middle / field
     look[2] *= -0.5  # depth grows away from the lamp
     return look

@@ -13,6 +13,7 @@ from appliance.projector.picture.body_buffers import BodyBuffers, merged
 
 STEP = 0.02  # figure heights from one point of a strand to the next
 POINTS = 28  # steps of a strand
+OFF = 0.018  # figure heights from the nearest vertex: a strand that is further off has run past a tip
 TAPER = 7  # steps in which a strand ends
 SPACING = 0.045  # figure heights between where strands start
 TURN = 0.35  # how far a strand turns around its limb, per length that it runs along it
@@ -83,7 +84,8 @@ def _walk(
         next_near = _nearest(places, stepped)
         out = np.sum((stepped - places[next_near]) * normals[next_near], axis=1, keepdims=True)
         stepped = stepped - normals[next_near] * out
-        goes_on = np.sum((stepped - at) * heading, axis=1) > 0.3 * STEP
+        off = np.linalg.norm(stepped - places[next_near], axis=1)
+        goes_on = (np.sum((stepped - at) * heading, axis=1) > 0.3 * STEP) & (off < OFF)
         at = np.where(goes_on[:, None], stepped, at)
         near = np.where(goes_on, next_near, near)
         heading = np.where(goes_on[:, None], way, 0.0)
@@ -106,7 +108,7 @@ def _tapered(runs_on: NDArray[np.bool_]) -> Floats:
 def _along(skeleton: Skeleton, bind_positions: Array) -> Array:
     """(J, 3) along the body beyond each joint, to its longest branch; it runs on from its parent."""
     length, along = np.zeros(len(skeleton)), np.zeros((len(skeleton), 3))
-    for joint, offset in skeleton.ends:
+    for joint, offset in skeleton.ends if skeleton.stance is None else ():  # else they point elsewhere
         along[joint] = offset
     for joint in reversed(range(1, len(skeleton))):
         parent = skeleton.parents[joint]

@@ -44,6 +44,9 @@ _FRAGMENT = {
     "ink_finish GAMMA FRAME": (44, 1),
     "cloud": (10, 0),
     "veil": (40, 0),
+    "card": (60, 2),
+    "card GAMMA": (84, 2),
+    "mask": (8, 1),
     "final": (6, 1),
     "final DIM": (26, 1),
     "final GAMMA DIM": (50, 1),
@@ -54,6 +57,8 @@ _FRAGMENT = {
     "final BLEND DIM MARKS": (152, 2),
     "final GAMMA BLEND DIM MARKS": (176, 2),
 }
+BACKDROP = "BACKDROP"  # the part of a look's last step that has an image behind the figure
+_IMAGE = (10, 1)  # what that adds
 _VERTEX = {
     "screen": (8, 0),
     "laid": (20, 0),
@@ -80,7 +85,9 @@ class Use:
     @property
     def seconds(self) -> float:
         """On a Raspberry Pi 4, estimated, without its memory: operations or fetches, whichever is more."""
-        operations, fetches = _FRAGMENT[self.fragment]
+        operations, fetches = _FRAGMENT[self.fragment.replace(f" {BACKDROP}", "")]
+        if BACKDROP in self.fragment:
+            operations, fetches = operations + _IMAGE[0], fetches + _IMAGE[1]
         vertex_operations, vertex_fetches = _VERTEX[self.vertex]
         shaded, placed = self.pixels, self.vertices * _VERTEX_PASSES
         return (

@@ -17,14 +17,22 @@ class Target:
     """A texture of four bytes a pixel that can be drawn into, optionally with depth."""
 
     def __init__(
-        self, ctx: moderngl.Context, tally: Tally, size: tuple[int, int], depth: bool = False
+        self,
+        ctx: moderngl.Context,
+        tally: Tally,
+        size: tuple[int, int],
+        depth: bool = False,
+        samples: int = 0,
     ) -> None:
-        self.size, self._tally = size, tally
+        """samples: of each pixel's edges, melted into the texture by `finish`; 0: one, in its middle."""
+        self.size, self._ctx, self._tally, self.samples = size, ctx, tally, samples
         self.texture = ctx.texture(size, 4)
         self.texture.repeat_x = self.texture.repeat_y = False
-        self._depth = ctx.depth_renderbuffer(size) if depth else None
-        self.buffer = ctx.framebuffer([self.texture], self._depth)
-        self.bytes = size[0] * size[1] * (8 if depth else 4)
+        self._depth = ctx.depth_renderbuffer(size, samples=samples) if depth else None
+        self._fine = ctx.renderbuffer(size, 4, samples=samples) if samples else None
+        self._melted = ctx.framebuffer([self.texture]) if samples else None
+        self.buffer = ctx.framebuffer([self._fine or self.texture], self._depth)
+        self.bytes = size[0] * size[1] * (4 + (8 * samples if samples else 4 * depth))
         self._invalidate = _invalidation() if depth else None
 
     @property
@@ -37,7 +45,7 @@ class Target:
         self.buffer.use()
         self.buffer.viewport = (0, 0, *self.size)
         self.buffer.clear(*colour)
-        self._tally.count_bytes(4 * self.pixels)
+        self._tally.count_bytes(4 * max(self.samples, 1) * self.pixels)
 
     def keep(self, channels: str, depth: bool = True) -> None:
         """Restrict drawing to these channels ('r' to 'a'), and depth only if wanted."""
@@ -45,16 +53,20 @@ class Target:
         self.buffer.depth_mask = depth
         self.buffer.use()
 
-    def forget_depth(self) -> None:
-        """Discard depth right after its last use: a GPU that draws in tiles then never stores it."""
+    def finish(self) -> None:
+        """All is drawn. Depth is discarded: a GPU that draws in tiles then never stores it."""
         if self._invalidate is not None:
             self._invalidate(_FRAMEBUFFER, 1, ctypes.byref(ctypes.c_uint(_DEPTH)))
+        if self._melted is not None:
+            self._ctx.copy_framebuffer(self._melted, self.buffer)
+            self._tally.count_bytes(4 * (self.samples + 1) * self.pixels)
 
     def release(self) -> None:
         self.buffer.release()
         self.texture.release()
-        if self._depth:
-            self._depth.release()
+        for owned in (self._depth, self._fine, self._melted):
+            if owned is not None:
+                owned.release()
 
 
 def _invalidation() -> Callable[..., None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -14,6 +15,17 @@ Size = tuple[int, int]
 FLAT = np.array([[2.0, 0.0, -1.0], [0.0, 2.0, -1.0], [0.0, 0.0, 1.0]])  # all of the framebuffer, upright
 
 
+class Detail(NamedTuple):
+    """How finely figures are drawn: their resolution, as a share of the picture's, and samples of each pixel
+    of their outlines (0: one, in its middle)."""
+
+    scale: float
+    samples: int
+
+
+DETAILS = (Detail(0.7, 0), Detail(1.0, 0), Detail(1.0, 4))  # each takes longer than the one before it
+
+
 @dataclass(frozen=True)
 class Wall:
     """A framebuffer of `display` pixels; the scene is drawn as for a picture of `picture` pixels.
@@ -21,7 +33,8 @@ class Wall:
     clip_from_picture: (3, 3), the projective map from the picture's unit square (y up) to clip space, with a
     third row above 0 all over it; the rest of the framebuffer becomes black. level: of the brightness;
     gamma: above 1 lifts the dark tones; finer: how many times finer the figure is drawn than its look says,
-    at most as fine as the picture: in a small one its edges would else be steps.
+    at most as fine as the picture: in a small one its edges would else be steps; detail: of figures
+    whose look says none.
     """
 
     framebuffer: moderngl.Framebuffer
@@ -31,6 +44,7 @@ class Wall:
     level: float = 1.0
     gamma: float = 1.0
     finer: float = 1.0
+    detail: Detail = DETAILS[0]
 
     @property
     def aspect(self) -> float:

@@ -23,7 +23,12 @@ vec4 soft(vec2 at) {
 void main() {
     vec4 sheet = texture(paper, uv);
     float rough = sheet.b - 0.5;
-    vec3 blank = air_colour * (0.95 + 0.10 * (sheet.r - 0.5) + 0.12 * rough), shown = blank;
+#ifdef BACKDROP
+    vec3 paper_colour = air_colour * image_behind(uv);
+#else
+    vec3 paper_colour = air_colour;
+#endif
+    vec3 blank = paper_colour * (0.95 + 0.10 * (sheet.r - 0.5) + 0.12 * rough), shown = blank;
 #ifndef FRAME
     vec2 at = uv + (sheet.rg - 0.5) * reach;
     vec4 wet = texture(wet_picture, at);

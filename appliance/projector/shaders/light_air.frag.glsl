@@ -6,10 +6,12 @@ uniform sampler2D far_glow;
 uniform sampler2D noise;
 uniform vec3 eye;
 uniform vec2 ground;
+uniform vec2 stands[4];
 uniform vec2 heart;
 uniform sampler2D floor_shadow;
 uniform vec2 middle;
 uniform float reach;
+uniform float spread;
 uniform vec3 figure_light;
 uniform float mirror;
 uniform mat3 axes;
@@ -24,11 +26,26 @@ out vec4 colour;
 #include tone
 #include edges
 
-// The figure, taken for a picture that stands upright before the eye, on a dull floor: it dims with height.
+// The figure that stands the nearest to this ray.
+vec2 nearest_stand() {
+    vec2 ahead = normalize(ray.xz), found = stands[0];
+    float least = 1e9;
+    for (int i = 0; i < 4; i++) {
+        vec2 way = stands[i] - eye.xz;
+        float aside = abs(way.x * ahead.y - way.y * ahead.x);
+        if (aside < least) {
+            least = aside;
+            found = stands[i];
+        }
+    }
+    return found;
+}
+
+// That figure, taken for a picture that stands upright before the eye, on a dull floor: it dims with height.
 vec3 mirrored(vec3 at) {
     vec3 up = vec3(ray.x, -ray.y, ray.z);
-    vec2 ahead = normalize(ground - eye.xz);
-    float way = dot(ground - at.xz, ahead) / dot(up.xz, ahead);
+    vec2 stand = nearest_stand(), ahead = normalize(stand - eye.xz);
+    float way = dot(stand - at.xz, ahead) / dot(up.xz, ahead);
     vec3 met = at + way * up, seen = (met - eye) * axes;
     vec2 spot = 0.5 - 0.5 * seen.xy / (seen.z * slopes);
     bool misses = way < 0.0 || any(lessThan(spot, vec2(0.0))) || any(greaterThan(spot, vec2(1.0)));
@@ -46,7 +63,7 @@ float lit_below(vec2 at) {
 
 void main() {
     vec3 near = texture(near_glow, uv).rgb, far = 0.5 * texture(far_glow, uv).rgb;
-    vec2 p = vec2(uv.x * aspect, uv.y), off_heart = p - heart;
+    vec2 p = vec2(uv.x * aspect, uv.y), off_heart = (p - heart) / vec2(spread, 1.0);
     float haze = 0.4 + 1.2 * texture(noise, p * 0.33 + vec2(-0.004, 0.003) * time).r;
     float on_floor = 0.0;
     vec3 reflected = vec3(0.0);
@@ -54,7 +71,7 @@ void main() {
         vec3 at = eye - ray * (eye.y / ray.y);
         float worn = 0.7 + 0.6 * texture(noise, at.xz * 0.4).r;
         reflected = worn * (2.5 * mirror * mirrored(at) + 0.38 * figure_light * lit_below(at.xz));
-        vec2 off = at.xz - ground;
+        vec2 off = (at.xz - ground) / spread;
         on_floor = exp(-dot(off, off) * 2.4);
     }
     vec3 light = reflected + glow * (1.6 * near * near + 2.6 * far * far);

@@ -8,6 +8,6 @@ uniform float exposure;
 void main() {
     vec3 drawn = min((2.0 * exposure) * texture(picture, uv).rgb, 1.0);
     vec4 around = texture(air, uv);
-    vec3 shown = (drawn + around.rgb - drawn * around.rgb) * around.a;
+    vec3 shown = before_image(drawn + around.rgb - drawn * around.rgb, uv) * around.a;
     show(shown);
 }

@@ -7,6 +7,7 @@ uniform vec3 eye;
 uniform vec2 ground;
 uniform vec2 middle;
 uniform float reach;
+uniform float spread;
 uniform vec3 light_colour;
 uniform vec3 accent_colour;
 uniform vec3 air_colour;
@@ -25,7 +26,7 @@ out vec4 colour;
 vec3 floor_light() {
     if (ray.y > -1e-3) return vec3(0.0);
     vec3 at = eye - ray * (eye.y / ray.y);
-    vec2 off = at.xz - ground;
+    vec2 off = (at.xz - ground) / spread;
     float far = dot(off, off);
     float pool = exp(-far * 1.9) * (1.0 + 0.6 * exp(-far * 5.0));
     vec2 on_cast = (at.xz - middle) / reach;

@@ -8,6 +8,7 @@ uniform vec2 texel;
 
 void main() {
     vec4 around = texture(air, uv);
+    around.rgb = before_image(around.rgb, uv);
 #ifdef FRAME
     show(around.a * around.rgb);
 #else

@@ -31,10 +31,9 @@ class Cloud:
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
         """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, view, colours = self._easel, scene.view, palette(look)
-        picture = easel.picture(wall, look.render_scale)
+        picture = easel.picture(wall, look)
         inputs = {
             **scene.inputs,
-            "poses": easel.poses.texture,
             "noise": easel.noise,
             "row": 0,
             "lamp": direction(view.azimuth + KEY_FROM, KEY_ABOVE),
@@ -53,18 +52,18 @@ class Cloud:
         picture.start()
         picture.keep("")
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._body.draw(easel.tally, scene.body_pixels(picture.size), inputs)
+        easel.draw_figures(self._body, scene.body_pixels(picture.size), inputs)
         picture.keep("rgba", depth=False)
         easel.ctx.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
         grains = round(GRAINS * look.density)
-        self._grains.draw(
-            easel.tally,
+        easel.draw_figures(
+            self._grains,
             grains * max(2.0, inputs["pixels"] / scene.distance) ** 2,
             inputs,
             moderngl.POINTS,
             grains,
         )
         picture.keep("rgba")
-        picture.forget_depth()
+        picture.finish()
         self._glow.finish(scene, look, colours, picture, opacity, wall)

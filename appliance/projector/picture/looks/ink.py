@@ -40,23 +40,23 @@ class Ink:
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
         """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, colours = self._easel, palette(look)
-        picture = easel.picture(wall, look.render_scale)
+        picture = easel.picture(wall, look)
         inputs: dict[str, Any] = {
             **scene.inputs,
             **easel.held(look),
-            "poses": easel.poses.texture,
+            **easel.behind(look),
             "noise": easel.noise,
         }
         picture.start()
         picture.keep("ra")
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._figure.draw(
-            easel.tally, scene.body_pixels(picture.size), inputs | {"row": 0, "level": 1.0, "hollow": 1.0}
+        easel.draw_figures(
+            self._figure, scene.body_pixels(picture.size), inputs | {"row": 0, "level": 1.0, "hollow": 1.0}
         )
         if look.trail_s > 0:
             self._leave_traces(scene, look.trail_s, inputs, picture)
         picture.keep("rgba")
-        picture.forget_depth()
+        picture.finish()
         wet = self._glow.spread(picture, "near glow", WET)
         inputs |= {
             "picture": picture.texture,
@@ -99,7 +99,7 @@ class Ink:
                 "hollow": 0.0,
                 "held": 0.0,
             }
-            self._echo.draw(easel.tally, 1.6 * scene.body_pixels(picture.size), inputs)
+            easel.draw_figures(self._echo, 1.6 * scene.body_pixels(picture.size), inputs)
         picture.keep("b")
         brush = max(2.0, BRUSH * scene.share_of_picture * picture.size[1])
         inputs |= {
@@ -112,5 +112,5 @@ class Ink:
         }
         length = trail_s * scene.share_of_picture * picture.size[1]  # at a figure height a second
         pixels = STROKES * length * brush
-        self._strokes.draw(easel.tally, pixels, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
+        easel.draw_figures(self._strokes, pixels, inputs, moderngl.TRIANGLE_STRIP, 2 * rows, STROKES)
         easel.ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD

@@ -37,14 +37,14 @@ class Lines:
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
         """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, colours = self._easel, palette(look)
-        picture = easel.picture(wall, look.render_scale)
+        picture = easel.picture(wall, look)
         picture.start()
         easel.ctx.enable_only(moderngl.BLEND)
         easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
         for side, share in ((-1.0, MIRROR * look.shadow), (1.0, 1.0)):
             if share > 0:
                 self._figure(scene, look, colours, picture, side, share)
-        picture.forget_depth()
+        picture.finish()
         self._glow.finish(scene, look, colours, picture, opacity, wall, mirror=0.0)
 
     def _figure(
@@ -55,13 +55,11 @@ class Lines:
         share *= WIDTH * picture.size[1] / width  # as much light from a small picture as from a large one
         inputs: dict[str, Any] = {
             **scene.inputs,
-            "poses": self._easel.poses.texture,
             "pixel": (2 / picture.size[0], 2 / picture.size[1]),
             "floor_side": side,
             "width": width,
             "far_colour": stored(colours.accent),
             "held_colour": stored(colours.held),
-            "holds": self._easel.holds.texture,
             "held": 0.0,
         }
         if look.trail_s > 0:
@@ -90,8 +88,8 @@ class Lines:
             "brightness": 0.8 * share,
         }
         length = look.trail_s * scene.share_of_picture * picture.size[1]  # at a figure height a second
-        self._trails.draw(
-            self._easel.tally,
+        self._easel.draw_figures(
+            self._trails,
             TRACES * length * 2 * trail["width"],
             inputs | trail,
             moderngl.TRIANGLE_STRIP,
@@ -112,6 +110,5 @@ class Lines:
         """The first part of all strands."""
         count = round(part * self._count)
         length = count * POINTS * STEP * scene.share_of_picture * picture.size[1]
-        self._strands.draw(
-            self._easel.tally, length * 2 * inputs["width"], inputs, vertices=count * POINTS * 6
-        )
+        pixels, triangles = length * 2 * inputs["width"], moderngl.TRIANGLES
+        self._easel.draw_figures(self._strands, pixels, inputs, triangles, count * POINTS * 6)

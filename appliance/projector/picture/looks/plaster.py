@@ -34,7 +34,6 @@ class Plaster:
             **scene.inputs,
             **self._shadow.draw(scene, lamp),
             "noise": easel.noise,
-            "poses": easel.poses.texture,
             "row": 0,
             "lamp": lamp,
             "back_lamp": direction(view.azimuth + RIM_FROM, RIM_ABOVE),
@@ -43,22 +42,23 @@ class Plaster:
             "accent_colour": colours.accent,
             "held_colour": colours.held,
             **easel.held(look),
+            **easel.behind(look),
             "air_colour": colours.background,
             "shadow": look.shadow,
             "fog": look.fog,
             "exposure": look.exposure,
             "vignette": look.vignette,
         }
-        picture = easel.picture(wall, look.render_scale)
+        picture = easel.picture(wall, look)
         picture.start()
         easel.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._figure.draw(easel.tally, scene.body_pixels(picture.size), inputs)
-        picture.forget_depth()
+        easel.draw_figures(self._figure, scene.body_pixels(picture.size), inputs)
+        picture.finish()
         pool = np.array([view.ground[0], 0.0, view.ground[1]])
         inputs |= {
             "beam_from": view.on_picture(pool + BEAM * lamp),
             "beam_to": view.on_picture(pool),
-            "beam_width": BEAM_WIDTH * scene.share_of_picture,
+            "beam_width": scene.spread * BEAM_WIDTH * scene.share_of_picture,
         }
         air = easel.canvas("stage", (round(AIR_LINES * scene.aspect), AIR_LINES))
         air.start()

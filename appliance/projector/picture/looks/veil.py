@@ -27,17 +27,15 @@ class Veil:
     def draw(self, scene: Scene, look: LookConfig, opacity: float, wall: Wall) -> None:
         """Lay the look onto the wall, over what is there already as far as `opacity` says."""
         easel, colours = self._easel, palette(look)
-        picture = easel.picture(wall, look.render_scale)
+        picture = easel.picture(wall, look)
         picture.start()
         easel.ctx.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
         easel.ctx.blend_func = moderngl.ONE, moderngl.ONE
         inputs = {
             **scene.inputs,
-            "poses": easel.poses.texture,
             "lamp": direction(scene.view.azimuth + KEY_FROM, KEY_ABOVE),
             "light_colour": stored(colours.light),
             "held_colour": stored(colours.held),
-            "holds": easel.holds.texture,
         }
         held = easel.held(look)["held"]
         echoes = round(ECHOES * look.density) if look.trail_s > 0 else 0
@@ -51,6 +49,6 @@ class Veil:
                 "brightness": 1.5 if echo == 0 else 0.75 * (1 - share) ** 1.3,
             }
             body = self._figure if echo == 0 else self._echo
-            body.draw(easel.tally, 1.6 * scene.body_pixels(picture.size), inputs)
-        picture.forget_depth()
+            easel.draw_figures(body, 1.6 * scene.body_pixels(picture.size), inputs)
+        picture.finish()
         self._glow.finish(scene, look, colours, picture, opacity, wall)

@@ -1,0 +1,41 @@
+"""Image files of a show as textures: no larger than the picture needs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as Files
+
+Image = NDArray[np.uint8]
+MOST_PIXELS = 64_000_000  # of a file: more would hold up the projector's start
+LINES = 1080  # of the texture at most
+
+
+def read_image(path: Path | str, lines: int = LINES) -> Image:
+    """(height, width, 4) red, green, blue, alpha, top row first, of at most `lines` rows.
+
+    Raises OSError for what is no image, or one of too many pixels.
+    """
+    try:
+        with Files.open(path, formats=("PNG", "JPEG")) as file:
+            if file.width * file.height > MOST_PIXELS:
+                raise OSError(f"it has more than {MOST_PIXELS // 1_000_000} million pixels")
+            shrunk = min(1.0, lines / file.height)
+            size = max(1, round(file.width * shrunk)), max(1, round(file.height * shrunk))
+            image = file.convert("RGBA")
+            return np.asarray(image if image.size == size else image.resize(size, Files.Resampling.LANCZOS))
+    except (ValueError, SyntaxError, Files.DecompressionBombError) as error:
+        raise OSError(str(error)) from error
+
+
+def texture_of(gl: moderngl.Context, image: Image) -> moderngl.Texture:
+    """On the GPU, its lowest row first, colours multiplied by alpha."""
+    alpha = image[..., 3:].astype(np.float32) / 255
+    flat = np.concatenate([np.round(image[..., :3] * alpha), image[..., 3:]], axis=2).astype(np.uint8)
+    texture = gl.texture((image.shape[1], image.shape[0]), 4, np.ascontiguousarray(flat[::-1]).tobytes())
+    texture.repeat_x = texture.repeat_y = False
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    return texture

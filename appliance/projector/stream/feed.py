@@ -1,0 +1,85 @@
+"""The projector's end of the stream: gives pictures to the process that serves them, when that asks."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+from appliance.box.parent_death import PARENT
+from appliance.projector.raw_stream import RawStream
+from appliance.projector.stream.pipe import head
+from appliance.projector.window import Size
+from appliance.show.stream import StreamConfig
+
+AGAIN_S = 5.0  # before a process that ended is started once more
+_LAST_WORDS_S = 1.0
+
+
+class Feed:
+    """Runs the stream's process. It costs a picture nothing while nobody looks, and never waits."""
+
+    def __init__(self, config: StreamConfig, say: Callable[[str], None]) -> None:
+        self._config, self._say = config, say
+        self._process: subprocess.Popen[bytes] | None = None
+        self._pictures: RawStream | None = None
+        self._begun_at = 0.0
+        self._is_said = False
+
+    def offer(self, now: float, size: Size, read: Callable[[], bytes]) -> None:
+        """Give the picture of this moment where one is wanted. read: its bytes as OpenGL gives them."""
+        if self._pictures is None or self._pictures.is_closed or self._is_over():
+            if self._process is None or now - self._begun_at >= AGAIN_S:
+                self._begin(now)
+            return
+        if self._is_wanted():
+            self._pictures.offer(read(), size)
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is None:
+            return
+        self._process.terminate()  # first: then no picture waits for it
+        if self._pictures is not None:
+            self._pictures.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(_LAST_WORDS_S)
+        self._process.kill()
+        self._process.wait()
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+        self._process = self._pictures = None
+
+    def _begin(self, now: float) -> None:
+        if self._process is not None and not self._is_said:
+            self._is_said = True
+            self._say(
+                f"The stream on port {self._config.port} has ended. The audience sees the picture; media "
+                f"servers and mixers do not. It is started again every {AGAIN_S:g} s: is the port another "
+                "program's?"
+            )
+        self.close()
+        self._begun_at = now
+        pictures, into = os.pipe()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "appliance.projector.stream", self._config.model_dump_json()],
+            stdin=pictures,
+            stdout=subprocess.PIPE,
+            env={**os.environ, PARENT: str(os.getpid())},
+        )
+        os.close(pictures)
+        assert self._process.stdout is not None
+        os.set_blocking(self._process.stdout.fileno(), False)
+        self._pictures = RawStream(into, head)
+
+    def _is_over(self) -> bool:
+        return self._process is None or self._process.poll() is not None
+
+    def _is_wanted(self) -> bool:
+        assert self._process is not None and self._process.stdout is not None
+        try:
+            return bool(os.read(self._process.stdout.fileno(), 64))
+        except BlockingIOError:
+            return False

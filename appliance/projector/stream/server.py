@@ -1,0 +1,170 @@
+"""Serves the newest picture: as MJPEG to any number of clients, each at its own pace, and as one file."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import signal
+import socket
+import threading
+from collections.abc import Awaitable, Callable
+from io import BytesIO
+from typing import BinaryIO
+
+from aiohttp import web
+from PIL import Image
+
+from appliance.projector.stream.keying import keyed
+from appliance.projector.stream.pipe import WANTED, Picture, read_picture
+from appliance.show.stream import StreamConfig
+
+BOUNDARY = "picture"
+MOST_CLIENTS = 8
+_BUFFER = 1 << 18  # bytes that the system keeps for a slow client: more would be old pictures
+_UNANSWERED_S = 1.0  # before a picture that did not come is asked for again
+_HEAD = "--{}\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n"
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Newest:
+    """The newest picture as JPEG; clients wait for the next one here."""
+
+    def __init__(self, config: StreamConfig, asks: BinaryIO) -> None:
+        self._config, self._asks = config, asks
+        self._come = asyncio.Condition()
+        self._asked_at = 0.0
+        self.picture: Picture = (1, 1, bytes(4))
+        self.jpeg = b""
+        self.number = 0
+        self.watching = self.clients = 0
+
+    async def put(self, picture: Picture, jpeg: bytes) -> None:
+        """A picture has come."""
+        async with self._come:
+            self.picture, self.jpeg, self.number = picture, jpeg, self.number + 1
+            self._asked_at = 0.0
+            self._come.notify_all()
+
+    async def after(self, number: int) -> int:
+        """Wait for a picture that is newer than this one; its number."""
+        self.watching += 1
+        try:
+            async with self._come:
+                await self._come.wait_for(lambda: self.number > number)
+                return self.number
+        finally:
+            self.watching -= 1
+
+    async def ask(self) -> None:
+        """Ask the projector for pictures, as often as the box file says, while a client waits."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await asyncio.sleep(1.0 / self._config.rate)
+            if self.watching and loop.time() - self._asked_at > _UNANSWERED_S:
+                self._asked_at = loop.time()
+                self._asks.write(WANTED)
+                self._asks.flush()
+
+
+async def serve(config: StreamConfig, pictures: BinaryIO, asks: BinaryIO) -> None:
+    """Listen, until the pictures end or the process is asked to stop. Raises OSError where it cannot."""
+    newest, loop = Newest(config, asks), asyncio.get_running_loop()
+    over = asyncio.Event()
+    loop.add_signal_handler(signal.SIGTERM, over.set)
+    runner = web.AppRunner(_app(config, newest), access_log=None, shutdown_timeout=0.5)
+    await runner.setup()
+    await web.TCPSite(runner, config.host, config.port).start()
+    threading.Thread(
+        target=_read, args=(pictures, config.quality, newest, loop, over), name="pictures", daemon=True
+    ).start()
+    asking = loop.create_task(newest.ask())
+    await over.wait()
+    asking.cancel()
+    await runner.cleanup()
+
+
+def _read(
+    pictures: BinaryIO, quality: int, newest: Newest, loop: asyncio.AbstractEventLoop, over: asyncio.Event
+) -> None:
+    """In a thread of its own: as long as encoding takes, clients are served."""
+    try:
+        while (picture := read_picture(pictures)) is not None:
+            asyncio.run_coroutine_threadsafe(newest.put(picture, jpeg_of(picture, quality)), loop).result()
+    finally:
+        loop.call_soon_threadsafe(over.set)
+
+
+def jpeg_of(picture: Picture, quality: int) -> bytes:
+    """A picture as JPEG."""
+    width, height, pixels = picture
+    file = BytesIO()
+    Image.frombuffer("RGBX", (width, height), pixels, "raw", "RGBX", 0, 1).convert("RGB").save(
+        file, "JPEG", quality=quality
+    )
+    return file.getvalue()
+
+
+def png_of(picture: Picture) -> bytes:
+    """A picture as PNG with alpha, as much as it shines."""
+    width, height, pixels = picture
+    file = BytesIO()
+    Image.frombytes("RGBA", (width, height), keyed(pixels)).save(file, "PNG", compress_level=1)
+    return file.getvalue()
+
+
+def _app(config: StreamConfig, newest: Newest) -> web.Application:
+    networks = [ipaddress.ip_network(one) for one in config.viewers]
+
+    @web.middleware
+    async def viewers_only(request: web.Request, handler: Handler) -> web.StreamResponse:
+        address = ipaddress.ip_address((request.remote or "").partition("%")[0])
+        mapped = getattr(address, "ipv4_mapped", None) or address
+        if not (mapped.is_loopback or any(mapped in network for network in networks)):
+            raise web.HTTPForbidden(text="The box file lists this device nowhere under stream: viewers.")
+        return await handler(request)
+
+    async def stream(request: web.Request) -> web.StreamResponse:
+        return await _stream(request, newest)
+
+    async def jpeg(request: web.Request) -> web.Response:
+        await newest.after(newest.number)
+        return web.Response(body=newest.jpeg, content_type="image/jpeg", headers=_NEVER_KEPT)
+
+    async def png(request: web.Request) -> web.Response:
+        await newest.after(newest.number)
+        png = await asyncio.to_thread(png_of, newest.picture)
+        return web.Response(body=png, content_type="image/png", headers=_NEVER_KEPT)
+
+    app = web.Application(middlewares=[viewers_only])
+    app.add_routes(
+        [web.get("/picture.mjpg", stream), web.get("/picture.jpg", jpeg), web.get("/picture.png", png)]
+    )
+    return app
+
+
+_NEVER_KEPT = {"Cache-Control": "no-store"}
+
+
+async def _stream(request: web.Request, newest: Newest) -> web.StreamResponse:
+    """Each client takes the newest picture when it has taken the one before: a slow one gets fewer."""
+    if newest.clients >= MOST_CLIENTS:
+        raise web.HTTPServiceUnavailable(text=f"{MOST_CLIENTS} programs fetch the picture already.")
+    newest.clients += 1
+    kind = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
+    response = web.StreamResponse(headers={**_NEVER_KEPT, "Content-Type": kind})
+    try:
+        await response.prepare(request)
+        if request.transport is not None:
+            request.transport.get_extra_info("socket").setsockopt(
+                socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER
+            )
+        number = newest.number
+        while True:
+            number = await newest.after(number)
+            jpeg = newest.jpeg
+            await response.write(_HEAD.format(BOUNDARY, len(jpeg)).encode() + jpeg + b"\r\n")
+    except ConnectionError:
+        return response
+    finally:
+        newest.clients -= 1

@@ -1,0 +1,170 @@
+"""Cards over the dance: words, images and plain colours, their fades, and what is wrong with their files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+from PIL import Image
+
+from appliance.box.show_state import ShowState
+from appliance.projector.context import offscreen
+from appliance.projector.corners import homography
+from appliance.projector.picture.cards import Cards
+from appliance.projector.picture.image_file import MOST_PIXELS, read_image
+from appliance.projector.picture.lettering import fonts_of_machine, lettered, letters_without_font
+from appliance.projector.picture.wall import Wall
+from appliance.show.card import BLANK, CardConfig, cards_by_name
+from appliance.show.config_error import ConfigError
+from appliance.show.projector import MaskConfig, ProjectorConfig
+from appliance.show.show import load_show
+from tests.bundles import write_show
+from tests.projector.stage_double import pixels
+from tests.projector.test_loop import Evening
+
+SIZE = (160, 90)
+RED = (230, 60, 40)
+Show = Callable[..., np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def gl() -> Iterator[moderngl.Context]:
+    with offscreen(SIZE) as context:
+        yield context
+
+
+@pytest.fixture
+def show(gl: moderngl.Context, tmp_path: Path) -> Show:
+    """What cards make of a picture of one grey."""
+    Image.new("RGBA", (30, 20), (*RED, 255)).save(tmp_path / "logo.png")
+
+    def shown(cards: list[CardConfig], state: ShowState, now: float = 10.0, level: float = 1.0) -> np.ndarray:
+        made = Cards(gl, cards_by_name(cards), tmp_path, pytest.fail)
+        gl.screen.clear(0.4 * level, 0.4 * level, 0.4 * level, 1.0)
+        whole = np.array([[2.0, 0.0, -1.0], [0.0, 2.0, -1.0], [0.0, 0.0, 1.0]])
+        made.draw(Wall(gl.screen, SIZE, SIZE, whole, level), state, now)
+        made.release()
+        return pixels(gl.screen, SIZE).astype(int)
+
+    return shown
+
+
+def test_without_a_card_the_picture_is_as_it_was(show: Show) -> None:
+    assert np.array_equal(show([], ShowState()), np.full((90, 160, 3), 102))
+    assert np.array_equal(show([], ShowState(card="no such card")), np.full((90, 160, 3), 102))
+
+
+def test_blank_is_black_and_fades_in_and_out(show: Show) -> None:
+    fading = ShowState().with_card(BLANK, 10.0, 4.0)
+    assert [show([], fading, now).mean() for now in (10.0, 11.0, 12.0, 14.0)] == pytest.approx(
+        [102, 76.5, 51, 0], abs=1
+    )
+    off = fading.with_card("", 20.0, 2.0)
+    assert show([], off, 21.0).mean() == pytest.approx(51, abs=1)
+
+
+def test_a_logo_keeps_its_shape_at_its_place_and_follows_the_level(show: Show) -> None:
+    logo = CardConfig(name="logo", image="logo.png", image_size=0.4, place=(0.25, 0.75))
+    rows, columns = np.nonzero((np.abs(show([logo], ShowState(card="logo")) - RED) < 3).all(axis=2))
+    assert abs(np.ptp(rows) + 1 - 36) <= 2 and abs(np.ptp(columns) + 1 - 54) <= 2
+    assert (rows.mean(), columns.mean()) == pytest.approx((0.75 * 90, 0.25 * 160), abs=1)
+    dim = show([logo], ShowState(card="logo"), level=0.5)
+    assert np.abs(dim[67, 40] - np.array(RED) / 2).max() <= 1
+    assert np.abs(dim[5, 5] - 51).max() <= 1
+
+
+def test_two_cards_of_one_ground_fade_without_the_dance_shining_through(show: Show) -> None:
+    cards = [
+        CardConfig(name="one", background="#ffffff", text="one", colour="#000000"),
+        CardConfig(name="two", background="#ffffff"),
+    ]
+    fading = ShowState(card="one").with_card("two", 10.0, 2.0)
+    assert (show(cards, fading, 11.0)[:10] == 255).all()
+    assert show(cards, fading, 11.0).min() > show(cards, ShowState(card="one")).min()
+
+
+def test_words_too_wide_are_shrunk_into_the_picture(show: Show) -> None:
+    long = CardConfig(name="long", text="W" * 60, size=0.3, background="#000000")
+    light = show([long], ShowState(card="long")).max(axis=(0, 2))
+    assert light.max() > 100 and not light[:3].any() and not light[-3:].any()
+
+
+@pytest.mark.skipif(not fonts_of_machine(), reason="no font is installed here")
+def test_letters_of_several_scripts_are_drawn_as_themselves() -> None:
+    """Arabic letters join: a word is narrower than its letters side by side."""
+    words = "Καλή Добрый дом"
+    assert letters_without_font(words) == ""
+    assert letters_without_font("a\U0010fffd") == "\U0010fffd"
+    alone = [lettered(letter, 60, (255, 255, 255)).shape[1] - 60 for letter in "دمية"]
+    together = lettered("دمية", 60, (255, 255, 255)).shape[1] - 60
+    if letters_without_font("دمية") == "":
+        assert together < 0.95 * sum(alone)
+    two = lettered("a\nb", 40, RED)
+    assert two.shape[0] > 1.5 * lettered("a", 40, RED).shape[0]
+    assert (two[..., :3] == RED).all() and two[..., 3].max() == 255
+
+
+def test_a_card_follows_the_corners(gl: moderngl.Context, tmp_path: Path) -> None:
+    made = Cards(gl, cards_by_name([CardConfig(name="w", background="#ffffff")]), tmp_path, pytest.fail)
+    corners = ((0.25, 0.2), (0.75, 0.2), (0.75, 0.8), (0.25, 0.8))
+    y_up = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
+    clip = np.array([[2.0, 0.0, -1.0], [0.0, -2.0, 1.0], [0.0, 0.0, 1.0]]) @ homography(corners) @ y_up
+    gl.screen.clear()
+    made.draw(Wall(gl.screen, SIZE, SIZE, clip), ShowState(card="w"), 1.0)
+    made.release()
+    lit = pixels(gl.screen, SIZE)[..., 0] > 127
+    assert lit[18:72, 40:120].all() and lit.sum() == 54 * 80
+
+
+def test_a_broken_file_leaves_the_rest_of_the_card(gl: moderngl.Context, tmp_path: Path) -> None:
+    (tmp_path / "logo.png").write_bytes(b"\x89PNG\r\n\x1a\nno more")
+    said: list[str] = []
+    Cards(
+        gl, {"t": CardConfig(name="t", image="logo.png", background="#ffffff")}, tmp_path, said.append
+    ).release()
+    assert len(said) == 1 and "The card 't' cannot be drawn whole" in said[0]
+    Image.new("1", (MOST_PIXELS // 100 + 1, 100)).save(tmp_path / "huge.png")
+    with pytest.raises(OSError, match="more than 64 million pixels"):
+        read_image(tmp_path / "huge.png")
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ({"cards": [{"name": "none"}]}, "'none' takes a card off"),
+        ({"cards": [{"name": "a"}, {"name": "a"}]}, "Two cards are called 'a'"),
+        ({"cards": [{"name": "a", "image": "phrase.bvh"}]}, "neither a PNG nor a JPEG"),
+        ({"looks": [{"name": "a", "image": "gone.png"}]}, "There is no file 'gone.png'"),
+        ({"cards": [{"name": "title"}], "cues": [{"name": "c", "card": "titel"}]}, "Did you mean 'title'?"),
+    ],
+)
+def test_what_a_show_says_wrong_about_cards_is_refused(
+    section: dict[str, object], words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ConfigError, match=words.replace("?", r"\?")):
+        load_show(write_show(tmp_path, **section))
+    cues = [{"name": "c", "card": "none", "camera": {"angle_deg": 90}}, {"name": "d", "card": "blank"}]
+    assert load_show(write_show(tmp_path, cues=cues)).config.names["card"] == ("blank",)
+
+
+def test_cards_lie_over_the_look_and_under_masters_and_masks(gl: moderngl.Context, tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    white = [{"name": "white", "background": "#ffffff"}]
+    door = MaskConfig(points=[(0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (0.0, 1.0)], soft=0.0)
+    show = write_show(tmp_path / "show", cards=white)
+    evening = Evening(gl, tmp_path / "run", show, ProjectorConfig(masks=[door]))
+    evening.begin()
+    for _ in range(90):
+        evening.picture(SIZE)
+    evening.declare(ShowState(card="white").with_master(0.5, evening.now, 0.0))
+    for direct in (True, False):  # onto the display, and through a texture
+        seen = evening.picture(SIZE, lines=() if direct else ("x",))[SIZE[1] // 2 :]
+        assert not seen[:, : SIZE[0] // 2].any()
+        assert np.abs(seen[:, SIZE[0] // 2 :].astype(int) - 128).max() <= 2
+    evening.declare(replace(evening.show_state, card=""))
+    assert evening.picture(SIZE)[-1, -1, 1] < 60
+    evening.close()
