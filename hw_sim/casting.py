@@ -62,6 +62,7 @@ def cast_sensors(
     seed: int,
     *,
     stand_still_s: float = 0.0,
+    taps: bool = False,
     drift_ppm: float = 0.0,
     reboot_every_s: float | None = None,
     make: DeviceMaker = EmulatedSensor,
@@ -71,7 +72,7 @@ def cast_sensors(
     return [
         make(
             key,
-            Wearer(motion_of(number, key.name), stand_still_s),
+            Wearer(motion_of(number, key.name), stand_still_s, taps),
             phase_s=phases.uniform(0.0, PERIOD_US * 1e-6),
             drift_ppm=drift_ppm,
             reboot_every_s=reboot_every_s,

@@ -77,6 +77,10 @@ def emulate(
             "pose. 0: dances at once.",
         ),
     ] = 2.0,
+    tap: Annotated[
+        bool,
+        typer.Option("--tap", help="A double tap at the start: the box takes the neutral pose sooner."),
+    ] = False,
     network: Annotated[
         NetworkKind,
         typer.Option(
@@ -131,6 +135,8 @@ def emulate(
         chosen = choose_keys(
             keys, [name for name, _ in wanted], count, lambda words: typer.echo(words, err=True)
         )
+        if tap and firmware:
+            raise ValueError("--tap is not for --firmware, whose sensors feel a finger on their case")
         if serial is not None and len(chosen) > 1:
             raise ValueError(f"a cable carries one sensor, not {len(chosen)}; say which one with --sensor")
         sensors = cast_sensors(
@@ -138,6 +144,7 @@ def emulate(
             motion_of,
             seed,
             stand_still_s=stand_still,
+            taps=tap,
             drift_ppm=drift_ppm,
             reboot_every_s=reboot_every,
             make=firmware_maker() if firmware else EmulatedSensor,

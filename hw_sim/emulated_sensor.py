@@ -209,7 +209,7 @@ class EmulatedSensor:
         return left
 
     def _reading(self, pairing: Pairing, lane: Lane, at: float) -> Outgoing:
-        self._wearer.reading_sent(at)
+        self.taps += self._wearer.reading_sent(at)
         orientation = self._wearer.orientation(at)
         sequence, self._readings = self._readings, self._readings + 1
         reading = wire.Reading(

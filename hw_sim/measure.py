@@ -15,9 +15,10 @@ from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
 from appliance.sensor.keys import create_keys
 from hw_sim.emulated_sensor import REBOOT_S
-from hw_sim.figures import FREE_SETTLING_S, Evidence, figures_of, table, verdict
+from hw_sim.figures import FREE_SETTLING_S, SETTLING_S, Evidence, figures_of, table, verdict
 from hw_sim.peers import ProbeError, Setting, scratch_folder
 from hw_sim.probe import Course, run, run_restarts
+from hw_sim.progress import Progress
 
 REFUSED, FAILED = 2, 1
 BEAT_S = 0.02
@@ -49,6 +50,10 @@ def measure(
         bool,
         typer.Option("--light", help="From the hand to the light too: needs an X11 screen, and fills it."),
     ] = False,
+    progress: Annotated[
+        Path | None,
+        typer.Option(help="Write what is measured into this file meanwhile, as JSON objects, one a line."),
+    ] = None,
 ) -> None:
     """Measure the whole way, datagram in to datagram out, with an emulated sensor on a venue's network.
 
@@ -60,17 +65,21 @@ def measure(
     """
     try:
         with scratch_folder("bunraku-measure-") as scratch:
-            setting = _setting(show, box, scratch, firmware)
+            setting, told = _setting(show, box, scratch, firmware), Progress(progress)
             print(f"Measuring {seconds:g} s in phase with the sensor ...", flush=True)
-            locked = run(setting, locked_course(seconds))
+            told.tell(phase="locked", seconds=seconds, settling_s=min(SETTLING_S, seconds / 2.0))
+            locked = run(setting, locked_course(seconds), told)
             free_s = max(6.0, seconds / 3.0)
             print(f"Measuring {free_s:g} s running free ...", flush=True)
-            free = run(setting, free_course(free_s))
+            told.tell(phase="free", seconds=free_s, settling_s=FREE_SETTLING_S)
+            free = run(setting, free_course(free_s), told)
             course = power_on_course(seconds, POWERED_FIRMWARE_S if firmware else POWERED_S)
             print(f"Switching the sensor on and off for {course.seconds:g} s ...", flush=True)
+            told.tell(phase="power-ons", seconds=course.seconds)
             power_ons = run(setting, course)
             times = min(max(2, round(seconds / 6)), MOST_RESTARTS)
             print(f"Killing and starting the box {times} times ...", flush=True)
+            told.tell(phase="restarts", times=times)
             restarts = run_restarts(setting, times)
             seen = None
             if light:
@@ -83,6 +92,7 @@ def measure(
         raise typer.Exit(REFUSED) from None
     figures = figures_of(evidence)
     limits = verdict(figures)
+    told.tell(figures=figures, limits=[limit._asdict() | {"holds": limit.holds} for limit in limits])
     for line in table(figures, limits):
         print(line)
     written = [json_file] if json_file is not None else []

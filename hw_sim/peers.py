@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import random
 import shutil
@@ -30,6 +31,7 @@ PRIORITY = 50  # below the box's: the receiver's clock readings matter, the box'
 _FIRST, _STEP = map(int, os.environ.get("BUNRAKU_PORTS", "0:1").split(":"))
 PORTS = range(20000, 32000)[_FIRST::_STEP]
 _CHANCE = random.SystemRandom()  # unseeded, so that two runs at once choose different ports
+_PR_SET_PDEATHSIG = 1
 STEP_EVERY_S = 0.6
 STEP_DEGREES = 40.0
 
@@ -75,7 +77,10 @@ def emulate_command(setting: Setting, port: int, log: Path, *options: str) -> li
 
 
 def write_box_file(setting: Setting, folder: Path, ports: tuple[int, int, int], **own: object) -> Path:
-    """The venue's limits and real-time settings with the run's own ports: sensors, control, frames."""
+    """The venue's limits and real-time settings with the run's own ports: sensors, control, frames.
+
+    What it learns and where it meets its processes are its own too; it serves no page and makes no sound.
+    """
     sensors, control, frames = ports
     values = {
         "sensors": {"udp": {"host": HOST, "port": sensors}, "keys": str(setting.keys)},
@@ -83,6 +88,9 @@ def write_box_file(setting: Setting, folder: Path, ports: tuple[int, int, int], 
         "control": {"host": HOST, "port": control},
         "journal": {},
         "runtime": str(folder / "runtime"),
+        "state": str(folder / "state"),
+        "console": None,
+        "sound": None,
         **own,
     }
     path = folder / "box.yaml"
@@ -146,9 +154,15 @@ def scratch_folder(prefix: str) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def process(command: Sequence[str], words: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Runs inside the context; its output goes into the file `words`."""
+    """Runs inside the context, and not longer than this process; its output goes into the file `words`."""
     with words.open("ab") as out:
-        running = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
+        running = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            preexec_fn=_end_with_parent,
+        )
         try:
             yield running
         finally:
@@ -158,6 +172,11 @@ def process(command: Sequence[str], words: Path) -> Iterator[subprocess.Popen[by
             except subprocess.TimeoutExpired:
                 running.kill()
                 running.wait()
+
+
+def _end_with_parent() -> None:
+    """prctl(2): a measurement that is killed leaves no box and no sensor behind."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 @contextlib.contextmanager

@@ -36,6 +36,7 @@ from hw_sim.peers import (
     stop,
     write_box_file,
 )
+from hw_sim.progress import LiveTransport, Progress
 from hw_sim.screen import Picture, Screen, Watcher
 
 PLAYER_STOP = b"/player/stop\0\0\0\0,\0\0\0"
@@ -74,8 +75,11 @@ class Run:
     pictures: Sequence[Picture] = ()
 
 
-def run(setting: Setting, course: Course) -> Run:
-    """Start box and emulator, record, stop both. Raises ProbeError when the box does not dance."""
+def run(setting: Setting, course: Course, progress: Progress | None = None) -> Run:
+    """Start box and emulator, record, stop both; progress: hears of each reading meanwhile.
+
+    Raises ProbeError when the box does not dance.
+    """
     folder = setting.scratch / course.name
     folder.mkdir()
     sensors, control = free_ports(2)
@@ -98,8 +102,9 @@ def run(setting: Setting, course: Course) -> Run:
             emulate = emulate_command(setting, sensors, log, *_options(course))
             with process(emulate, folder / "emulator.txt") as emulator:
                 first_reading(emulator, log, folder / "emulator.txt")
-                with _seen(screen, box, folder) as pictures:
-                    datagrams, rss_mb, stood_from = _watch(receiver, stage, course, control)
+                live = LiveTransport(progress or Progress(None), log, setting.sensor)
+                with _seen(screen, box, folder) as pictures, closing(live):
+                    datagrams, rss_mb, stood_from = _watch(receiver, stage, course, control, live)
             stop(stage, words)
     header, ticks = read_journal(folder / "run.journal")
     return Run(
@@ -170,14 +175,20 @@ def _options(course: Course) -> list[str]:
 
 
 def _watch(
-    receiver: OscReceiver, stage: subprocess.Popen[bytes], course: Course, control: int
+    receiver: OscReceiver,
+    stage: subprocess.Popen[bytes],
+    course: Course,
+    control: int,
+    live: LiveTransport,
 ) -> tuple[list[tuple[float, bytes]], float, float]:
     """Collect datagrams for the course. Returns them, the box's memory (MB) and when the phrase stopped."""
     datagrams: list[tuple[float, bytes]] = []
     rss_mb, end = 0.0, time.monotonic() + course.seconds
     stand_at, look_at, stood_from = end - course.standing_s, 0.0, float("inf")
     while (now := time.monotonic()) < end and stage.poll() is None:
-        datagrams += receiver.poll_datagrams(0.05)
+        came = receiver.poll_datagrams(0.05)
+        datagrams += came
+        live.look(came)
         if now >= look_at:
             rss_mb, look_at = max(rss_mb, _resident_mb(stage.pid)), now + 0.5
         if now >= stand_at and stood_from > now:

@@ -1,4 +1,4 @@
-"""One line on the terminal while the emulator runs, and one at its end."""
+"""One line on the terminal while the emulator runs, and one at its beginning and its end."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ class StatusLine:
     def __enter__(self) -> StatusLine:
         if self._console.is_terminal:
             self._live.start()
+        else:
+            self._console.print(f"Calling the box at {self._where}.", soft_wrap=True)
         return self
 
     def __exit__(

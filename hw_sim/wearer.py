@@ -5,17 +5,20 @@ from __future__ import annotations
 from hw_sim.motions import IDENTITY, Motion, Quaternion, inverse, multiply, part_of
 
 EASE_S = 1.0  # from the rest pose into the motion
+TAPS_AT_READING = 5  # a few of the first ones may be lost; the box counts taps from the first that it hears
 
 
 class Wearer:
     """A hand that moves; its orientation is in stage axes.
 
     Stands in the rest pose for `stand_still_s` after the first reading left (infinite: until `start_moving`),
-    then eases into the motion. With 0 it follows the motion from the start.
+    then eases into the motion. With 0 it follows the motion from the start. One that taps asks with a double
+    tap for the neutral pose, which the box then takes sooner.
     """
 
-    def __init__(self, motion: Motion, stand_still_s: float = 0.0) -> None:
+    def __init__(self, motion: Motion, stand_still_s: float = 0.0, taps: bool = False) -> None:
         self._motion = motion
+        self._taps, self._readings = taps, 0
         self._stand_still_s = stand_still_s
         self._begun: float | None = None  # when the motion begins, seconds of the emulator's clock
         self._way_back = inverse(motion(0.0))
@@ -25,10 +28,15 @@ class Wearer:
         if not self._stand_still_s and self._begun is None:
             self._begun = now
 
-    def reading_sent(self, at: float) -> None:
-        """Called for each reading that leaves for the box; the first one starts the clock."""
+    def reading_sent(self, at: float) -> bool:
+        """Called for each reading that leaves for the box; the first one starts the clock.
+
+        Whether the sensor is tapped twice now.
+        """
         if self._begun is None:
             self._begun = at + self._stand_still_s
+        self._readings += 1
+        return self._taps and self._readings == TAPS_AT_READING
 
     def start_moving(self, now: float) -> None:
         """Dance from now on."""

@@ -17,18 +17,19 @@ from typing import Annotated
 
 import typer
 from PIL import Image
-from playwright.sync_api import Browser, TimeoutError, sync_playwright
+from playwright.sync_api import Browser, Page, TimeoutError, sync_playwright
 
 CHROMIUM = "/usr/bin/chromium"
-PAGES = ("tonight", "dance", "sensors")
+PAGES = ("tonight", "dance", "sensors", "prove", "happened", "box")
 _FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 _COLOURS = 64  # a third of the bytes, and nothing that is seen
 _WELL_WITHIN_MS = 20_000
+_FADED_MS, _PROVEN_WITHIN_MS = 4_000, 300_000
 _LINKED_S = 15.0  # the emulated sensor is on, its neutral pose taken, and no fallback of the start in force
 
 
-def take_pictures(browser: Browser, address: str, folder: Path) -> list[Path]:
-    """A PNG of each page as a phone shows it."""
+def take_pictures(browser: Browser, address: str, folder: Path, pin: str = "") -> list[Path]:
+    """A PNG of each page as a phone shows it. pin: with it latency is proven first, for a picture of that."""
     folder.mkdir(parents=True, exist_ok=True)
     taken = []
     tab = browser.new_page(viewport={"width": 390, "height": 844}, locale="en-GB")
@@ -36,10 +37,16 @@ def take_pictures(browser: Browser, address: str, folder: Path) -> list[Path]:
     tab.wait_for_selector("body[data-heard]")
     with contextlib.suppress(TimeoutError):
         tab.wait_for_selector("body[data-level=well]", timeout=_WELL_WITHIN_MS)
+    if pin:
+        _prove(tab, pin)
     for page in PAGES:
         tab.click(f'[data-page="{page}"]')
         if page == "dance":
             tab.wait_for_selector("body[data-tick]")
+        if page == "happened":
+            tab.wait_for_selector("#happened-all:not([hidden])", timeout=_WELL_WITHIN_MS)
+        if page == "box":
+            tab.wait_for_selector("#box-all:not([hidden])", timeout=_WELL_WITHIN_MS)
         tab.wait_for_timeout(500)
         taken.append(folder / f"page-{page}.png")
         tab.screenshot(path=taken[-1])
@@ -48,19 +55,40 @@ def take_pictures(browser: Browser, address: str, folder: Path) -> list[Path]:
     return taken
 
 
+def _prove(tab: Page, pin: str) -> None:
+    """Stop the show, measure for a moment, go on."""
+    tab.click('[data-page="device"]')
+    tab.click("#give-pin")
+    tab.fill("#pin-input", pin)
+    tab.click("#pin-send")
+    tab.wait_for_selector("body[data-known=yes]")
+    tab.click('[data-page="tonight"]')
+    tab.click("#stop")
+    tab.wait_for_timeout(_FADED_MS)
+    tab.click('[data-page="prove"]')
+    tab.select_option("#prove-seconds", "6")
+    tab.click("#prove-begin")
+    tab.wait_for_selector("body[data-proof]", timeout=_PROVEN_WITHIN_MS)
+    tab.click('[data-page="tonight"]')
+    tab.click("#go")
+    tab.wait_for_selector("body[data-level=well]", timeout=_WELL_WITHIN_MS)
+
+
 @contextlib.contextmanager
-def _dancing() -> Iterator[str]:
-    """The address of the page of a box that dances the show that comes with it, for no receiver."""
+def _dancing() -> Iterator[tuple[str, str]]:
+    """Address and PIN of the page of a box that dances the show that comes with it, for no receiver."""
     with tempfile.TemporaryDirectory() as scratch:
         box = Path(scratch) / "box.yaml"
         box.write_text("outputs: {osc: []}\nconsole: {port: 0}\ncontrol: {port: 0}\nruntime: run\n")
         command = [sys.executable, "-m", "appliance.cli", "play", "--emulate", "--box", str(box)]
+        command += ["--journal", f"{scratch}/night"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             try:
                 said = iter(process.stdout or ())
-                address = next(found[1] for line in said if (found := re.search(r"page: (http\S+),", line)))
+                said_at = (re.search(r"page: (http\S+), PIN (\d+)", line) for line in said)
+                address, pin = next(found.groups() for found in said_at if found)
                 time.sleep(_LINKED_S)
-                yield address
+                yield address, pin
             finally:
                 process.terminate()
 
@@ -70,10 +98,10 @@ def main(
     out: Annotated[Path, typer.Option(help="The folder.")] = _FOLDER,
 ) -> None:
     """Take the pictures of docs/technician.md."""
-    box = contextlib.nullcontext(address) if address else _dancing()
-    with box as found, sync_playwright() as playwright:
+    box = contextlib.nullcontext((address, "")) if address else _dancing()
+    with box as (found, pin), sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        for path in take_pictures(browser, found, out):
+        for path in take_pictures(browser, found, out, pin):
             print(path)
         browser.close()
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
-import ipaddress
 import json
 import os
 import socket
@@ -18,7 +16,15 @@ import typer
 
 from appliance.box.runtime_folder import RuntimeFolderError, runtime_folder
 from appliance.cli.companions import Companion
-from appliance.cli.options import BoxFile, ChosenFile, ThisBoxFile, command_group, is_for_subcommand
+from appliance.cli.options import (
+    BoxFile,
+    ChosenFile,
+    ShowFolder,
+    ThisBoxFile,
+    command_group,
+    is_for_subcommand,
+)
+from appliance.cli.page_address import address, address_of, open_console_port
 from appliance.console.devices import Devices
 from appliance.console.settings import Settings
 from appliance.show.box import BoxConfig, load_box
@@ -27,7 +33,6 @@ from appliance.show.console import ConsoleConfig
 from appliance.stage.stage_error import StageError
 
 _KEPT, _WHERE = "console.json", "console.path"
-_ELSEWHERE = "192.0.2.1", 9  # an address of no machine (RFC 5737): which of ours would a packet leave by?
 
 console = command_group(
     "Serve the page: a browser at the venue shows the box and, with the PIN, commands it. `bunraku play` "
@@ -47,7 +52,9 @@ def serve(context: typer.Context, box: BoxFile = None, chosen: ChosenFile = None
         words = "This box file says `console: null`, so this box serves no page."
         raise NotAskedForError([Problem(config.file.path, 0, words, "Write `console: {port: 8080}`.")])
     descriptor = open_console_port(config.console).detach()
-    print(f"The page: {address_of(descriptor)}. Its PIN: bunraku console pin.", flush=True)
+    print(
+        f"The page: {address_of(descriptor, config.console.https)}. Its PIN: bunraku console pin.", flush=True
+    )
     os.set_inheritable(descriptor, True)
     command = console_command(
         config, descriptor, kept_in(config), journal=config.journal.folder, chosen=chosen
@@ -62,9 +69,13 @@ def pin(
         bool, typer.Option("--new", help="Choose another one; every device needs it again.")
     ] = False,
 ) -> None:
-    """Print the PIN that a device gives once before it may change anything."""
+    """Print the PIN that a device gives once before it may change anything; with HTTPS, the fingerprint."""
+    from appliance.console.certificate import FILE, fingerprint
+
     devices = _devices(box)
     print(devices.change_pin() if new else devices.pin)
+    with contextlib.suppress(OSError, ValueError):
+        print(f"Certificate, SHA-256: {fingerprint(devices.path.with_name(FILE))}")
 
 
 @console.command("devices")
@@ -94,32 +105,83 @@ def tell_about(box: BoxFile = None, chosen: ChosenFile = None) -> None:
     print(json.dumps(about(chosen, box)))
 
 
-def open_console_port(console: ConsoleConfig, or_any: bool = False) -> socket.socket:
-    """The page's socket, listening. or_any: on a free port where the wanted one is taken.
+@console.command("prove", hidden=True)
+def prove_wanted(box: BoxFile = None, chosen: ChosenFile = None) -> None:
+    """Measure what the page wants proven, and keep it."""
+    from appliance.cli.proof import prove
+    from appliance.console.proofs import FOLDER, Proofs
+    from appliance.release.choice import box_of
 
-    Raises StageError.
-    """
+    path = box_of(box, chosen)
+    config = load_box(path)
+    proofs = Proofs(_kept_here(config).parent / FOLDER)
+    raise typer.Exit(prove(_runtime(config), proofs, path, chosen))
+
+
+@console.command("map", hidden=True)
+def tell_map(show: ShowFolder = None) -> None:
+    """Print the map of a show's poses, as JSON for the page."""
+    from appliance.generator.pose_map import pose_map
+    from appliance.show.bundle import default_show_path
+    from appliance.show.show import load_show
+
     try:
-        return _listening(console.host, console.port)
+        print(json.dumps(pose_map(load_show(show or default_show_path()))))
+    except LookupError as error:
+        raise StageError(str(error)) from None
+
+
+@console.command("cue", hidden=True)
+def keep_cue(
+    show: Annotated[Path, typer.Option(help="The show that dances.")],
+    into: Annotated[Path, typer.Option(help="Where its copy lies.")],
+    cue: Annotated[str, typer.Option(help="As JSON.")],
+) -> None:
+    """Write a cue into the copy of a show."""
+    from appliance.release import rehearsed
+
+    try:
+        print(rehearsed.keep_cue(show, into, json.loads(cue)))
     except OSError as error:
-        if or_any and error.errno == errno.EADDRINUSE:
-            return _listening(console.host, 0)
-        raise StageError(
-            f"TCP port {console.port} on {console.host} cannot be opened for the page ({error.strerror}). "
-            "Is a second bunraku running? Stop it, or give another port under console: in the box file."
-        ) from error
+        raise StageError(f"{into}: the copy of the show cannot be kept ({error.strerror}).") from error
 
 
-def address_of(descriptor: int) -> str:
-    """The page's address, as a browser takes it."""
-    with socket.socket(fileno=os.dup(descriptor)) as listening:
-        host, port = listening.getsockname()[:2]
-    if ipaddress.ip_address(host).is_unspecified:
-        host = socket.gethostname()
-        with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-            asking.connect(_ELSEWHERE)
-            host = asking.getsockname()[0]
-    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+@console.command("box-file", hidden=True)
+def show_or_change_box_file(
+    box: BoxFile = None,
+    chosen: ChosenFile = None,
+    change: Annotated[bool, typer.Option("--change", help="Read a change from standard input.")] = False,
+) -> None:
+    """Print the box file for the page, or change it."""
+    from appliance.cli import box_file
+
+    if not change:
+        print(json.dumps(box_file.told(box, chosen)))
+        return
+    wanted = box_file.Change(**json.loads(sys.stdin.read()))
+    print(json.dumps(box_file.change(box, chosen, wanted)))
+
+
+@console.command("dance-again", hidden=True)
+def dance_again(
+    show: Annotated[str, typer.Argument(help="Its id, as `bunraku console about` tells it.")],
+    chosen: ChosenFile = None,
+) -> None:
+    """Let a show that the box has kept dance from now on."""
+    from appliance.cli.box_file import dance_again
+    from appliance.release.choice import CHOSEN, RUN
+
+    print(json.dumps(dance_again(chosen or RUN / CHOSEN, show)))
+
+
+def card_lines(box: BoxConfig) -> tuple[str, ...]:
+    """For the projector's test card: address and PIN of the page that runs here; nothing without one."""
+    try:
+        kept, host, port = (_runtime(box) / _WHERE).read_text().splitlines()
+        https = box.console is not None and box.console.https
+        return f"page {address(host, int(port), https)}", f"pin {Devices(Path(kept)).pin}"
+    except (OSError, ValueError, StageError):
+        return ()
 
 
 def console_command(
@@ -141,8 +203,9 @@ def console_command(
     if control is not None and control[0] == "0.0.0.0":
         control = "127.0.0.1", control[1]
     folder = _runtime(box)
-    with contextlib.suppress(OSError):
-        (folder / _WHERE).write_text(str(kept))
+    with contextlib.suppress(OSError), socket.socket(fileno=os.dup(descriptor)) as opened:
+        host, port = opened.getsockname()[:2]
+        (folder / _WHERE).write_text(f"{kept}\n{host}\n{port}\n")
     settings = Settings(
         folder=str(folder),
         descriptor=descriptor,
@@ -151,8 +214,10 @@ def console_command(
         viewers=tuple(console.viewers),
         names=tuple(console.names),
         rehearsal=console.rehearsal,
+        https=console.https,
         journal=None if journal is None else str(journal.resolve()),
         about=_named(box, chosen),
+        is_installed=chosen is not None,
     )
     return sys.executable, "-m", "appliance.console", settings.packed()
 
@@ -173,7 +238,8 @@ def page_companion(
     kept = _runtime(box) / _KEPT if rehearsal else kept_in(box)
     command = console_command(box, page.fileno(), kept, heard_on, journal)
     try:
-        say(f"The page: {address_of(page.fileno())}, PIN {Devices(kept).pin}.")
+        https = box.console is not None and box.console.https
+        say(f"The page: {address_of(page.fileno(), https)}, PIN {Devices(kept).pin}.")
     except OSError as error:
         say(f"{kept}: no PIN can be kept there ({error.strerror}). No page; the dance goes on.")
     return Companion("The page", command, "Browsers come back by themselves.", descriptors=(page.fileno(),))
@@ -194,12 +260,7 @@ def _named(box: BoxConfig, chosen: Path | None) -> tuple[str, ...]:
 def _devices(box: Path | None) -> Devices:
     from appliance.release.installed_box import box_here
 
-    config = load_box(box_here(box))
-    path = kept_in(config)
-    # A page that runs says where it keeps them: in a rehearsal elsewhere.
-    with contextlib.suppress(OSError):
-        told = Path((_runtime(config) / _WHERE).read_text())
-        path = told if told.is_file() else path
+    path = _kept_here(load_box(box_here(box)))
     try:
         return Devices(path)
     except OSError as error:
@@ -209,16 +270,17 @@ def _devices(box: Path | None) -> Devices:
         ) from error
 
 
+def _kept_here(box: BoxConfig) -> Path:
+    """The same as the page that runs here says: in a rehearsal it keeps them elsewhere."""
+    path = kept_in(box)
+    with contextlib.suppress(OSError, StageError):  # root does not meet the box's processes
+        told = Path((_runtime(box) / _WHERE).read_text().partition("\n")[0])
+        path = told if told.is_file() else path
+    return path
+
+
 def _runtime(box: BoxConfig) -> Path:
     try:
         return runtime_folder(box)
     except RuntimeFolderError as error:
         raise StageError(str(error)) from error
-
-
-def _listening(host: str, port: int) -> socket.socket:
-    """`::` takes IPv4 too; on a machine without IPv6 it is IPv4 alone."""
-    if host == "::" and not socket.has_dualstack_ipv6():
-        host = "0.0.0.0"
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    return socket.create_server((host, port), family=family, dualstack_ipv6=host == "::")

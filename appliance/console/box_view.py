@@ -9,6 +9,7 @@ from typing import Any
 
 from appliance.box.fallback import Fallen
 from appliance.box.process_health import ProcessHealth
+from appliance.box.show_state import MOTION, ShowStateReader
 from appliance.console.desk import Answer, Desk, NoAnswerError
 from appliance.console.stage_view import StageView
 from appliance.console.verdict import Verdict, verdict
@@ -16,8 +17,9 @@ from appliance.show_control.sensor_roster import RosterLine
 from appliance.show_control.status_messages import STATUS, Status
 
 _NO_BATTERY = 255
+_KNOBS = ("stiffness", "storm", "feedback")  # of the springs
 _SAME_STAGE_S = 5.0  # a stage that seems to have started this much later is another one
-_LISTS = {"/cues/cue": "cues", "/phrases/phrase": "phrases", "/looks/look": "looks"}
+_LISTS = {"/cues/cue": "cues", "/phrases/phrase": "phrases", "/looks/look": "looks", "/cards/card": "cards"}
 
 
 class BoxView:
@@ -27,7 +29,10 @@ class BoxView:
     when no tick was late or skipped. words: the same as JSON.
     """
 
-    def __init__(self, desk: Desk, stage: StageView, processes: ProcessHealth) -> None:
+    def __init__(
+        self, desk: Desk, stage: StageView, processes: ProcessHealth, show_state: ShowStateReader
+    ) -> None:
+        self._show_state = show_state
         self._desk, self._stage, self._processes = desk, stage, processes
         self._batteries: dict[str, int] = {}
         self._late: tuple[int, int] | None = None
@@ -72,7 +77,22 @@ class BoxView:
             "processes": [{"who": one.who, "late": one.late} for one in self._processes.members(now)],
             "hands": [{"joint": joint, "who": who, "holds": bool(holds)} for joint, who, holds in hands],
             "generation": self._stage.generation,
+            **self._declared(),
             **lists,
+        }
+
+    def _declared(self) -> dict[str, Any]:
+        """What was declared for the show of now. motion: of what is made ahead, by `SOURCE NAME`, the value
+        and its fade. springs: of springs and strings; a knob that nobody turned is left out.
+        """
+        state = self._show_state.read()
+        dance = state.dance if state.show == self._stage.facts.get("show") else {}
+        motion = {name: list(part[2]) for name, part in dance.items() if name.startswith(MOTION)}
+        turned = {name: dance[name][2][0] for name in _KNOBS if name in dance}
+        setting = dance["springs"][1] if "springs" in dance else ""
+        return {
+            "motion": {name.removeprefix(MOTION): values for name, values in motion.items()},
+            "springs": turned | {"setting": setting, "strings": state.strings},
         }
 
     def _sensor(self, line: RosterLine) -> dict[str, Any]:

@@ -6,35 +6,50 @@ import asyncio
 import contextlib
 import os
 import sys
+from collections.abc import Mapping
 
 from aiohttp import web
 
 LARGEST = 8 << 20  # bytes of an answer
 
 
-async def answer_of(*arguments: str, patience_s: float) -> bytes:
-    """The output of `bunraku` with these arguments, LARGEST bytes at most.
+async def answer_of(*arguments: str, patience_s: float, said: bytes | None = None) -> bytes:
+    """The output of `bunraku` with these arguments, LARGEST bytes at most. said: its standard input.
 
     Raises 404 with its own sentence where it refuses, 503 where it takes too long or says too much.
     """
+    command = sys.executable, "-m", "appliance.cli", *arguments
+    env = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    try:
+        status, answer, troubles = await output_of(*command, patience_s=patience_s, said=said, env=env)
+    except TimeoutError:
+        raise web.HTTPServiceUnavailable(text="Reading this took too long. Try again in a moment.") from None
+    if status:
+        words = troubles.decode(errors="replace").strip().rpartition("\n")[2]
+        raise web.HTTPNotFound(text=words.removeprefix("bunraku: ") or "This cannot be read.")
+    if len(answer) > LARGEST:
+        raise web.HTTPServiceUnavailable(text="That is too much at once.")
+    return answer
+
+
+async def output_of(
+    *command: str, patience_s: float, said: bytes | None = None, env: Mapping[str, str] | None = None
+) -> tuple[int, bytes, bytes]:
+    """A command's exit status, output and errors. said: its standard input; env: None is this process's.
+
+    Raises OSError where it cannot be run, TimeoutError where it takes too long: then it is killed.
+    """
     child = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "appliance.cli", *arguments),
-        stdin=asyncio.subprocess.DEVNULL,
+        *command,
+        stdin=asyncio.subprocess.DEVNULL if said is None else asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        env=env,
     )
     try:
         async with asyncio.timeout(patience_s):
-            said, troubles = await child.communicate()
-    except TimeoutError:
-        raise web.HTTPServiceUnavailable(text="Reading this took too long. Try again in a moment.") from None
+            answer, troubles = await child.communicate(said)
+            return await child.wait(), answer, troubles
     finally:
         with contextlib.suppress(ProcessLookupError):
             child.kill()
-    if child.returncode:
-        words = troubles.decode(errors="replace").strip().rpartition("\n")[2]
-        raise web.HTTPNotFound(text=words.removeprefix("bunraku: ") or "This cannot be read.")
-    if len(said) > LARGEST:
-        raise web.HTTPServiceUnavailable(text="That is too much at once.")
-    return said

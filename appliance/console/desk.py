@@ -11,11 +11,13 @@ from typing import Any
 from appliance.show_control.command import REPLY, SENSORS_REPLY, STREAMS
 from appliance.show_control.packet import BUNDLE, Message, datagram, messages_in, readable
 
-QUESTIONS = ("/status", "/fallbacks", "/cues", "/phrases", "/looks", "/hands", "/sensors/list")
+QUESTIONS = ("/status", "/fallbacks", "/cues", "/phrases", "/looks", "/cards", "/hands", "/sensors/list")
 PATIENCE_S = 2.0  # show control answers within 0.6 s, and later while it starts
 _STREAM_S = 0.25  # of a stream's command only the refusal is answered
 _MOST_WAITING = 512
 _AT_ONCE = 32
+_NO_COMMANDS = "This box takes no commands: its box file says `control: null`."
+_SILENT = "Show control does not answer. What is in force stays in force; try again."
 _NOW = struct.pack(">Q", 1)  # OSC's time tag for 'immediately'
 
 Answer = tuple[str, list[Any]]
@@ -67,11 +69,27 @@ class Desk:
         return True, ""
 
     @contextlib.asynccontextmanager
+    async def streaming(self) -> AsyncIterator[Stream]:
+        """A socket for a stream of commands that nothing waits for. Raises NoAnswerError."""
+        if self._control is None:
+            raise NoAnswerError(_NO_COMMANDS)
+        try:
+            transport, replies = await asyncio.get_running_loop().create_datagram_endpoint(
+                _Replies, remote_addr=self._control
+            )
+        except OSError:
+            raise NoAnswerError(_SILENT) from None
+        try:
+            yield Stream(transport, replies.waiting)
+        finally:
+            transport.close()
+
+    @contextlib.asynccontextmanager
     async def _asking(self, question: bytes, patience_s: float) -> AsyncIterator[Callable[[], Any]]:
         """Send a datagram; inside, awaiting what is given returns the next message that comes back."""
         if self._control is None:
-            raise NoAnswerError("This box takes no commands: its box file says `control: null`.")
-        silent = NoAnswerError("Show control does not answer. What is in force stays in force; try again.")
+            raise NoAnswerError(_NO_COMMANDS)
+        silent = NoAnswerError(_SILENT)
         async with self._free:
             try:
                 transport, replies = await asyncio.get_running_loop().create_datagram_endpoint(
@@ -87,6 +105,24 @@ class Desk:
                 raise silent from None
             finally:
                 transport.close()
+
+
+class Stream:
+    """Commands that go out one after the other; of each the refusal alone comes back."""
+
+    def __init__(self, transport: asyncio.DatagramTransport, waiting: asyncio.Queue[Answer]) -> None:
+        self._transport, self._waiting = transport, waiting
+
+    def send(self, address: str, arguments: Sequence[str | int | float]) -> None:
+        """One command; what the socket does not take at once is dropped."""
+        self._transport.sendto(datagram((address, *arguments)))
+
+    async def refusal(self) -> str:
+        """The next sentence that says why a command was not carried out."""
+        while True:
+            address, values = await self._waiting.get()
+            if address == REPLY and len(values) == 3 and not values[1]:
+                return readable(str(values[2]))
 
 
 class _Replies(asyncio.DatagramProtocol):

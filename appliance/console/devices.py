@@ -35,7 +35,7 @@ class Devices:
     """The file with PIN and devices, which other processes may change. Raises OSError without a place."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
         self._file = WholeFile(path, _LARGEST)
         self._changed = -1
         self._pin = ""
@@ -85,7 +85,7 @@ class Devices:
     def _look(self) -> None:
         """Read the file again where it has changed; a spoilt one is as good as none."""
         try:
-            changed = self._path.stat().st_mtime_ns
+            changed = self.path.stat().st_mtime_ns
         except OSError:
             return
         if changed == self._changed:
@@ -103,7 +103,7 @@ class Devices:
     def _write(self, pin: str, devices: tuple[Device, ...]) -> None:
         values = {"pin": pin, "devices": [asdict(device) for device in devices]}
         self._file.write(json.dumps(values, indent=1).encode())
-        self._pin, self._devices, self._changed = pin, devices, self._path.stat().st_mtime_ns
+        self._pin, self._devices, self._changed = pin, devices, self.path.stat().st_mtime_ns
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import signal
 import socket
+import ssl
 import time
 from pathlib import Path
 
@@ -14,15 +15,24 @@ from appliance.box.fallback import Fallbacks
 from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealth, ProcessHealthWriter
 from appliance.box.realtime import give_way
+from appliance.box.show_state import ShowStateReader
 from appliance.console.about import About
 from appliance.console.box_view import BoxView
+from appliance.console.certificate import certificate_in, https_context
 from appliance.console.desk import Desk
 from appliance.console.devices import Devices
 from appliance.console.guard import Guard
+from appliance.console.hands import Hands
 from appliance.console.happened import Happened
+from appliance.console.logs import Logs
+from appliance.console.pose_map import PoseMap
+from appliance.console.prove import Prove
+from appliance.console.rehearsed import Rehearsed
+from appliance.console.sensor_changes import SensorChanges
 from appliance.console.server import Server
 from appliance.console.settings import Settings
 from appliance.console.stage_view import StageView
+from appliance.console.venue import Venue
 from appliance.console.watchers import Watchers
 
 TICK_S = 0.02
@@ -47,20 +57,32 @@ async def _serve(settings: Settings) -> int:
     folder = Path(settings.folder)
     devices, stage, watchers = Devices(Path(settings.kept)), StageView(folder), Watchers()
     guard, desk = Guard(settings.viewers, settings.names, devices), Desk(settings.control)
-    box = BoxView(desk, stage, ProcessHealth(folder))
+    box = BoxView(desk, stage, ProcessHealth(folder), ShowStateReader(folder))
     health, notifier = ProcessHealthWriter(folder, "console", Fallbacks(())), Notifier()
     happened, about = Happened(settings.journal), About(settings.about)
-    app = Server(guard, devices, desk, stage, box, watchers, happened, about, settings.rehearsal).app()
+    prove = Prove(guard, folder, Path(settings.kept).parent, settings.about, settings.is_installed)
+    logs = Logs(guard, folder, settings.is_installed)
+    venue = Venue(guard, folder, settings.about, settings.is_installed)
+    hands, others = Hands(guard, desk, folder), [*prove.routes(), *logs.routes(), *venue.routes()]
+    named = settings.about if settings.about[:1] == ("--box",) else ()
+    others += SensorChanges(guard, stage, named).routes()
+    if settings.rehearsal:
+        others += Rehearsed(guard, stage, box, Path(settings.kept).parent).routes()
+        others += [*hands.routes(), *PoseMap(stage).routes()]
+    parts = (guard, devices, desk, stage, box, watchers, happened, about)
+    app = Server(*parts, settings.rehearsal, others).app()
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=_LAST_REQUESTS_S, keepalive_timeout=30.0)
     await runner.setup()
     listening = socket.socket(fileno=settings.descriptor)
     listening.setblocking(False)
-    await web.SockSite(runner, listening, backlog=_WAITING_CONNECTIONS).start()
+    context = _https(settings) if settings.https else None
+    await web.SockSite(runner, listening, backlog=_WAITING_CONNECTIONS, ssl_context=context).start()
     notifier.ready("The page is served.")
     tasks = [
         asyncio.create_task(_pulse(notifier, health)),
         asyncio.create_task(_refresh(box, watchers)),
         asyncio.create_task(_send_frames(stage, watchers)),
+        asyncio.create_task(hands.watch()),
         asyncio.create_task(stopped.wait()),
     ]
     ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -68,6 +90,8 @@ async def _serve(settings: Settings) -> int:
     for task in tasks:
         task.cancel()
     await watchers.close()
+    await prove.close()
+    await hands.close()
     await runner.cleanup()
     faults = [fault for task in ended if (fault := task.exception())]
     if faults:  # a task of ours broke: start anew, and let its traceback be seen
@@ -77,6 +101,11 @@ async def _serve(settings: Settings) -> int:
     health.close()
     stage.close()
     return 0
+
+
+def _https(settings: Settings) -> ssl.SSLContext:
+    names = (socket.gethostname(), *settings.names)
+    return https_context(certificate_in(Path(settings.kept).parent, names))
 
 
 async def _pulse(notifier: Notifier, health: ProcessHealthWriter) -> None:

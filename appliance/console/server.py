@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 import secrets
 import time
-from typing import Any
+from collections.abc import Iterable
 
 from aiohttp import web
 
 from appliance.console.about import About
+from appliance.console.body import said
 from appliance.console.box_view import BoxView
 from appliance.console.desk import Desk, NoAnswerError
 from appliance.console.devices import DIGITS, LONGEST_NAME, Devices, WrongPins
@@ -25,9 +25,8 @@ from appliance.show_control.command import FORMS, command
 from appliance.show_control.packet import is_readable
 from appliance.show_control.status_messages import QUESTIONS
 
-LARGEST_REQUEST = 4096  # bytes
 _YEAR_S = 365 * 24 * 3600
-_MOST_ARGUMENTS = 16
+_MOST_ARGUMENTS = 32  # a line over the map
 _NOT_FROM_HERE = frozenset((*QUESTIONS, "/sensors/list", "/ping"))  # answered to the page in another way
 
 
@@ -45,7 +44,9 @@ class Server:
         happened: Happened,
         about: About,
         rehearsal: bool,
+        others: Iterable[web.RouteDef] = (),
     ) -> None:
+        self._others = tuple(others)
         self._happened, self._about, self._rehearsal = happened, about, rehearsal
         self._guard, self._devices, self._desk = guard, devices, desk
         self._stage, self._box, self._watchers = stage, box, watchers
@@ -54,7 +55,7 @@ class Server:
 
     def app(self) -> web.Application:
         """The application, ready to serve."""
-        app = web.Application(middlewares=[self._guard.check], client_max_size=LARGEST_REQUEST)
+        app = web.Application(middlewares=[self._guard.check])
         app.add_routes(
             [
                 web.get("/status", self._status),
@@ -70,6 +71,7 @@ class Server:
                 web.post("/api/pin", self._take_pin),
                 web.post("/api/revoke", self._revoke),
                 web.post("/api/command", self._command),
+                *self._others,
                 web.get("/{path:.*}", PageFiles().serve),
             ]
         )
@@ -112,8 +114,8 @@ class Server:
         if wait_s := self._wrong_pins.wait_s(asker, now):
             headers = {"Retry-After": str(math.ceil(wait_s))}
             raise web.HTTPTooManyRequests(text="Too many wrong PINs. Wait a minute.", headers=headers)
-        said = await _said(request)
-        pin, name = said.get("pin"), said.get("name", "")
+        values = await said(request)
+        pin, name = values.get("pin"), values.get("name", "")
         if not isinstance(pin, str) or not isinstance(name, str) or not is_readable([name]):
             raise web.HTTPBadRequest(text="A PIN is six digits, and a name is a text.")
         if not secrets.compare_digest(pin.encode()[: 4 * DIGITS], self._devices.pin.encode()):
@@ -129,19 +131,19 @@ class Server:
 
     async def _revoke(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
-        device_id = (await _said(request)).get("id")
+        device_id = (await said(request)).get("id")
         if not isinstance(device_id, str) or not self._devices.revoke(device_id):
             raise web.HTTPNotFound(text="There is no such device.")
         return web.json_response({"done": True})
 
     async def _command(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
-        said = await _said(request)
-        address, arguments = said.get("address"), said.get("arguments", [])
+        values = await said(request)
+        address, arguments = values.get("address"), values.get("arguments", [])
         if not isinstance(address, str) or address not in FORMS or address in _NOT_FROM_HERE:
             raise web.HTTPBadRequest(text="This is no command of the page.")
         if not _are_plain(arguments):
-            raise web.HTTPBadRequest(text="Arguments are numbers and texts, sixteen at most.")
+            raise web.HTTPBadRequest(text="Arguments are numbers and texts, 32 at most.")
         try:
             command(address, arguments)  # show control says the same; this keeps its port free of it
             done, words = await self._desk.send_command(address, arguments)
@@ -162,17 +164,6 @@ class Server:
     async def _refresh(self) -> None:
         await self._box.refresh()
         self._watchers.put_words(self._box.words)
-
-
-async def _said(request: web.Request) -> dict[str, Any]:
-    """The body as an object. Raises 400, and 413 above LARGEST_REQUEST."""
-    try:
-        said = json.loads(await request.read())
-    except (ValueError, RecursionError):
-        raise web.HTTPBadRequest(text="This is no JSON.") from None
-    if not isinstance(said, dict):
-        raise web.HTTPBadRequest(text="This is no JSON object.")
-    return said
 
 
 def _are_plain(arguments: object) -> bool:

@@ -11,8 +11,9 @@ class Settings:
     """The port's socket is open already: `descriptor`. control: where commands arrive; None: nowhere.
 
     journal: its folder; None: none is kept. about: options of `bunraku console about` that name this box.
-    folder: where the box's processes meet. kept: the file with PIN and remembered devices. viewers, names,
-    rehearsal: as in the box file.
+    is_installed: systemd starts what the page wants done. folder: where the box's processes meet. kept: the
+    file with PIN and remembered devices. viewers, names, rehearsal, https: as in
+    the box file.
     """
 
     folder: str
@@ -22,8 +23,10 @@ class Settings:
     viewers: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     rehearsal: bool = True
+    https: bool = False
     journal: str | None = None
     about: tuple[str, ...] = ()
+    is_installed: bool = False
 
     def packed(self) -> str:
         """As one argument of a command line; there are no secrets in it."""

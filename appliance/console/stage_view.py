@@ -28,7 +28,8 @@ _LOOK_S = 0.1
 class StageView:
     """The shared frame of a runtime folder, read without numpy; never waits, never raises.
 
-    facts: show, skeleton and hands, as the page gets them; empty before the first stage. generation: another
+    facts: show, skeleton and hands, as the page gets them; empty before the first stage. show_directory: for
+    this box's own processes; None before the first stage. generation: another
     number for each new stage.
     """
 
@@ -39,6 +40,7 @@ class StageView:
         self._layout = FrameLayout(0)
         self._frame_time = -math.inf
         self.facts: dict[str, Any] = {}
+        self.show_directory: Path | None = None
         self.generation = 0
 
     def newest(self, now: float) -> bytes | None:
@@ -53,7 +55,11 @@ class StageView:
         if len(payload) != self._layout.bytes:
             return None
         tick, self._frame_time, _, _, _, flags, joints = FRAME_HEAD.unpack_from(payload)
-        return BROWSER_HEAD.pack(tick, flags & LATE, joints) + payload[self._layout.world_at :]
+        layout = self._layout
+        ends = range(layout.root_at + layout.stride, layout.bytes + 1, layout.stride)
+        left_out = layout.world_at - layout.root_at
+        seen = [payload[end - layout.stride + left_out : end] for end in ends]
+        return BROWSER_HEAD.pack(tick, flags & LATE, joints) + b"".join(seen)
 
     def state(self, now: float) -> Literal["absent", "fresh", "stale"]:
         """stale: its newest frame is older than half a second, or it died."""
@@ -77,11 +83,12 @@ class StageView:
         rings = self._file.rings
         found = rings[FACTS].newest() if len(rings) > FRAMES else None
         try:
-            self.facts = _for_browsers(plain_json(found[1] if found else b""))
+            facts = plain_json(found[1] if found else b"")
+            self.facts, self.show_directory = _for_browsers(facts), Path(facts["show_directory"])
         except (ValueError, KeyError, TypeError, IndexError):
             self._file.refuse(f"holds no facts about a show. Start {WRITER} again.")
             return
-        self._layout = FrameLayout(len(self.facts["joints"]))
+        self._layout = FrameLayout(len(self.facts["joints"]), len(self.facts["puppets"]) or 1)
         self.generation += 1
 
 
@@ -95,8 +102,13 @@ def _for_browsers(facts: dict[str, Any]) -> dict[str, Any]:
         "ends": skeleton["ends"],
         "held": [skeleton["joints"][joint] for joint in facts["held"]],
         "hands": facts["hands"],
+        "puppets": facts["puppets"],
         "coding": facts["coding"],
         "interaction": facts["interaction"],
         "most_iterations": facts["most_iterations"],
         "rehearsal": facts["rehearsal"],
+        "motion": facts.get("motion", {}),
+        "springs": facts.get("springs", []),
+        "springs_feedback": facts.get("springs_feedback", {}),
+        "has_strings": facts.get("has_strings", False),
     }

@@ -21,7 +21,7 @@ _LINK_LOCAL = "20"  # scope, in hexadecimal, as the kernel writes it
 def about(chosen: Path | None, box: Path | None, home: Path = HOME) -> dict[str, Any]:
     """For JSON. chosen: what the preflight chose; box: the box file; home: where releases are installed.
 
-    shows: source and `good` (has danced on this box) of what dances and then of what would dance instead,
+    shows: id, source and `good` (has danced on this box) of what dances and then of what would dance instead,
     in this order; refused, aside: sentences on what was found and is not danced; releases: those
     installed, oldest first; release: the folder's name of the one that dances, None where none is installed.
     """
@@ -29,7 +29,9 @@ def about(chosen: Path | None, box: Path | None, home: Path = HOME) -> dict[str,
     if choice is not None:
         box = choice.first.box
     return {
-        "shows": [{"source": one.source, "good": one.good} for one in choice.pairs] if choice else [],
+        "shows": [{"id": one.id, "source": one.source, "good": one.good} for one in choice.pairs]
+        if choice
+        else [],
         "refused": list(choice.refused) if choice else [],
         "aside": [one.words for one in choice.aside] if choice else [],
         "box_file": None if box is None else str(box),

@@ -56,6 +56,11 @@ class ConsoleConfig(Section):
         length=(0, 8),
     )
 
+    https: bool = key(
+        "Serve the page over HTTPS, with a certificate of the box's own; `bunraku console pin` shows its "
+        "fingerprint, which a browser asks about once.",
+        False,
+    )
     rehearsal: bool = key(
         "Show the page Rehearsal (phrase, iterations, hands); false: a venue that plays the show as it is.",
         True,

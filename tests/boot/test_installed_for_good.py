@@ -31,7 +31,7 @@ def on_the_stick(image: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("stick")
     made = changed_release(release(image), folder / "made", "9.9.4", _STAGE, _FAILS_WHEN_TOLD)
     unit = made / "system/usr/lib/systemd/system/bunraku-console.service"
-    unit.write_text(unit.read_text().replace("TasksMax=16", "TasksMax=17"))
+    unit.write_text(unit.read_text().replace("TasksMax=48", "TasksMax=49"))
     return changed_release(made, folder / "release", "9.9.4", _STAGE, "")
 
 
@@ -66,7 +66,7 @@ def test_it_dances_after_a_power_cut_and_goes_back_for_good(installed: Box, figu
         "power-on to first frame with a release on the data partition", first.at - box.machine.powered_at
     )
     assert "9.9.4" in box.machine.run("readlink", "/opt/bunraku/current")
-    assert box.machine.show("bunraku-console", "TasksMax") == "17", "systemd has read this release's units"
+    assert box.machine.show("bunraku-console", "TasksMax") == "49", "systemd has read this release's units"
     box.machine.await_that(lambda: _watch_is_over(box), "the watch does not end: it dances")
     assert box.machine.show(_WATCH, "Result") == "success"
     assert not box.machine.path(f"{KEPT}/tries").exists()
@@ -78,7 +78,7 @@ def test_it_dances_after_a_power_cut_and_goes_back_for_good(installed: Box, figu
     box.power_on()
     box.await_frames(50)
     assert "9.9.4" not in box.machine.run("readlink", "/opt/bunraku/current")
-    assert box.machine.show("bunraku-console", "TasksMax") == "16"
+    assert box.machine.show("bunraku-console", "TasksMax") == "48"
     assert box.machine.show("bunraku-release", "ActiveState") == "inactive", "nothing on the way to the dance"
 
 
@@ -96,7 +96,7 @@ def test_one_whose_stage_does_not_start_any_more_gives_way(installed: Box, figur
     box.power_on()
     box.await_frames(50)
     assert box.machine.show(STAGE, "NRestarts") == "0", "it is not tried again"
-    assert box.machine.show("bunraku-console", "TasksMax") == "16"
+    assert box.machine.show("bunraku-console", "TasksMax") == "48"
 
 
 def test_a_damaged_one_never_dances(installed: Box) -> None:

@@ -15,7 +15,7 @@ from tests.boot.spin import spin
 
 KILLED_LIMIT_S, HUNG_LIMIT_S = 1.0, 3.0
 KILLS = 12
-WALKED_M = 0.25  # what the dancer may have moved between two frames that a second of darkness lies between
+WALKED_M = 0.6  # the phrase walks 0.56 m at most in half a second: a place is no older
 
 pytestmark = pytest.mark.boot
 

@@ -6,8 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright
+from playwright.sync_api import Page as Tab
 
 from tests.bundles import write_show
+from tests.console.browser import CHROMIUM, LAPTOP, PATIENCE_MS, PHONE
 from tests.console.page import CUES, Page, box_with_page, page_alone
 from tests.system.box import Box
 
@@ -18,10 +21,43 @@ def page(tmp_path: Path) -> Iterator[Page]:
         yield page
 
 
-@pytest.fixture(scope="module")
+PUPPETS = [{"name": "left", "x": -0.8}, {"name": "right", "x": 0.8, "turned": 30}]
+
+
+@pytest.fixture(scope="session")
 def venue(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Box, Page]]:
-    """A box that dances, with a sensor and two cues."""
+    """A box on which two puppets dance, with a sensor and two cues."""
     folder = tmp_path_factory.mktemp("venue")
-    show = write_show(folder / "show", cues=CUES)
+    show = write_show(folder / "show", cues=CUES, puppets=PUPPETS)
     with box_with_page(show, folder, "--journal", str(folder / "night")) as (box, page):
         yield box, page
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Its loop of events is this thread's until it ends: no longer than a module's tests."""
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(params=[PHONE, LAPTOP], ids=["phone", "laptop"])
+def context(request: pytest.FixtureRequest, browser: Browser) -> Iterator[BrowserContext]:
+    made = browser.new_context(**request.param, locale="en-GB")
+    made.set_default_timeout(PATIENCE_MS)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def tab(context: BrowserContext, venue: tuple[Box, Page]) -> Iterator[Tab]:
+    """The page, opened; an error of its scripts fails the test."""
+    expect.set_options(timeout=PATIENCE_MS)
+    opened = context.new_page()
+    errors: list[str] = []
+    opened.on("pageerror", lambda error: errors.append(str(error)))
+    opened.goto(venue[1].origin)
+    opened.wait_for_selector("body[data-heard]")
+    yield opened
+    assert not errors

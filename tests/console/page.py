@@ -63,7 +63,7 @@ class Page:
         with contextlib.closing(http.client.HTTPConnection(HOST, self.port, timeout=60)) as connection:
             sent = {name.replace("_", "-"): value for name, value in headers.items()}
             if self.cookie:
-                sent["Cookie"] = self.cookie
+                sent.setdefault("Cookie", self.cookie)
             connection.request(method, path, body, sent)
             response = connection.getresponse()
             return Answer(response.status, response.read().decode(), dict(response.getheaders()))

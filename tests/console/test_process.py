@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from appliance.box.process_health import ProcessHealth
-from appliance.cli.console import open_console_port
+from appliance.cli.console import card_lines
+from appliance.cli.page_address import open_console_port
+from appliance.show.box import BoxConfig, load_box
 from appliance.show.console import ConsoleConfig
 from appliance.stage.stage_error import StageError
 from hw_sim.peers import HOST
@@ -43,6 +45,12 @@ def test_it_takes_little_memory_tells_its_health_and_ends_when_asked(tmp_path: P
         assert (member.who, member.late) == ("console", False)
         assert process.end(signal.SIGTERM) == 0
         assert not health.fallbacks(time.monotonic()), "it ended as it should"
+
+
+def test_the_test_card_tells_address_and_pin_of_the_page_that_runs(tmp_path: Path) -> None:
+    assert card_lines(BoxConfig(runtime=tmp_path / "runtime")) == (), "no page runs"
+    with page_alone(tmp_path) as (page, _):
+        assert card_lines(load_box(page.box_file)) == (f"page {page.origin}", f"pin {page.pin}")
 
 
 def test_a_killed_page_is_told_as_a_fallback(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ from urllib.parse import urlparse
 
 import pytest
 
+from appliance.console.body import LARGEST_REQUEST
 from appliance.console.devices import FREE_TRIES
-from appliance.console.server import LARGEST_REQUEST
 from hw_sim.peers import HOST
 from tests.console.page import Page, page_alone
 from tests.system.processes import run_bunraku

@@ -57,7 +57,7 @@ async def next_words(browser: ClientWebSocketResponse) -> dict[str, Any]:
     return words
 
 
-def test_a_browser_gets_the_pose_that_leaves_the_box(venue: tuple[Box, Page]) -> None:
+def test_a_browser_gets_the_poses_that_leave_the_box(venue: tuple[Box, Page]) -> None:
     box, page = venue
     reader = FrameReader(box.runtime)
 
@@ -69,13 +69,13 @@ def test_a_browser_gets_the_pose_that_leaves_the_box(venue: tuple[Box, Page]) ->
             while equal < 20 and time.monotonic() < until:
                 frame = await next_frame(browser)
                 tick, _, joints = BROWSER_HEAD.unpack_from(frame)
-                numbers = np.frombuffer(frame, "<f4", -1, BROWSER_HEAD.size)
-                assert len(numbers) == 8 * joints
+                puppets = np.frombuffer(frame, "<f4", -1, BROWSER_HEAD.size).reshape(2, 8 * joints)
                 for seen in reader.frames(10, time.monotonic()):
                     if seen.tick == tick:
-                        assert np.array_equal(numbers[: 4 * joints], seen.world.ravel())
-                        assert np.array_equal(numbers[4 * joints : 7 * joints], seen.positions.ravel())
-                        assert np.array_equal(numbers[7 * joints :], seen.holds)
+                        for numbers, puppet in zip(puppets, (seen, *seen.others), strict=True):
+                            assert np.array_equal(numbers[: 4 * joints], puppet.world.ravel())
+                            assert np.array_equal(numbers[4 * joints : 7 * joints], puppet.positions.ravel())
+                            assert np.array_equal(numbers[7 * joints :], puppet.holds)
                         equal += 1
         return equal
 

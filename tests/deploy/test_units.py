@@ -66,6 +66,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     programs = (
         "/usr/sbin/nft",
         "/usr/bin/systemctl",
+        "/usr/bin/rm",
         "/usr/bin/systemd-tmpfiles",
         "/bin/bash",
         "/usr/local/sbin/bunraku-install",
@@ -148,8 +149,8 @@ def test_the_keeper_outlasts_an_orderly_end_of_all_others() -> None:
 
 def test_the_target_starts_everything_that_is_there_at_power_on() -> None:
     wanted = re.findall(r"^Wants=(.*)$", (UNITS / "bunraku.target").read_text(), re.MULTILINE)
-    started_by_others = {"bunraku-anew.service", "bunraku-stick.service"}
-    assert set(wanted) == set(SERVICES) - started_by_others | {"bunraku-anew.path"}
+    started_by_others = {"bunraku-anew.service", "bunraku-prove.service", "bunraku-stick.service"}
+    assert set(wanted) == set(SERVICES) - started_by_others | {"bunraku-anew.path", "bunraku-prove.path"}
 
 
 @pytest.mark.parametrize("name", SERVICES)

@@ -10,6 +10,7 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hw_sim.peers import scratch_folder
@@ -44,8 +45,10 @@ def test_a_folder_is_removed_while_files_still_appear_in_it() -> None:
 def test_measures_writes_figures_and_picture_and_gives_a_verdict(tmp_path: Path) -> None:
     show = write_show(tmp_path / "show")
     figures_file, report = tmp_path / "figures.json", tmp_path / "report"
+    progress = tmp_path / "progress"
     done = measure(
-        "--show", str(show), "--seconds", "4", "--json", str(figures_file), "--report", str(report)
+        *("--show", str(show), "--seconds", "4", "--json", str(figures_file), "--report", str(report)),
+        *("--progress", str(progress)),
     )
     assert done.returncode in (0, 1), (
         done.stderr
@@ -54,6 +57,19 @@ def test_measures_writes_figures_and_picture_and_gives_a_verdict(tmp_path: Path)
     figures = json.loads(figures_file.read_text())
     assert json.loads((report / "measure.json").read_text()) == figures
     assert (report / "measure.png").read_bytes().startswith(b"\x89PNG")
+    told = [json.loads(line) for line in progress.read_text().splitlines()]
+    assert [one["phase"] for one in told if "phase" in one] == ["locked", "free", "power-ons", "restarts"]
+    assert told[-1]["figures"] == figures
+    assert all(limit["holds"] for limit in told[-1]["limits"]) == (done.returncode == 0)
+    begun = told.index(next(one for one in told if one.get("phase") == "free"))
+    live = [
+        ms
+        for one in told[:begun]
+        for at, ms in zip(one.get("at_s", ()), one.get("transport_ms", ()), strict=True)
+        if at >= told[0]["settling_s"]
+    ]
+    assert len(live) > 0.8 * figures["readings"], "what is told meanwhile"
+    assert abs(float(np.median(live)) - figures["transport_ms"]["p50"]) < 1.0
     assert figures["ticks"] > 100
     assert figures["readings"] > 20
     assert 0.0 < figures["transport_ms"]["p50"] <= figures["transport_ms"]["max"]

@@ -1,4 +1,4 @@
-"""The emulator's line: once a second on a terminal, never elsewhere, and a last word in any case."""
+"""The emulator's line: once a second on a terminal; elsewhere a first word; a last one in any case."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def test_on_a_terminal_one_line_a_second() -> None:
     assert "50 readings sent" in out.getvalue()
 
 
-def test_elsewhere_only_the_last_word() -> None:
+def test_elsewhere_the_first_and_the_last_word() -> None:
     out = StringIO()
     emulator = played()
     with StatusLine("box:9750", Console(file=out, width=100)) as status:
         status.show(emulator, 100.0)
-        assert out.getvalue() == ""
+        assert out.getvalue() == "Calling the box at box:9750.\n"
         status.end(emulator)
-    assert out.getvalue() == "1 sensor -> box:9750: 50 readings sent\n"
+    assert out.getvalue().endswith("box:9750.\n1 sensor -> box:9750: 50 readings sent\n")
 
 
 def test_when_nothing_got_out_it_says_what_to_look_at() -> None:

@@ -41,7 +41,7 @@ def test_a_cue_names_the_parameters_that_it_changes_and_no_others(tmp_path: Path
     cue = {"name": "wild", "phrase": "vary", "motion": {"vary": {"sigma": 2.0}}}
     show = load_show(write_show_with_sources(tmp_path, {"source": "granular"}, cues=[cue]))
     assert show.config.cues[0].model_dump(mode="json")["motion"] == {"vary": {"sigma": 2.0}}
-    assert show.config.names["phrase"] == ("main", "vary", "granular", "path")
+    assert show.config.names["phrase"] == ("main", "vary", "granular", "path", "improvise")
     assert show.motion_networks["path"] == tmp_path / "pose.onnx"
     with pytest.raises(ConfigError, match="sigma"):
         load_show(write_show_with_sources(tmp_path, cues=[cue | {"motion": {"vary": {"sigma": -1.0}}}]))

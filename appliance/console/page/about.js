@@ -1,4 +1,5 @@
 // Box: which show dances and which would instead, release, addresses, clock.
+import { danceAgain, twice } from "./venue.js";
 import { language, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
@@ -16,8 +17,7 @@ export async function readAbout() {
 
 function tell(box) {
   byId("box-shows-part").hidden = box.shows.length === 0;
-  byId("box-shows").replaceChildren(...box.shows.map((show, place) => item(
-    show.source, `${words(place ? "box_instead" : "box_dances")} · ${words(show.good ? "box_good" : "box_new")}`)));
+  byId("box-shows").replaceChildren(...box.shows.map(shown));
   const refused = [...box.refused, ...box.aside];
   byId("box-refused-part").hidden = refused.length === 0;
   byId("box-refused").replaceChildren(...refused.map((sentence) => item(sentence, "")));
@@ -33,6 +33,20 @@ function tell(box) {
 // The box's clock, which a Pi without a network has wrong.
 export function showClock(value) {
   byId("box-clock").textContent = `${words("box_time")}: ${new Date(1000 * value.time).toLocaleString(language, { hourCycle: "h23" })}`;
+}
+
+// Each but the first can be danced again, where the box has kept it; what comes with the box is the last resort.
+function shown(show, place) {
+  const line = item(show.source, `${words(place ? "box_instead" : "box_dances")} · ${words(show.good ? "box_good" : "box_new")}`);
+  if (place === 0 || !show.id) return line;
+  const row = document.createElement("div"), button = document.createElement("button");
+  row.className = "row";
+  button.type = "button";
+  button.textContent = words("dance_again");
+  twice(button, () => danceAgain(show.id), "sure_now");
+  row.append(button);
+  line.append(row);
+  return line;
 }
 
 function item(said, below) {

@@ -68,10 +68,10 @@ export class Box extends EventTarget {
 }
 
 // What the box answers to a request: {status, words, done, ...}; status 0: no answer at all.
-export async function request(path, said) {
+export async function request(path, said, patienceMs = 6000) {
   const options = said === undefined ? {} : { method: "POST", body: JSON.stringify(said) };
   try {
-    const response = await fetch(path, { ...options, signal: AbortSignal.timeout(6000) });
+    const response = await fetch(path, { ...options, signal: AbortSignal.timeout(patienceMs) });
     if (!response.ok) return { status: response.status, words: await response.text() };
     return { status: 200, value: await response.json() };
   } catch {

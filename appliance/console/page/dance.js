@@ -1,6 +1,7 @@
 // The dance in 3D, drawn on a plain canvas: a body of capsules, its shadow, a floor. No library, no graphics card.
 const HEAD_BYTES = 16; // tick (float64), flags, joints (uint32): stage_view.py
 const GRID_M = 3;
+const NEAR_M = 4.5, BACK = 1.8; // the eye from one dancer; and for each metre that several are from their middle
 const HELD = 0.01; // less is not seen
 const INK = { body: [238, 226, 206], hand: [255, 138, 92], floor: "#2a2f36", shadow: "#000000" };
 
@@ -14,6 +15,7 @@ export class Dance {
     this.pitch = 0.12;
     this.zoom = 1;
     this.centre = null;
+    this.away = NEAR_M;
     this.show = null;
     this.frame = null;
     this.generation = -1;
@@ -37,10 +39,15 @@ export class Dance {
   }
 
   take(buffer) {
+    if (this.canvas.offsetParent === null) return; // on another page
     const head = new DataView(buffer), joints = head.getUint32(12, true);
-    if (buffer.byteLength !== HEAD_BYTES + 32 * joints) return;
-    const numbers = new Float32Array(buffer, HEAD_BYTES);
-    this.frame = { tick: head.getFloat64(0, true), world: numbers.subarray(0, 4 * joints), positions: numbers.subarray(4 * joints, 7 * joints), holds: numbers.subarray(7 * joints) };
+    const puppets = (buffer.byteLength - HEAD_BYTES) / (32 * joints);
+    if (!Number.isInteger(puppets) || puppets < 1) return;
+    const figures = Array.from({ length: puppets }, (_, puppet) => {
+      const numbers = new Float32Array(buffer, HEAD_BYTES + 32 * joints * puppet, 8 * joints);
+      return { world: numbers.subarray(0, 4 * joints), positions: numbers.subarray(4 * joints, 7 * joints), holds: numbers.subarray(7 * joints) };
+    });
+    this.frame = { tick: head.getFloat64(0, true), figures, ...figures[0] }; // fingers and words are the first one's
     this.takenAt = performance.now();
     document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
   }
@@ -97,13 +104,16 @@ export class Dance {
       this.tell(this.words(this.box.framesWanted ? "no_dance" : "dance_off"));
       return;
     }
-    const point = (joint) => frame.positions.subarray(3 * joint, 3 * joint + 3);
-    const root = point(0);
-    this.centre ??= [root[0], root[2]];
-    this.centre = this.centre.map((value, axis) => value + 0.05 * (root[2 * axis] - value));
+    const root = pointOf(frame, 0), roots = frame.figures.map((figure) => pointOf(figure, 0));
+    const middle = [0, 2].map((axis) => roots.reduce((sum, one) => sum + one[axis], 0) / roots.length);
+    this.centre ??= middle;
+    this.centre = this.centre.map((value, axis) => value + 0.05 * (middle[axis] - value));
+    const apart = Math.max(...roots.map((one) => Math.hypot(one[0] - middle[0], one[2] - middle[1])));
+    const away = NEAR_M + BACK * apart;
+    this.away += 0.05 * (away - this.away);
     const eye = this.eye(wide, high);
     this.drawFloor(ink, eye, ratio);
-    const bones = this.bones(point);
+    const bones = frame.figures.flatMap((figure) => this.bones(figure));
     ink.lineCap = "round";
     ink.strokeStyle = INK.shadow;
     ink.globalAlpha = 0.45;
@@ -112,7 +122,10 @@ export class Dance {
     const seen = bones.map((bone) => ({ ...bone, a: eye(bone.from), b: eye(bone.to) }));
     seen.sort((one, other) => other.a.away + other.b.away - one.a.away - one.b.away);
     for (const { a, b, radius, held } of seen) this.drawBone(ink, a, b, radius, held);
-    for (const joint of this.heldJoints()) this.drawRing(ink, eye(point(joint)), ratio, frame.holds[joint]);
+    for (const figure of frame.figures) {
+      for (const joint of this.heldJoints(figure)) this.drawRing(ink, eye(pointOf(figure, joint)), ratio, figure.holds[joint]);
+    }
+    document.body.dataset.puppets = frame.figures.length;
     document.body.dataset.held = this.heldJoints().map((joint) => `${show.joints[joint]} ${frame.holds[joint].toFixed(2)}`).join(", ");
     document.body.dataset.tick = frame.tick;
     document.body.dataset.root = Array.from(root, (value) => value.toFixed(3)).join(" ");
@@ -121,37 +134,37 @@ export class Dance {
     this.tell(isOld ? this.words("dance_stands") : names.length ? this.words("held", { names: names.join(", ") }) : this.words("free"));
   }
 
-  heldJoints() {
-    return this.show.joints.map((_, joint) => joint).filter((joint) => this.frame.holds[joint] > HELD);
+  heldJoints(figure = this.frame) {
+    return this.show.joints.map((_, joint) => joint).filter((joint) => figure.holds[joint] > HELD);
   }
 
   tell(sentence) {
     if (this.caption.textContent !== sentence) this.caption.textContent = sentence;
   }
 
-  // From metres to pixels, with the distance from the eye: 4.5 m away from the dancer, 1 m above the floor.
+  // From metres to pixels, with the distance from the eye: 4.5 m away from one dancer, 1 m above the floor.
   eye(wide, high) {
     const [sy, cy, sp, cp] = [Math.sin(this.yaw), Math.cos(this.yaw), Math.sin(this.pitch), Math.cos(this.pitch)];
     const size = 1.75 * Math.min(wide * 1.15, high) * this.zoom, [x0, z0] = this.centre;
     return ([x, y, z]) => {
       const side = cy * (x - x0) - sy * (z - z0), near = sy * (x - x0) + cy * (z - z0), up = y - 0.95;
-      const away = Math.max(0.4, 4.5 - (cp * near + sp * up)), scale = size / away;
+      const away = Math.max(0.4, this.away - (cp * near + sp * up)), scale = size / away;
       return { x: wide / 2 + scale * side, y: high / 2 - scale * (cp * up - sp * near), away, scale };
     };
   }
 
-  bones(point) {
-    const { show, frame } = this;
+  bones(figure) {
+    const { show } = this, point = (joint) => pointOf(figure, joint);
     const bones = [];
     const add = (joint, from, to) => {
       const name = show.joints[joint].toLowerCase(), length = Math.hypot(...from.map((v, axis) => to[axis] - v));
       const trunk = /hip|pelvis|root|spine|torso|chest|back/.test(name);
       const radius = /head/.test(name) ? 0.085 : Math.min(trunk ? 0.085 : 0.055, Math.max(0.022, 0.2 * length));
-      if (length > 0.005) bones.push({ from: [...from], to: [...to], radius, held: frame.holds[joint] });
+      if (length > 0.005) bones.push({ from: [...from], to: [...to], radius, held: figure.holds[joint], joint });
     };
     show.parents.forEach((parent, joint) => { if (parent >= 0) add(parent, point(parent), point(joint)); });
     for (const [joint, offset] of show.ends) {
-      const turned = rotated(frame.world.subarray(4 * joint, 4 * joint + 4), offset), from = point(joint);
+      const turned = rotated(figure.world.subarray(4 * joint, 4 * joint + 4), offset), from = point(joint);
       add(joint, from, turned.map((value, axis) => value + from[axis]));
     }
     return bones;
@@ -204,6 +217,8 @@ export class Dance {
     ink.stroke();
   }
 }
+
+const pointOf = (figure, joint) => figure.positions.subarray(3 * joint, 3 * joint + 3);
 
 // A vector turned by a unit quaternion w, x, y, z.
 function rotated([w, x, y, z], [a, b, c]) {

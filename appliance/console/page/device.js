@@ -29,16 +29,24 @@ export function initDevice(me, table) {
 }
 
 // Ask the box for something; a device that it does not know gives the PIN first, and then it is done at once.
+export async function ask(path, said, patience) {
+  const answer = await request(path, said, patience);
+  if (answer.status !== 401) return answer;
+  tell(false);
+  return new Promise((answered) => askPin(() => answered(ask(path, said, patience))));
+}
+
 export async function command(address, ...given) {
-  const answer = await request("/api/command", { address, arguments: given });
-  if (answer.status === 401) {
-    tell(false);
-    askPin(() => command(address, ...given));
-    return false;
-  }
+  const answer = await ask("/api/command", { address, arguments: given });
   const done = answer.status === 200 && answer.value.done;
   say(answer.status === 200 ? answer.value.words : answer.words || words("no_page"), !done);
   return done;
+}
+
+// Do something that needs the PIN, which a device that is not known gives first.
+export function withPin(then) {
+  if (known) then();
+  else askPin(then);
 }
 
 export function say(sentence, refused = false) {

@@ -5,9 +5,13 @@ import { showChoices } from "./choices.js";
 import { Dance } from "./dance.js";
 import { command, initDevice } from "./device.js";
 import { initHappened, readHappened, stopHappened } from "./happened.js";
+import { initLogs } from "./logs.js";
 import { initPicture, showPicture } from "./picture.js";
-import { initRehearsal, showRehearsal } from "./rehearsal.js";
+import { initProve, leaveProve, showProve } from "./prove.js";
+import { initRehearsal, leaveRehearsal, showRehearsal } from "./rehearsal.js";
+import { initSensorChanges, showSensorChanges } from "./sensor_changes.js";
 import { showSensors } from "./sensors.js";
+import { initVenue } from "./venue.js";
 import { clock, hasWords, loadWords, number, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
@@ -26,7 +30,10 @@ function show(page) {
   if (known === "happened") readHappened();
   else stopHappened();
   if (known === "box") readAbout();
-  box.showFrames(known === "dance" && byId("show-dance").checked);
+  if (known === "prove") showProve();
+  else leaveProve();
+  if (known !== "rehearsal") leaveRehearsal();
+  box.showFrames(["dance", "rehearsal"].includes(known) && byId("show-dance").checked);
 }
 
 function verdict() {
@@ -83,6 +90,7 @@ function tonight(value) {
   }));
   showChoices(byId("cues"), byId("cues-part"), value.cues, (name) => command("/cue", name));
   showChoices(byId("looks"), byId("looks-part"), value.looks, (name) => command("/look", name));
+  showChoices(byId("overlays"), byId("overlays-part"), value.cards, (name) => command("/card", name));
   if (status && document.activeElement !== byId("master")) master(status.panic || status.blackout ? null : status.level);
   byId("panic").setAttribute("aria-pressed", Boolean(status?.panic));
   byId("blackout").setAttribute("aria-pressed", Boolean(status?.blackout));
@@ -124,7 +132,11 @@ const dance = new Dance(byId("stage"), byId("held"), box, words);
 initDevice(me, words);
 initPicture();
 initHappened();
-initRehearsal(me);
+initProve();
+initSensorChanges();
+initLogs();
+initVenue();
+initRehearsal(me, box);
 for (const button of document.querySelectorAll("nav button")) button.addEventListener("click", () => show(button.dataset.page));
 byId("show-dance").addEventListener("change", () => show("dance"));
 addEventListener("hashchange", () => show(location.hash.slice(1)));
@@ -142,6 +154,7 @@ byId("heading-all").addEventListener("click", () => command("/sensors/heading"))
 box.addEventListener("value", () => {
   tonight(box.value);
   showSensors(byId("cards"), box.value, words);
+  showSensorChanges(box.value, dance.show);
   showPicture(box.value);
   showClock(box.value);
   showRehearsal(box.value, dance.show);

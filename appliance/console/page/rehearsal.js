@@ -1,11 +1,17 @@
-// For choreographers: the phrase, how often a window is coded, and which hands hold.
+// For choreographers: the figure with its hands, what is danced, how often a window is coded.
 import { showChoices } from "./choices.js";
-import { command } from "./device.js";
+import { request } from "./box.js";
+import { command, withPin } from "./device.js";
+import { Figure } from "./figure.js";
+import { initMotion, showMotion } from "./motion.js";
+import { initSprings, showSprings } from "./springs.js";
+import { hasWords, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
-const PHRASE_FADE_S = 1;
+const PHRASE_FADE_S = 1, KEEPING_MS = 120_000;
+let figure = null;
 
-export function initRehearsal(me) {
+export function initRehearsal(me, box) {
   document.querySelector('[data-page="rehearsal"]').hidden = !me.rehearsal;
   for (const id of ["coding", "interaction"]) {
     byId(id).addEventListener("input", () => tell());
@@ -15,18 +21,43 @@ export function initRehearsal(me) {
       byId(id).blur();
     });
   }
+  figure = new Figure(byId("figure"), byId("figure-said"), box, words);
+  initMotion();
+  initSprings();
+  byId("cue-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    withPin(keepCue);
+  });
 }
 
 export function showRehearsal(value, show) {
-  showChoices(byId("phrases"), byId("phrases-part"), value.phrases, (name) => command("/phrase", name, PHRASE_FADE_S));
-  const hands = value.hands.map((one) => ({ name: one.joint, label: `${one.joint} · ${one.who}`, now: one.holds }));
+  figure.show = show;
+  byId("figure-how").hidden = figure.joints.length === 0;
+  const phrases = value.phrases.map((one) => ({ ...one, label: hasWords(`source_${one.name}`) ? words(`source_${one.name}`) : one.name }));
+  showChoices(byId("phrases"), byId("phrases-part"), phrases, (name) => command("/phrase", name, PHRASE_FADE_S));
+  const hands = value.hands.map((one) => ({ name: one.joint, label: `${one.joint} · ${one.who === "osc" ? words("hand_here") : one.who}`, now: one.holds }));
   showChoices(byId("hands"), byId("hands-part"), hands, (joint, holds) => command("/hold", joint, holds ? 0 : 1));
   for (const id of ["coding", "interaction"]) {
     if (show) byId(id).max = show.most_iterations;
     if (value.status && document.activeElement !== byId(id)) byId(id).value = value.status[id];
   }
   tell();
+  showMotion(value, show);
+  showSprings(value, show);
 }
+
+// The settings of now become a cue in a copy of the show; what dances stays as it is.
+async function keepCue() {
+  byId("cue-keep").disabled = true;
+  byId("cue-said").textContent = words("change_runs");
+  const answer = await request("/api/cue", { name: byId("cue-name").value }, KEEPING_MS);
+  byId("cue-keep").disabled = false;
+  byId("cue-said").textContent = answer.status === 200 ? answer.value.words : answer.words || words("no_page");
+  if (answer.status === 200) byId("cue-show").hidden = false;
+}
+
+// Away from the page no joint is held.
+export function leaveRehearsal() { figure.letGo(); }
 
 function tell() {
   for (const id of ["coding", "interaction"]) byId(`${id}-said`).textContent = byId(id).value;

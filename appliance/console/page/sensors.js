@@ -1,5 +1,6 @@
 // One card for each sensor. A card stays the same element, so that a press on it is never lost.
 import { command } from "./device.js";
+import { changeButtons } from "./sensor_changes.js";
 import { hasWords, number } from "./words.js";
 
 const cards = new Map();
@@ -37,7 +38,10 @@ function made(name, words) {
     button.addEventListener("click", () => command(address, name));
     row.append(button);
   }
-  root.append(title, state, facts, complaint, row);
+  const changes = document.createElement("div");
+  changes.className = "row changes";
+  changes.append(...changeButtons(name));
+  root.append(title, state, facts, complaint, row, changes);
   return { root, state, facts, complaint };
 }
 

@@ -1,0 +1,149 @@
+"""`bunraku console box-file`: what the page shows and changes of the box file, checked as the file itself."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from appliance.box.durable import alone_in, write_beside, write_whole
+from appliance.cli.preflight import LATE_TURN_S, candidate_problems, publish
+from appliance.release.adoption import Outcome, Places, adopt, read_choice
+from appliance.release.arrivals import BOX, look
+from appliance.release.choice import CHOSEN, Choice
+from appliance.show.box import load_box
+from appliance.show.config_error import ConfigError
+from appliance.show.venue_keys import venue_keys
+from appliance.show.yaml_edit import with_value
+from appliance.stage.stage_error import StageError
+
+FROM_PAGE = "page"  # the folder below /data/bunraku in which the page's box file arrives, as from a stick
+_EMPTY = "# The box file of this venue; for what it leaves out the box has values built in.\n"
+_AT_ONCE, _LATER = 0.0, float("inf")
+
+
+class Change(NamedTuple):
+    """text: the whole file; values: (location, value) of keys to set in it; now: restart with it at once."""
+
+    text: str
+    values: list[tuple[list[str | int], Any]]
+    now: bool = False
+
+    def applied(self) -> str:
+        """The text with the values. Raises ValueError."""
+        text = self.text
+        for location, value in self.values:
+            text = with_value(text, tuple(location), value)
+        return text
+
+
+def told(box: Path | None, chosen: Path | None) -> dict[str, Any]:
+    """For JSON: the file's text, its venue's keys, whether it can be changed and when that counts."""
+    place = _place(box, chosen)
+    if place is None:
+        raise StageError(
+            "This box has no box file: all is on this machine. Give bunraku play one: --box box.yaml."
+        )
+    config = load_box(place if place.exists() else None)
+    return {
+        "file": str(place),
+        "text": place.read_text(encoding="utf-8-sig") if place.exists() else _EMPTY,
+        "keys": [one._asdict() for one in venue_keys(config)],
+        "at_once": chosen is not None,
+    }
+
+
+def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, Any]:
+    """Check and write it. For JSON: `problems` (nothing was written), else `words`: what counts from when.
+
+    anew: all units have to start anew now. The page's process sees to it, once its browser has the answer.
+    """
+    place = _place(box, chosen)
+    if place is None:
+        raise StageError("This box has no box file that could be changed.")
+    try:
+        text = wanted.applied()
+        problems = _problems(place, text)
+    except ValueError as error:
+        problems, text = [{"line": 0, "words": str(error)}], ""
+    if problems:
+        return {"problems": problems}
+    if chosen is not None:
+        return _adopt(chosen, text, wanted.now)
+    before = place.with_name(f"{place.name}.before")
+    if place.exists():
+        write_whole(before, place.read_bytes(), private=True)
+    write_whole(place, text.encode())
+    return {
+        "problems": [],
+        "words": f"{place} is written; the one before is {before.name}. It counts from the next start of "
+        "bunraku play on.",
+    }
+
+
+def dance_again(chosen: Path, show: str) -> dict[str, Any]:
+    """Let a pair that is kept dance from now on, by its id; for JSON. Raises StageError."""
+    here = Choice.read(chosen)
+    if here is None:
+        raise StageError("What this box chose at power-on cannot be read. Look: bunraku doctor.")
+    places = Places(here.data, chosen.parent)
+    with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
+        kept = read_choice(places.data)
+        pair = next((one for one in (*kept.pairs, *here.pairs) if one.id == show and one.is_there), None)
+        if pair is None or not pair.id:
+            raise StageError("This show is not kept on the box any more. Bring it on a stick.")
+        choice = kept.with_newest(pair)
+        choice._replace(data=places.data).write(places.data / CHOSEN)
+        said: list[str] = []
+        publish(places, Outcome(choice, True, ()), True, _AT_ONCE, said.append, restarts=False)
+    return {"words": f"The {pair.source} dances again, and after the next power-on too.", "anew": True}
+
+
+def _place(box: Path | None, chosen: Path | None) -> Path | None:
+    """The file as the venue wrote it; on an installed box without one the place where the page's arrives."""
+    choice = None if chosen is None else Choice.read(chosen)
+    if choice is None:
+        return box
+    newest = (read_choice(choice.data).pairs or choice.pairs)[0]  # it may wait for the next power-on
+    if newest.box_id:
+        original = newest.box.with_suffix(".original.yaml")
+        return original if original.is_file() else newest.box
+    return choice.data / FROM_PAGE / BOX
+
+
+def _problems(place: Path, text: str) -> list[dict[str, Any]]:
+    """What is wrong, with its line: read beside the file, for what it names is relative to its folder."""
+    place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    beside = write_beside(place.with_name("checked.yaml"), text.encode(), private=True)
+    try:
+        load_box(beside)
+    except ConfigError as error:
+        return [{"line": one.line, "words": f"{one.message} {one.cure}".strip()} for one in error.problems]
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink()
+    return []
+
+
+def _adopt(chosen: Path, text: str, now: bool) -> dict[str, Any]:
+    """As a box file from a stick: on the shelf under its content's id, the one before it kept, then tried."""
+    here = Choice.read(chosen) or Choice()
+    places = Places(here.data, chosen.parent)
+    arrival = places.data / FROM_PAGE
+    arrival.mkdir(mode=0o700, exist_ok=True)
+    write_whole(arrival / BOX, text.encode())
+    with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
+        outcome = adopt(places, [look(FROM_PAGE, arrival)], candidate_problems, late=True)
+        said = list(outcome.words)
+        if outcome.taken:
+            publish(places, outcome, True, _AT_ONCE if now else _LATER, said.append, restarts=False)
+    if not outcome.taken and outcome.choice.refused:
+        return {"problems": [{"line": 0, "words": words} for words in outcome.choice.refused]}
+    if not outcome.taken:
+        return {"problems": [], "words": "This box file counts already."}
+    when = "now: all but the release starts anew" if now else "after the next power-on"
+    return {
+        "problems": [],
+        "anew": now,
+        "words": f"The box file is kept and counts {when}. The one before it stays on the box.",
+    }

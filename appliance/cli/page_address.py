@@ -1,0 +1,55 @@
+"""Where the page is served: its socket, and the address that browsers take."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import ipaddress
+import os
+import socket
+
+from appliance.show.console import ConsoleConfig
+from appliance.stage.stage_error import StageError
+
+_ELSEWHERE = "192.0.2.1", 9  # an address of no machine (RFC 5737): which of ours would a packet leave by?
+
+
+def open_console_port(console: ConsoleConfig, or_any: bool = False) -> socket.socket:
+    """The page's socket, listening. or_any: on a free port where the wanted one is taken.
+
+    Raises StageError.
+    """
+    try:
+        return listening(console.host, console.port)
+    except OSError as error:
+        if or_any and error.errno == errno.EADDRINUSE:
+            return listening(console.host, 0)
+        raise StageError(
+            f"TCP port {console.port} on {console.host} cannot be opened for the page ({error.strerror}). "
+            "Is a second bunraku running? Stop it, or give another port under console: in the box file."
+        ) from error
+
+
+def address_of(descriptor: int, https: bool = False) -> str:
+    """The page's address, as a browser takes it."""
+    with socket.socket(fileno=os.dup(descriptor)) as opened:
+        host, port = opened.getsockname()[:2]
+        return address(host, port, https)
+
+
+def address(host: str, port: int, https: bool = False) -> str:
+    """The same of a socket that listens on this host and port."""
+    if ipaddress.ip_address(host).is_unspecified:
+        host = socket.gethostname()
+        with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+            asking.connect(_ELSEWHERE)
+            host = asking.getsockname()[0]
+    return f"http{'s' * https}://{f'[{host}]' if ':' in host else host}:{port}"
+
+
+def listening(host: str, port: int) -> socket.socket:
+    """`::` takes IPv4 too; on a machine without IPv6 it is IPv4 alone."""
+    if host == "::" and not socket.has_dualstack_ipv6():
+        host = "0.0.0.0"
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    return socket.create_server((host, port), family=family, dualstack_ipv6=host == "::")

@@ -1,0 +1,221 @@
+"""`bunraku console prove`: what the page wants proven, measured and kept as a document."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import platform
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from appliance.box.parent_death import PARENT
+from appliance.console.proofs import Proofs
+from appliance.console.proving import SHOW_GOES, Proving, Wanted
+from appliance.outputs.frame_reader import FrameReader
+from appliance.release.choice import Choice
+from appliance.show.bundle import bundle_files, default_show_path
+
+_LOOK_S = 0.2
+_ENDS_WITHIN_S = 20.0  # measure ends its box and its sensor
+_MODELS = ("/proc/device-tree/model", "/sys/class/dmi/id/product_name")
+_PACKAGES = ("bunraku", "onnxruntime", "numpy")
+_ENDED = "It was ended before its end. Nothing was kept."
+
+
+def prove(runtime: Path, proofs: Proofs, box: Path | None, chosen: Path | None) -> int:
+    """Prove what is wanted, and keep it; 1 where that did not work, which the progress says."""
+    proving = Proving(runtime)
+    wanted = proving.wanted()
+    if wanted is None:
+        return 0
+    try:
+        show, name = _show(runtime, chosen)
+        document = _latency(proving, wanted, show, box) if wanted.kind == "latency" else _doctor(proving, box)
+        about = {"kind": wanted.kind, "made": time.time(), "host": socket.gethostname()}
+        about |= {"machine": machine(), "software": software()}
+        about |= {"show": {"name": name, "checksum": checksum(show)}, "box_file": about_file(box)}
+        proving.tell(kept=proofs.add(about | document))
+    except (_NotProvenError, OSError) as error:
+        proving.tell(trouble=str(error))
+        return 1
+    finally:
+        proving.end()
+    return 0
+
+
+class _NotProvenError(Exception):
+    """Nothing to keep; the message says why."""
+
+
+def _latency(proving: Proving, wanted: Wanted, show: Path, box: Path | None) -> dict[str, Any]:
+    """The measurement's figures and limits, and its readings in phase with the sensor."""
+    named = ("--box", str(box)) if box is not None else ()
+    with tempfile.TemporaryDirectory(prefix="bunraku-prove-") as scratch:
+        told = Path(scratch) / "progress"
+        told.touch()
+        command = ("measure", "--seconds", str(wanted.seconds), "--progress", str(told))
+        said = _run(proving, (*command, "--show", str(show), *named), _copying(told, proving), True)
+        lines = [json.loads(line) for line in told.read_text().splitlines()]
+    if not lines or "figures" not in lines[-1]:
+        raise _NotProvenError(f"It could not be measured. {said.strip()[-600:]}")
+    in_phase = lines[: next(place for place, one in enumerate(lines) if one.get("phase") == "free")]
+    limits = lines[-1]["limits"]
+    return {
+        "holds": all(limit["holds"] for limit in limits),
+        "seconds": wanted.seconds,
+        "settling_s": in_phase[0]["settling_s"],
+        "at_s": [at for one in in_phase for at in one.get("at_s", ())],
+        "transport_ms": [ms for one in in_phase for ms in one.get("transport_ms", ())],
+        "figures": lines[-1]["figures"],
+        "limits": limits,
+    }
+
+
+def _doctor(proving: Proving, box: Path | None) -> dict[str, Any]:
+    said = _run(proving, ("doctor", "--json", *(("--box", str(box)) if box is not None else ())))
+    try:
+        findings = json.loads(said)
+    except ValueError:
+        raise _NotProvenError(f"The doctor did not end its look. {said.strip()[-600:]}") from None
+    return {"holds": all(one["verdict"] != "wrong" for one in findings), "findings": findings}
+
+
+def _run(
+    proving: Proving, words: tuple[str, ...], tell: Callable[[], None] = lambda: None, at_rest: bool = False
+) -> str:
+    """What a command of ours says; ended when it is no longer wanted. at_rest: or when the show goes on."""
+    with tempfile.TemporaryFile() as out, _ended_here() as is_ended:
+        child = subprocess.Popen(
+            (sys.executable, "-m", "appliance.cli", *words),
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, PARENT: str(os.getpid())},
+        )
+        try:
+            while child.poll() is None:
+                if proving.wanted() is None or is_ended():
+                    raise _NotProvenError(_ENDED)
+                if at_rest and proving.show_goes():
+                    raise _NotProvenError(f"{SHOW_GOES} {_ENDED}")
+                tell()
+                proving.tell()
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    child.wait(_LOOK_S)
+            tell()
+        finally:
+            _end(child)
+        out.seek(0)
+        return out.read().decode(errors="replace")
+
+
+def _copying(told: Path, proving: Proving) -> Callable[[], None]:
+    """Carries what measure tells to where the page reads it, as far as it is written."""
+    done = 0
+
+    def copy() -> None:
+        nonlocal done
+        with told.open("rb") as stream:
+            stream.seek(done)
+            part = stream.read()
+        part = part[: part.rfind(b"\n") + 1]
+        done += len(part)
+        if part:
+            with proving.progress.open("ab") as progress:
+                progress.write(part)
+
+    return copy
+
+
+def _end(child: subprocess.Popen[bytes]) -> None:
+    """As Ctrl-C does: measure then ends its box and its sensor by itself."""
+    if child.poll() is None:
+        child.send_signal(signal.SIGINT)
+        try:
+            child.wait(_ENDS_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.wait()
+
+
+@contextlib.contextmanager
+def _ended_here() -> Iterator[Callable[[], bool]]:
+    """Whether a signal asks this process to end."""
+    asked: list[int] = []
+    before = {
+        number: signal.signal(number, lambda number, _: asked.append(number))
+        for number in (signal.SIGTERM, signal.SIGINT)
+    }
+    try:
+        yield lambda: bool(asked)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def machine() -> dict[str, Any]:
+    """Model, processor, cores, memory and system of this machine, as far as it tells."""
+    model = next((text for path in _MODELS if (text := _text(path))), "")
+    named = [line for line in _text("/proc/cpuinfo").splitlines() if line.startswith("model name")]
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return {
+        "model": model,
+        "processor": named[0].partition(":")[2].strip() if named else platform.machine(),
+        "cores": os.cpu_count(),
+        "memory_mb": round(memory / 1e6),
+        "system": f"{platform.system()} {platform.release()}",
+    }
+
+
+def software() -> dict[str, str]:
+    """Versions of what dances."""
+    found = {"python": platform.python_version()}
+    for name in _PACKAGES:
+        with contextlib.suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
+
+
+def checksum(show: Path) -> str:
+    """Of names and contents of all files of a show."""
+    whole = hashlib.sha256()
+    for name in bundle_files(show):
+        with (show / name).open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        whole.update(os.fsencode(f"{name}\0{digest}\n"))
+    return whole.hexdigest()[:16]
+
+
+def about_file(box: Path | None) -> dict[str, str] | None:
+    """Name and checksum of the box file; None without one."""
+    if box is None:
+        return None
+    return {"name": box.name, "checksum": hashlib.sha256(box.read_bytes()).hexdigest()[:16]}
+
+
+def _show(runtime: Path, chosen: Path | None) -> tuple[Path, str]:
+    """Folder and name of the show that dances here, or that was chosen, or that comes with the box."""
+    with contextlib.closing(FrameReader(runtime)) as frames:
+        frames.newest(time.monotonic())
+        if frames.facts is not None:
+            return frames.facts.show_directory, frames.facts.show_name
+    choice = None if chosen is None else Choice.read(chosen)
+    show = default_show_path() if choice is None else choice.first.show
+    return show, show.name
+
+
+def _text(path: str) -> str:
+    try:
+        return Path(path).read_text(errors="replace").strip("\0\n ")
+    except OSError:
+        return ""

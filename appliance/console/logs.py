@@ -1,0 +1,85 @@
+"""The last lines of the box's units; on a machine without them, what `bunraku play` said."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from aiohttp import web
+
+from appliance.box.log_writer import MOST_SAID, SAID
+from appliance.console.child import output_of
+from appliance.console.guard import Guard
+
+_PATIENCE_S = 10.0
+_LONGEST = 600  # characters of a line
+_MOST = 200  # lines for a browser
+_FIGURES = re.compile(r" *[0-9.]+ Hz +tick ")  # the stage's line of each second; its newest is enough
+_JOURNALCTL = (
+    *("journalctl", "--boot", "--no-pager", f"--lines={MOST_SAID}", "--output=json", "--unit=bunraku*"),
+    "--output-fields=_SYSTEMD_UNIT,UNIT,MESSAGE",
+)
+
+
+class Logs:
+    """Requests for lines: `time` (Unix seconds), `who`, `words`; the newest last."""
+
+    def __init__(self, guard: Guard, runtime: Path, is_installed: bool) -> None:
+        self._guard, self._said, self._is_installed = guard, runtime / SAID, is_installed
+
+    def routes(self) -> list[web.RouteDef]:
+        """For the server."""
+        return [web.get("/api/logs", self._lines)]
+
+    async def _lines(self, request: web.Request) -> web.Response:
+        self._guard.require_device(request)
+        lines = await _of_units() if self._is_installed else self._of_play()
+        figures = [line for line in lines if _FIGURES.match(line["words"])]
+        told = [line for line in lines if line in figures[-1:] or not _FIGURES.match(line["words"])]
+        return web.json_response(told[-_MOST:])
+
+    def _of_play(self) -> list[dict[str, Any]]:
+        try:
+            said = self._said.read_text(errors="replace").splitlines()
+        except OSError:
+            raise web.HTTPNotFound(
+                text="Nothing is kept of what `bunraku play` said: is it running?"
+            ) from None
+        parts = [line.partition(" ") for line in said]
+        return [_line(float(at), "play", words) for at, _, words in parts if _is_number(at)]
+
+
+async def _of_units() -> list[dict[str, Any]]:
+    """Raises 503 where systemd's journal does not answer."""
+    try:
+        status, said, troubles = await output_of(*_JOURNALCTL, patience_s=_PATIENCE_S)
+    except TimeoutError:
+        raise web.HTTPServiceUnavailable(text="Reading the log took too long. Try again.") from None
+    except OSError as error:
+        raise web.HTTPServiceUnavailable(text=f"journalctl cannot be run ({error.strerror}).") from None
+    if status:
+        raise web.HTTPServiceUnavailable(
+            text=f"The log cannot be read: {troubles.decode(errors='replace')[:300]}"
+        )
+    return [one for line in said.splitlines() if (one := _of_journal(line))]
+
+
+def _of_journal(line: bytes) -> dict[str, Any] | None:
+    """An entry of journalctl's; None for one that is no text."""
+    try:
+        entry = json.loads(line)
+        unit = str(entry.get("UNIT") or entry["_SYSTEMD_UNIT"])  # of what systemd itself says about a unit
+        at, words = int(entry["__REALTIME_TIMESTAMP"]) / 1e6, entry["MESSAGE"]
+    except (ValueError, KeyError, TypeError):
+        return None
+    return _line(at, unit.removesuffix(".service"), words) if isinstance(words, str) else None
+
+
+def _line(at: float, who: str, words: str) -> dict[str, Any]:
+    return {"time": at, "who": who, "words": words[:_LONGEST]}
+
+
+def _is_number(text: str) -> bool:
+    return text.replace(".", "", 1).isdecimal()

@@ -1,0 +1,24 @@
+// The last lines of the box's units, for a device that gave the PIN.
+import { ask } from "./device.js";
+import { clock, words } from "./words.js";
+
+const byId = (id) => document.getElementById(id);
+
+export function initLogs() {
+  byId("logs-read").addEventListener("click", readLogs);
+}
+
+async function readLogs() {
+  byId("logs-said").textContent = words("box_reading");
+  const answer = await ask("/api/logs");
+  byId("logs-said").textContent = answer.status === 200 ? words(answer.value.length ? "logs_newest" : "logs_none") : answer.words || words("no_page");
+  if (answer.status !== 200) return;
+  byId("logs").replaceChildren(...answer.value.reverse().map((line) => {
+    const item = document.createElement("li"), small = document.createElement("small");
+    const unit = words(`unit_${line.who}`);
+    item.textContent = line.words;
+    small.textContent = `${clock(line.time)} · ${unit.startsWith("unit_") ? line.who : unit}`;
+    item.append(small);
+    return item;
+  }));
+}

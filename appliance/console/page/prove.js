@@ -1,0 +1,173 @@
+// Prove it: a measurement begins here, grows while it is looked at, and stays as a document.
+import { request } from "./box.js";
+import { drawCertificate, limitWords, madeAt, mostOf, valueOf, verdictOf } from "./certificate.js";
+import { ask, say } from "./device.js";
+import { DARK, drawPlots } from "./plots.js";
+import { words } from "./words.js";
+
+const byId = (id) => document.getElementById(id);
+const LOOK_MS = 500;
+let isShown = false, timer = 0, next = 0, measured = null, proof = null;
+
+export function initProve() {
+  byId("prove-begin").addEventListener("click", () => begin("latency"));
+  byId("prove-doctor").addEventListener("click", () => begin("doctor"));
+  byId("prove-end").addEventListener("click", () => ask("/api/prove/end", {}));
+  byId("prove-print").addEventListener("click", () => print());
+  byId("prove-png").addEventListener("click", savePicture);
+}
+
+export async function showProve() {
+  isShown = true;
+  const answer = await request("/api/prove");
+  if (answer.status !== 200) return tell(answer.words || words("no_page"));
+  list(answer.value.proofs);
+  running(answer.value.runs);
+  tell(answer.value.runs === null && answer.value.show_goes ? words("prove_show_goes") : "");
+  if (answer.value.runs !== null) follow(answer.value.runs);
+  return undefined;
+}
+
+export function leaveProve() {
+  isShown = false;
+  clearTimeout(timer);
+}
+
+async function begin(kind) {
+  const seconds = Number(byId("prove-seconds").value);
+  const answer = await ask("/api/prove", kind === "latency" ? { kind, seconds } : { kind });
+  if (answer.status !== 200) {
+    tell(answer.words || words("no_page"));
+    return;
+  }
+  byId("prove-document").hidden = true;
+  running({ kind });
+  follow({ kind, seconds });
+}
+
+function follow(wanted) {
+  clearTimeout(timer);
+  next = 0;
+  measured = { at: [], ms: [], settling: 0, seconds: wanted.seconds };
+  byId("prove-live").hidden = wanted.kind !== "latency";
+  byId("prove-live").scrollIntoView({ block: "center" });
+  tell(words(`prove_runs_${wanted.kind}`));
+  look();
+}
+
+async function look() {
+  if (!isShown) return;
+  let isOver = false;
+  try {
+    const answer = await fetch(`/api/prove/progress?from=${next}`, { signal: AbortSignal.timeout(6000) });
+    const lines = (await answer.text()).split("\n").filter(Boolean);
+    next = Number(answer.headers.get("X-Next"));
+    for (const line of lines) take(JSON.parse(line));
+    isOver = answer.headers.get("X-Runs") === "0" && lines.length === 0;
+  } catch { /* the page says by itself that the box is silent; it is asked again */ }
+  if (measured.at.length) drawLive();
+  if (isOver) await over();
+  else timer = setTimeout(look, LOOK_MS);
+}
+
+function take(told) {
+  if (told.phase) {
+    measured.inPhase = told.phase === "locked";
+    if (measured.inPhase) Object.assign(measured, { settling: told.settling_s, seconds: told.seconds });
+    tell(words(`prove_phase_${told.phase}`, told));
+  }
+  if (told.at_s && measured.inPhase) {
+    measured.at.push(...told.at_s);
+    measured.ms.push(...told.transport_ms);
+  }
+  if (told.kept) measured.kept = told.kept;
+  if (told.trouble) measured.trouble = told.trouble;
+}
+
+function drawLive() {
+  const canvas = byId("prove-plots"), scale = devicePixelRatio || 1;
+  canvas.width = canvas.clientWidth * scale;
+  canvas.height = canvas.clientHeight * scale;
+  const context = canvas.getContext("2d");
+  context.fillStyle = DARK.ground;
+  context.fillRect(0, 0, canvas.width, canvas.height);
+  const room = 12 * scale;
+  drawPlots(context, { x: room, y: room, width: canvas.width - 2 * room, height: canvas.height - room }, measured, DARK, 13 * scale);
+  document.body.dataset.readings = measured.at.length;
+}
+
+async function over() {
+  const { kept, trouble } = measured;
+  running(null);
+  await showProve();
+  if (trouble || !kept) tell(trouble || words("prove_broken"));
+  else await open(kept);
+}
+
+function running(wanted) {
+  document.body.dataset.proving = wanted ? wanted.kind : "";
+  byId("prove-live").hidden = wanted?.kind !== "latency";
+  for (const id of ["prove-begin", "prove-doctor", "prove-seconds"]) byId(id).disabled = wanted !== null;
+  byId("prove-end").hidden = wanted === null;
+}
+
+function list(proofs) {
+  byId("proofs-part").hidden = proofs.length === 0;
+  byId("proofs").replaceChildren(...proofs.map((one) => {
+    const item = document.createElement("li"), button = document.createElement("button"), small = document.createElement("small");
+    button.type = "button";
+    button.textContent = `${words(`prove_${one.kind}`)}, ${madeAt(one)}`;
+    button.addEventListener("click", () => open(one.id));
+    small.textContent = verdictOf(one);
+    small.className = one.holds ? "well" : "fault";
+    item.append(button, small);
+    return item;
+  }));
+}
+
+async function open(id) {
+  const answer = await request(`/api/prove/${id}`);
+  if (answer.status !== 200) return say(answer.words || words("no_page"), true);
+  proof = answer.value;
+  byId("prove-document").hidden = false;
+  byId("prove-verdict").textContent = verdictOf(proof);
+  byId("prove-verdict").className = proof.holds ? "well" : "fault";
+  byId("prove-lines").replaceChildren(...(proof.kind === "latency" ? proof.limits.map(limitItem) : proof.findings.map(findingItem)));
+  drawCertificate(byId("prove-sheet"), proof);
+  byId("prove-json").href = `/api/prove/${id}`;
+  byId("prove-json").download = `bunraku-${proof.kind}-${id}.json`;
+  byId("prove-verdict").scrollIntoView({ block: "center" });
+  document.body.dataset.proof = id;
+  return undefined;
+}
+
+function limitItem(limit) {
+  return line(`${limit.holds ? "✓" : "✗"} ${limitWords(limit)}: ${valueOf(limit)}`, mostOf(limit), limit.holds ? "" : "wrong");
+}
+
+function findingItem(finding) {
+  return line(`${words(`finding_${finding.verdict}`)} · ${finding.what}: ${finding.words}`, finding.cure, finding.verdict);
+}
+
+function line(said, below, kind) {
+  const item = document.createElement("li"), small = document.createElement("small");
+  item.textContent = said;
+  item.dataset.kind = kind;
+  small.textContent = below;
+  if (below) item.append(small);
+  return item;
+}
+
+function savePicture() {
+  byId("prove-sheet").toBlob((blob) => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = `bunraku-${proof.kind}-${proof.id}.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+  }, "image/png");
+}
+
+function tell(sentence) {
+  byId("prove-said").textContent = sentence;
+}

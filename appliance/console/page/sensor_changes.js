@@ -1,0 +1,98 @@
+// Sensors renamed, replaced, revoked, and a new one paired by cable: what the box says, as it says it.
+import { say, withPin } from "./device.js";
+import { words } from "./words.js";
+
+const byId = (id) => document.getElementById(id);
+let names = [], act = null, name = "";
+
+// For a card: buttons that open the dialog.
+export function changeButtons(sensor) {
+  return ["rename", "replace", "revoke"].map((what) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = words(what === "revoke" ? "sensor_revoke" : what);
+    button.setAttribute("aria-label", `${button.textContent}: ${sensor}`);
+    button.addEventListener("click", () => withPin(() => open(what, sensor)));
+    return button;
+  });
+}
+
+export function initSensorChanges() {
+  byId("pair").addEventListener("click", () => withPin(() => open("pair", "")));
+  byId("change-cancel").addEventListener("click", () => byId("change").close());
+  byId("change-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    send();
+  });
+}
+
+// Emulated sensors have no keys to change.
+export function showSensorChanges(value, show) {
+  names = value.sensors.map((one) => one.name);
+  const isEmulated = Boolean(show?.rehearsal) || !value.control;
+  byId("pair").hidden = isEmulated;
+  byId("sensors").dataset.emulated = isEmulated;
+}
+
+function open(what, sensor) {
+  [act, name] = [what, sensor];
+  byId("change-title").textContent = what === "pair" ? words("pair") : `${words(what === "revoke" ? "sensor_revoke" : what)}: ${sensor}`;
+  byId("change-how").textContent = words(`${what}_how`);
+  for (const part of ["name", "spare", "port", "network", "password"]) byId(`change-${part}-part`).hidden = true;
+  const parts = { rename: ["name"], replace: ["spare"], revoke: [], pair: ["name", "port", "network", "password"] }[what];
+  for (const part of parts) byId(`change-${part}-part`).hidden = false;
+  byId("change-spare").replaceChildren(...names.filter((one) => one !== sensor).map((one) => new Option(one, one)));
+  byId("change-name").value = what === "rename" ? sensor : "";
+  byId("change-password").value = "";
+  byId("change-steps").replaceChildren();
+  byId("change-send").textContent = words(what === "pair" ? "pair_begin" : what === "revoke" ? "sensor_revoke" : what);
+  byId("change-send").disabled = what === "replace" && names.length < 2;
+  byId("change").show(); // not modal: PANIC stays in reach
+}
+
+async function send() {
+  const said = { act, name };
+  if (act === "rename") said.new = byId("change-name").value.trim();
+  if (act === "replace") said.spare = byId("change-spare").value;
+  if (act === "pair") {
+    for (const part of ["name", "port", "network", "password"]) said[part] = byId(`change-${part}`).value.trim();
+  }
+  const send = byId("change-send"), steps = byId("change-steps");
+  send.disabled = true;
+  steps.replaceChildren(step(words("change_runs"), ""));
+  const isDone = await run(said, (sentence) => steps.insertBefore(step(sentence, ""), steps.lastChild));
+  steps.lastChild.remove();
+  steps.append(step(words(isDone ? "change_done" : "change_failed"), isDone ? "done" : "failed"));
+  send.disabled = isDone;
+}
+
+async function run(said, tell) {
+  try {
+    const answer = await fetch("/api/sensors", { method: "POST", body: JSON.stringify(said) });
+    if (!answer.ok) {
+      tell(await answer.text());
+      return false;
+    }
+    const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+    let rest = "", isDone = false;
+    for (let part = await reader.read(); !part.done; part = await reader.read()) {
+      const lines = (rest + part.value).split("\n");
+      rest = lines.pop();
+      for (const line of lines.map((one) => JSON.parse(one))) {
+        if ("words" in line) tell(line.words);
+        else isDone = line.done;
+      }
+    }
+    return isDone;
+  } catch {
+    say(words("no_page"), true);
+    return false;
+  }
+}
+
+function step(sentence, kind) {
+  const item = document.createElement("li");
+  item.textContent = sentence;
+  item.className = kind;
+  return item;
+}

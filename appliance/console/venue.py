@@ -1,0 +1,86 @@
+"""What a venue changes of its box: keys of the box file, and which of its shows dances."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+from pathlib import Path
+
+from aiohttp import web
+
+from appliance.console.body import said
+from appliance.console.child import answer_of
+from appliance.console.guard import Guard
+
+_LARGEST_FILE = 1 << 18  # bytes, as in show/yaml_file.py
+_PATIENCE_S = 90.0  # the whole show is checked on a new box file, as from a stick
+_ANSWERED_S = 1.0  # the units that start anew are this process's too
+ANEW = "anew"  # cli/preflight.py
+_SHOW = re.compile(r"[0-9a-f]{0,64}\+[0-9a-f]{0,64}")
+
+
+class Venue:
+    """Each by a process of its own, one at a time.
+
+    runtime: where the box's processes meet; options: the command's, which name the box.
+    """
+
+    def __init__(self, guard: Guard, runtime: Path, options: tuple[str, ...], is_installed: bool) -> None:
+        self._guard, self._options, self._is_installed = guard, options, is_installed
+        self._anew = runtime / ANEW
+        self._busy = asyncio.Lock()
+
+    def routes(self) -> list[web.RouteDef]:
+        """For the server."""
+        return [
+            web.get("/api/box/file", self._file),
+            web.post("/api/box/file", self._change),
+            web.post("/api/box/show", self._dance_again),
+        ]
+
+    async def _file(self, request: web.Request) -> web.Response:
+        self._guard.require_device(request)
+        return await self._done("box-file")
+
+    async def _change(self, request: web.Request) -> web.Response:
+        self._guard.require_device(request)
+        values = await said(request, 2 * _LARGEST_FILE)
+        text, keys, now = values.get("text"), values.get("values", []), values.get("now", False)
+        if not isinstance(text, str) or not isinstance(now, bool) or not _are_values(keys):
+            raise web.HTTPBadRequest(text="A change is a text, values of keys, and whether it counts now.")
+        wanted = json.dumps({"text": text, "values": keys, "now": now and self._is_installed})
+        return await self._done("box-file", "--change", said=wanted.encode())
+
+    async def _dance_again(self, request: web.Request) -> web.Response:
+        self._guard.require_device(request)
+        show = (await said(request)).get("id")
+        if not self._is_installed or not isinstance(show, str) or _SHOW.fullmatch(show) is None:
+            raise web.HTTPBadRequest(text="There is no such show.")
+        return await self._done("dance-again", "--", show)
+
+    async def _done(self, *words: str, said: bytes | None = None) -> web.Response:
+        if self._busy.locked():
+            raise web.HTTPConflict(text="The box file is being checked already. Try again in a moment.")
+        async with self._busy:
+            command, *rest = words
+            answer = await answer_of(
+                "console", command, *self._options, *rest, patience_s=_PATIENCE_S, said=said
+            )
+        if json.loads(answer).get("anew"):
+            asyncio.get_running_loop().call_later(_ANSWERED_S, self._anew.touch)
+        return web.Response(body=answer, content_type="application/json")
+
+
+def _are_values(values: object) -> bool:
+    """Pairs of a location (keys and places) and a value that YAML takes."""
+    if not isinstance(values, list) or len(values) > 64:
+        return False
+    return all(
+        isinstance(one, list)
+        and len(one) == 2
+        and isinstance(one[0], list)
+        and 0 < len(one[0]) <= 8
+        and all(isinstance(step, str) or type(step) is int for step in one[0])
+        for one in values
+    )

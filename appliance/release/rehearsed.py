@@ -1,0 +1,59 @@
+"""What a rehearsal keeps: a copy of the show with more cues, as a folder for the box's stick."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from appliance.box.durable import write_whole
+from appliance.release.arrivals import SHOW
+from appliance.show.bundle import write_checksums
+from appliance.show.config_error import ConfigError
+from appliance.show.cue_writing import with_cue
+from appliance.show.show import load_show
+
+ZIP = "show.zip"
+_OF = "of"  # which show.yaml the copy was made of
+_STICK = "bunraku"  # the folder on a stick in which the box looks
+
+
+def keep_cue(show: Path, folder: Path, cue: Mapping[str, Any]) -> str:
+    """Write a cue into the copy of a show in `folder`, and pack it; a sentence for people.
+
+    The copy is begun anew for another show. The show that dances stays as it is. Raises ConfigError for a cue
+    that the show refuses, OSError where the folder takes no files; then the copy is as it was.
+    """
+    begun, copy = folder / _OF, folder / SHOW
+    digest = hashlib.sha256((show / "show.yaml").read_bytes()).hexdigest()
+    if not begun.is_file() or begun.read_text() != digest:
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(show, copy, ignore=shutil.ignore_patterns(".*"))
+        write_whole(begun, digest.encode())
+    file = copy / "show.yaml"
+    before = file.read_text(encoding="utf-8")
+    try:
+        file.write_text(with_cue(before, cue), encoding="utf-8")
+        config = load_show(copy).config
+    except (ConfigError, yaml.YAMLError, ValueError, OSError):
+        file.write_text(before, encoding="utf-8")
+        raise
+    write_checksums(copy)
+    _pack(copy, folder / ZIP)
+    return f"The cue {cue['name']} is in the copy of the show, which has {len(config.cues)} cues now."
+
+
+def _pack(copy: Path, path: Path) -> None:
+    """As it lies on a stick; the file is there whole or not at all."""
+    part = path.with_suffix(".part")
+    with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed:
+        for one in sorted(copy.rglob("*")):
+            name = one.relative_to(copy)
+            if one.is_file() and not any(piece.startswith(".") for piece in name.parts):
+                packed.write(one, Path(_STICK, SHOW, name))
+    part.replace(path)

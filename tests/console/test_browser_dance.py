@@ -1,0 +1,82 @@
+"""The dance in a browser: as it leaves the box, and again from the journal."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page as Tab
+from playwright.sync_api import expect
+
+from appliance.outputs.frame_reader import FrameReader
+from appliance.pose.bvh import read_bvh
+from appliance.recorder.journal_error import JournalError
+from appliance.recorder.reading import Run, read_journal
+from tests.console.browser import await_true, press
+from tests.console.page import Page
+from tests.system.box import Box
+from tests.system.processes import wait_until
+
+pytestmark = pytest.mark.realtime
+
+
+def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page]) -> None:
+    box, _ = venue
+    reader = FrameReader(box.runtime)
+    press(tab, '[data-page="dance"]')
+    await_true(tab, "Number(document.body.dataset.tick) > 0")
+    expect(tab.locator("#held")).to_contain_text("Held:")
+    await_true(tab, "/^lShldr [01][.][0-9]{2}$/.test(document.body.dataset.held)")
+    assert tab.evaluate("document.body.dataset.puppets") == "2"
+    before = tab.locator("#stage").screenshot()
+    drawn = tab.evaluate("[document.body.dataset.tick, document.body.dataset.root]")
+    seen = {frame.tick: frame.root for frame in reader.frames(60, time.monotonic())}
+    assert np.allclose([float(part) for part in drawn[1].split()], seen[int(drawn[0])], atol=0.001)
+    await_true(tab, f"Number(document.body.dataset.tick) > {int(drawn[0]) + 20}")
+    assert tab.locator("#stage").screenshot() != before, "the figure moves"
+    tab.locator("#show-dance").uncheck()
+    expect(tab.locator("#held")).not_to_contain_text("No frame")
+    tab.wait_for_timeout(700)  # what was on its way has come
+    count = tab.evaluate("document.body.dataset.frames")
+    tab.wait_for_timeout(1000)
+    assert tab.evaluate("document.body.dataset.frames") == count, "switched off, it costs nothing"
+    tab.locator("#show-dance").check()
+    await_true(tab, f"Number(document.body.dataset.frames) > {count}")
+    reader.close()
+
+
+def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> None:
+    """The journal's newest run: a timeline, and a stretch of it in 3D, the poses those of the journal."""
+    wait_until(lambda: len(recorded(venue[0]).ticks) > 100, "nothing was recorded")
+    press(tab, '[data-page="happened"]')
+    expect(tab.locator("#happened-sum")).to_contain_text("late ticks")
+    assert tab.evaluate("document.querySelector('#timeline').width") > 200
+    tab.locator("#happened-second").fill("0")
+    press(tab, "#happened-dance")
+    expect(tab.locator("#again")).to_be_visible()
+    await_true(tab, "Boolean(document.body.dataset.tick)")
+    seen = {
+        tab.evaluate("[+document.body.dataset.tick, document.body.dataset.root].join(' ')") for _ in range(20)
+    }
+    ticks = recorded(venue[0]).ticks
+    for one in seen:
+        tick, *root = map(float, one.split())
+        (row,) = ticks[ticks["tick"] == tick]
+        positions, _ = recorded(venue[0]).skeleton.forward_kinematics(row["pose"], row["root"])
+        np.testing.assert_allclose(root, positions[0], atol=2e-3)
+    with tab.expect_download() as download:
+        press(tab, "#happened-bvh")
+    dance = read_bvh(download.value.path(), metres_per_unit=0.01)
+    assert dance.seconds > 1.0
+    press(tab, '[data-page="tonight"]')
+    expect(tab.locator("#again")).to_be_hidden()
+
+
+def recorded(box: Box) -> Run:
+    with contextlib.suppress(JournalError):
+        return read_journal(box.box_file.parent / "night").runs[-1]
+    return cast(Run, SimpleNamespace(ticks=()))

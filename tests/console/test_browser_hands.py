@@ -1,0 +1,179 @@
+"""Hands of a browser on the figure: a ring is dragged, and the joint is the puppet's again in every end."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, expect
+from playwright.sync_api import Page as Tab
+
+from appliance.outputs.frame_reader import FrameReader
+from tests.bundles import WORN, write_show
+from tests.console.browser import LAPTOP, PHONE, await_true, unlocked_tab
+from tests.console.page import Page, box_with_page
+from tests.system.box import Box
+from tests.system.processes import children_running, wait_until
+
+pytestmark = pytest.mark.realtime
+
+HELD = "rThigh"
+NEAR_PX = 20.0  # a bone keeps its length, and the body sways; untouched, the ring is 45 px away
+Studio = tuple[Box, Page, FrameReader]
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
+    """A box whose show has a hand for the page."""
+    folder = tmp_path_factory.mktemp("studio")
+    show = write_show(folder / "show", hands=[WORN, {"osc": True, "joint": HELD}])
+    with box_with_page(show, folder) as (box, page):
+        reader = FrameReader(box.runtime)
+        yield box, page, reader
+        reader.close()
+
+
+def held(studio: Studio) -> float:
+    """How firmly the joint is held now."""
+    reader = studio[2]
+    frame, facts = reader.newest(time.monotonic()), reader.facts
+    assert frame is not None and facts is not None
+    return float(frame.holds[facts.skeleton.index(HELD)])
+
+
+def opened(context: BrowserContext, studio: Studio) -> Tab:
+    """The rehearsal on a device that gave the PIN, with its ring drawn."""
+    tab = unlocked_tab(context, studio[1], "rehearsal")
+    tab.wait_for_selector("#figure[data-rings]")
+    return tab
+
+
+def ring(tab: Tab) -> tuple[float, float]:
+    """Where the ring is, in pixels of the window."""
+    (name, x, y), *others = json.loads(tab.get_attribute("#figure", "data-rings") or "[]")
+    assert (name, others) == (HELD, []), "the worn sensor's joint has no ring"
+    box = tab.locator("#figure").bounding_box()
+    assert box is not None
+    return box["x"] + x, box["y"] + y
+
+
+class Finger:
+    """Or the mouse on a laptop."""
+
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
+        self._touch: Any = None
+        if tab.evaluate("matchMedia('(pointer: coarse)').matches"):
+            self._touch = tab.context.new_cdp_session(tab)
+
+    def down(self, x: float, y: float) -> None:
+        if self._touch:
+            self._touch.send("Input.dispatchTouchEvent", _touch("touchStart", (x, y)))
+        else:
+            self._tab.mouse.move(x, y)
+            self._tab.mouse.down()
+
+    def move(self, x: float, y: float) -> None:
+        if self._touch:
+            self._touch.send("Input.dispatchTouchEvent", _touch("touchMove", (x, y)))
+        else:
+            self._tab.mouse.move(x, y)
+
+    def up(self) -> None:
+        if self._touch:
+            self._touch.send("Input.dispatchTouchEvent", _touch("touchEnd"))
+        else:
+            self._tab.mouse.up()
+
+
+def _touch(kind: str, *at: tuple[float, float]) -> dict[str, Any]:
+    return {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in at]}
+
+
+def test_a_ring_that_is_dragged_is_a_hand(context: BrowserContext, studio: Studio) -> None:
+    tab = opened(context, studio)
+    finger, (x, y) = Finger(tab), ring(tab)
+    assert held(studio) == 0.0
+    finger.down(x, y)
+    finger.move(x + 20, y - 20)
+    finger.move(x + 45, y - 45)
+    wait_until(lambda: held(studio) == 1.0, "the joint is not held")
+    expect(tab.locator("#figure-said")).to_contain_text(HELD)
+
+    def apart() -> float:
+        at = ring(tab)
+        return max(abs(at[0] - x - 45), abs(at[1] - y + 45))
+
+    wait_until(lambda: apart() < NEAR_PX, lambda: f"the ring is {apart()} px from the finger")
+    finger.up()
+    wait_until(lambda: held(studio) == 0.0, "lifted, and still held")
+    expect(tab.locator("#said.refused")).to_have_count(0)
+
+
+def test_a_phone_that_falls_asleep_gives_the_joint_back(browser: Browser, studio: Studio) -> None:
+    """Its page runs no scripts, and never says that the finger is gone."""
+    context = browser.new_context(**PHONE)
+    tab = opened(context, studio)
+    finger = Finger(tab)
+    finger.down(*ring(tab))
+    wait_until(lambda: held(studio) == 1.0)
+    sleep = context.new_cdp_session(tab)
+    sleep.send("Debugger.enable")
+    sleep.send("Debugger.pause")
+    wait_until(lambda: held(studio) == 0.0, "asleep, and still held")
+    sleep.send("Debugger.resume")
+    sleep.send("Debugger.disable")
+    finger.up()
+    finger.down(*ring(tab))
+    wait_until(lambda: held(studio) == 1.0, "awake, it cannot be taken again")
+    context.close()
+    wait_until(lambda: held(studio) == 0.0, "the browser is closed, and still held")
+
+
+def test_a_page_that_is_killed_gives_the_joint_back(browser: Browser, studio: Studio) -> None:
+    context = browser.new_context(**LAPTOP)
+    tab = opened(context, studio)
+    Finger(tab).down(*ring(tab))
+    wait_until(lambda: held(studio) == 1.0)
+    (process,) = children_running(studio[0].process.pid, "appliance.console")
+    tab.evaluate("document.getElementById('figure').remove()")  # its browser is not the one that helps
+    os.kill(process, signal.SIGKILL)
+    context.close()
+    wait_until(lambda: held(studio) == 0.0, "nothing gave it back")
+
+
+SPOKEN = """async (said) => {
+  const socket = new WebSocket(`ws://${location.host}/hands`);
+  return await new Promise((told) => {
+    socket.onmessage = (event) => told(JSON.parse(event.data).refused);
+    socket.onclose = (event) => told(event.code);
+    socket.onopen = () => socket.send(said);
+  });
+}"""
+
+
+def test_who_may_hold_what(browser: Browser, studio: Studio) -> None:
+    stranger = browser.new_page()
+    stranger.goto(studio[1].origin)
+    held_there = json.dumps({"joint": HELD, "turned": [1, 0, 0, 0]})
+    assert stranger.evaluate(SPOKEN, held_there) == 1006, "without the PIN there is no hand"
+    tab = opened(browser.new_context(**LAPTOP), studio)
+    for spoilt in ("{", "[]", '{"joint": ""}', '{"joint": "a", "turned": [0, 0, 0, 0]}', "[" * 400):
+        assert tab.evaluate(SPOKEN, spoilt) == 1008, spoilt
+    assert "No hand of this show holds 'lShldr'" in tab.evaluate(
+        SPOKEN, json.dumps({"joint": "lShldr", "turned": [1, 0, 0, 0]})
+    )
+    Finger(tab).down(*ring(tab))
+    wait_until(lambda: held(studio) == 1.0)
+    assert "Another browser holds" in tab.evaluate(SPOKEN, held_there)
+    wait_until(lambda: held(studio) == 1.0, "the refused one took it away")
+    tab.evaluate("location.hash = 'tonight'")
+    await_true(tab, "document.body.dataset.shown === 'tonight'")
+    wait_until(lambda: held(studio) == 0.0, "away from the page it is still held")
+    tab.context.close()
+    stranger.close()

@@ -1,0 +1,122 @@
+"""The page on which latency is proven, in a browser: it begins, grows, ends in a document."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, expect
+from playwright.sync_api import Page as Tab
+
+from tests.console.browser import LAPTOP, PATIENCE_MS, PHONE, await_true, declared, press, unlock
+from tests.console.page import Page
+from tests.system.box import Box
+from tests.system.processes import children, has_argument, wait_until
+
+pytestmark = pytest.mark.realtime
+
+MEASURED_WITHIN_MS = 10 * PATIENCE_MS  # a measurement of six seconds starts the box five times
+STAGE_RATE = re.compile(r"(49|50)\.\d Hz")
+
+
+def test_latency_is_proven_on_a_phone_once_the_show_is_stopped(
+    browser: Browser, venue: tuple[Box, Page], tmp_path: Path
+) -> None:
+    box, page = venue
+    context = browser.new_context(**PHONE, locale="en-GB")
+    context.set_default_timeout(PATIENCE_MS)
+    tab = context.new_page()
+    tab.goto(page.origin)
+    tab.wait_for_selector("body[data-heard]")
+    press(tab, '[data-page="prove"]')
+    expect(tab.locator("#prove-said")).to_contain_text("Stop it to measure")
+    tab.select_option("#prove-seconds", "6")
+    press(tab, "#prove-begin")
+    tab.fill("#pin-input", page.pin)
+    press(tab, "#pin-send")
+    expect(tab.locator("#prove-said")).to_contain_text("The show goes on, and a second dance beside it")
+    press(tab, '[data-page="tonight"]')
+    press(tab, "#stop")
+    wait_until(lambda: not declared(box).going)
+    press(tab, '[data-page="prove"]')
+    wait_until(lambda: not page.get("/api/prove").value["show_goes"], "the show does not come to its end")
+    press(tab, "#prove-begin")
+    await_true(tab, "Number(document.body.dataset.readings) > 20")
+    before = tab.evaluate("Number(document.body.dataset.readings)")
+    empty = tab.locator("#prove-plots").screenshot()
+    await_true(tab, f"Number(document.body.dataset.readings) > {before + 50}")
+    assert tab.locator("#prove-plots").screenshot() != empty, "the plots grow"
+    assert page.post("/api/prove", {"kind": "doctor"}, Cookie=cookie(tab)).status == 409, "one at a time"
+    tab.wait_for_selector("body[data-proof]", timeout=MEASURED_WITHIN_MS)
+    proof = page.get(f"/api/prove/{tab.evaluate('document.body.dataset.proof')}").value
+    expect(tab.locator("#prove-verdict")).to_have_text(
+        "All limits hold." if proof["holds"] else "A limit does not hold."
+    )
+    assert {"machine", "software", "show", "box_file", "made", "limits", "figures"} <= set(proof)
+    assert proof["show"]["name"] == page.status()["status"]["show"]
+    counted = [ms for at, ms in zip(proof["at_s"], proof["transport_ms"], strict=True) if at >= 3.0]
+    assert abs(sorted(counted)[len(counted) // 2] - proof["figures"]["transport_ms"]["p50"]) < 1.0
+    expect(tab.locator("#prove-lines li")).to_have_count(len(proof["limits"]))
+    with tab.expect_download() as download:
+        press(tab, "#prove-png")
+    with Image.open(download.value.path()) as sheet:
+        assert sheet.size == (1240, 1754) and len(sheet.convert("L").getcolors() or ()) > 50
+    with tab.expect_download() as download:
+        press(tab, "#prove-json")
+    assert json.loads(download.value.path().read_text()) == proof
+    press(tab, '[data-page="tonight"]')
+    press(tab, "#go")
+    wait_until(lambda: declared(box).going)
+    context.close()
+
+
+def cookie(tab: Tab) -> str:
+    """What the box remembers this browser by."""
+    return "; ".join(f"{one['name']}={one['value']}" for one in tab.context.cookies())
+
+
+def test_the_doctor_looks_while_the_show_goes_on(tab: Tab, venue: tuple[Box, Page]) -> None:
+    box, page = venue
+    unlock(tab, page)
+    press(tab, '[data-page="prove"]')
+    press(tab, "#prove-doctor")
+    tab.wait_for_selector("body[data-proof]", timeout=MEASURED_WITHIN_MS)
+    expect(tab.locator("#prove-lines")).to_contain_text(STAGE_RATE)
+    expect(tab.locator("#proofs li").first).to_contain_text("Doctor's report")
+    proof = page.get(f"/api/prove/{tab.evaluate('document.body.dataset.proof')}").value
+    assert proof["kind"] == "doctor"
+    assert proof["holds"] == all(one["verdict"] != "wrong" for one in proof["findings"])
+    wait_until(lambda: not ours(box.process.pid, "prove"))
+    tab.reload()
+    tab.wait_for_selector("body[data-heard]")
+    tab.locator("#proofs button").first.press("Enter")
+    expect(tab.locator("#prove-lines")).to_contain_text(STAGE_RATE)
+
+
+def ours(pid: int, word: str) -> bool:
+    """Whether a process below this one has this word on its command line."""
+    return any(has_argument(child, word) or ours(child, word) for child in children(pid))
+
+
+@pytest.mark.parametrize("context", [LAPTOP], ids=["laptop"], indirect=True)
+def test_a_measurement_ends_when_the_show_goes_on(tab: Tab, venue: tuple[Box, Page]) -> None:
+    """It must not take the time of a dance that people see; neither a box nor a sensor of it stays."""
+    box, page = venue
+    unlock(tab, page)
+    press(tab, '[data-page="tonight"]')
+    press(tab, "#stop")
+    wait_until(lambda: not page.get("/api/prove").value["show_goes"], "the show does not come to its end")
+    press(tab, '[data-page="prove"]')
+    press(tab, "#prove-begin")
+    expect(tab.locator("#prove-said")).to_contain_text("in phase with the sensor")
+    wait_until(lambda: ours(box.process.pid, "hw_sim"), "nothing is measured")
+    press(tab, '[data-page="tonight"]')
+    press(tab, "#go")
+    wait_until(lambda: not ours(box.process.pid, "measure"), "the measurement goes on")
+    wait_until(lambda: not ours(box.process.pid, "hw_sim"), "its sensor goes on")
+    press(tab, '[data-page="prove"]')
+    expect(tab.locator("#prove-begin")).to_be_enabled()
+    assert "Nothing was kept" in page.get("/api/prove/progress").text

@@ -1,0 +1,48 @@
+"""Sensors and rehearsal in a browser."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import Page as Tab
+from playwright.sync_api import expect
+
+from tests.console.browser import press, unlock
+from tests.console.page import Page
+from tests.system.box import Box
+from tests.system.processes import wait_until
+
+pytestmark = pytest.mark.realtime
+
+
+def test_sensors_have_cards_and_take_their_neutral_pose(tab: Tab, venue: tuple[Box, Page]) -> None:
+    unlock(tab, venue[1])
+    press(tab, '[data-page="sensors"]')
+    card = tab.locator('article[data-sensor="left-wrist"]')
+    expect(card).to_have_attribute("data-state", "linked")
+    expect(card).to_contain_text("Battery")
+    press(tab, 'article[data-sensor="left-wrist"] >> text=Find')
+    expect(tab.locator("#said")).not_to_be_empty()
+    expect(tab.locator("#said")).not_to_have_class("refused")
+    press(tab, "#neutral-all")
+    expect(tab.locator("#said")).to_contain_text("neutral", ignore_case=True)
+
+
+def test_a_rehearsal_changes_iterations_and_hands(tab: Tab, venue: tuple[Box, Page]) -> None:
+    _, page = venue
+    unlock(tab, page)
+    press(tab, '[data-page="rehearsal"]')
+    coding = tab.locator("#coding")
+    expect(coding).to_have_value("3")
+    coding.focus()
+    tab.keyboard.press("ArrowRight")
+    wait_until(lambda: page.status()["status"]["coding"] == 4)
+    coding.focus()
+    tab.keyboard.press("ArrowLeft")
+    wait_until(lambda: page.status()["status"]["coding"] == 3)
+    hand = tab.locator("#hands button")
+    expect(hand).to_have_attribute("aria-pressed", "true")
+    press(tab, "#hands button")
+    expect(hand).to_have_attribute("aria-pressed", "false")
+    assert not page.status()["hands"][0]["holds"]
+    press(tab, "#hands button")
+    expect(hand).to_have_attribute("aria-pressed", "true")

@@ -1,0 +1,64 @@
+"""The page over HTTPS: the box's own certificate, the same after a restart, its fingerprint at the prompt."""
+
+from __future__ import annotations
+
+import hashlib
+import http.client
+import json
+import socket
+import ssl
+from pathlib import Path
+
+import pytest
+import yaml
+
+from appliance.console.certificate import FILE, certificate_in, fingerprint, https_context
+from hw_sim.peers import HOST, free_ports
+from tests.system.processes import BUNRAKU, Process, run_bunraku, wait_until
+
+
+def served(port: int) -> str:
+    """The SHA-256 of the certificate that is served there; empty while there is none."""
+    try:
+        found = ssl.get_server_certificate((HOST, port))
+    except OSError:
+        return ""
+    return hashlib.sha256(ssl.PEM_cert_to_DER_cert(found)).digest().hex(":").upper()
+
+
+def test_a_box_has_one_certificate_and_the_same_rules_over_https(tmp_path: Path) -> None:
+    (port,) = free_ports(1, socket.SOCK_STREAM)
+    box_file = tmp_path / "box.yaml"
+    console = {"port": port, "https": True, "names": ["bunraku.hall"]}
+    kept = {"console": console, "control": None, "runtime": "runtime", "state": "state"}
+    box_file.write_text(yaml.safe_dump(kept))
+    with Process(tmp_path / "page.txt", [*BUNRAKU, "console", "--box", box_file]) as process:
+        first = wait_until(lambda: served(port), lambda: process.words)
+        assert f"The page: https://{HOST}:{port}" in process.words
+        pin, _, told = run_bunraku("console", "pin", "--box", box_file).stdout.strip().partition("\n")
+        assert told == f"Certificate, SHA-256: {first}"
+        trusted = ssl.create_default_context(cafile=str(tmp_path / "state" / FILE))
+        page = http.client.HTTPSConnection(HOST, port, context=trusted, timeout=60)
+        said = json.dumps({"pin": pin, "name": "a"})
+        page.request("POST", "/api/pin", said, {"Origin": f"https://{HOST}:{port}"})
+        answer = page.getresponse()
+        assert answer.status == 200 and "Secure" in (answer.headers["Set-Cookie"] or "")
+        answer.read()
+        page.request("POST", "/api/pin", said, {"Origin": f"http://{HOST}:{port}"})
+        assert page.getresponse().status == 403, "a page without HTTPS is another page"
+        page.close()
+        process.kill()
+        process.start()
+        assert wait_until(lambda: served(port), lambda: process.words) == first
+    assert (tmp_path / "state" / FILE).stat().st_mode & 0o077 == 0
+
+
+def test_what_cannot_be_used_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(OSError, match="is the package openssl there"):
+        certificate_in(tmp_path / "state", ())
+    (tmp_path / FILE).write_text("spoilt")
+    with pytest.raises(ssl.SSLError):
+        https_context(tmp_path / FILE)
+    with pytest.raises(ValueError, match="no certificate"):
+        fingerprint(tmp_path / FILE)
