@@ -15,7 +15,12 @@ from tests.bundles import MOVING, set_facts, write_show
 
 LATENT = 4
 SEQUENCE, POSE = 32, 1  # poses of a window
-SOURCES: dict[str, dict[str, Any]] = {"vary": {"sigma": 1.0}, "granular": {}, "path": {}}
+SOURCES: dict[str, dict[str, Any]] = {
+    "vary": {"sigma": 1.0},
+    "granular": {},
+    "path": {},
+    "improvise": {"seconds": 5.0},
+}
 
 
 def write_motion_network(path: Path, window: int, fails: bool = False) -> None:
@@ -23,6 +28,49 @@ def write_motion_network(path: Path, window: int, fails: bool = False) -> None:
 
     fails: what is decoded is not a number.
     """
+    ground = [[0.0] * LATENT, [[1, 0, 0, 0], [0, 1, 0, 0]], [-2, -2], [2, 2]]
+    _write(path, *_coder(window, fails), kind="motion", window=window, map=ground if window == 1 else "")
+
+
+def write_improviser_network(path: Path) -> None:
+    """Each move leads towards the rest pose, and away from it as its code says; the height stays."""
+    chance, steps, code, mixtures, many = np.random.default_rng(2), LATENT + 4, 3, 2, ["b"]
+    nodes, stored, inputs, outputs = _coder(8)
+    keep, away = np.full(steps, 0.9), 0.3 * chance.standard_normal((code, steps))
+    keep[-1], away[:, -1], away[:, -4:-1] = 1.0, 0.0, 0.05 * away[:, -4:-1]
+    stored |= {
+        "keep": keep,
+        "away": away,
+        "ramp": np.linspace(0.1, 1.0, 8)[:, None],
+        "look_at_move": chance.standard_normal((steps, code)),
+        "foresee": 0.3 * chance.standard_normal((code, mixtures * (2 * code + 1))),
+    }
+    stored |= {"last": np.array([2]), "middle": np.array([1]), "steps_axis": np.array([1])}
+    nodes += [
+        helper.make_node("ReduceMean", ["move_heard", "steps_axis"], ["heard"], keepdims=0),
+        helper.make_node("MatMul", ["heard", "look_at_move"], ["code_of_move"]),
+        helper.make_node("MatMul", ["last_code", "foresee"], ["mixture"]),
+        helper.make_node("Tanh", ["cells"], ["later_cells"]),
+        helper.make_node("Gather", ["steps_before", "last"], ["from"], axis=1),
+        helper.make_node("Mul", ["from", "keep"], ["kept"]),
+        helper.make_node("MatMul", ["next_code", "away"], ["aim"]),
+        helper.make_node("Unsqueeze", ["aim", "middle"], ["aims"]),
+        helper.make_node("Mul", ["aims", "ramp"], ["led"]),
+        helper.make_node("Add", ["kept", "led"], ["next_move"]),
+    ]
+    inputs |= {"steps_heard": [*many, 3, steps], "move_heard": [*many, 8, steps]}
+    inputs |= {"steps_before": ["n", 3, steps], "next_code": ["n", code]}
+    inputs |= {"last_steps": ["f", 3, steps], "last_code": ["f", code], "cells": ["f", 2]}
+    outputs |= {"code_of_move": [*many, code], "next_move": ["n", 8, steps]}
+    outputs |= {"mixture": ["f", mixtures * (2 * code + 1)], "later_cells": ["f", 2]}
+    _write(path, nodes, stored, inputs, outputs, kind="improviser", window=8, mixtures=mixtures)
+
+
+Ports = dict[str, list[Any]]
+Parts = tuple[list[onnx.NodeProto], dict[str, np.ndarray[Any, Any]], Ports, Ports]
+
+
+def _coder(window: int, fails: bool = False) -> Parts:
     chance, moving = np.random.default_rng(1), len(MOVING)
     rest = np.tile(quaternion.IDENTITY, (window, moving, 1)).astype(np.float32)
     waves = np.sin(np.linspace(0, np.pi, window))[:, None, None] + 1.0
@@ -32,10 +80,10 @@ def write_motion_network(path: Path, window: int, fails: bool = False) -> None:
         "look": chance.standard_normal((moving * 4, LATENT)),
         "bends": bends.reshape(LATENT, -1),
         "rest": rest.ravel() * (np.nan if fails else 1.0),
+        "flat": np.array([-1, window, moving * 4]),
+        "shape": np.array([-1, window, moving, 4]),
+        "time": np.array([1]),
     }
-    constants = [numpy_helper.from_array(value.astype(np.float32), name) for name, value in stored.items()]
-    shapes = {"flat": [-1, window, moving * 4], "shape": [-1, window, moving, 4], "time": [1]}
-    constants += [numpy_helper.from_array(np.array(value, np.int64), name) for name, value in shapes.items()]
     nodes = [
         helper.make_node("Reshape", ["windows", "flat"], ["steps"]),
         helper.make_node("ReduceMean", ["steps", "time"], ["mean"], keepdims=0),
@@ -44,27 +92,39 @@ def write_motion_network(path: Path, window: int, fails: bool = False) -> None:
         helper.make_node("Add", ["bent", "rest"], ["whole"]),
         helper.make_node("Reshape", ["whole", "shape"], ["decoded"]),
     ]
-    poses, codes = [window, moving, 4], [LATENT]
-    ports = {
-        "windows": ["w", *poses],
-        "latents": ["v", *codes],
-        "coded": ["w", *codes],
-        "decoded": ["v", *poses],
-    }
-    infos = [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name, shape in ports.items()]
-    graph = helper.make_graph(nodes, "motion", infos[:2], infos[2:], constants)
+    poses = [window, moving, 4]
+    inputs = {"windows": ["w", *poses], "latents": ["v", LATENT]}
+    return nodes, stored, inputs, {"coded": ["w", LATENT], "decoded": ["v", *poses]}
+
+
+def _write(
+    path: Path,
+    nodes: list[onnx.NodeProto],
+    stored: dict[str, np.ndarray[Any, Any]],
+    inputs: Ports,
+    outputs: Ports,
+    **facts: Any,
+) -> None:
+    constants = [
+        numpy_helper.from_array(value.astype(np.int64 if value.dtype.kind == "i" else np.float32), name)
+        for name, value in stored.items()
+    ]
+    sides = [
+        [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name, shape in side.items()]
+        for side in (inputs, outputs)
+    ]
+    graph = helper.make_graph(nodes, "motion", *sides, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)])
     model.ir_version = 9
-    ground = (
-        json.dumps([[0.0] * LATENT, [[1, 0, 0, 0], [0, 1, 0, 0]], [-2, -2], [2, 2]]) if window == 1 else ""
-    )
-    set_facts(model, MOVING, kind="motion", window=str(window), latent=str(LATENT), map=ground)
+    said = {name: fact if isinstance(fact, str) else json.dumps(fact) for name, fact in facts.items()}
+    set_facts(model, MOVING, latent=str(LATENT), **said)
     onnx.save(model, str(path))
 
 
 def write_show_with_sources(folder: Path, motion: dict[str, Any] | None = None, **sections: Any) -> Path:
-    """A show without hands whose phrase can be varied, walked away from, and followed over a map."""
+    """A show without hands whose phrase can be varied, walked away from, followed over a map, continued."""
     folder.mkdir(parents=True, exist_ok=True)
     write_motion_network(folder / "sequence.onnx", SEQUENCE)
     write_motion_network(folder / "pose.onnx", POSE)
+    write_improviser_network(folder / "improviser.onnx")
     return write_show(folder, hands=[], motion=SOURCES | (motion or {}), **sections)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from appliance.box.record import Record, SlotFile
 from appliance.pose.foreign_file import plain_json
@@ -16,8 +17,23 @@ PLACE = Record("place", "place", LARGEST)
 FILE = PLACE.name
 
 _NUMBERS = struct.Struct("<q9d4HBB")
+_OTHER = struct.Struct("<9d2H")  # of another puppet: its places as above, its iterations
 _ENDED = 1
 _MOST = 0xFFFF
+
+
+class Standing(NamedTuple):
+    """Where another puppet than the first is, right before the next tick; the same words as Checkpoint's."""
+
+    phrase: str
+    position_s: float
+    excerpt: tuple[float, float]
+    rate: float
+    standing: tuple[float, float, float]  # x, z, heading
+    strayed: tuple[float, float]
+    coding: int
+    interaction: int
+    let_go: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +46,8 @@ class Checkpoint:
     whose hands have let go; source: what is to take the phrase's place, else ""; applied: the generation of
     the show state that all this follows; boot: the machine's boot id; tick: of the last frame; restarts,
     power_cuts: how often the show went on after one; ended: the show was ended as it should; tries: starts
-    from here that produced no frame.
+    from here that produced no frame; others: the puppets beside the first; motion: parts of the show state
+    for the generator, by name, with their values.
     """
 
     show: str
@@ -54,6 +71,8 @@ class Checkpoint:
     tries: int = 0
     applied: int = 0
     source: str = ""
+    others: tuple[Standing, ...] = ()
+    motion: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
 
 def packed(place: Checkpoint) -> bytes:
@@ -74,9 +93,18 @@ def packed(place: Checkpoint) -> bytes:
         _ENDED * place.ended,
         place.tries,
     )
+    others = tuple([(other.phrase, other.let_go) for other in place.others])
     payload = numbers + _names(
-        *(place.show, place.phrase, place.cue, place.let_go, place.boot, place.applied, place.source)
+        *(place.show, place.phrase, place.cue, place.let_go, place.boot, place.applied, place.source),
+        *((others, place.motion) if others or place.motion else ()),
     )
+    payload += b"\0" if others else b""
+    for one in place.others:
+        payload += _OTHER.pack(
+            one.position_s, *one.excerpt, one.rate, *one.standing, *one.strayed, one.coding, one.interaction
+        )
+    if len(payload) > LARGEST and place.motion:
+        return packed(replace(place, motion=()))  # the place counts for more
     if len(payload) > LARGEST:
         raise ValueError(f"A place of {len(payload)} bytes is longer than {LARGEST}.")
     return payload
@@ -88,7 +116,8 @@ def unpacked(payload: bytes) -> Checkpoint | None:
         tick, position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, *small = (
             _NUMBERS.unpack_from(payload)
         )
-        show, phrase, cue, let_go, boot, applied, *later = plain_json(payload[_NUMBERS.size :])
+        names, numbers_of_others = _split(payload)
+        show, phrase, cue, let_go, boot, applied, *later = plain_json(names)
         place = Checkpoint(
             str(show),
             str(phrase),
@@ -110,12 +139,40 @@ def unpacked(payload: bytes) -> Checkpoint | None:
             bool(small[4] & _ENDED),
             small[5],
             int(applied),
-            *map(str, later[:1]),
+            str(later[0]) if later else "",
+            tuple(map(_standing, *later[1:2], numbers_of_others)) if later[1:] else (),
+            tuple((str(name), tuple(map(float, values))) for name, values in later[2]) if later[2:] else (),
         )
     except (struct.error, ValueError, TypeError):
         return None
-    sound = (position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z)
+    sound = [position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z]
+    for one in place.others:
+        sound += [one.position_s, *one.excerpt, one.rate, *one.standing, *one.strayed]
+    for _, values in place.motion:
+        sound += values
     return place if all(math.isfinite(number) for number in sound) else None
+
+
+def _split(payload: bytes) -> tuple[bytes, list[tuple[float, ...]]]:
+    """The names in a packed checkpoint, JSON without a zero byte, and the numbers of the other puppets."""
+    names, _, behind = payload[_NUMBERS.size :].partition(b"\0")
+    return names, list(_OTHER.iter_unpack(behind))
+
+
+def _standing(names: list[Any], numbers: tuple[float, ...]) -> Standing:
+    position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, coding, interaction = numbers
+    phrase, let_go = names
+    return Standing(
+        str(phrase),
+        position_s,
+        (start_s, end_s),
+        rate,
+        (x, z, heading),
+        (strayed_x, strayed_z),
+        int(coding),
+        int(interaction),
+        tuple(map(str, let_go)),
+    )
 
 
 class CheckpointWriter:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
+import time
+from collections import deque
+from pathlib import Path
 from queue import SimpleQueue
 
 WAITING_LINES = 200
+SAID, MOST_SAID = "said", 2000  # the file in the runtime folder, and how many lines it has at least
 _LAST_WORDS_S = 0.5
 
 
@@ -21,8 +26,17 @@ class LogWriter:
         # Its put() takes no lock: the real-time thread would wait for one that another thread holds.
         self._lines: SimpleQueue[str | None] = SimpleQueue()
         self.dropped = self._told = 0
+        self._kept: Path | None = None
+        self._last: deque[str] = deque(maxlen=MOST_SAID)
+        self._since_whole = 0  # lines since the file was written as a whole
         self._thread = threading.Thread(target=self._speak, name="speaker", daemon=True)
         self._thread.start()
+
+    def keep_in(self, path: Path) -> None:
+        """Keep the last lines in a file too, each with its time (Unix seconds): the page shows them."""
+        with contextlib.suppress(OSError):
+            path.write_bytes(b"")
+        self._kept = path
 
     def say(self, line: str) -> None:
         """Hand over one line; never waits, not even for a lock."""
@@ -49,4 +63,14 @@ class LogWriter:
             return  # the reader is gone: the show goes on
 
     def _write(self, line: str) -> None:
+        self._keep(f"{time.time():.3f} {line}\n")
         os.write(self._descriptor, f"{line}\n".encode(errors="backslashreplace"))
+
+    def _keep(self, line: str) -> None:
+        self._last.append(line)
+        if self._kept is None:
+            return
+        self._since_whole = (self._since_whole + 1) % MOST_SAID
+        said, mode = (line, "ab") if self._since_whole else ("".join(self._last), "wb")
+        with contextlib.suppress(OSError), self._kept.open(mode) as stream:
+            stream.write(said.encode(errors="backslashreplace"))

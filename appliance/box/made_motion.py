@@ -13,18 +13,20 @@ from appliance.pose.foreign_file import plain_json
 FOLDER = "material"  # in the runtime folder: what was made, as files
 FILE, KIND = "made_motion", "made_motion"
 KEPT_FILE, KEPT_KIND = "kept_motions", "kept_motions"
-_LARGEST, _LARGEST_KEPT = 4096, 8192
+_LARGEST, _LARGEST_KEPT = 16384, 8192
 
 
 class MadeMotion(NamedTuple):
     """recipe: JSON; file: its name in the runtime folder's `material`; name: of the source, or of what was
-    kept. at_once: it is to be danced now, not at the next return.
+    kept. at_once: it is to be danced now, not at the next return. from_s: the second of what is danced
+    from which it goes on; None: from none.
     """
 
     recipe: str
     file: str
     name: str
     at_once: bool
+    from_s: float | None = None
 
 
 class MadeMotionWriter:
@@ -97,8 +99,13 @@ def forget_made_motion(folder: Path) -> None:
 def _parsed(payload: bytes) -> MadeMotion | None:
     try:
         values = plain_json(payload)
+        from_s = values.get("from_s")
         return MadeMotion(
-            str(values["recipe"]), str(values["file"]), str(values["name"]), bool(values["at_once"])
+            str(values["recipe"]),
+            str(values["file"]),
+            str(values["name"]),
+            bool(values["at_once"]),
+            None if from_s is None else float(from_s),
         )
     except (ValueError, LookupError, TypeError):
         return None

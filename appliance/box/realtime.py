@@ -44,9 +44,7 @@ def enter_realtime(priority: int) -> tuple[str, ...]:
     a collection on a large heap took up to 118 ms. What a start has left (0.7 MB) is frozen too: looking for
     it would keep the first frame waiting for 25 ms.
     """
-    gc.freeze()
-    gc.disable()
-    sys.setswitchinterval(_SWITCH_INTERVAL_S)
+    share_the_interpreter()
     missing = (_take_priority(priority), _lock_memory(), _sharpen_timers())
     return tuple(words for words in missing if words)
 
@@ -61,6 +59,26 @@ def borrowed_priority(priority: int | None) -> Iterator[None]:
         yield
     finally:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def thread_priority(priority: int) -> str:
+    """Real-time priority for the calling thread alone; the reason where the system refuses it, else ""."""
+    if _is_realtime():
+        return ""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+    except (OSError, AttributeError) as error:
+        return _reason(error)
+    return ""
+
+
+def share_the_interpreter() -> None:
+    """For a thread that must not wait: other threads hand the interpreter over within 0.5 ms, and nothing
+    stops all of them to collect what a start has left.
+    """
+    gc.freeze()
+    gc.disable()
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
 
 
 def leave_realtime() -> None:
@@ -81,13 +99,9 @@ def _is_realtime() -> bool:
 
 
 def _take_priority(priority: int) -> str:
-    if _is_realtime():
-        return ""
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
-    except (OSError, AttributeError) as error:
+    if reason := thread_priority(priority):
         return (
-            f"No real-time priority ({_reason(error)}). The dance runs, but other programs can hold it up: "
+            f"No real-time priority ({reason}). The dance runs, but other programs can hold it up: "
             "on a busy machine one tick in a hundred came 25 to 340 ms late. "
             "Allow it with `ulimit -r 70`, with CPUSchedulingPolicy=fifo in the unit, or with the capability "
             "CAP_SYS_NICE."

@@ -16,6 +16,7 @@ FILE, KIND = "show_state", "show_state"
 MOTION = "motion "  # so begin parts of the dance that are for the generator
 LARGEST = 8192  # bytes; the longest names of a show fit, in any script
 
+_FADED = ("going", "master", "look", "card", "camera", "lights", "strings")
 Part = tuple[int, str, tuple[float, ...]]  # the generation that declared it, a text, numbers
 
 
@@ -23,7 +24,8 @@ Part = tuple[int, str, tuple[float, ...]]  # the generation that declared it, a 
 class ShowState:
     """What show control has declared; times are monotonic seconds of this machine, names are the show's.
 
-    look, lights: "" is the show's first. Fades run by themselves: readers pass the time at which they draw.
+    look, lights: "" is the show's first; card: "" is none; camera: what differs from the look's, by key.
+    Fades run by themselves: readers pass the time at which they draw.
 
     dance: what the stage applies, each part once, in this order: `cue` (name), `phrase` (name; fade in
     seconds), `iterations` (coding, interaction, fade in seconds), `rate` (of playback; none: the show's),
@@ -45,10 +47,22 @@ class ShowState:
     look_before: str = ""
     look_since: float = 0.0
     look_fade_s: float = 0.0
+    card: str = ""
+    card_before: str = ""
+    card_since: float = 0.0
+    card_fade_s: float = 0.0
+    camera: Mapping[str, float | str] = field(default_factory=dict)
+    camera_before: Mapping[str, float | str] = field(default_factory=dict)
+    camera_since: float = 0.0
+    camera_fade_s: float = 0.0
     lights: str = ""
     lights_before: str = ""
     lights_since: float = 0.0
     lights_fade_s: float = 0.0
+    strings: float = 1.0  # how loud they are
+    strings_before: float = 1.0
+    strings_since: float = 0.0
+    strings_fade_s: float = 0.0
     cue: str = ""  # the newest; "": none yet
     show: str = ""
     generation: int = 0
@@ -70,21 +84,29 @@ class ShowState:
 
     def master_level(self, now: float) -> float:
         """0..1: the master's fader on its way."""
-        part = _part(now, self.master_since, self.master_fade_s)
+        part = part_of_fade(now, self.master_since, self.master_fade_s)
         return self.master_before * (1.0 - part) + self.master * part
 
     def going_level(self, now: float) -> float:
         """0..1: 1 while the show goes, on its way to 0 after /stop and back to 1 after /go."""
-        part = _part(now, self.going_since, self.going_fade_s)
+        part = part_of_fade(now, self.going_since, self.going_fade_s)
         return part if self.going else 1.0 - part
 
     def look_mix(self, now: float) -> float:
         """0..1: how much of `look` is there already; the rest is `look_before`."""
-        return _part(now, self.look_since, self.look_fade_s)
+        return part_of_fade(now, self.look_since, self.look_fade_s)
+
+    def card_mix(self, now: float) -> float:
+        """0..1: how much of `card` is there already; the rest is `card_before`."""
+        return part_of_fade(now, self.card_since, self.card_fade_s)
+
+    def camera_mix(self, now: float) -> float:
+        """0..1: how far the camera is on its way from `camera_before` to `camera`."""
+        return part_of_fade(now, self.camera_since, self.camera_fade_s)
 
     def lights_mix(self, now: float) -> float:
         """0..1: how much of the mappings `lights` is there already; the rest is `lights_before`."""
-        return _part(now, self.lights_since, self.lights_fade_s)
+        return part_of_fade(now, self.lights_since, self.lights_fade_s)
 
     def with_going(self, going: bool, now: float, fade_s: float) -> ShowState:
         """Stop or go on from the brightness of this moment; `fade_s` is for the whole way."""
@@ -97,10 +119,30 @@ class ShowState:
         before = self.master_level(now)
         return replace(self, master=master, master_before=before, master_since=now, master_fade_s=fade_s)
 
+    def strings_level(self, now: float) -> float:
+        """0..1: how loud the strings are, on its way; master comes on top."""
+        part = part_of_fade(now, self.strings_since, self.strings_fade_s)
+        return self.strings_before * (1.0 - part) + self.strings * part
+
+    def with_strings(self, strings: float, now: float, fade_s: float) -> ShowState:
+        """Another loudness of the strings, from the one of this moment."""
+        before = self.strings_level(now)
+        return replace(self, strings=strings, strings_before=before, strings_since=now, strings_fade_s=fade_s)
+
     def with_look(self, look: str, now: float, fade_s: float) -> ShowState:
         """Another look, from the one that is seen most at this moment."""
         before = self.look if self.look_mix(now) >= 0.5 else self.look_before
         return replace(self, look=look, look_before=before, look_since=now, look_fade_s=fade_s)
+
+    def with_card(self, card: str, now: float, fade_s: float) -> ShowState:
+        """Another card, from the one that is seen most at this moment; "": none."""
+        before = self.card if self.card_mix(now) >= 0.5 else self.card_before
+        return replace(self, card=card, card_before=before, card_since=now, card_fade_s=fade_s)
+
+    def with_camera(self, camera: Mapping[str, float | str], now: float, fade_s: float) -> ShowState:
+        """Another place of the camera, from the one that is nearest at this moment; {}: the look's."""
+        before = self.camera if self.camera_mix(now) >= 0.5 else self.camera_before
+        return replace(self, camera=camera, camera_before=before, camera_since=now, camera_fade_s=fade_s)
 
     def with_lights(self, lights: str, now: float, fade_s: float) -> ShowState:
         """Another set of light mappings, from the one that is seen most at this moment."""
@@ -115,15 +157,17 @@ class ShowState:
         return replace(self, generation=number, dance=others | declared)
 
     def for_show(self, show: str) -> ShowState:
-        """Without the cue and the dance of another show."""
-        return self if show == self.show else replace(self, show=show, cue="", dance={})
+        """Without the cue, the camera and the dance of another show."""
+        if show == self.show:
+            return self
+        return replace(self, show=show, cue="", dance={}, camera={}, camera_before={})
 
     def settled(self, now: float) -> ShowState:
         """With fades that began in the future done: the machine's clock has restarted since."""
-        late = max(self.going_since, self.master_since, self.look_since, self.lights_since) > now
-        if not late:
+        if max(getattr(self, f"{part}_since") for part in _FADED) <= now:
             return self
-        return replace(self, going_fade_s=0.0, master_fade_s=0.0, look_fade_s=0.0, lights_fade_s=0.0)
+        done: dict[str, Any] = {f"{part}_fade_s": 0.0 for part in _FADED}
+        return replace(self, **done)
 
 
 _FIELDS = tuple(one.name for one in fields(ShowState))
@@ -178,7 +222,7 @@ def forget_show_state(folder: Path) -> None:
     (folder / FILE).unlink(missing_ok=True)
 
 
-def _part(now: float, since: float, fade_s: float) -> float:
+def part_of_fade(now: float, since: float, fade_s: float) -> float:
     """How much of a fade is over, 0..1."""
     if fade_s <= 0.0:
         return 1.0

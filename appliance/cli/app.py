@@ -35,6 +35,7 @@ _MODULES = {  # in each a function or a group of the command's name
     "control": "appliance.cli.control",
     "console": "appliance.cli.console",
     "generate": "appliance.cli.generate",
+    "kept": "appliance.cli.kept",
     "keep": "appliance.cli.keep",
     "check": "appliance.cli.check",
     "pack": "appliance.cli.check",

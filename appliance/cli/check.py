@@ -9,7 +9,8 @@ import typer
 
 from appliance.cli.network_proof import proved, require_danceable
 from appliance.cli.options import BoxFile
-from appliance.dancer.material.motion_network import MotionNetwork, MotionNetworkError
+from appliance.dancer.material.maker import open_network
+from appliance.dancer.material.motion_network import MotionNetworkError
 from appliance.pose.file_trouble import sentence
 from appliance.pose.foreign_file import content
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig, load_box
@@ -121,7 +122,7 @@ def _refuse_motion_networks(show: Show) -> None:
     problems = []
     for source, file in show.motion_networks.items():
         try:
-            MotionNetwork(file, show.skeleton.names)
+            open_network(source, file, show.skeleton.names)
         except MotionNetworkError as error:
             cure = "Copy the file again, or train it on this dancer's recordings."
             problems.append(show.file.problem(("motion", source), f"{file.name}: {error}", cure))
@@ -131,7 +132,10 @@ def _refuse_motion_networks(show: Show) -> None:
 
 def _refuse_misfits(show: Show, box: BoxConfig) -> None:
     """Raises ConfigError where the box file names joints or fixtures that do not fit this show."""
-    problems = [*box.output_misfits(show.skeleton.names), *misplaced(show, box)]
+    problems = [
+        *box.output_misfits(show.skeleton.names, len(show.config.hands_of_puppets)),
+        *misplaced(show, box),
+    ]
     if problems:
         raise ConfigError(problems)
 

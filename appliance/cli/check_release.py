@@ -69,7 +69,6 @@ def _danced(pair: Pair) -> tuple[float, float]:
     from appliance.cli.check import verified_parts, without_ports
     from appliance.show.box import load_box
     from appliance.show.show import load_show
-    from appliance.stage.iterations import Iterations
     from appliance.stage.sensor_fit import SensorFit
     from appliance.stage.sensor_memory import SensorMemory
     from appliance.stage.stage_parts import assemble
@@ -78,8 +77,8 @@ def _danced(pair: Pair) -> tuple[float, float]:
     verdict = verified_parts(pair.show, pair.box)[1]
     box = load_box(pair.box)
     parts, memory = assemble(load_show(pair.show), without_ports(box)), SensorMemory(None, print)
-    iterations = Iterations(verdict.coding, verdict.interaction, verdict.most_coding)
-    tick = Tick(parts, SensorFit(parts, memory, print), iterations, latest_start_s=TICK_S)
+    parts.run_with(verdict)
+    tick = Tick(parts, SensorFit(parts, memory, print), parts.first.iterations, latest_start_s=TICK_S)
     costs_ms: list[float] = []
     for number in range(_TICKS):
         started, begun = time.monotonic(), time.thread_time()

@@ -6,19 +6,23 @@ import contextlib
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from appliance.box.parent_death import PARENT
 from appliance.sensor.keys import create_keys
-from appliance.sensor.neutral import STILL_S
 from appliance.show.box import BoxConfig, UdpConfig
 from appliance.show.show import Show
 from appliance.stage.stage_error import StageError
 
 _LAST_WORDS_S = 2.0
-_STAND_STILL_S = STILL_S + 0.2  # the neutral pose is taken; then the hand leads
+_STAND_STILL_S = (
+    0.8  # a double tap, half a second of stillness: the neutral pose is taken; then the hand leads
+)
+_CALLING_WITHIN_S = 15.0
+_WORDS = "emulator.txt"
 
 
 @contextmanager
@@ -31,12 +35,12 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     names = list(dict.fromkeys(hand.sensor for hand in show.config.hands if hand.sensor))
     if not names:
         raise StageError("This show has no sensors to emulate. Leave --emulate out.")
-    keys, words = scratch / "sensors.keys", scratch / "emulator.txt"
+    keys, words = scratch / "sensors.keys", scratch / _WORDS
     create_keys(keys, names)
     udp = box.sensors.udp or UdpConfig()
     command = [
         *(sys.executable, "-m", "appliance.cli", "emulate", "--keys", str(keys), "--motion", "dance"),
-        *("--host", udp.host, "--port", str(udp.port), "--stand-still", str(_STAND_STILL_S)),
+        *("--host", udp.host, "--port", str(udp.port), "--stand-still", str(_STAND_STILL_S), "--tap"),
     ]
     sensors = box.sensors.model_copy(update={"udp": udp, "keys": keys})
     journal = box.journal.model_copy(update={"folder": None})
@@ -59,3 +63,13 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
             process.wait(_LAST_WORDS_S)
         process.kill()
         process.wait()
+
+
+def wait_until_calling(scratch: Path) -> None:
+    """Until the emulated sensors call the box, so that the hand leads from the dance's first second on.
+
+    Goes on without them after some seconds, or where they ended.
+    """
+    deadline = time.monotonic() + _CALLING_WITHIN_S
+    while not (scratch / _WORDS).stat().st_size and time.monotonic() < deadline:
+        time.sleep(0.02)

@@ -73,7 +73,8 @@ def retarget(
 
     require_known_ending(out)
     dance, _ = read_as_told(phrase, reading)
-    other, _ = read_as_told(to / "skeleton.bvh" if to.is_dir() else to, reading)
+    of_a_show = to.is_dir()  # its skeleton is in the stage's frame already
+    other, _ = read_as_told(to / "skeleton.bvh") if of_a_show else read_as_told(to, reading)
     try:
         found = put_on(dance, other.skeleton)
     except ValueError as error:

@@ -70,15 +70,15 @@ def _commands(box: BoxConfig) -> Iterator[str]:
 
 
 def _page(box: BoxConfig) -> Iterator[str]:
-    """From the listed viewers, IPv4 and IPv6 apart, as nft has them."""
-    console = box.console
-    if console is None or _is_loopback(console.host) or not console.port:
-        return
-    for family, version in (("ip", 4), ("ip6", 6)):
-        networks = [one for one in console.viewers if ipaddress.ip_network(one).version == version]
-        if networks:
-            viewers = ", ".join(networks)
-            yield f'{family} saddr {{ {viewers} }} tcp dport {console.port} accept comment "the page"'
+    """The page and the stream, from the listed viewers, IPv4 and IPv6 apart, as nft has them."""
+    for served, name in ((box.console, "the page"), (box.projector.stream, "the stream")):
+        if served is None or _is_loopback(served.host) or not served.port:
+            continue
+        for family, version in (("ip", 4), ("ip6", 6)):
+            networks = [one for one in served.viewers if ipaddress.ip_network(one).version == version]
+            if networks:
+                viewers = ", ".join(networks)
+                yield f'{family} saddr {{ {viewers} }} tcp dport {served.port} accept comment "{name}"'
 
 
 def _own_network(access_points: Sequence[str]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from appliance.box.leftovers import forget_run
-from appliance.box.log_writer import LogWriter
+from appliance.box.log_writer import SAID, LogWriter
 from appliance.box.stop_signals import stop_signals
 from appliance.cli.readings import readings_line
 from appliance.sensor.memory import forget_memory
@@ -68,7 +68,7 @@ def play_show(
         stopped = opened.enter_context(stop_signals())
         scratch = _scratch(opened) if emulate or filmstrip or rehearse else None
         if emulate and scratch:
-            from appliance.cli.emulation import emulated
+            from appliance.cli.emulation import emulated, wait_until_calling
 
             box = opened.enter_context(emulated(show, box, scratch))
         keeps, minutes = journal is not None, box.journal.minutes
@@ -87,10 +87,12 @@ def play_show(
             begin_in(cue, show, control)
         page = None
         if box.console is not None and not alone:
-            from appliance.cli.console import open_console_port, page_companion
+            from appliance.cli.console import page_companion
+            from appliance.cli.page_address import open_console_port
 
             page = opened.enter_context(open_console_port(box.console, or_any=True))
         stage = Stage(show, box, speaker.say, box.path, rehearsal=emulate)
+        speaker.keep_in(stage.sharing.folder / SAID)
         with closing(stage):
             keepers_box = _rehearsal_box(stage, scratch) if emulate and scratch else box.path
             keeper = _keeper(keepers_box, journal, minutes) if keeps else None
@@ -100,6 +102,8 @@ def play_show(
             companions = () if alone else tuple(_companions(show, box, control, window or shown))
             if page is not None:
                 companions += (page_companion(box, page, control, speaker.say, emulate, journal),)
+            if emulate and scratch:
+                wait_until_calling(scratch)
             with _running(companions + (() if keeper is None else (keeper,)), speaker, stage):
                 stage.dance(seconds, stopped)
             if keeper is not None:

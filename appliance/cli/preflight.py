@@ -43,13 +43,13 @@ def preflight(options: Options, say: Callable[[str], None], uptime_s: float) -> 
             os.nice(19)
     try:
         if not options.late:  # this dances even if the new show ends this process
-            _publish(places, Outcome(chosen_before(places), False, ()), False, uptime_s, say)
+            publish(places, Outcome(chosen_before(places), False, ()), False, uptime_s, say)
         patience_s = LATE_TURN_S if options.late else TURN_S
         with alone_in(options.data, patience_s), alone_in(options.run, patience_s):
             outcome = _found(options, places)
             for words in outcome.words:
                 say(words)
-            _publish(places, outcome, options.late, uptime_s, say)
+            publish(places, outcome, options.late, uptime_s, say)
     except BlockingIOError:
         say("Another preflight has not ended. What danced before goes on. Plug the stick in again.")
     except OSError as error:
@@ -89,10 +89,18 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _publish(
-    places: Places, outcome: Outcome, late: bool, uptime_s: float, say: Callable[[str], None]
+def publish(
+    places: Places,
+    outcome: Outcome,
+    late: bool,
+    uptime_s: float,
+    say: Callable[[str], None],
+    restarts: bool = True,
 ) -> None:
-    """Write the choice where all processes look for it; a show that has run for long is not interrupted."""
+    """Write the choice where all processes look for it; a show that has run for long is not interrupted.
+
+    restarts: the units start anew with it; else the caller sees to that.
+    """
     path = places.run / CHOSEN
     before = Choice.read(path) if late else None
     if before is not None and (not outcome.taken or uptime_s >= _AT_ONCE_S):
@@ -103,7 +111,7 @@ def _publish(
     choice = outcome.choice.complete(built_in_box(places))._replace(data=places.data)
     aside = () if before is None else before.aside  # also what the stage put aside during the checks
     choice.without(Choice(aside=tuple(one for one in aside if one.id != choice.first.id))).write(path)
-    if before is not None:
+    if before is not None and restarts:
         (places.run / ANEW).touch()
         say("The box was switched on only just now: the new show dances at once.")
 

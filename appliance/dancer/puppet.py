@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import onnxruntime
@@ -55,6 +56,15 @@ class Puppet:
                 f"{path}: the network moves joints that this skeleton does not have. {error} "
                 "Use the skeleton that the network was trained on."
             ) from None
+        self._clear_memory()
+
+    def another(self) -> Self:
+        """A puppet of the same network: it shares the session, and nothing that changes."""
+        other = copy(self)
+        other._clear_memory()
+        return other
+
+    def _clear_memory(self) -> None:
         self.is_broken = False
         self._window = np.zeros((self.window, len(self.joints), 4), dtype=np.float32)
         self._sound: FloatArray | None = None

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from appliance.outputs.frame_reader import SeenFrame
+from appliance.outputs.motion_features import MotionFeatures
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
-from appliance.show.light_rules import RuleConfig
+from appliance.show.light_rules import FEATURES, RuleConfig
 
 SMOOTHING_S = 0.06  # of speeds: three ticks, so that one late frame is no step
 PAUSE_S = 0.2  # without a new frame for this long, nothing moves
@@ -20,29 +22,43 @@ _COORDINATE = {"across": 0, "height": 1, "depth": 2}
 
 
 class Dance:
-    """The newest frame and how fast its joints move. Arrays are (J, ...) in the skeleton's order."""
+    """The newest frame and how fast its joints move. Arrays are (J, ...) in the skeleton's order.
 
-    def __init__(self, skeleton: Skeleton) -> None:
+    It is the first puppet's; `of` gives those of the others.
+    """
+
+    def __init__(self, skeleton: Skeleton, puppets: Sequence[str] = ()) -> None:
+        """puppets: the names of several, else ()."""
         self.skeleton = skeleton
+        self._others = {name: Dance(skeleton) for name in puppets[1:]}
         joints = len(skeleton)
         self.positions: NDArray[np.float64] = np.zeros((joints, 3))  # world, metres
         self.pose: NDArray[np.float64] = np.tile(quaternion.IDENTITY.astype(float), (joints, 1))
         self.world = self.pose.copy()
         self.speeds: NDArray[np.float64] = np.zeros(joints)  # metres a second
         self.body_speed = 0.0
+        self._features: MotionFeatures | None = None  # made when a rule first reads one
+        self._felt: dict[str, float] = dict.fromkeys(FEATURES, 0.0)  # smoothed
         self._time = -math.inf
         self._tick: tuple[int, int] | None = None
 
     def take_frame(self, frame: SeenFrame, generation: int, now: float) -> None:
         """Take the newest frame, which may be the same again; `generation`: the stage's."""
+        for dance, other in zip(self._others.values(), frame.others, strict=False):
+            dance.take_frame(other, generation, now)
         tick = (generation, frame.tick)
         if tick == self._tick:
             if now - self._time > PAUSE_S:
                 self._settle(np.zeros_like(self.speeds), PAUSE_S)
+                self._feel(dict.fromkeys(FEATURES, 0.0), PAUSE_S)
             return
         if (not frame.late or self._tick is None) and np.isfinite(frame.positions).all():
             self._measure(frame, generation)
         self._tick = tick
+
+    def of(self, puppet: str | None) -> Dance:
+        """The dance of a puppet; None: the first."""
+        return self if puppet is None else self._others.get(puppet, self)
 
     def read(self, rule: RuleConfig) -> float:
         """What a rule reads now: metres, metres a second or degrees."""
@@ -51,6 +67,9 @@ class Dance:
             return float(self.positions[joint, _COORDINATE[rule.reads]])
         if rule.reads == "speed":
             return self.body_speed if rule.joint is None else float(self.speeds[joint])
+        if rule.reads in self._felt:
+            self._features = self._features or MotionFeatures(len(self.skeleton))
+            return self._felt[rule.reads]
         turned = self.pose[joint] if rule.relative else self.world[joint]
         return turn(turned, rule.axis) if rule.reads == "turn" else lean(turned, rule.axis)
 
@@ -64,15 +83,25 @@ class Dance:
         continues = self._tick is not None and self._tick[0] == generation
         if continues and 0.0 < elapsed_s < PAUSE_S:
             speeds = np.linalg.norm(frame.positions - self.positions, axis=-1) / elapsed_s
+            if speeds.max() > FASTEST_M_S and self._features is not None:
+                self._features = MotionFeatures(len(self.skeleton))  # a jump: motion begins anew
             self._settle(np.minimum(speeds, FASTEST_M_S), elapsed_s)
         else:
             self._settle(np.zeros_like(self.speeds), PAUSE_S)
         self.positions[:], self.pose[:], self.world[:] = frame.positions, frame.pose, frame.world
         self._time = frame.frame_time
+        if self._features is not None:
+            self._features.take_frame(frame.positions, frame.frame_time)
+            self._feel({name: float(self._features.numbers[name][0]) for name in FEATURES}, elapsed_s)
 
     def _settle(self, speeds: NDArray[np.float64], elapsed_s: float) -> None:
         self.speeds += (speeds - self.speeds) * (1.0 - math.exp(-elapsed_s / SMOOTHING_S))
         self.body_speed = float(self.speeds.mean())
+
+    def _feel(self, numbers: Mapping[str, float], elapsed_s: float) -> None:
+        share = 1.0 - math.exp(-elapsed_s / SMOOTHING_S)
+        for name, number in numbers.items():
+            self._felt[name] += (number - self._felt[name]) * share
 
 
 def turn(q: NDArray[np.float64], axis: tuple[float, float, float]) -> float:

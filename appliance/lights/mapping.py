@@ -102,7 +102,7 @@ class _Rule:
         if config.reads == "steady":
             wanted = config.value
         else:
-            wanted = bent(config, share(dance.read(config), config.ends))
+            wanted = bent(config, share(dance.of(config.puppet).read(config), config.ends))
         if self._level is not None:
             wanted = eased(self._level, wanted, config.attack_s, config.release_s, seconds)
         self._level = wanted
@@ -124,7 +124,7 @@ class _Aim:
             for place, head in enumerate(patch.heads.heads)
             if not config.fixtures or head.fixture.name in config.fixtures
         ]
-        self._joint = config.joint
+        self._joint, self._puppet = config.joint, config.puppet
         self._point = None if config.reads == "place" else np.array(config.at)
         self._offset = np.array(config.offset)
 
@@ -132,7 +132,7 @@ class _Aim:
         """Nothing to reset: only the heads' own speed limits an aim."""
 
     def apply(self, dance: Dance, seconds: float, output: MappingOutput) -> None:
-        point = dance.place(self._joint) if self._point is None else self._point
+        point = dance.of(self._puppet).place(self._joint) if self._point is None else self._point
         output.aims[self.heads] = point + self._offset
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from appliance.box.pace import Pace
@@ -31,10 +33,15 @@ class Rig:
     """
 
     def __init__(
-        self, config: LightsConfig, patch: Patch, skeleton: Skeleton, rate_hz: float = USUAL_RATE_HZ
+        self,
+        config: LightsConfig,
+        patch: Patch,
+        skeleton: Skeleton,
+        rate_hz: float = USUAL_RATE_HZ,
+        puppets: Sequence[str] = (),
     ) -> None:
         self.patch = patch
-        self.dance = Dance(skeleton)
+        self.dance = Dance(skeleton, puppets)
         self.safety = 1.0  # 0: the dance alone; 1: the safe look alone
         self._safe, self._homes = _safe_look(config.safe, patch), config.safe.heads == "home"
         self.values: Values = patch.dimmed(self._safe, 1.0)  # (S,) what the last pass showed

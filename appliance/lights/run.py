@@ -49,7 +49,8 @@ class Lights:
         config = rig_here(show, box)
         patch = Patch(config.fixtures, show.directory)
         self.show, self.box = show, box
-        self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz)
+        puppets = [puppet.name for puppet in show.config.puppets]
+        self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz, puppets)
         self.universes = wired(patch, box)
         self._stage, self._show_state, self._say, self._fallbacks = stage, show_state, say, fallbacks
         self._foreign: int | None = None

@@ -11,18 +11,22 @@ HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
 LATE = 1  # flag
 # Tick, frame time, when it left the stage, the sensor's sequence and its arrival, flags, joints.
 FRAME_HEAD = struct.Struct("<qddqdII")
-# For browsers: tick, flags, joints; then world rotations (w, x, y, z), positions and holds, float32.
+# For browsers: tick, flags, joints; then each puppet's world rotations (w, x, y, z), positions and holds,
+# float32.
 BROWSER_HEAD = struct.Struct("<dII")
 
 
 class FrameLayout:
-    """Where the arrays of J joints lie in a frame's payload: all float32, little-endian, in this order."""
+    """Where the arrays of J joints lie in a frame's payload: all float32, little-endian, in this order. Those
+    of further puppets lie behind those of the first, `stride` bytes from one to the next.
+    """
 
-    def __init__(self, joints: int) -> None:
-        self.joints = joints
+    def __init__(self, joints: int, puppets: int = 1) -> None:
+        self.joints, self.puppets = joints, puppets
         self.root_at = FRAME_HEAD.size
         self.pose_at = self.root_at + 12
         self.world_at = self.pose_at + 16 * joints
         self.positions_at = self.world_at + 16 * joints
         self.holds_at = self.positions_at + 12 * joints
-        self.bytes = self.holds_at + 4 * joints
+        self.stride = self.holds_at + 4 * joints - self.root_at
+        self.bytes = self.root_at + puppets * self.stride

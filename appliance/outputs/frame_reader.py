@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -49,6 +49,9 @@ class SeenFrame:
     positions: NDArray[np.float32]  # (J, 3) world, metres
     root: NDArray[np.float32]  # (3,) world, metres
     holds: NDArray[np.float32]  # (J,) 0..1: how firmly a hand holds each joint
+    others: tuple[SeenFrame, ...] = field(
+        default=(), kw_only=True
+    )  # of the puppets beside the first, in their order
 
 
 class FrameReader:
@@ -141,12 +144,12 @@ class FrameReader:
         except (ValueError, KeyError, TypeError):
             self._file.refuse(f"holds no facts about a show. Start {WRITER} again.")
             return
-        self._layout = FrameLayout(len(self.facts.skeleton))
+        self._layout = self.facts.layout
         self.generation += 1
 
     def _frame(self, payload: bytes, now: float) -> SeenFrame | None:
         """None for frames that must not be shown: not finite, or from before this machine's restart."""
-        layout, joints = self._layout, self._layout.joints
+        layout = self._layout
         if len(payload) != layout.bytes:
             return None
         tick, frame_time, left, sequence, arrival, flags, _ = FRAME_HEAD.unpack_from(payload)
@@ -154,16 +157,18 @@ class FrameReader:
         is_ahead = frame_time > now + _AHEAD_S and frame_time > self._monotonic() + _AHEAD_S
         if is_ahead or not np.isfinite(numbers).all():
             return None
-        return SeenFrame(
-            tick,
-            frame_time,
-            left,
-            bool(flags & LATE),
-            sequence,
-            arrival,
-            np.frombuffer(payload, "<f4", 4 * joints, layout.pose_at).reshape(joints, 4),
-            np.frombuffer(payload, "<f4", 4 * joints, layout.world_at).reshape(joints, 4),
-            np.frombuffer(payload, "<f4", 3 * joints, layout.positions_at).reshape(joints, 3),
-            np.frombuffer(payload, "<f4", 3, layout.root_at),
-            np.frombuffer(payload, "<f4", joints, layout.holds_at),
-        )
+        head = tick, frame_time, left, bool(flags & LATE), sequence, arrival
+        others = (SeenFrame(*head, *_arrays(payload, layout, one)) for one in range(1, layout.puppets))
+        return SeenFrame(*head, *_arrays(payload, layout, 0), others=tuple(others))
+
+
+def _arrays(payload: bytes, layout: FrameLayout, puppet: int) -> tuple[NDArray[np.float32], ...]:
+    """A puppet's pose, world, positions, root and holds."""
+    joints, at = layout.joints, puppet * layout.stride
+    return (
+        np.frombuffer(payload, "<f4", 4 * joints, at + layout.pose_at).reshape(joints, 4),
+        np.frombuffer(payload, "<f4", 4 * joints, at + layout.world_at).reshape(joints, 4),
+        np.frombuffer(payload, "<f4", 3 * joints, at + layout.positions_at).reshape(joints, 3),
+        np.frombuffer(payload, "<f4", 3, at + layout.root_at),
+        np.frombuffer(payload, "<f4", joints, at + layout.holds_at),
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from appliance.outputs.datagram_sender import DatagramSender
@@ -17,9 +17,11 @@ from appliance.show.box import OutputsConfig
 class Outputs:
     """The receivers that the stage sends joint frames to; lights and projector read the shared frame."""
 
-    def __init__(self, config: OutputsConfig, skeleton: Skeleton) -> None:
-        self._osc = OscOutputs(config.osc, skeleton, "osc" in config.model_fields_set)
-        self._posistagenet = tuple(PosiStageNet(one, skeleton) for one in config.posistagenet)
+    def __init__(self, config: OutputsConfig, skeleton: Skeleton, puppets: Sequence[str] = ()) -> None:
+        """puppets: their names; (): one, without a name."""
+        names = puppets or ("",)
+        self._osc = OscOutputs(config.osc, skeleton, "osc" in config.model_fields_set, len(names))
+        self._posistagenet = tuple(PosiStageNet(one, skeleton, names) for one in config.posistagenet)
         self.receivers: tuple[DatagramSender, ...] = (*self._osc.receivers, *self._posistagenet)
         self._shared: FrameWriter | None = None
 
@@ -27,13 +29,13 @@ class Outputs:
         """Write frames to `shared` too, until `close`."""
         self._shared = shared
 
-    def publish_frame(self, frame: JointFrame) -> None:
-        """Send one frame to every receiver and share it. Never waits, never raises."""
-        self._osc.send_frame(frame)
+    def publish_frame(self, frame: JointFrame, *others: JointFrame) -> None:
+        """Send one frame of each puppet to every receiver and share them. Never waits, never raises."""
+        self._osc.send_frame(frame, *others)
         for output in self._posistagenet:
-            output.send_frame(frame)
+            output.send_frame(frame, *others)
         if self._shared is not None:
-            self._shared.write(frame)
+            self._shared.write(frame, *others)
 
     def publish_health(self, health: Mapping[str, Any]) -> None:
         """Share how the box is; once a second, after the frame has left."""

@@ -15,7 +15,9 @@ from appliance.show.osc import OscConfig
 class OscOutputs:
     """All OSC receivers of a box. Encoded once a frame for all receivers that want the same."""
 
-    def __init__(self, configs: Sequence[OscConfig], skeleton: Skeleton, asked_for: bool = True) -> None:
+    def __init__(
+        self, configs: Sequence[OscConfig], skeleton: Skeleton, asked_for: bool = True, puppets: int = 1
+    ) -> None:
         self.receivers = tuple(
             DatagramSender(
                 f"{config.host}:{config.port} ({config.dialect})",
@@ -26,18 +28,27 @@ class OscOutputs:
         )
         self._frame_message = FrameMessage()
         forms = [config.model_dump_json(exclude={"host", "port", "frame_message"}) for config in configs]
-        self._encoders = {
-            form: DIALECTS[config.dialect](skeleton, config)
-            for form, config in dict(zip(forms, configs, strict=True)).items()
-        }
+        self._encoders = [  # of each puppet
+            {
+                form: DIALECTS[config.dialect](skeleton, addressed, config.number_of(puppet))
+                for form, config in dict(zip(forms, configs, strict=True)).items()
+                if (addressed := config.of_puppet(puppet)) is not None
+            }
+            for puppet in range(puppets)
+        ]
         self._audience = list(zip(configs, forms, self.receivers, strict=True))
 
-    def send_frame(self, frame: JointFrame) -> None:
-        """Send one frame to every receiver. Never waits, never raises."""
+    def send_frame(self, frame: JointFrame, *others: JointFrame) -> None:
+        """Send one frame of each puppet to every receiver. Never waits, never raises."""
         mark = self._frame_message.encode(frame)
-        encoded = {form: encoder.encode(frame) for form, encoder in self._encoders.items()}
+        first, *more = (
+            {form: encoder.encode(one) for form, encoder in encoders.items()}
+            for one, encoders in zip((frame, *others), self._encoders, strict=True)
+        )
         for config, form, receiver in self._audience:
-            datagrams = encoded[form]
+            datagrams = first.get(form, ())
+            for encoded in more:
+                datagrams = (*datagrams, *encoded.get(form, ()))
             marked = (*mark, *datagrams) if config.frame_message else datagrams
             receiver.send_datagrams(marked, frame.frame_time)
 

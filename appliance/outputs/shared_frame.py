@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,8 @@ from appliance.outputs.joint_frame import JointFrame
 from appliance.pose.foreign_file import plain_json
 from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
 
+_Arrays = tuple[np.ndarray[Any, np.dtype[np.float32]], ...]
+
 
 @dataclass(frozen=True)
 class Facts:
@@ -50,8 +52,18 @@ class Facts:
     most_iterations: int
     pid: int
     started: float  # seconds on the monotonic clock
-    springs: tuple[str, ...] = ()  # names of their settings
+    springs: tuple[str, ...] = ()  # names of their settings, first the one at the start
+    springs_feedback: Mapping[str, float] = field(default_factory=dict)  # 0..1, of each setting
+    has_strings: bool = False
     rehearsal: bool = False  # its sensors are emulated: nothing is kept
+    cards: tuple[str, ...] = ()
+    puppets: tuple[str, ...] = ()  # their names; (): one, without a name
+    motion: Mapping[str, Any] = field(default_factory=dict)  # sources that are made ahead, as in show.yaml
+
+    @property
+    def layout(self) -> FrameLayout:
+        """How its frames lie."""
+        return FrameLayout(len(self.skeleton), len(self.puppets) or 1)
 
     def packed(self) -> bytes:
         """As JSON."""
@@ -74,7 +86,7 @@ class Facts:
         """From JSON. Raises ValueError, KeyError or TypeError for foreign data."""
         facts = plain_json(packed)
         skeleton, box_file = facts["skeleton"], facts["box_file"]
-        names = ("held", "hands", "phrases", "cues", "looks", "lights", "springs")
+        names = ("held", "hands", "phrases", "cues", "looks", "lights", "springs", "cards", "puppets")
         return cls(
             **facts
             | {name: tuple(facts[name]) for name in names}
@@ -100,23 +112,18 @@ class FrameWriter:
 
     def __init__(self, folder: Path, facts: Facts, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._monotonic = monotonic
-        packed, layout = facts.packed(), FrameLayout(len(facts.skeleton))
+        packed, layout = facts.packed(), facts.layout
         shapes = [(1, len(packed)), (HEALTH_SLOTS, HEALTH_BYTES), (FRAME_SLOTS, layout.bytes)]
         self._file = RingFileWriter.new(folder / FILE, KIND, FORMAT, shapes)
         self._file.rings[FACTS].write(packed)
         self._ring = self._file.rings[FRAMES]
         self._payload = payload = self._ring.payload
         self._joints = layout.joints
-        self._root = np.frombuffer(payload, "<f4", 3, layout.root_at)
-        self._holds = np.frombuffer(payload, "<f4", layout.joints, layout.holds_at)
-        self._pose, self._world, self._positions = (
-            np.frombuffer(payload, "<f4", layout.joints * width, at).reshape(layout.joints, width)
-            for width, at in ((4, layout.pose_at), (4, layout.world_at), (3, layout.positions_at))
-        )
+        self._arrays = [_arrays(payload, layout, puppet) for puppet in range(layout.puppets)]
         self._file.publish()
 
-    def write(self, frame: JointFrame) -> None:
-        """Publish a frame: one copy, no system call, nothing for the collector."""
+    def write(self, frame: JointFrame, *others: JointFrame) -> None:
+        """Publish the frames of all puppets: one copy, no system call, nothing for the collector."""
         FRAME_HEAD.pack_into(
             self._payload,
             0,
@@ -128,12 +135,20 @@ class FrameWriter:
             LATE if frame.late else 0,
             self._joints,
         )
-        self._root[...] = frame.root
-        self._pose[...] = frame.pose
-        self._world[...] = frame.world
-        self._positions[...] = frame.positions
-        self._holds[...] = frame.holds
+        self._fill(self._arrays[0], frame)
+        if others:
+            for puppet, other in enumerate(others, 1):
+                self._fill(self._arrays[puppet], other)
         self._ring.publish()
+
+    @staticmethod
+    def _fill(arrays: _Arrays, frame: JointFrame) -> None:
+        root, pose, world, positions, holds = arrays
+        root[...] = frame.root
+        pose[...] = frame.pose
+        world[...] = frame.world
+        positions[...] = frame.positions
+        holds[...] = frame.holds
 
     def write_health(self, health: Mapping[str, Any]) -> None:
         """Publish the box's health, after the frame has left; a list that is too long loses its end."""
@@ -148,3 +163,15 @@ class FrameWriter:
     def close(self) -> None:
         """Remove the file: readers find no stage."""
         self._file.close(remove=True)
+
+
+def _arrays(payload: memoryview, layout: FrameLayout, puppet: int) -> _Arrays:
+    """Where a puppet's root (3,), pose (J, 4), world (J, 4), positions (J, 3) and holds (J,) are written."""
+    joints, at = layout.joints, puppet * layout.stride
+    root = np.frombuffer(payload, "<f4", 3, at + layout.root_at)
+    holds = np.frombuffer(payload, "<f4", joints, at + layout.holds_at)
+    pose, world, positions = (
+        np.frombuffer(payload, "<f4", joints * width, at + begin).reshape(joints, width)
+        for width, begin in ((4, layout.pose_at), (4, layout.world_at), (3, layout.positions_at))
+    )
+    return root, pose, world, positions, holds

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 _HEAD = struct.Struct("<QII")  # number, kind, bytes
+_PIECE = struct.Struct("<HH")  # which piece of a long event, of how many; they follow each other
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +15,7 @@ class Entry:
     """A tick (its record) or an event (JSON); `number` counts both."""
 
     number: int
-    kind: int  # record.TICK, record.EVENT
+    kind: int  # record.TICK, record.EVENT, record.PIECE
     data: bytes
 
 
@@ -35,3 +36,30 @@ def unpacked(data: bytes) -> Iterator[Entry]:
             return
         yield Entry(number, kind, data[at : at + length])
         at += length
+
+
+def pieces_of(event: bytes, most_bytes: int) -> Iterator[bytes]:
+    """A long event as the data of several entries, each of `most_bytes` at most."""
+    size = most_bytes - _PIECE.size
+    count = -(-len(event) // size)
+    for place in range(count):
+        yield _PIECE.pack(place, count) + event[place * size : (place + 1) * size]
+
+
+class Pieces:
+    """Puts long events together, whatever segments their pieces lie in."""
+
+    def __init__(self) -> None:
+        self._kept: dict[int, bytes] = {}
+
+    def whole(self, piece: Entry) -> bytes | None:
+        """The event that ends with this piece; None before its last one, or if one is lost.
+
+        Raises struct.error or LookupError for what is no piece.
+        """
+        place, count = _PIECE.unpack_from(piece.data)
+        self._kept[piece.number] = piece.data[_PIECE.size :]
+        numbers = range(piece.number - place, piece.number - place + count)
+        if numbers[-1] != piece.number or not all(number in self._kept for number in numbers):
+            return None
+        return b"".join(self._kept.pop(number) for number in numbers)

@@ -18,7 +18,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.recorder import chunks, log
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import POSITION
-from appliance.recorder.record import DAMAGED, EVENT, TICK, layout_of, require_sound, skeleton_of
+from appliance.recorder.record import DAMAGED, EVENT, PIECE, TICK, layout_of, require_sound, skeleton_of
 from appliance.recorder.segments import SUFFIX, segment_paths
 
 EXPORTED = ".bunraku"
@@ -231,6 +231,7 @@ class _Part:
     ticks: dict[int, bytes] = field(default_factory=dict)
     events: dict[int, dict[str, Any]] = field(default_factory=dict)
     keyframes: dict[int, bytes] = field(default_factory=dict)
+    pieces: log.Pieces = field(default_factory=log.Pieces)
 
     @property
     def has_ticks(self) -> bool:
@@ -271,9 +272,11 @@ def _add(parts: dict[str, _Part], data: bytes, room: _Room) -> None:
                     if len(entry.data) != tick_bytes:
                         raise ValueError("a tick of another length")
                     part.ticks[entry.number] = entry.data
-                elif entry.kind == EVENT:
+                elif entry.kind in (EVENT, PIECE):
                     room.take(_OF_JSON * len(entry.data))
-                    part.events[entry.number] = _event(entry.data)
+                    event = entry.data if entry.kind == EVENT else part.pieces.whole(entry)
+                    if event is not None:
+                        part.events[entry.number] = _event(event)
 
 
 def _event(data: bytes) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from appliance.show.show import Show
 
 LATE, NOT_FINITE, JUMPED, RESENT = 1, 2, 4, 8  # flags of a tick; RESENT: it sent the last pose once more
 SECTIONS = ("drain", "motion", "puppeteers", "puppet", "blend", "figure", "send")
-TICK, EVENT = 1, 2  # kinds of entries
+TICK, EVENT, PIECE = 1, 2, 3  # kinds of entries; PIECE: of an event that is too long for one entry
 ORDER = "order"  # kind of the event that show control asked for something, and what came of it
 # What facts, events and ticks raise that no box wrote.
 DAMAGED = (ValueError, LookupError, ArithmeticError, TypeError, AttributeError, RecursionError, struct.error)
@@ -25,8 +25,10 @@ _LONGEST_TICK_S, _LAST_WRITTEN_AT = 1.0, 1e11  # seconds, and seconds since 1970
 SAID = "said"  # kind of the event that people were told something
 
 
-def record(joints: int, hands: int, sensors: int, live: int) -> np.dtype[np.void]:
+def record(joints: int, hands: int, sensors: int, live: int, others: int = 0) -> np.dtype[np.void]:
     """One tick: its slot, what it heard, what it made of it, and how long that took.
+
+    others: puppets beside the first, whose frames others_* hold; without them there are no such fields.
 
     live: 1 for a show with a live dancer, else 0. live_*: the pose that came of it in this tick; the arrival
     is not a number where none did.
@@ -58,8 +60,18 @@ def record(joints: int, hands: int, sensors: int, live: int) -> np.dtype[np.void
             ("reading_times", "<f8", (sensors, 3)),  # measured_at, arrival, round_trip_s (not a number: none)
             # sequence, sensor_time_us, battery, calibration, boot_nonce, taps, recoveries, flags, wearable
             ("reading_numbers", "<i8", (sensors, 9)),
+            *(_of_others(joints, others) if others else ()),
         ]
     )
+
+
+def _of_others(joints: int, others: int) -> list[tuple[str, str, tuple[int, ...]]]:
+    return [
+        ("others_flags", "<u4", (others,)),  # NOT_FINITE
+        ("others_iterations", "<u2", (others, 2)),  # coding, interaction
+        ("others_root", "<f4", (others, 3)),
+        ("others_pose", "<f4", (others, joints, 4)),
+    ]
 
 
 def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
@@ -72,7 +84,9 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
 
     skeleton, bundled = show.skeleton, show.directory.resolve() == default_show_path().resolve()
     hands = [{"joint": hand.joint, "kind": hand.kind, "sensor": hand.sensor} for hand in show.config.hands]
-    layout = record(len(skeleton), len(hands), len(sensors), int(show.config.motion.live))
+    puppets = puppets_of(show)
+    live, others = int(show.config.motion.live), max(len(puppets) - 1, 0)
+    layout = record(len(skeleton), len(hands), len(sensors), live, others)
     files = [show.file.path, show.network, *dict.fromkeys(show.phrases.values())]
     return {
         "run": os.urandom(8).hex(),
@@ -81,6 +95,7 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
         "sections": SECTIONS,
         "hands": hands,
         "sensors": list(sensors),
+        **({"puppets": puppets} if puppets else {}),
         "joints": skeleton.names,
         "parents": [int(parent) for parent in skeleton.parents],
         "offsets": np.asarray(skeleton.offsets).tolist(),
@@ -96,11 +111,19 @@ def facts_of_run(show: Show, sensors: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def puppets_of(show: Show) -> list[list[Any]]:
+    """Name and held joints of each puppet; [] for a show that has one without a place."""
+    names, hands = [puppet.name for puppet in show.config.puppets], show.config.hands_of_puppets
+    return [[name, [hand.joint for hand in held]] for name, held in zip(names, hands, strict=False)]
+
+
 def require_sound(facts: dict[str, Any]) -> None:
     """Raises KeyError, ValueError or TypeError where a file's facts are not those of a run."""
     figure, layout = skeleton_of(facts), layout_of(facts)
     live = min(layout["live_arrival"].shape[0], 1)
-    needed = record(len(figure), len(facts["hands"]), len(facts["sensors"]), live)
+    puppets = facts.get("puppets", [])
+    others = max(len(puppets) - 1, 0)
+    needed = record(len(figure), len(facts["hands"]), len(facts["sensors"]), live, others)
     for name in needed.names or ():
         if layout[name] != needed[name]:
             raise ValueError(f"another '{name}' in its ticks")
@@ -109,6 +132,7 @@ def require_sound(facts: dict[str, Any]) -> None:
     directory, files = facts["show_directory"], facts["show_files"]
     texts = [facts["run"], facts["show"], *facts["sensors"], *files, *files.values()]
     texts += [] if directory is None else [directory]
+    texts += [text for name, held in puppets for text in (name, *held)]
     if not all(isinstance(text, str) for text in texts):
         raise TypeError("names that are no text")
     if not 0.0 < facts["tick_s"] < _LONGEST_TICK_S or not 0.0 <= facts["written_at"] < _LAST_WRITTEN_AT:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Iterator
 from typing import Any
@@ -16,6 +17,7 @@ from appliance.recorder.record import LATE, NOT_FINITE, holds_of
 
 MOST_BINS, MOST_EVENTS = 240, 400
 EVERY = 2  # ticks from one frame of a stretch to the next
+_LONG_WORD = re.compile(r"[\w+/=]{60,}")  # numbers packed as text: nobody reads them
 
 
 def timeline(number: int, run: Run) -> dict[str, Any]:
@@ -58,7 +60,7 @@ def words_of(event: dict[str, Any]) -> str:
     asked = event.get("order", {})
     parts = [asked.get("name", ""), asked.get("text", ""), *asked.get("values", ()), event.get("words", "")]
     refused = ["(refused)"] * (event.get("done") is False)
-    return " ".join(filter(None, map(str, [*parts, *refused])))
+    return _LONG_WORD.sub("…", " ".join(filter(None, map(str, [*parts, *refused]))))
 
 
 def stretch(run: Run, start_s: float, seconds: float) -> Iterator[bytes]:

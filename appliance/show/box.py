@@ -164,12 +164,12 @@ class BoxConfig(Section):
             )
         return self
 
-    def output_misfits(self, joints: Sequence[str]) -> list[Problem]:
-        """Where its outputs do not fit a skeleton with these joints."""
+    def output_misfits(self, joints: Sequence[str], puppets: int = 1) -> list[Problem]:
+        """Where its outputs do not fit this number of puppets with these joints."""
         outputs = self.outputs
         return [
-            *misfits(outputs.posistagenet, joints, self.file),
-            *osc_misfits(outputs.osc, joints, self.file),
+            *misfits(outputs.posistagenet, joints, puppets, self.file),
+            *osc_misfits(outputs.osc, joints, puppets, self.file),
         ]
 
     @property

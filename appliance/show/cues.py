@@ -8,8 +8,10 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from appliance.show.config_error import Problem, did_you_mean
+from appliance.show.look import CameraChange
 from appliance.show.motion_sources import MotionChanges
 from appliance.show.section import Section, key, refusal
+from appliance.show.sources import NO_CARD
 from appliance.show.yaml_file import Location, YamlFile
 
 FADE_S = 2.0
@@ -24,8 +26,8 @@ class CueConfig(Section):
 
     name: str = key("What `/cue` calls it.", length=(1, 64))
     phrase: Name | None = key(
-        "What the puppet starts from: `main`, a name under motion.phrases, `live`, `vary`, `granular` or "
-        "`path`. A phrase begins at its start; one that plays already goes on.",
+        "What the puppet starts from: `main`, a name under motion.phrases, `live`, `vary`, `granular`, "
+        "`path` or `improvise`. A phrase begins at its start; one that plays already goes on.",
         None,
     )
     motion: MotionChanges | None = key(
@@ -40,10 +42,18 @@ class CueConfig(Section):
     )
     springs: Name | None = key("Setting of the springs that are among the hands.", None)
     look: Name | None = key("Name of the look.", None)
+    camera: CameraChange | None = key(
+        "Where the camera stands from now on, whatever the look, like {angle_deg: 90, figure: 0.4}; "
+        "{}: as the look says.",
+        None,
+    )
+    card: Name | None = key("Name of the card over the dance; none: no card.", None)
     lights: Name | None = key("Name of the set of light mappings.", None)
+    strings: float | None = key("How loud the strings are, 0 to 1.", None, within=(0, 1))
     master: float | None = key("Brightness of lights and picture, 0 to 1.", None, within=(0, 1))
     fade_s: float = key(
-        "How long phrase, iterations, look, lights and master take to change, in seconds. "
+        "How long phrase, iterations, springs, strings, look, camera, card, lights and master take "
+        "to change, in seconds. "
         "Hands take 0.5 s to hold and 1 s to let go, whatever stands here.",
         FADE_S,
         within=(0, 60),
@@ -52,14 +62,19 @@ class CueConfig(Section):
     @field_validator("iterations")
     @classmethod
     def _coding_then_interaction(cls, times: tuple[int, int] | None) -> tuple[int, int] | None:
-        if times is not None and times[0] < 1:
-            raise refusal("A cue cannot have 0 coding iterations: nothing would dance.", "Write 1 or more.")
-        if times is not None and times[1] > times[0]:
-            raise refusal(
-                f"{times[1]} interaction iterations are more than {times[0]} coding iterations.",
-                f"Write [{times[0]}, {max(times[0] - 1, 1)}], which leaves the last pass free.",
-            )
-        return times
+        return require_coding_then_interaction(times, "A cue")
+
+
+def require_coding_then_interaction(times: tuple[int, int] | None, what: str) -> tuple[int, int] | None:
+    """Coding and interaction iterations that can be danced. Raises a refusal."""
+    if times is not None and times[0] < 1:
+        raise refusal(f"{what} cannot have 0 coding iterations: nothing would dance.", "Write 1 or more.")
+    if times is not None and times[1] > times[0]:
+        raise refusal(
+            f"{times[1]} interaction iterations are more than {times[0]} coding iterations.",
+            f"Write [{times[0]}, {max(times[0] - 1, 1)}], which leaves the last pass free.",
+        )
+    return times
 
 
 def cue_problems(
@@ -67,7 +82,7 @@ def cue_problems(
 ) -> Iterator[Problem]:
     """Names in cues that the show does not have, and cues with the same name, each with its line.
 
-    `known`: which names there are for the keys phrase, hands, springs, look and lights of a cue.
+    `known`: which names there are for the keys phrase, hands, springs, look, card and lights of a cue.
     """
     names = [cue.name for cue in cues]
     for place, cue in enumerate(cues):
@@ -97,6 +112,7 @@ _UNKNOWN = {
     "phrase": "This show has no phrase '{}'.",
     "hands": "No hand of this show holds the joint '{}'.",
     "look": "This show has no look '{}'.",
+    "card": "This show has no card '{}'.",
     "lights": "This show has no set of light mappings '{}'.",
     "springs": "This show has no setting of springs '{}'.",
 }
@@ -104,9 +120,9 @@ _UNKNOWN = {
 
 def _named(cue: CueConfig, place: int) -> Iterator[tuple[str, Location, str]]:
     """Each name in a cue: its key, where it stands, the name."""
-    for what in ("phrase", "look", "lights", "springs"):
+    for what in ("phrase", "look", "card", "lights", "springs"):
         word = getattr(cue, what)
-        if word is not None:
+        if word is not None and (what, word) != ("card", NO_CARD):
             yield what, ("cues", place, what), word
     for hand, joint in enumerate(cue.hands or ()):
         yield "hands", ("cues", place, "hands", hand), joint

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from appliance.show.config_error import did_you_mean
-from appliance.show.motion_sources import GranularConfig, PathConfig, VaryConfig
+from appliance.show.motion_sources import GranularConfig, ImproviseConfig, PathConfig, VaryConfig
 from appliance.show.section import BundleFile, Section, key, refusal
-from appliance.show.sources import GRANULAR, LIVE, MADE, MAIN, PATH, VARY
+from appliance.show.sources import GRANULAR, IMPROVISE, LIVE, MADE, MAIN, PATH, VARY
 
 Blending = Literal["prompt", "hann"]
 
@@ -80,6 +80,9 @@ class MotionConfig(Section):
     vary: VaryConfig | None = key("The source `vary`: the phrase danced anew at every return.", None)
     granular: GranularConfig | None = key("The source `granular`: a walk through what the dancer does.", None)
     path: PathConfig | None = key("The source `path`: a path through the dancer's poses that wobbles.", None)
+    improvise: ImproviseConfig | None = key(
+        "The source `improvise`: goes on from what was just danced, and never comes back.", None
+    )
     kept: list[Annotated[str, Field(min_length=1, max_length=64)]] = key(
         "Names of motions that were kept on the box (`/motion/keep`) and that cues of this show call. Until "
         "one is there the last phrase plays on.",
@@ -87,8 +90,8 @@ class MotionConfig(Section):
         length=(0, 16),
     )
     source: str = key(
-        "What the show starts from: `main`, a name under phrases, `live`, `vary`, `granular` or `path`. The "
-        "phrase plays until what is made ahead is there.",
+        "What the show starts from: `main`, a name under phrases, `live`, `vary`, `granular`, `path` or "
+        "`improvise`. The phrase plays until what is made ahead is there.",
         MAIN,
         length=(1, 64),
     )
@@ -114,7 +117,7 @@ class MotionConfig(Section):
                 cure = "Keep the motion by another name."
                 raise refusal(f"'{name}' names something else too.", cure, at=("kept", place))
             if not self.made_sources:
-                cure = "Add `vary`, `granular` or `path` under motion."
+                cure = "Add `vary`, `granular`, `path` or `improvise` under motion."
                 raise refusal("A show without a source that is made ahead has no generator.", cure, at="kept")
         if self.source not in self.sources:
             raise refusal(
@@ -155,9 +158,14 @@ class MotionConfig(Section):
         return (*self.files, *([LIVE] if self.live else []), *self.made_sources, *self.kept)
 
     @property
-    def made_sources(self) -> dict[str, VaryConfig | GranularConfig | PathConfig]:
+    def made_sources(self) -> dict[str, VaryConfig | GranularConfig | PathConfig | ImproviseConfig]:
         """The sources that the generator makes, by name."""
-        sections = {VARY: self.vary, GRANULAR: self.granular, PATH: self.path}
+        sections = {
+            VARY: self.vary,
+            GRANULAR: self.granular,
+            PATH: self.path,
+            IMPROVISE: self.improvise,
+        }
         return {name: section for name, section in sections.items() if section is not None}
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
@@ -14,7 +14,9 @@ Metres = Annotated[tuple[float, float, float], Field(strict=False)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Colour = Annotated[tuple[Share, Share, Share], Field(strict=False)]
-Reading = Literal["place", "across", "height", "depth", "speed", "turn", "lean", "steady"]
+Feature = Literal["qom", "weight_effort", "time_effort", "flow_effort", "space_effort"]
+Reading = Literal["place", "across", "height", "depth", "speed", "turn", "lean", "steady", Feature]
+FEATURES: tuple[Feature, ...] = get_args(Feature)
 
 USUAL_RANGES: dict[str, tuple[float, float]] = {
     "across": (-2.0, 2.0),  # metres
@@ -23,6 +25,11 @@ USUAL_RANGES: dict[str, tuple[float, float]] = {
     "speed": (0.0, 2.0),  # metres a second
     "turn": (-180.0, 180.0),  # degrees
     "lean": (0.0, 90.0),
+    "qom": (0.0, 2.0),  # metres a second
+    "weight_effort": (0.0, 4.0),  # (metres a second)^2
+    "time_effort": (0.0, 20.0),  # metres a second^2
+    "flow_effort": (0.0, 1000.0),  # metres a second^3
+    "space_effort": (1.0, 4.0),
 }
 AIM, COLOUR = "aim", "colour"  # what a rule can drive beside attributes
 MAX_RULES = 64
@@ -36,10 +43,16 @@ class RuleConfig(Section):
     )
     reads: Reading = key(
         "place (for aim), across, height and depth in metres, speed in metres a second, turn "
-        "about `axis` and lean of `axis` away from its rest direction in degrees, steady (nothing moves it)."
+        "about `axis` and lean of `axis` away from its rest direction in degrees, steady (nothing moves it); "
+        "of the whole body qom (quantity of motion) and the efforts after Laban."
     )
     joint: Joint | None = key(
         "The joint that is read; left out: the root, and for speed the whole body's mean.", None
+    )
+    puppet: str | None = key(
+        "The name of the puppet that is read, of a show with several; left out: the first.",
+        None,
+        length=(1, 32),
     )
     drives: str = key(
         "aim (pan and tilt follow the joint), colour, dimmer, or any attribute of the profile.",
@@ -47,7 +60,8 @@ class RuleConfig(Section):
     )
     range: Pair | None = key(
         "The readings that count as 0 and 1. Left out: speed 0 to 2, height 0 to 2, across and "
-        "depth -2 to 2, turn -180 to 180, lean 0 to 90.",
+        "depth -2 to 2, turn -180 to 180, lean 0 to 90, qom 0 to 2, weight_effort 0 to 4, "
+        "time_effort 0 to 20, flow_effort 0 to 1000, space_effort 1 to 4.",
         None,
     )
     curve: Literal["linear", "s", "gamma", "points"] = key(

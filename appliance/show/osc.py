@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
@@ -9,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from appliance.show.config_error import Problem
 from appliance.show.posistagenet import unknown_joints
+from appliance.show.puppets import MOST_PUPPETS
 from appliance.show.section import Axes, Ipv4, Section, key, refusal, refuse_repeats
 from appliance.show.yaml_file import YamlFile
 
@@ -26,6 +28,7 @@ PROGRAMS: Mapping[str, Mapping[str, Any]] = {
     "ray-marching": {"port": 9004, "messages": ["pos_world", "rot_world"], "scale": 100.0, "axes": _Z_UP},
     "supercollider": {"port": 9005, "messages": ["pos_world"], "prefix": "/mocap/joint", "axes": _Z_UP},
 }
+_NUMBER = re.compile(r"(?<=/)\d+(?=/|$)")
 _OF_ONE_DIALECT = ("messages", "prefix", "joints", "ends", "scale", "axes", "rotations")
 
 
@@ -38,6 +41,12 @@ class OscConfig(Section):
         "The AI-Toolbox program that listens: sets port and the keys below as it wants them; a key that "
         "stands here too counts more. docs/osc.md has the table.",
         None,
+    )
+    puppet: int | None = key(
+        "Of a show with several puppets: the number of the one that it gets, from 0, as if there were no "
+        "other. null: all of them, counted up in the addresses; vmc: the first.",
+        None,
+        within=(0, MOST_PUPPETS - 1),
     )
     dialect: Dialect = key("The messages that it understands; docs/osc.md shows them.", "ai-toolbox")
     frame_message: bool = key("Send /bunraku/frame (tick, time, sequence, late) before the joints.", False)
@@ -98,10 +107,39 @@ class OscConfig(Section):
                 )
         return self
 
+    def number_of(self, puppet: int) -> int:
+        """The number of a puppet in this receiver's addresses."""
+        return puppet if self.puppet is None else 0
 
-def osc_misfits(receivers: Sequence[OscConfig], joints: Sequence[str], file: YamlFile) -> list[Problem]:
-    """Joints that a skeleton with these `joints` does not have; file: the box file of the receivers."""
-    return [
+    def of_puppet(self, puppet: int) -> OscConfig | None:
+        """This receiver with the prefix of a puppet; None where it gets nothing of it.
+
+        A prefix without a number, like /mocap/joint, has room for one puppet.
+        """
+        number = self.number_of(puppet)
+        if self.puppet not in (None, puppet) or (number and self.dialect == "vmc"):
+            return None
+        if not number or self.dialect == "joint":
+            return self
+        prefix = _NUMBER.sub(lambda found: str(int(found[0]) + number), self.prefix, count=1)
+        return None if prefix == self.prefix else self.model_copy(update={"prefix": prefix})
+
+
+def osc_misfits(
+    receivers: Sequence[OscConfig], joints: Sequence[str], puppets: int, file: YamlFile
+) -> list[Problem]:
+    """Joints that a skeleton with these `joints` does not have, and puppets that the show does not; file: the
+    box file of the receivers."""
+    missing = [
+        file.problem(
+            ("outputs", "osc", place, "puppet"),
+            f"The show has no puppet {receiver.puppet}: this receiver would get nothing.",
+            f"Write 0 to {puppets - 1}, or null for all." if puppets > 1 else "Remove it.",
+        )
+        for place, receiver in enumerate(receivers)
+        if (receiver.puppet or 0) >= puppets
+    ]
+    return missing + [
         problem
         for place, receiver in enumerate(receivers)
         for problem in unknown_joints(receiver.joints, joints, ("outputs", "osc", place), file)

@@ -33,8 +33,8 @@ class PosiStageNetConfig(Section):
         "Joints that become trackers, in this order; [] for all of the show.", [], length=(0, 256)
     )
     first_tracker: int = key(
-        "Number of the first joint's tracker; the next ones follow. Two boxes in one network "
-        "need numbers of their own. Some consoles count trackers from 1.",
+        "Number of the first joint's tracker; the next ones follow, then those of the next puppet. Two "
+        "boxes in one network need numbers of their own. Some consoles count trackers from 1.",
         0,
         within=(0, LAST_TRACKER),
     )
@@ -67,13 +67,15 @@ def unknown_joints(
     return problems
 
 
-def misfits(outputs: Sequence[PosiStageNetConfig], joints: Sequence[str], file: YamlFile) -> list[Problem]:
-    """What does not fit a skeleton with these joints; file: the box file that the outputs stand in."""
+def misfits(
+    outputs: Sequence[PosiStageNetConfig], joints: Sequence[str], puppets: int, file: YamlFile
+) -> list[Problem]:
+    """What does not fit this number of puppets with these joints. file: the box file with the outputs."""
     problems: list[Problem] = []
     for place, output in enumerate(outputs):
         here: Location = ("outputs", "posistagenet", place)
         problems += unknown_joints(output.joints, joints, here, file)
-        last = output.first_tracker + len(output.joints or joints) - 1
+        last = output.first_tracker + puppets * len(output.joints or joints) - 1
         if last > LAST_TRACKER:
             message = f"Trackers are numbered up to {LAST_TRACKER}, and these would end at {last}."
             cure = "Begin with a lower number, or name fewer joints."

@@ -9,6 +9,7 @@ from pydantic.fields import FieldInfo
 
 from appliance.show import describe
 from appliance.show.box import BoxConfig
+from appliance.show.hand import HandConfig
 from appliance.show.section import Section
 from appliance.show.show import ShowConfig
 
@@ -122,6 +123,9 @@ def _tables(model: type[Section], path: str) -> list[str]:
         below = describe.section(field.annotation)
         if below:
             place = f"{path}.{name}" if path else name
+            if path and below is HandConfig:
+                parts.append(f"### {place}[ ]\n\nAs [hands[ ]](#hands-) of the show.\n")
+                continue
             parts += _tables(below, f"{place}[ ]" if describe.is_list(field.annotation) else place)
     return parts
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,19 +13,25 @@ from appliance.pose.bvh import BvhError, read_bvh
 from appliance.pose.foreign_file import require_inside
 from appliance.pose.skeleton import Skeleton
 from appliance.show.bundle import COPY_AGAIN
+from appliance.show.card import MOST_CARDS, CardConfig, cards_by_name, each_card_once
 from appliance.show.config_error import ConfigError, Problem, did_you_mean
 from appliance.show.cues import CueConfig, cue_problems
 from appliance.show.dance import DancerConfig, MotionConfig
 from appliance.show.hand import HandConfig
 from appliance.show.lights import LightsConfig
 from appliance.show.look import LookConfig, looks_by_name
+from appliance.show.puppets import (
+    MAX_HANDS,
+    MOST_PUPPETS,
+    PuppetConfig,
+    puppet_problems,
+    require_each_joint_once,
+)
 from appliance.show.section import Section, key, part, refusal, refuse_repeats
 from appliance.show.sound import StringsConfig
 from appliance.show.springs import SpringsConfig, springs_by_name
 from appliance.show.validation import validated
-from appliance.show.yaml_file import YamlFile, read_yaml
-
-MAX_HANDS = 8
+from appliance.show.yaml_file import Location, YamlFile, read_yaml
 
 
 class ShowConfig(Section):
@@ -38,6 +44,12 @@ class ShowConfig(Section):
     hands: list[HandConfig] = key(
         "Which puppeteer holds which joint, each joint at most once.", [], length=(0, MAX_HANDS)
     )
+    puppets: list[PuppetConfig] = key(
+        "Several figures on the stage, the one that cues and commands lead first. []: one, where its phrase "
+        "has it.",
+        [],
+        length=(0, MOST_PUPPETS),
+    )
     springs: list[SpringsConfig] = key(
         "Settings of the springs that are among the hands. []: the built-in loose, stiff and storm.",
         [],
@@ -49,6 +61,11 @@ class ShowConfig(Section):
         [],
         length=(0, 32),
     )
+    cards: list[CardConfig] = key(
+        "What cues show over the dance: titles, logos, black. `blank` is there without being named.",
+        [],
+        length=(0, MOST_CARDS),
+    )
     lights: LightsConfig = part(LightsConfig)
     strings: StringsConfig | None = key("Strings that the dance plays (`bunraku sound`); null: none.", None)
     cues: list[CueConfig] = key("What show control can call up by name, in order.", [], length=(0, 200))
@@ -56,17 +73,26 @@ class ShowConfig(Section):
     @field_validator("hands")
     @classmethod
     def _each_joint_once(cls, hands: list[HandConfig]) -> list[HandConfig]:
+        return require_each_joint_once(hands)
+
+    @field_validator("puppets")
+    @classmethod
+    def _each_puppet_once(cls, puppets: list[PuppetConfig]) -> list[PuppetConfig]:
         refuse_repeats(
-            [hand.joint for hand in hands],
-            "Two hands hold the joint '{value}' (hands[{first}] and hands[{place}]).",
-            "Give one of them another joint.",
+            [puppet.name for puppet in puppets],
+            "Two puppets are called '{value}'.",
+            "Give one another name.",
         )
-        primaries = [place for place, hand in enumerate(hands) if hand.primary]
+        return puppets
+
+    @model_validator(mode="after")
+    def _one_primary(self) -> ShowConfig:
+        primaries = [at for at, hand in self.hands_at if hand.primary]
         if len(primaries) > 1:
             raise refusal(
                 "Two hands are primary.", "The tick can follow one sensor: keep one.", at=primaries[1]
             )
-        return hands
+        return self
 
     @field_validator("springs")
     @classmethod
@@ -80,22 +106,21 @@ class ShowConfig(Section):
 
     @model_validator(mode="after")
     def _springs_as_set(self) -> ShowConfig:
-        """At most one hand is springs, and its setting is there."""
-        places = [place for place, hand in enumerate(self.hands) if hand.springs is not None]
-        if len(places) > 1:
-            raise refusal(
-                "Two hands are springs.",
-                "Keep one: it holds all joints below its own.",
-                at=("hands", places[1], "springs"),
-            )
-        names = list(springs_by_name(self.springs))
-        for place in places:
-            setting = self.hands[place].springs or ""
+        """At most one hand of a puppet is springs, and its setting is there."""
+        names, seen = list(springs_by_name(self.springs)), set()
+        for at, setting in [(at, hand.springs) for at, hand in self.hands_at if hand.springs is not None]:
+            if at[:-1] in seen:
+                raise refusal(
+                    "Two hands are springs.",
+                    "Keep one: it holds all joints below its own.",
+                    at=(*at, "springs"),
+                )
+            seen.add(at[:-1])
             if setting not in names:
                 raise refusal(
                     f"This show has no setting of springs '{setting}'.",
                     did_you_mean(setting, names),
-                    at=("hands", place, "springs"),
+                    at=(*at, "springs"),
                 )
         return self
 
@@ -107,10 +132,31 @@ class ShowConfig(Section):
         )
         return looks
 
+    _each_card_once = field_validator("cards")(each_card_once)
+
+    @property
+    def hands_of_puppets(self) -> list[list[HandConfig]]:
+        """The hands of each puppet, at least of one."""
+        return [self.hands, *(puppet.hands for puppet in self.puppets[1:])]
+
+    @property
+    def hands_at(self) -> Iterator[tuple[Location, HandConfig]]:
+        """All hands of all puppets, and where they stand in the file."""
+        for puppet, hands in enumerate(self.hands_of_puppets):
+            above: Location = ("puppets", puppet, "hands") if puppet else ("hands",)
+            yield from (((*above, place), hand) for place, hand in enumerate(hands))
+
+    @property
+    def iterations_of_puppets(self) -> list[tuple[int, int]]:
+        """Coding and interaction iterations of each puppet at the start."""
+        first = self.dancer.coding_iterations, self.dancer.interaction_iterations
+        return [first, *(puppet.iterations or first for puppet in self.puppets[1:])]
+
     @property
     def primary_sensor(self) -> str | None:
         """Name of the sensor that the tick's phase follows; None without sensors."""
-        sensors = sorted((hand for hand in self.hands if hand.sensor), key=lambda hand: not hand.primary)
+        worn = [hand for _, hand in self.hands_at if hand.sensor]
+        sensors = sorted(worn, key=lambda hand: not hand.primary)
         return sensors[0].sensor if sensors else None
 
     @property
@@ -120,12 +166,14 @@ class ShowConfig(Section):
 
     @property
     def names(self) -> dict[str, tuple[str, ...]]:
-        """What a cue may name under phrase, hands, springs, look, lights; first what is in force at start."""
+        """What a cue may name under each key; first what is in force at start."""
+        at_start = [hand.springs for hand in self.hands if hand.springs]
         return {
             "phrase": self.motion.sources,
             "hands": tuple(hand.joint for hand in self.hands),
-            "springs": tuple(springs_by_name(self.springs)) if self.has_springs else (),
+            "springs": tuple(dict.fromkeys([*at_start, *springs_by_name(self.springs)])) if at_start else (),
             "look": tuple(looks_by_name(self.looks)),
+            "card": tuple(cards_by_name(self.cards)),
             "lights": tuple(mapping.name for mapping in self.lights.mappings),
         }
 
@@ -164,10 +212,8 @@ class Show:
         """Refuse hands on joints that the network does not move; `joints` are those that it does."""
         words = "The network does not move the joint '{}'."
         problems = [
-            self.file.problem(
-                ("hands", place, "joint"), words.format(hand.joint), did_you_mean(hand.joint, joints)
-            )
-            for place, hand in enumerate(self.config.hands)
+            self.file.problem((*at, "joint"), words.format(hand.joint), did_you_mean(hand.joint, joints))
+            for at, hand in self.config.hands_at
             if hand.joint not in joints
         ]
         if problems:
@@ -188,8 +234,8 @@ class Show:
         )
         cure = f"To lead the body hold '{skeleton.names[highest]}'; to turn the figure leave it as it is."
         return [
-            self.file.problem(("hands", place, "joint"), words, cure)
-            for place, hand in enumerate(self.config.hands)
+            self.file.problem((*at, "joint"), words, cure)
+            for at, hand in self.config.hands_at
             if hand.joint == skeleton.names[0] and hand.kind not in ("kept", "springs")
         ]
 
@@ -236,6 +282,7 @@ def load_show(directory: Path | str) -> Show:
         problems.extend(error.problems)
     else:
         problems.extend(cue_problems(config.cues, config.names, file))
+        problems.extend(puppet_problems(config.puppets, config.motion, config.lights.mappings, file))
     if problems or skeleton is None:
         raise ConfigError(problems)
     return Show(config, directory, skeleton, file)

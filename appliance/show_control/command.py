@@ -67,6 +67,11 @@ _WIND = tuple(Number(f"{axis}, m/s", -30, 30) for axis in "xyz")
 _CORNER = Number("corner", 1, 4, is_whole=True)
 _PLACE = (Number("x", -0.5, 1.5), Number("y", -0.5, 1.5))  # as far as keys move a corner
 _POINT = (Number("x", 0, 1), Number("y", 0, 1))
+_STAND = (
+    Number("angle in degrees", -180, 180),
+    Number("elevation in degrees", -3, 70),
+    Number("figure", 0.1, 0.9),
+)
 _WAY = (Number("dx", -1, 1), Number("dy", -1, 1))
 
 FORMS: dict[str, Form] = {
@@ -87,8 +92,15 @@ FORMS: dict[str, Form] = {
         for name, about in parameters.items()
     },
     "/look": Form("look", (_FADE,), optional=1),
+    "/card": Form("card", (_FADE,), optional=1),
+    "/camera": Form(numbers=(*_STAND, _FADE), optional=1),
+    "/camera/look": Form(numbers=(_FADE,), optional=1),
     "/lights": Form("light mappings", (_FADE,), optional=1),
-    "/springs": Form("setting"),
+    "/strings": Form(numbers=(Number("loudness", 0, 1), _FADE), optional=1),
+    "/springs": Form("setting", (_FADE,), optional=1),
+    "/springs/stiffness": Form(numbers=(Number("times the setting's", 0.1, 10), _FADE), optional=1),
+    "/springs/storm": Form(numbers=(Number("strength", 0, 1), _FADE), optional=1),
+    "/springs/feedback": Form(numbers=(Number("gain", 0, 1), _FADE), optional=1),
     "/springs/wind": Form(numbers=_WIND),
     "/springs/gravity": Form(numbers=(Number("downwards, m/s^2", -20, 20),)),
     "/springs/kick": Form(numbers=_WIND),
@@ -99,6 +111,7 @@ FORMS: dict[str, Form] = {
     "/cues": Form(),
     "/phrases": Form(),
     "/looks": Form(),
+    "/cards": Form(),
     "/hands": Form(),
     "/fallbacks": Form(),
     "/projector/corner": Form(numbers=(_CORNER, *_PLACE)),

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from appliance.box.show_state import ShowState
 from appliance.show_control.acknowledgements import Acknowledgements
 from appliance.show_control.command import PONG, REPLY, SENSORS_REPLY, STREAMS, Command, command
 from appliance.show_control.key_file import KeyFile
 from appliance.show_control.live_input import LiveInput, is_live
+from appliance.show_control.names_of_show import joint_name
 from appliance.show_control.order_dispatch import OrderDispatch
 from appliance.show_control.orders import Order, Place
 from appliance.show_control.packet import Message, messages_in, readable
@@ -22,7 +23,6 @@ from appliance.show_control.show_state_commands import (
     DECLARATIONS,
     SHOWS_RATE,
     in_cue,
-    joint_name,
     let_go,
     of_this_show,
 )
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 # What a box sends is never answered: two boxes would go on answering each other for ever.
 _ANSWERS = frozenset((REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END))
-_LISTED = ("/cues/", "/phrases/", "/looks/", "/hands/", "/fallbacks/", "/motion/is")
+_LISTED = ("/cues/", "/phrases/", "/looks/", "/cards/", "/hands/", "/fallbacks/", "/motion/is")
 _ONCE_A_BUNDLE = frozenset((*QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
 
@@ -119,21 +119,30 @@ class CommandHandler:
             self._publish_changed(of_this_show(self.show_state, facts))
         if self._is_new_stage and facts is not None and (health := self._observer.health()):
             self._is_new_stage = False
-            self._adopt(facts, str(health.get("cue", "")), now)
+            self._adopt(facts, health, now)
         self.acknowledgements.send_due(now)
 
     def status(self, strangers: int, now: float) -> Status:
         """How the box is."""
         return status(self.show_state, self._observer, self.refused, strangers, now)
 
-    def _adopt(self, facts: Facts, name: str, now: float) -> None:
-        """After a power cut the stage goes on in its cue: picture and lights too, unless declared since.
+    def _adopt(self, facts: Facts, health: Mapping[str, Any], now: float) -> None:
+        """After a power cut the stage goes on in its cue: picture and lights too, unless declared since; and
+        the generator with the values that were declared for it.
 
         Its master is left out: a box that was switched on shows something.
         """
-        cue = next((cue for cue in facts.cues if cue["name"] == name), None)
+        before: Mapping[str, list[float]] = health.get("motion") or {}
+        values = {
+            name: ("", tuple(given)) for name, given in before.items() if name not in self.show_state.dance
+        }
+        if values:
+            self._publish_changed(self.show_state.with_dance(now, values))
+        cue = next((cue for cue in facts.cues if cue["name"] == health.get("cue")), None)
         if cue is not None and not self.show_state.cue:
-            parts = [part for part in ("look", "lights") if not getattr(self.show_state, part)]
+            parts = [
+                part for part in ("look", "card", "camera", "lights") if not getattr(self.show_state, part)
+            ]
             adopted = in_cue(self.show_state, {**cue, "fade_s": 0.0}, parts, now)
             if cue.get("springs"):  # the stage's checkpoint does not hold it
                 adopted = adopted.with_dance(now, {"springs": (cue["springs"], ())})

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from appliance.box.show_state import MOTION, ShowState
 from appliance.outputs.shared_frame import Facts
 from appliance.show.config_error import did_you_mean
-from appliance.show.sources import MADE, PARAMETERS, PATH, POINTS
+from appliance.show.sources import MADE, NO_CARD, PARAMETERS, PATH, POINTS
 from appliance.show_control.command import Command
+from appliance.show_control.names_of_show import danced, held, joint_name, known, next_cue
 
 STOP_FADE_S = 2.0
 GO_FADE_S = 1.0
-LOOK_FADE_S = 2.0  # of looks and lights, where a command gives none
+LOOK_FADE_S = 2.0  # of looks, cards, camera and lights, where a command gives none
 PHRASE_FADE_S = 2.0
+STAND = ("angle_deg", "elevation_deg", "figure")  # what /camera sets
 MOST_AGAIN = 1000
+
+SPRINGS_KNOBS = ("wind", "gravity", "stiffness", "storm", "feedback")  # they last until the next setting
 
 SHOWS_RATE: dict[str, tuple[str, tuple[float, ...]]] = {"rate": ("", ())}
 
@@ -64,10 +68,31 @@ def _master(show_state: ShowState, command: Command, facts: Facts | None, now: f
     return show_state, f"Master goes to {100 * master:.0f} %."
 
 
+def _strings(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    strings, *fade = command.values
+    show_state = show_state.with_strings(strings, now, fade[0] if fade else 0.0)
+    return show_state, f"The strings go to {100 * strings:.0f} %."
+
+
 def _look(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     name = known("look", command.text, facts.looks if facts else None)
     fade_s = command.values[0] if command.values else LOOK_FADE_S
     return show_state.with_look(name, now, fade_s), f"The look {name} comes over {fade_s:g} s."
+
+
+def _card(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    fade_s = command.values[0] if command.values else LOOK_FADE_S
+    if command.text == NO_CARD:
+        return show_state.with_card("", now, fade_s), f"The card goes over {fade_s:g} s."
+    name = known("card", command.text, facts.cards if facts else None)
+    return show_state.with_card(name, now, fade_s), f"The card {name} comes over {fade_s:g} s."
+
+
+def _camera(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    given = 0 if command.address == "/camera/look" else len(STAND)
+    fade_s = command.values[given] if command.values[given:] else LOOK_FADE_S
+    camera = dict(zip(STAND[:given], command.values, strict=False))
+    return show_state.with_camera(camera, now, fade_s), f"The camera moves over {fade_s:g} s."
 
 
 def _lights(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
@@ -77,7 +102,7 @@ def _lights(show_state: ShowState, command: Command, facts: Facts | None, now: f
 
 
 def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    facts = _danced(facts)
+    facts = danced(facts)
     cues = {str(cue["name"]): cue for cue in facts.cues}
     name = known("cue", command.text, [*cues]) if command.text else next_cue(show_state.cue, [*cues])
     cue, fade_s = cues[name], float(cues[name]["fade_s"])
@@ -85,9 +110,9 @@ def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: floa
     if cue.get("phrase") is not None:
         parts["phrase"] = cue["phrase"], (fade_s,)
     if cue.get("hands") is not None:
-        parts |= {f"hand {joint}": (joint, (float(joint in cue["hands"]),)) for joint in _held(facts)}
+        parts |= {f"hand {joint}": (joint, (float(joint in cue["hands"]),)) for joint in held(facts)}
     if cue.get("springs") is not None:
-        show_state, parts["springs"] = _without_weather(show_state), (cue["springs"], ())
+        show_state, parts["springs"] = _without_knobs(show_state), (cue["springs"], (fade_s,))
     for source, changes in (cue.get("motion") or {}).items():
         parts |= {f"{MOTION}{source} {key}": ("", (float(value), fade_s)) for key, value in changes.items()}
     if cue.get("iterations") is not None:
@@ -96,20 +121,20 @@ def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: floa
 
 
 def _phrase(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    name = known("phrase", command.text, (*_danced(facts).phrases, *command.kept))
+    name = known("phrase", command.text, (*danced(facts).phrases, *command.kept))
     return show_state.with_dance(now, {"phrase": (name, command.values or (PHRASE_FADE_S,))}), ""
 
 
 def _motion(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
     _, _, source, name = command.address.split("/")
-    known("source of motion", source, _danced(facts).phrases)
+    known("source of motion", source, danced(facts).phrases)
     value, *fade_s = command.values
     words = f"The {name} of {source} goes to {value:g}{f' over {fade_s[0]:g} s' if fade_s else ''}."
     return show_state.with_dance(now, {f"{MOTION}{source} {name}": ("", command.values)}), words
 
 
 def _points(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    known("source of motion", PATH, _danced(facts).phrases)
+    known("source of motion", PATH, danced(facts).phrases)
     if len(command.values) % 2:
         raise ValueError("/motion/path takes x and y of each point, and the last one has no y.")
     points = len(command.values) // 2
@@ -119,7 +144,7 @@ def _points(show_state: ShowState, command: Command, facts: Facts | None, now: f
 
 
 def _again(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    if not any(source in _danced(facts).phrases for source in MADE):
+    if not any(source in danced(facts).phrases for source in MADE):
         raise ValueError("This show has no source that is made ahead: show.yaml names them under motion.")
     before = show_state.dance.get(f"{MOTION}again", (0, "", (0.0,)))[2][0]
     return show_state.with_dance(
@@ -128,39 +153,40 @@ def _again(show_state: ShowState, command: Command, facts: Facts | None, now: fl
 
 
 def _iterations(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    _danced(facts)
+    danced(facts)
     return show_state.with_dance(now, {"iterations": ("", command.values)}), ""
 
 
 def _springs(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    name = known("setting of springs", command.text, _danced(facts).springs)
-    return _without_weather(show_state).with_dance(now, {"springs": (name, ())}), f"The springs are {name}."
+    name = known("setting of springs", command.text, danced(facts).springs)
+    parts = {"springs": (name, command.values)}
+    return _without_knobs(show_state).with_dance(now, parts), f"The springs are {name}."
 
 
-def _weather(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    if not _danced(facts).springs:
+def _knob(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
+    if not danced(facts).springs:
         raise ValueError("No hand of this show is springs. Add {springs: loose, joint: ...} to its hands.")
     part = command.address.removeprefix("/springs/")
     return show_state.with_dance(now, {part: ("", command.values)}), ""
 
 
-def _without_weather(show_state: ShowState) -> ShowState:
-    """Another setting of the springs brings its own wind and gravity."""
-    dance = {name: part for name, part in show_state.dance.items() if name not in ("wind", "gravity")}
+def _without_knobs(show_state: ShowState) -> ShowState:
+    """Another setting of the springs brings its own wind, gravity and feedback."""
+    dance = {name: part for name, part in show_state.dance.items() if name not in SPRINGS_KNOBS}
     return replace(show_state, dance=dance)
 
 
 def _hold(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    joint, held = joint_name(command.text, facts), _held(_danced(facts))
-    if joint not in held:
-        cure = did_you_mean(joint, held) if held else "Give it some under `hands` in its show.yaml."
+    joint, joints = joint_name(command.text, facts), held(danced(facts))
+    if joint not in joints:
+        cure = did_you_mean(joint, joints) if joints else "Give it some under `hands` in its show.yaml."
         raise ValueError(f"No hand of this show holds '{joint}'. {cure}")
     words = f"The hand of {joint} {'holds' if command.values[0] else 'lets go'}."
     return show_state.with_dance(now, {f"hand {joint}": (joint, command.values)}), words
 
 
 def _rate(show_state: ShowState, command: Command, facts: Facts | None, now: float) -> Declared:
-    _danced(facts)
+    danced(facts)
     rate = (0.0,) if command.address == "/player/stop" else command.values
     return show_state.with_dance(now, {"rate": ("", rate)}), ""
 
@@ -172,14 +198,17 @@ DECLARATIONS: dict[str, Declaration] = {
     "/blackout": _blackout,
     "/master": _master,
     "/look": _look,
+    "/card": _card,
+    "/camera": _camera,
+    "/camera/look": _camera,
     "/lights": _lights,
     "/cue": _cue,
     "/phrase": _phrase,
     "/iterations": _iterations,
     "/hold": _hold,
     "/springs": _springs,
-    "/springs/wind": _weather,
-    "/springs/gravity": _weather,
+    "/strings": _strings,
+    **{f"/springs/{name}": _knob for name in SPRINGS_KNOBS},
     "/motion/path": _points,
     "/motion/again": _again,
     **{f"/motion/{source}/{name}": _motion for source, names in PARAMETERS.items() for name in names},
@@ -199,7 +228,7 @@ def let_go(command: Command) -> str:
     return _LET_GO.get(command.address, "") if command.values == (0.0,) else ""
 
 
-PARTS = ("look", "lights", "master")  # what audience sees of a cue beside the dance
+PARTS = ("look", "card", "camera", "lights", "master", "strings")  # what is seen and heard beside it
 
 
 def in_cue(show_state: ShowState, cue: Mapping[str, Any], parts: Iterable[str], now: float) -> ShowState:
@@ -208,10 +237,18 @@ def in_cue(show_state: ShowState, cue: Mapping[str, Any], parts: Iterable[str], 
     wanted = {part: cue[part] for part in parts if cue.get(part) is not None}
     if "look" in wanted:
         show_state = show_state.with_look(wanted["look"], now, fade_s)
+    if "card" in wanted:
+        card = wanted["card"] if wanted["card"] != NO_CARD else ""
+        show_state = show_state.with_card(card, now, fade_s)
+    if "camera" in wanted:
+        camera = {key: value for key, value in wanted["camera"].items() if value is not None}
+        show_state = show_state.with_camera(camera, now, fade_s)
     if "lights" in wanted:
         show_state = show_state.with_lights(wanted["lights"], now, fade_s)
     if "master" in wanted:
         show_state = show_state.with_master(float(wanted["master"]), now, fade_s)
+    if "strings" in wanted:
+        show_state = show_state.with_strings(float(wanted["strings"]), now, fade_s)
     return replace(show_state, cue=cue["name"])
 
 
@@ -224,49 +261,9 @@ def of_this_show(show_state: ShowState, facts: Facts | None) -> ShowState:
         show_state,
         look=show_state.look if show_state.look in facts.looks else "",
         look_before=show_state.look_before if show_state.look_before in facts.looks else "",
+        card=show_state.card if show_state.card in facts.cards else "",
+        card_before=show_state.card_before if show_state.card_before in facts.cards else "",
         lights=show_state.lights if show_state.lights in facts.lights else "",
         lights_before=show_state.lights_before if show_state.lights_before in facts.lights else "",
         cue=show_state.cue if show_state.cue in [cue["name"] for cue in facts.cues] else "",
     )
-
-
-def joint_name(joint: str | int, facts: Facts | None) -> str:
-    """A joint's name; commands may give its number in the skeleton. Raises ValueError."""
-    if isinstance(joint, str):
-        return joint
-    names = _danced(facts).skeleton.names
-    if not 0 <= joint < len(names):
-        raise ValueError(f"There is no joint {joint}: this skeleton has joints 0 to {len(names) - 1}.")
-    return names[joint]
-
-
-def _danced(facts: Facts | None) -> Facts:
-    if facts is None:
-        raise ValueError("No stage has danced on this box yet: nothing is changed. Start it: bunraku play.")
-    return facts
-
-
-def _held(facts: Facts) -> list[str]:
-    return [facts.skeleton.names[joint] for joint in facts.held]
-
-
-def known(kind: str, name: str | int, names: Sequence[str] | None) -> str:
-    """The name, if the show has it. Raises ValueError with the nearest one; `names` None: no stage so far."""
-    if names is None:
-        raise ValueError(
-            f"No stage has danced on this box yet: whether there is a {kind} '{name}' is unknown."
-        )
-    if name not in names:
-        cure = did_you_mean(name, names) if names else "It has none at all: show.yaml names them."
-        raise ValueError(f"This show has no {kind} '{name}'. {cure}")
-    return str(name)
-
-
-def next_cue(cue: str, names: Sequence[str]) -> str:
-    """The one after this cue in show.yaml; the first one at the beginning. Raises ValueError."""
-    if not names:
-        raise ValueError("This show has no cues: show.yaml names them.")
-    place = names.index(cue) + 1 if cue in names else 0
-    if place == len(names):
-        raise ValueError(f"{cue} was the last cue. Name one, like /cue {names[0]}.")
-    return names[place]

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from appliance.box.show_state import ShowState
 from appliance.pose.foreign_file import plain_json
+from appliance.show.sources import NO_CARD
 from appliance.show_control.packet import Message
 
 if TYPE_CHECKING:
     from appliance.show_control.stage_observer import StageObserver
 
 STATUS, END = "/bunraku/status", "/end"
-QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/hands", "/fallbacks", "/motion")
+QUESTIONS = ("/status", "/cues", "/phrases", "/looks", "/cards", "/hands", "/fallbacks", "/motion")
 UNKNOWN = -1.0
 _LONGEST_WORDS = 1000  # of a sentence in an answer
 
@@ -86,6 +87,10 @@ def told(
     """The answer to one of QUESTIONS: a message for each thing, and one to end with."""
     if question == "/status":
         answers: list[Message] = [(STATUS, *now_status)]
+    elif question == "/cards":
+        cards = (NO_CARD, *observer.facts.cards) if observer.facts else ()
+        shown = show_state.card or NO_CARD
+        answers = [("/cards/card", name, int(name == shown)) for name in cards]
     else:
         answers = list(_LISTS[question](now_status, observer, now))
     yield from answers
@@ -127,7 +132,7 @@ def _motion(status: Status, observer: StageObserver, now: float) -> Iterator[Mes
     recipe = plain_json(str(observer.health().get("made") or "{}"))
     recipe = recipe.get("of", recipe)
     for name, value in recipe.items() if status.phrase else ():
-        if name != "number" and value is not None:
+        if name not in ("number", "after", "prompt") and value is not None:
             yield "/motion/is", name, *(value if isinstance(value, list) else (value,))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from appliance.outputs.osc.humanoid import humanoid_bones
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.t_pose import humanoid_rest
 
 PREFIX = "/VMC/Ext/"
 BONE, ROOT = f"{PREFIX}Bone/Pos", f"{PREFIX}Root/Pos"
@@ -14,21 +15,27 @@ _HIPS = "Hips"
 
 Quaternion = tuple[float, float, float, float]  # w, x, y, z
 Vector = tuple[float, float, float]
+_UNTURNED: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
 class VmcInput:
     """Collects the bones of a frame; what comes of them is a pose of the skeleton.
 
     Unity's axes are left-handed: X is mirrored, so (x, y, z, w) becomes (w, x, -y, -z). Rotations count from
-    a T-pose and are relative to the next bone above: joints between two bones stay at rest, and so do those
-    without a bone. Nothing in the protocol ends a frame: it is whole when all bones of the frame before have
-    come, or one of them comes again.
+    a T-pose, whatever the skeleton's zero pose is, and are relative to the next bone above: joints between
+    two bones stay as in that T-pose, and so do those without a bone. Nothing in the protocol ends a frame: it
+    is whole when all bones of the frame before have come, or one of them comes again.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
         self._joint_of = humanoid_bones(skeleton.names)
-        self._rotations = [1.0, 0.0, 0.0, 0.0] * len(skeleton)
-        self._root: tuple[Vector, Quaternion] = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+        rest = [_as_quaternion(turn) for turn in humanoid_rest(skeleton).tolist()]
+        above = [rest[parent] if parent >= 0 else _UNTURNED for parent in skeleton.parents]
+        self._from_above, self._rest = [_inverse(turn) for turn in above], rest
+        self._rotations = [0.0] * 4 * len(skeleton)
+        for joint in range(len(skeleton)):
+            self._turn(joint, _UNTURNED)
+        self._root: tuple[Vector, Quaternion] = (0.0, 0.0, 0.0), _UNTURNED
         self._hips: tuple[Vector, Quaternion] = self._root
         self._knows_hips = False
         self._came: set[str] = set()
@@ -55,12 +62,16 @@ class VmcInput:
         if name == _HIPS:
             self._hips, self._knows_hips = (place, turned), True
         elif (joint := self._joint_of.get(name)) is not None:
-            self._rotations[4 * joint : 4 * joint + 4] = turned
+            self._turn(joint, turned)
+
+    def _turn(self, joint: int, turned: Quaternion) -> None:
+        """A turn from the T-pose, in the axes of the bone above, becomes one from the zero pose."""
+        local = _multiplied(_multiplied(self._from_above[joint], turned), self._rest[joint])
+        self._rotations[4 * joint : 4 * joint + 4] = local
 
     def _pose(self) -> tuple[Vector, list[float]]:
         (root, root_turned), (hips, hips_turned) = self._root, self._hips
-        joint = self._joint_of[_HIPS]
-        self._rotations[4 * joint : 4 * joint + 4] = _multiplied(root_turned, hips_turned)
+        self._turn(self._joint_of[_HIPS], _multiplied(root_turned, hips_turned))
         reach = _rotated(root_turned, hips)
         place = (root[0] + reach[0], root[1] + reach[1], root[2] + reach[2])
         return place if self._knows_hips else (math.nan,) * 3, list(self._rotations)
@@ -86,6 +97,14 @@ def _multiplied(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def _rotated(turned: Quaternion, vector: Vector) -> Vector:
-    back = (turned[0], -turned[1], -turned[2], -turned[3])
-    _, x, y, z = _multiplied(_multiplied(turned, (0.0, *vector)), back)
+    _, x, y, z = _multiplied(_multiplied(turned, (0.0, *vector)), _inverse(turned))
     return x, y, z
+
+
+def _inverse(turned: Quaternion) -> Quaternion:
+    return turned[0], -turned[1], -turned[2], -turned[3]
+
+
+def _as_quaternion(values: Sequence[float]) -> Quaternion:
+    w, x, y, z = values
+    return w, x, y, z

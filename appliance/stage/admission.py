@@ -31,7 +31,8 @@ _SECOND_LOOK_S = 10
 class Admission:
     """What the box will dance with, and why.
 
-    Times are milliseconds of one puppet run as paced on stage; `one_ms` is the p99 of a single iteration.
+    Times are milliseconds of one run of all puppets as paced on stage; `one_ms` is the p99 of a single
+    iteration.
     """
 
     asked_coding: int
@@ -43,6 +44,7 @@ class Admission:
     p50_ms: float
     p99_ms: float
     budget_ms: float
+    puppets: int = 1
 
     @property
     def fits(self) -> bool:
@@ -51,16 +53,18 @@ class Admission:
 
     def sentence(self) -> str:
         """The verdict for people: what was measured, what it means for the show, what to do."""
+        of = f" of {self.puppets} puppets" if self.puppets > 1 else ""
         if self.fits:
             return (
-                f"{self.coding} coding iterations cost {self.p99_ms:.1f} ms (p99, paced) "
+                f"{self.coding} coding iterations{of} cost {self.p99_ms:.1f} ms (p99, paced) "
                 f"of a budget of {self.budget_ms:.1f} ms; up to {self.most_coding} would fit."
             )
         idle = " The hands move nothing." if self.interaction == 0 < self.asked_interaction else ""
         return (
-            f"{self.asked_coding} coding iterations do not fit: they cost {self.p99_ms:.1f} ms (p99, paced) "
-            f"of a budget of {self.budget_ms:.1f} ms. On stage the dancer runs with {self.coding}, "
-            f"{self.interaction} of them interactive, and follows the phrase more closely.{idle} "
+            f"{self.asked_coding} coding iterations{of} do not fit: they cost {self.p99_ms:.1f} ms "
+            f"(p99, paced) of a budget of {self.budget_ms:.1f} ms. On stage the dancer runs with "
+            f"{self.coding}, {self.interaction} of them interactive, and follows the phrase more "
+            f"closely.{idle} "
             f"Lower dancer.coding_iterations to {self.most_coding}, choose a faster network, "
             "or raise limits.tick_budget_ms."
         )
@@ -108,8 +112,8 @@ def admit(
     if p99_ms > budget_ms and coding > 1:
         most = min(most, coding - 1)
         while most > 1:
-            lowered = cost_ms(dance, most, _free_kept(coding, interaction, most), budget_ms, clock)
-            if lowered[1] <= budget_ms:
+            cost = cost_ms(dance, *lowered(coding, interaction, most), budget_ms, clock)
+            if cost[1] <= budget_ms:
                 break
             most -= max(1, most // 8)
     allowed = min(coding, most)
@@ -117,7 +121,7 @@ def admit(
         asked_coding=coding,
         asked_interaction=interaction,
         coding=allowed,
-        interaction=_free_kept(coding, interaction, allowed),
+        interaction=lowered(coding, interaction, allowed)[1],
         most_coding=most,
         one_ms=one_ms,
         p50_ms=p50_ms,
@@ -167,5 +171,7 @@ def _most_that_fits(coding: int, one_ms: float, all_ms: float, budget_ms: float)
     return max(1, min(MOST_ITERATIONS, 1 + int((budget_ms - one_ms) / slope_ms)))
 
 
-def _free_kept(coding: int, interaction: int, allowed: int) -> int:
-    return max(0, min(allowed, allowed - (coding - interaction)))
+def lowered(coding: int, interaction: int, most: int) -> tuple[int, int]:
+    """Coding and interaction iterations where at most `most` fit: the free passes are kept."""
+    allowed = min(coding, most)
+    return allowed, max(0, min(allowed, allowed - (coding - interaction)))

@@ -36,11 +36,11 @@ def admitted(folder: Path, parts: StageParts, show: Show, box: BoxConfig, comes_
 
 def admission_record(show: Show, box: BoxConfig) -> Record:
     """The measurement, as a record whose scope is all that it depends on."""
-    network, dancer = show.network.stat(), show.config.dancer
+    network, config = show.network.stat(), show.config
     scope = {
         "network": [str(show.network.resolve()), network.st_size, network.st_mtime_ns],
-        "iterations": [dancer.coding_iterations, dancer.interaction_iterations],
-        "hands": [hand.joint for hand in show.config.hands],
+        "iterations": config.iterations_of_puppets,
+        "hands": [[hand.joint for hand in hands] for hands in config.hands_of_puppets],
         "budget_ms": box.limits.tick_budget_ms,
         "priority": box.realtime.priority if box.realtime.enabled else None,
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from appliance.dancer.puppeteers import Remote
+from appliance.dancer.springs_parameters import KNOBS
 from appliance.pose import quaternion
 from appliance.sensor.link import SensorLink
 from appliance.show.config_error import did_you_mean
@@ -12,7 +13,8 @@ from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.stage_parts import StageParts
 
 SENSOR_ORDERS = frozenset(("neutral", "heading", "strobe", "reload"))
-SPRINGS_ORDERS = frozenset(("springs", "wind", "gravity", "kick"))
+SPRINGS_ORDERS = frozenset(("springs", "kick", *KNOBS))
+KNOB_S = 0.5  # in which a knob's value is reached where a command gives no fade
 STROBE_S = 10.0
 
 Outcome = tuple[bool, str]
@@ -41,15 +43,17 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
             if iterations.asked[1] == 0 and any(puppeteer.enabled for puppeteer in parts.hands.puppeteers):
                 words = f"{words} None of the iterations is interactive: the hands move nothing.".lstrip()
         elif order.name == "allow":
-            iterations.allow(int(order.values[0]))
+            for puppet in parts.puppets:
+                puppet.iterations.allow(int(order.values[0]))
         elif order.name in SPRINGS_ORDERS:
             _spring(order, parts)
         elif order.name == "phrase":
-            words = parts.play(order.text, *order.values)
+            words = parts.first.play(order.text, *order.values)
         elif order.name == "made":
             parts.dance_made(order.text, order.values[0])
         elif order.name == "rate":
-            motion.rate = order.values[0]
+            for puppet in parts.puppets:
+                puppet.motion.rate = order.values[0]
         elif order.name == "jump":
             motion.jump(order.values[0])
         elif order.name == "excerpt":
@@ -119,7 +123,7 @@ def _enable(order: Order, parts: StageParts) -> None:
 def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
     """Where a joint is now, local to its parent; before the first tick where the phrase has it."""
     place = parts.skeleton.index(joint)
-    parent, world = parts.skeleton.parents[place], parts.grounding.figure.world
+    parent, world = parts.skeleton.parents[place], parts.first.grounding.figure.world
     here: quaternion.Array = world[place]
     if not here.any():
         here = parts.motion.window()[0][place]
@@ -129,33 +133,34 @@ def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
 
 
 def _spring(order: Order, parts: StageParts) -> None:
-    """Give the springs another setting, wind (m/s), gravity (m/s^2) or a kick (m/s)."""
-    springs = parts.springs
+    """Give the springs another setting, a kick (m/s), or turn one of their knobs."""
+    springs = parts.first.springs
     if springs is None:
         raise ValueError("No hand of this show is springs. Add {springs: loose, joint: ...} to its hands.")
     if order.name == "kick":
         springs.kick(order.values)
-    elif order.name == "wind":
-        springs.wind[:] = order.values
-    elif order.name == "gravity":
-        springs.gravity = order.values[0]
+    elif order.name in ("wind", "gravity"):
+        springs.turn(order.name, order.values)
+    elif order.name in KNOBS:
+        springs.turn(order.name, order.values[:1], *(order.values[1:] or (KNOB_S,)))
     elif str(order.text) in springs.settings:
-        springs.call(str(order.text))
+        springs.call(str(order.text), order.values[0] if order.values else 0.0)
     else:
         raise ValueError(f"There is no setting of springs '{order.text}' in this show.")
 
 
 def _turn(order: Order, parts: StageParts) -> None:
-    """Give a joint that is held by OSC its orientation, or back to the puppet."""
-    for puppeteer in parts.hands.puppeteers:
-        if isinstance(puppeteer, Remote) and puppeteer.joint == order.text:
-            if order.name == "release":
-                puppeteer.release()
-            else:
-                x, y, z, angle = order.values
-                puppeteer.hold_axis_angle((x, y, z), angle)
-            return
-    raise ValueError(
-        f"No hand of this show holds '{order.text}' by OSC. "
-        f"Add {{osc: true, joint: {order.text}}} to its hands."
-    )
+    """Give a joint that is held by OSC its orientation, or back: of each puppet with such a hand there."""
+    puppeteers = [one for puppet in parts.puppets for one in puppet.hands.puppeteers]
+    led = [one for one in puppeteers if isinstance(one, Remote) and one.joint == order.text]
+    if not led:
+        raise ValueError(
+            f"No hand of this show holds '{order.text}' by OSC. "
+            f"Add {{osc: true, joint: {order.text}}} to its hands."
+        )
+    for puppeteer in led:
+        if order.name == "release":
+            puppeteer.release()
+        else:
+            x, y, z, angle = order.values
+            puppeteer.hold_axis_angle((x, y, z), angle)

@@ -6,12 +6,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from appliance.recorder.record import NOT_FINITE, RESENT
 
 if TYPE_CHECKING:
     from appliance.stage.tick import Tick
 
+Floats = NDArray[np.float32]
 METRES_PER_DEGREE = 0.01  # how far the root may be off where joints may be off by a degree
 
 
@@ -53,20 +55,17 @@ class Comparison:
         self.ticks += 1
         words = self._words or _other(recorded, tick)
         self._words = ""
-        frame = tick.frame
-        is_same = (
-            frame.pose.tobytes() == recorded["pose"].tobytes()
-            and frame.root.tobytes() == recorded["root"].tobytes()
-        )
-        if is_same and not words:
+        root, pose = _of_all(recorded, "root", tick), _of_all(recorded, "pose", tick)
+        if all(then.tobytes() == here.tobytes() for then, here in (root, pose)) and not words:
             return
-        degrees = _degrees_between(recorded["pose"], frame.pose)
-        joint, metres = int(degrees.argmax()), float(np.linalg.norm(recorded["root"] - frame.root))
+        degrees = _degrees_between(*pose)
+        joint = int(degrees.argmax()) % len(tick.parts.skeleton)
+        metres = float(np.linalg.norm(root[0] - root[1], axis=-1).max())
         found = Difference(
             int(recorded["tick"]),
             float(recorded["frame_time"]) - self._begun,
             tick.parts.skeleton.names[joint],
-            float(degrees[joint]),
+            float(degrees.max()),
             metres,
             words,
         )
@@ -87,6 +86,13 @@ class Comparison:
         return _size(found) > self._tolerance
 
 
+def _of_all(recorded: Any, name: str, tick: Tick) -> tuple[Floats, Floats]:
+    """`root` (P, 3) or `pose` (P, J, 4) of all puppets: as recorded, and as they are now."""
+    here = np.stack([getattr(puppet.frame, name) for puppet in tick.parts.puppets])
+    then = recorded[name][None]
+    return (then if len(here) == 1 else np.concatenate([then, recorded[f"others_{name}"]])), here
+
+
 def _size(found: Difference) -> float:
     return max(found.degrees, found.metres / METRES_PER_DEGREE)
 
@@ -96,6 +102,10 @@ def _other(recorded: Any, tick: Tick) -> str:
     frame, times = tick.frame, tick.iterations
     was_late, had_failed = (bool(recorded["flags"] & flag) for flag in (RESENT, NOT_FINITE))
     iterations = int(recorded["coding_iterations"]), int(recorded["interaction_iterations"])
+    others = tick.parts.puppets[1:]
+    other_failed = bool(others) and bool((recorded["others_flags"] & NOT_FINITE).any())
+    if other_failed != any(puppet.network_failed for puppet in others):
+        return "the network failed for another puppet then, or fails here"
     if was_late != frame.late:
         return "it was late then and is in time here" if was_late else "it was in time then and is late here"
     if had_failed != tick.network_failed:
@@ -108,7 +118,7 @@ def _other(recorded: Any, tick: Tick) -> str:
 
 
 def _degrees_between(one: Any, other: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Angles (J,) between orientations (J, 4), exact for small ones."""
+    """Angles (P, J) between orientations (P, J, 4), exact for small ones."""
     a, b = np.asarray(one, np.float64), np.asarray(other, np.float64)
     chord = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
     degrees: np.ndarray[Any, np.dtype[np.float64]] = np.degrees(4.0 * np.arcsin(np.clip(chord / 2, 0, 1)))

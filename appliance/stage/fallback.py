@@ -90,7 +90,7 @@ SOURCE_LATE = Fallback(
     "source-late",
     "What the puppet was to start from did not come in time: the last phrase plays on, and the source takes "
     "over again when it is back. Of a live dancer check the program that sends it, and the network; of vary, "
-    "granular and path the generator: journalctl -u bunraku-generator.",
+    "granular, path and improvise the generator: journalctl -u bunraku-generator.",
 )
 POSE_REFUSED = Fallback(
     "pose-refused",

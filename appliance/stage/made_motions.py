@@ -9,15 +9,16 @@ from appliance.dancer.loop import Loop
 from appliance.dancer.material.material_file import read_material
 from appliance.dancer.motion_source import Playback
 from appliance.show.show import Show
-from appliance.show.sources import GRANULAR, VARY
+from appliance.show.sources import GRANULAR, IMPROVISE, VARY
 from appliance.show_control.orders import Order
 from appliance.stage.stage_parts import StageParts
 
 LATE_S = 3.0  # after which a source that was called and has not come is late
 MELT_S = 1.0  # from one variation to the next
 ORDER = "made"
-_ANEW = (VARY, GRANULAR)  # another one at every return
+_ANEW = (VARY, GRANULAR, IMPROVISE)  # another one at every return
 _ROUND_S = 0.5  # back by more than this, a loop has come round
+_AHEAD_S = 3.0  # what goes on from a moment that is farther ahead does not wait for it
 
 
 class MadeMotions:
@@ -32,6 +33,8 @@ class MadeMotions:
         self._wanted, self._since = "", 0.0
         self._place = (0, 0.0)  # number of the loop, second in it
         self._tried: MadeMotion | None = None
+        self._seen: MadeMotion | None = None
+        self._seen_at = 0.0
         self.is_late = False
 
     def order(self, wanted: str, fade_s: float, now: float) -> Order | None:
@@ -48,10 +51,22 @@ class MadeMotions:
         if newest is None or newest.name != wanted or newest is self._tried:
             self.is_late |= returned and wanted in _ANEW if is_here else now - self._since > LATE_S
             return None
-        if is_here and not (newest.at_once or returned):
+        if newest is not self._seen:
+            self._seen, self._seen_at = newest, now
+        is_due = newest.at_once or returned or not is_here
+        if newest.from_s is not None and (is_here or newest.at_once):
+            is_due = returned or self._reaches(newest, before, now)
+        if not is_due:
             return None
         self._tried, self.is_late = newest, False
         return Order(ORDER, (MELT_S if is_here else fade_s,), newest.recipe)
+
+    def _reaches(self, newest: MadeMotion, before: tuple[int, float], now: float) -> bool:
+        """Whether the dance is where this one goes on from; one that is wanted at once waits a moment."""
+        ahead_s = (newest.from_s or 0.0) - self._place[1]
+        if newest.at_once:
+            return not 0.0 < ahead_s <= _AHEAD_S or now - self._seen_at > _AHEAD_S
+        return before[0] == self._place[0] and ahead_s <= 0.0 < ahead_s + self._place[1] - before[1]
 
     def loop(self, recipe: str) -> Loop:
         """The loop of a recipe that the generator has made. Raises ValueError."""

@@ -1,6 +1,8 @@
-"""The puppeteers of a show: one for each of its hands."""
+"""The puppeteers of a show: one for each hand of a puppet."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from appliance.dancer.grounding import Grounding
 from appliance.dancer.puppet import Puppet
@@ -13,16 +15,17 @@ from appliance.show.springs import springs_by_name
 from appliance.stage.stage_error import StageError
 
 
-def puppeteers_of(show: Show, puppet: Puppet, grounding: Grounding) -> list[Puppeteer]:
-    """All hands in their order; springs know the others, whose joints they leave alone."""
-    hands = show.config.hands
+def puppeteers_of(
+    show: Show, hands: Sequence[HandConfig], puppet: Puppet, grounding: Grounding
+) -> list[Puppeteer]:
+    """The hands of one puppet in their order; springs know the others, whose joints they leave alone."""
     made = {place: _puppeteer(hand) for place, hand in enumerate(hands) if hand.springs is None}
     others, settings = tuple(made.values()), springs_by_name(show.config.springs)
     for place, hand in enumerate(hands):
         if hand.springs is not None:
             facts = hand.joint, show.skeleton, grounding.figure, puppet.joints, settings
             try:
-                made[place] = Springs(*facts, hand.springs, hand.weight, others)
+                made[place] = Springs(*facts, hand.springs, hand.weight, others, show.config.strings)
             except ValueError as error:
                 raise StageError(f"{show.file.path}: {error}") from error
     for place, hand in enumerate(hands):

@@ -13,13 +13,16 @@ from appliance.stage.iterations import Iterations
 from appliance.stage.made_motions import MELT_S, MadeMotions
 from appliance.stage.stage_parts import StageParts
 
+GATE_S = 1.0  # in which strings drive the joints again after panic, blackout and stop
+
 
 class Reconciler:
     """Compares the show state with what the dance does: once a tick, at the price of a small read.
 
     generation: of the show state that the dance follows. cue: the newest. rate: of playback while the show
     goes. words: what there was to say about the newest change. source: what the show starts from while
-    nothing is declared; wanted: what is to take the phrase's place now, "" for none.
+    nothing is declared; wanted: what is to take the phrase's place now, "" for none. motion: names and values
+    of what was declared for the generator, also before a power cut.
     """
 
     def __init__(
@@ -36,8 +39,10 @@ class Reconciler:
         self.generation, self.cue, self.words = 0, "", ""
         self.rate = self._usual_rate = parts.motion.rate
         self._show, self._reader = show, reader
-        self._is_first = parts.springs is not None  # a checkpoint knows nothing of the springs' setting
+        self._is_first = parts.first.springs is not None  # a checkpoint knows nothing of the springs' setting
+        self._gate = True
         self._made, self.source, self.wanted = made, source, ""
+        self.motion: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     def pending(self, now: float) -> Sequence[Order]:
         """Orders that make the dance follow the show state; none in nearly every tick."""
@@ -50,11 +55,19 @@ class Reconciler:
             for name, (number, text, values) in show_state.dance.items():
                 if number > before and name == "rate":
                     self.rate = values[0] if values else self._usual_rate or 1.0
-                elif name.startswith(MOTION) or (name == "phrase" and self._is_made(text)):
+                elif name.startswith(MOTION):
+                    self.motion = tuple({**dict(self.motion), name: values}.items())
+                elif name == "phrase" and self._is_made(text):
                     continue  # the generator makes it
-                elif number > before or (self._is_first and name in SPRINGS_ORDERS):
+                elif number > before:
                     orders.append(Order(name.partition(" ")[0], values, text))
+                elif self._is_first and name in SPRINGS_ORDERS:  # it was in force
+                    orders.append(without_fade(Order(name, values, text)))
             self._is_first = False
+        if (gate := show_state.going and not (show_state.panic or show_state.blackout)) != self._gate:
+            self._gate = gate
+            if self.parts.first.springs is not None:
+                orders.append(Order("gate", (float(gate), GATE_S if gate else 0.0)))
         live, is_ours = self.parts.live, show_state.show == self._show
         declared = show_state.dance.get("phrase") if is_ours else None
         wanted, fade = (declared[1], declared[2]) if declared else (self.source, ())
@@ -85,8 +98,17 @@ class Reconciler:
             if order.name == "phrase" and order.text in self.parts.motion.phrases:
                 self.parts.motion.start_with(order.text)
                 continue
-            if order.name == "iterations":
-                order = replace(order, values=order.values[:2])
-            words.append(obey(order, self.parts, self.iterations)[1])
+            words.append(obey(without_fade(order), self.parts, self.iterations)[1])
         cue = f"The show goes on in the cue '{self.cue}'." if self.cue else ""
         return " ".join(filter(None, (cue, *words)))
+
+
+def without_fade(order: Order) -> Order:
+    """The same, at once."""
+    if order.name == "iterations":
+        return replace(order, values=order.values[:2])
+    if order.name == "springs":
+        return replace(order, values=())
+    if order.name in ("feedback", "stiffness", "storm"):
+        return replace(order, values=(order.values[0], 0.0))
+    return order

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,8 @@ import numpy as np
 from appliance.box.live_pose import LivePose
 from appliance.box.ring_file import RingFileWriter
 from appliance.recorder.keyframe import POSITION, packed
-from appliance.recorder.record import EVENT, TICK, layout_of
+from appliance.recorder.log import pieces_of
+from appliance.recorder.record import EVENT, NOT_FINITE, PIECE, TICK, layout_of
 
 if TYPE_CHECKING:
     from appliance.box.clock import Slot
@@ -25,7 +27,8 @@ LOG_SLOTS = 4096  # 80 s: how long the disk may hang before the journal loses a 
 KEYFRAME_TICKS = 500  # from one keyframe to the next
 KEYFRAME_SLOTS = 1 + LOG_SLOTS // KEYFRAME_TICKS
 KEYFRAME_BYTES, KEYFRAME_JOINT_BYTES = 1 << 14, 1 << 9  # and for each joint
-EVENT_BYTES = 1024
+EVENT_BYTES = 1024  # of an entry
+LONGEST_EVENT = 8 * EVENT_BYTES  # the recipe of an improvisation with its prompt has half of that
 ENTRY = struct.Struct("<Q")  # kind of an entry of the log; then the tick's record, or the event as JSON
 
 _NO_ROUND_TRIP = _NOT_HEARD = float("nan")
@@ -42,6 +45,7 @@ class Recorder:
         said, layout = json.dumps(facts).encode(), layout_of(facts)
         entry_bytes = ENTRY.size + max(layout.itemsize, EVENT_BYTES)
         keyframe_bytes = KEYFRAME_BYTES + KEYFRAME_JOINT_BYTES * len(facts["joints"])
+        keyframe_bytes *= len(facts.get("puppets", ())) or 1
         shapes = [(1, len(said)), (LOG_SLOTS, entry_bytes), (KEYFRAME_SLOTS, keyframe_bytes)]
         self.lost = 0
         self._file = RingFileWriter.new(folder / FILE, KIND, FORMAT, shapes)
@@ -73,11 +77,18 @@ class Recorder:
         field["coding_iterations"][0] = tick.iterations.coding
         field["interaction_iterations"][0] = tick.iterations.interaction
         field["sections_ms"][0] = tick.sections_ms
-        for hand, place in enumerate(parts.hand_places):
-            field["targets"][0, hand] = parts.hands.targets[0, place]
-            field["weights"][0, hand] = parts.hands.weights[place]
+        hands = parts.hands
+        for hand, place in enumerate(parts.first.hand_places):
+            field["targets"][0, hand] = hands.targets[0, place]
+            field["weights"][0, hand] = hands.weights[place]
         field["root"][0] = frame.root
         field["pose"][0] = frame.pose
+        for other, puppet in enumerate(parts.puppets[1:]):
+            field["others_flags"][0, other] = puppet.network_failed * NOT_FINITE
+            times = puppet.iterations
+            field["others_iterations"][0, other] = times.coding, times.interaction
+            field["others_root"][0, other] = puppet.frame.root
+            field["others_pose"][0, other] = puppet.frame.pose
         self._note_readings(tick)
         self._note_live(tick.live_heard)
         self._log.publish()
@@ -85,14 +96,14 @@ class Recorder:
         self._ticks += 1
 
     def event(self, kind: str, now: float, **facts: Any) -> None:
-        """Something happened between two ticks: `facts` as JSON, 1 KiB at most (long texts lose their end).
+        """Something happened between two ticks: `facts` as JSON (beyond LONGEST_EVENT texts lose their end).
 
         `now`: seconds on the monotonic clock.
         """
         try:
-            said = _within({"kind": kind, "now": now} | facts)
-            self._log.write(ENTRY.pack(EVENT) + said)
-            self._entries += 1
+            for entry in _entries_of(_within({"kind": kind, "now": now} | facts)):
+                self._log.write(entry)
+                self._entries += 1
         except (TypeError, ValueError):
             self.lost += 1
 
@@ -135,9 +146,16 @@ class Recorder:
             )
 
 
+def _entries_of(said: bytes) -> Iterator[bytes]:
+    """An event as one entry of the log, or as pieces in several."""
+    if len(said) <= EVENT_BYTES:
+        return iter([ENTRY.pack(EVENT) + said])
+    return (ENTRY.pack(PIECE) + piece for piece in pieces_of(said, EVENT_BYTES))
+
+
 def _within(facts: dict[str, Any]) -> bytes:
     """As JSON that fits an event; the longest text loses its end until it does. Raises ValueError."""
-    while len(said := json.dumps(facts).encode()) > EVENT_BYTES:
+    while len(said := json.dumps(facts).encode()) > LONGEST_EVENT:
         texts = [name for name, value in facts.items() if isinstance(value, str) and len(value) > 1]
         if not texts:
             raise ValueError(f"{len(said)} bytes do not fit an event")

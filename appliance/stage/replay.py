@@ -15,7 +15,7 @@ from appliance.dancer.slerp import FloatArray
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import unpacked
 from appliance.recorder.reading import Run
-from appliance.recorder.record import DAMAGED, NOT_FINITE, ORDER
+from appliance.recorder.record import DAMAGED, NOT_FINITE, ORDER, puppets_of
 from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show
@@ -45,13 +45,18 @@ class Replay:
         self._run = run
         parts = assemble(show, _NO_PORTS)
         hands = [hand["joint"] for hand in run.header["hands"]]
-        if parts.skeleton.names != run.skeleton.names or hands != [hand.joint for hand in show.config.hands]:
+        is_same = hands == [hand.joint for hand in show.config.hands]
+        is_same = is_same and run.header.get("puppets", []) == puppets_of(show)
+        if parts.skeleton.names != run.skeleton.names or not is_same:
             raise JournalError(
-                f"{show.directory}: this show has another figure or other hands than the recorded one "
+                f"{show.directory}: this show has other figures or other hands than the recorded one "
                 f"('{run.header['show']}'). Name its bundle: --show DIR."
             )
         parts.link = self._link = _RecordedLink(run)
-        parts.puppet = self._puppet = _RecordedPuppet(show)
+        first = _RecordedPuppet(show)
+        self._puppets = [first, *(first.another() for _ in parts.puppets[1:])]
+        for one, recorded in zip(parts.puppets, self._puppets, strict=True):
+            one.puppet = recorded
         parts.live_inbox = self._live = _RecordedLive(run)
         maker = maker_of(show, parts.motion)
         parts.loop_of = maker
@@ -62,7 +67,7 @@ class Replay:
     @property
     def forced(self) -> int:
         """Ticks whose network failed then and not here."""
-        return self._puppet.forced
+        return sum(puppet.forced for puppet in self._puppets)
 
     def dance(self, comparison: Comparison, from_s: float = 0.0) -> Iterator[int]:
         """Run what was recorded, from the last keyframe before a second of the run on; tells `comparison` of
@@ -114,7 +119,9 @@ class Replay:
     def _dance_row(self, row: int, comparison: Comparison) -> None:
         recorded = self._run.ticks[row]
         self._link.row = self._live.row = row
-        self._puppet.fails = bool(recorded["flags"] & NOT_FINITE)
+        flags = [recorded["flags"], *(recorded["others_flags"] if len(self._puppets) > 1 else ())]
+        for puppet, flag in zip(self._puppets, flags, strict=True):
+            puppet.fails = bool(flag & NOT_FINITE)
         slot = Slot(
             int(recorded["tick"]),
             float(recorded["frame_time"]),

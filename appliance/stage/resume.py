@@ -104,13 +104,16 @@ class Resumption:
         standing = place.x, place.z, place.heading
         now_rate = 0.0 if reconciler.stands(now) else rate
         parts.motion.start_at(place.phrase, place.excerpt, place.position_s, now_rate, standing)
-        parts.grounding.strayed = place.strayed
+        parts.first.grounding.strayed = place.strayed
         for puppeteer in parts.hands.puppeteers:
             puppeteer.enabled = puppeteer.joint not in place.let_go
+        for one, noted in zip(parts.puppets[1:], place.others, strict=False):
+            one.go_on(noted, now_rate)
         reconciler.cue, reconciler.rate = place.cue, rate
         reconciler.generation = 0 if self._after_power_cut else place.applied
         if self._after_power_cut and place.source:
             reconciler.source = place.source
+        reconciler.motion = place.motion
         return reconciler.iterations.ask(place.coding, place.interaction)
 
     def _place(self, reconciler: Reconciler, tick: int) -> Checkpoint:
@@ -124,7 +127,7 @@ class Resumption:
             motion.excerpt_s,
             reconciler.rate,
             *motion.standing,
-            reconciler.parts.grounding.strayed,
+            reconciler.parts.first.grounding.strayed,
             coding,
             interaction,
             reconciler.cue,
@@ -135,6 +138,8 @@ class Resumption:
             self.power_cuts,
             applied=reconciler.generation,
             source=reconciler.wanted,
+            motion=reconciler.motion,
+            others=tuple([puppet.noted for puppet in reconciler.parts.puppets[1:]]),
         )
 
     def _write(self, place: Checkpoint) -> None:

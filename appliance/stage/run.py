@@ -20,7 +20,6 @@ from appliance.stage.admission import Admission, SecondLook
 from appliance.stage.admission_cache import admitted
 from appliance.stage.carry_out import carry_out
 from appliance.stage.health import Health
-from appliance.stage.iterations import Iterations
 from appliance.stage.made_motions import open_made_motions
 from appliance.stage.phase_lock import PhaseLock
 from appliance.stage.reconcile import Reconciler
@@ -91,9 +90,8 @@ class Stage:
                 self.sharing.folder, self.parts, show, box, self.resuming.comes_back
             )
             self._closing = opened.pop_all()
-        measured = self.admission
-        wished = measured.asked_coding, measured.asked_interaction
-        self.iterations = Iterations(measured.coding, measured.interaction, measured.most_coding, wished)
+        self.parts.run_with(self.admission)
+        self.iterations = self.parts.first.iterations
         self.second_look = SecondLook(self.admission)
         self.reconciler = Reconciler(
             *(show.config.name, self.parts, self.iterations, show_state, self.made, show.config.motion.source)

@@ -40,7 +40,7 @@ class SensorFit:
         self._say = say
         self._news: list[str] = []
         self._wearers = {
-            name: SensorBinding(name, [WornHand(joint, parts.mountings[joint.joint]) for joint in joints])
+            name: SensorBinding(name, list(map(WornHand, joints, parts.mountings[name])))
             for name, joints in parts.worn.items()
         }
         for wearer in self._wearers.values():

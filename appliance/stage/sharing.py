@@ -12,6 +12,7 @@ from appliance.box.runtime_folder import Claim, RuntimeFolderError, runtime_fold
 from appliance.outputs.shared_frame import Facts, FrameWriter
 from appliance.show.box import BoxConfig
 from appliance.show.show import Show
+from appliance.show.springs import springs_by_name
 from appliance.stage.health import Health
 from appliance.stage.iterations import Iterations
 from appliance.stage.reconcile import Reconciler
@@ -37,12 +38,20 @@ def facts_of(
         looks=names["look"],
         lights=names["lights"],
         springs=names["springs"],
+        springs_feedback={name: one.feedback for name, one in springs_by_name(config.springs).items()},
+        has_strings=config.strings is not None,
+        cards=names["card"],
         coding=iterations.coding,
         interaction=iterations.interaction,
         most_iterations=iterations.most,
         pid=os.getpid(),
         started=now,
         rehearsal=rehearsal,
+        puppets=tuple(puppet.name for puppet in config.puppets),
+        motion={
+            name: section.model_dump(mode="json", by_alias=True)
+            for name, section in config.motion.made_sources.items()
+        },
     )
 
 
@@ -102,9 +111,10 @@ class Sharing:
             "locked": locked,
             "coding": iterations.coding,
             "interaction": iterations.interaction,
-            "phrase": parts.source,
+            "phrase": parts.first.source,
             "base": parts.motion.base,
             "wanted": reconciler.wanted,
+            "motion": dict(reconciler.motion),
             "made": parts.motion.made.recipe if parts.motion.made else "",
             "position_s": parts.motion.position_s,
             "cue": reconciler.cue,

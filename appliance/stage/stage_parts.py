@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -22,8 +22,8 @@ from appliance.dancer.phrase import PhraseError
 from appliance.dancer.phrase_cache import PhraseCache
 from appliance.dancer.puppet import Puppet, PuppetError
 from appliance.dancer.puppeteers import WornSensor
-from appliance.dancer.slerp import FloatArray
 from appliance.dancer.springs import Springs
+from appliance.outputs.joint_frame import JointFrame
 from appliance.outputs.outputs import Outputs
 from appliance.pose.bvh import BvhError
 from appliance.pose.recording import Recording
@@ -34,11 +34,13 @@ from appliance.sensor.state import restored_reading
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import ConfigError
 from appliance.show.show import Show
-from appliance.show.sources import LIVE
-from appliance.stage.admission import Admission, admit
+from appliance.show.sources import LIVE, MAIN
+from appliance.stage.admission import MOST_ITERATIONS, Admission, admit, lowered
+from appliance.stage.iterations import Iterations
 from appliance.stage.open_sensors import open_sensors
 from appliance.stage.puppeteers_of_show import mounting_of, puppeteers_of
 from appliance.stage.stage_error import StageError
+from appliance.stage.stage_puppet import Place, StagePuppet
 
 
 def _nothing_made(recipe: str) -> Loop:
@@ -49,30 +51,49 @@ def _nothing_made(recipe: str) -> Loop:
 class StageParts:
     """Everything that dances, hears and speaks.
 
-    `hand_places`: where the hands' joints stand among the moving ones; `worn`: which joints a sensor holds;
-    `mountings`: how it is worn for each of these joints; `complaints`: why sensors are not let in.
+    puppets: at least one; cues and commands lead the first. `worn`: which joints a sensor holds, of any
+    puppet; `mountings`: how it is worn for each of these; `complaints`: why sensors are not let in.
     """
 
     skeleton: Skeleton
-    puppet: Puppet
-    motion: Playback
-    blending: Blending
-    grounding: Grounding
-    hands: Hands
-    hand_places: list[int]
+    puppets: tuple[StagePuppet, ...]
     worn: dict[str, list[WornSensor]]
-    mountings: dict[str, Mounting]
+    mountings: dict[str, list[Mounting]]
     primary: str | None
     link: SensorLink
     outputs: Outputs
-    crossfade_s: float
-    live: Live | None = None  # None: the show has no such source
     live_inbox: LivePoseReader | None = None
     live_refused: int = 0  # poses of another figure, or none
-    springs: Springs | None = None  # those among the hands
     complaints: tuple[str, ...] = ()
     newest_primary: SensorReading | None = field(default=None)
     loop_of: Callable[[str], Loop] = field(default=_nothing_made)  # of a recipe
+
+    @property
+    def first(self) -> StagePuppet:
+        """The one that cues and commands lead."""
+        return self.puppets[0]
+
+    @property
+    def motion(self) -> Playback:
+        """What the first puppet starts from."""
+        return self.first.motion
+
+    @property
+    def live(self) -> Live | None:
+        """The live dancer that the first puppet may start from."""
+        return self.first.live
+
+    @property
+    def hands(self) -> Hands:
+        """The first puppet's."""
+        return self.first.hands
+
+    def run_with(self, measured: Admission) -> None:
+        """Let each puppet run with as many of its iterations as fit."""
+        for one in self.puppets:
+            wished = one.iterations.wished
+            times = lowered(*wished, measured.coding)
+            one.iterations = Iterations(*times, measured.most_coding, wished)
 
     def hear(self, reading: SensorReading) -> None:
         """Give a reading to the joints that its sensor holds."""
@@ -84,34 +105,18 @@ class StageParts:
     def hear_live(self) -> LivePose | None:
         """The pose of a live dancer that has come since the last tick, once it is believed."""
         heard = None if self.live is None or self.live_inbox is None else self.live_inbox.read()
-        if self.live is None or heard is None:
+        if heard is None:
             return None
-        pose, root = np.frombuffer(heard.rotations, np.float32), np.array(heard.root, np.float32)
-        if heard.joints == len(self.skeleton) and self.live.hear(
-            pose.reshape(-1, 4), root, heard.arrival, self.motion.window()[0]
+        pose = np.frombuffer(heard.rotations, np.float32).reshape(-1, 4)
+        root = np.array(heard.root, np.float32)
+        if heard.joints == len(self.skeleton) and all(
+            one.live.hear(pose, root, heard.arrival, one.motion.window()[0])
+            for one in self.puppets
+            if one.live is not None
         ):
             return heard
         self.live_refused += 1
         return None
-
-    @property
-    def lift(self) -> float:
-        """How far the figure is to be above the floor, metres: in a jump of the phrase."""
-        return self.motion.lift * (1.0 - (self.live.share if self.live is not None else 0.0))
-
-    @property
-    def source(self) -> str:
-        """The name of what the puppet starts from: a phrase's, or `live`."""
-        return LIVE if self.live is not None and self.live.is_chosen else self.motion.phrase
-
-    def starts_from(self, now: float) -> tuple[FloatArray, FloatArray]:
-        """The window (T, J, 4) and the roots (T, 3) of this tick; call it once a tick."""
-        window, roots = self.motion.window(), self.motion.roots()
-        if self.live is not None:
-            window, roots = self.live.lay_over(now, window, roots)
-        if self.springs is not None:
-            self.springs.follow_phrase(window[0], roots[0])
-        return window, roots
 
     def dance_made(self, recipe: str, fade_s: float) -> None:
         """Go over to what the generator made. Raises ValueError, and the phrase plays on."""
@@ -122,34 +127,13 @@ class StageParts:
         if self.live is not None and self.live.is_chosen:
             self.live.choose(False, fade_s)
 
-    def play(self, name: str, *fade_s: float) -> str:
-        """Switch to a phrase, or to `live`; a sentence where nothing changes. Raises ValueError."""
-        if name != LIVE or self.live is None:
-            plays_already = not self.motion.play(name, *fade_s)
-            if self.live is None or not self.live.is_chosen:
-                return f"The phrase '{name}' plays already, and goes on." if plays_already else ""
-        self.live.choose(name == LIVE, *(fade_s or (self.crossfade_s,)))
-        return ""  # whether it is heard is news of its own
-
     def state(self) -> dict[str, Any]:
-        """What the dance to come depends on, for `restore`: plain values and copies of arrays."""
-        return {
-            "motion": self.motion.state(),
-            "blending": self.blending.state(),
-            "grounding": self.grounding.state(),
-            "hands": self.hands.state(),
-            "live": None if self.live is None else self.live.state(),
-            "newest_primary": self.newest_primary,
-        }
+        """What the first puppet's dance to come depends on, for `restore`: plain values, copies of arrays."""
+        return {**self.first.parts_state(), "newest_primary": self.newest_primary}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a state that parts of the same show gave."""
-        self.motion.restore(state["motion"])
-        self.blending.restore(state["blending"])
-        self.grounding.restore(state["grounding"])
-        self.hands.restore(state["hands"])
-        if self.live is not None:
-            self.live.restore(state["live"])
+        self.first.restore_parts(state)
         self.newest_primary = restored_reading(state["newest_primary"])
 
     def close(self) -> None:
@@ -173,75 +157,75 @@ def assemble(
     Raises StageError or ConfigError before anything dances. Keys that are missing are no reason not to dance:
     see `complaints`.
     """
+    config = show.config
     try:
         puppet = Puppet(show.network, show.skeleton)
         show.require_moving(puppet.joints)
         motion, floor = _playback(show, puppet.window, PhraseCache(show.directory, memory))
+        puppets = [_stage_puppet(show, 0, puppet, motion, floor)]
+        for number, one in enumerate(config.puppets[1:], 1):
+            other = motion.another(MAIN if one.phrase in (None, LIVE) else one.phrase, one.start_s)
+            puppets.append(_stage_puppet(show, number, puppet.another(), other, floor))
     except PuppetError as error:
         raise StageError(str(error)) from error
-    grounding = Grounding(show.skeleton, floor)
-    puppeteers = puppeteers_of(show, puppet, grounding)
     worn: dict[str, list[WornSensor]] = {}
-    mountings: dict[str, Mounting] = {}
-    for hand, puppeteer in zip(show.config.hands, puppeteers, strict=True):
-        if hand.sensor is not None and isinstance(puppeteer, WornSensor):
-            worn.setdefault(hand.sensor, []).append(puppeteer)
-            mountings[hand.joint] = mounting_of(hand)
+    mountings: dict[str, list[Mounting]] = {}
+    for hands, made in zip(config.hands_of_puppets, puppets, strict=True):
+        for hand, puppeteer in zip(hands, made.hands.puppeteers, strict=True):
+            if hand.sensor is not None and isinstance(puppeteer, WornSensor):
+                worn.setdefault(hand.sensor, []).append(puppeteer)
+                mountings.setdefault(hand.sensor, []).append(mounting_of(hand))
     link, complaints = open_sensors(box, list(worn), profiles)
     return StageParts(
         skeleton=show.skeleton,
-        puppet=puppet,
-        motion=motion,
-        blending=Blending(
-            len(puppet.joints), puppet.window, show.config.dancer.hop, show.config.dancer.blending
-        ),
-        grounding=grounding,
-        hands=Hands(puppeteers, puppet.joints, puppet.window),
-        hand_places=[puppet.joints.index(hand.joint) for hand in show.config.hands],
+        puppets=tuple(puppets),
         worn=worn,
         mountings=mountings,
-        primary=show.config.primary_sensor,
+        primary=config.primary_sensor,
         link=link,
         outputs=_outputs(show, box, box_file),
-        live=Live(len(show.skeleton), puppet.window) if show.config.motion.live else None,
-        crossfade_s=show.config.motion.crossfade_s,
-        springs=next((one for one in puppeteers if isinstance(one, Springs)), None),
         complaints=complaints,
     )
 
 
 def admission(parts: StageParts, show: Show, box: BoxConfig) -> Admission:
-    """Measure the show's iterations on this machine with the first window and all hands of the show.
+    """Measure the show's iterations on this machine with the first window and all hands of all puppets.
 
     Raises StageError where the network fails.
     """
-    dance = _dance(parts, show.network)
-    dancer = show.config.dancer
+    dance = _dance(parts, show)
+    asked = max(show.config.iterations_of_puppets)
     with borrowed_priority(box.realtime.priority if box.realtime.enabled else None):
-        return admit(
-            dance, dancer.coding_iterations, dancer.interaction_iterations, box.limits.tick_budget_ms
-        )
+        return replace(admit(dance, *asked, box.limits.tick_budget_ms), puppets=len(parts.puppets))
 
 
 def warm_up(parts: StageParts, show: Show, admitted: Admission) -> None:
     """Let the network run once as the first tick will: its first run takes several times as long."""
-    _dance(parts, show.network)(admitted.coding, admitted.interaction)
+    _dance(parts, show)(admitted.coding, admitted.interaction)
 
 
-def _dance(parts: StageParts, network: Path) -> Callable[[int, int], object]:
-    """Runs the puppet with the first window and all hands of the show; its poses go nowhere."""
-    window = parts.puppet.select(parts.motion.window()).copy()
-    mask, targets, weights = parts.hands.mask.copy(), parts.hands.targets, parts.hands.weights
-    mask[parts.hand_places] = True
+def _dance(parts: StageParts, show: Show) -> Callable[[int, int], object]:
+    """Runs all puppets with their first windows and all hands; their poses go nowhere. None of them runs
+    with more iterations than the show gives it, but where there is one puppet.
+    """
+    runs = []
+    for one, most in zip(parts.puppets, show.config.iterations_of_puppets, strict=True):
+        mask = one.hands.mask.copy()
+        mask[one.hand_places] = True
+        window = one.puppet.select(one.motion.window()).copy()
+        runs.append((one.puppet, most, (window, mask, one.hands.targets, one.hands.weights)))
 
     def dance(coding: int, interaction: int) -> object:
         try:
-            return parts.puppet.dance(window, mask, targets, weights, coding, interaction)
+            for puppet, most, held in runs:
+                times = (coding, interaction) if len(runs) == 1 else lowered(*most, coding)
+                puppet.dance(*held, *times)
         except Exception as error:  # onnxruntime has a class of its own for every way to fail
             raise StageError(
-                f"{network}: the network fails at {coding} coding iterations ({str(error)[:200]}). "
+                f"{show.network}: the network fails at {coding} coding iterations ({str(error)[:200]}). "
                 "Nothing is danced. Export the show again."
             ) from None
+        return None
 
     return dance
 
@@ -282,7 +266,34 @@ def _phrase(show: Show, path: Path, preparations: PhraseCache) -> tuple[Recordin
 
 
 def _outputs(show: Show, box: BoxConfig, box_file: Path | None) -> Outputs:
-    problems = box.output_misfits(show.skeleton.names)
+    problems = box.output_misfits(show.skeleton.names, len(show.config.hands_of_puppets))
     if problems:
         raise ConfigError(problems)
-    return Outputs(box.outputs, show.skeleton)
+    return Outputs(box.outputs, show.skeleton, [puppet.name for puppet in show.config.puppets])
+
+
+def _stage_puppet(
+    show: Show, number: int, puppet: Puppet, motion: Playback, floor: Floor | None
+) -> StagePuppet:
+    """One of the show's puppets; the first one has number 0."""
+    config, times = show.config, show.config.iterations_of_puppets[number]
+    hands, grounding = config.hands_of_puppets[number], Grounding(show.skeleton, floor)
+    puppeteers = puppeteers_of(show, hands, puppet, grounding)
+    joints, window, placed = puppet.joints, puppet.window, config.puppets
+    made = StagePuppet(
+        puppet=puppet,
+        motion=motion,
+        blending=Blending(len(joints), window, config.dancer.hop, config.dancer.blending),
+        grounding=grounding,
+        hands=Hands(puppeteers, joints, window),
+        hand_places=[joints.index(hand.joint) for hand in hands],
+        iterations=Iterations(*times, MOST_ITERATIONS, times),
+        frame=JointFrame(len(show.skeleton)),
+        crossfade_s=config.motion.crossfade_s,
+        live=Live(len(show.skeleton), window) if config.motion.live else None,
+        springs=next((one for one in puppeteers if isinstance(one, Springs)), None),
+        place=Place(placed[number], motion.roots()[0]) if placed else None,
+    )
+    if number and placed[number].phrase == LIVE:
+        made.play(LIVE, 0.0)
+    return made

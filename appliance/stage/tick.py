@@ -1,4 +1,4 @@
-"""One tick: readings in, puppet, blending, joints out. The whole of it, in the order in which data flows."""
+"""One tick: readings in, puppets, blending, joints out. The whole of it, in the order in which data flows."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from appliance.box.clock import Slot
 from appliance.box.live_pose import LivePose
-from appliance.outputs.joint_frame import JointFrame
 from appliance.recorder.record import SECTIONS
 from appliance.sensor.link import SensorReading
 from appliance.stage.iterations import Iterations
 from appliance.stage.sensor_fit import SensorFit
 from appliance.stage.stage_parts import StageParts
 
-_STANDING = ("pose", "world", "positions", "root")  # arrays of a frame
 DRAIN, MOTION, HANDS, PUPPET, BLEND, FIGURE, SEND = range(len(SECTIONS))
 
 
@@ -38,26 +36,33 @@ class Tick:
         latest_start_s: float,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
+        """iterations: of the first puppet; the others have theirs."""
         self.parts = parts
         self.wearing = wearing
-        self.iterations = iterations
+        self.iterations = parts.first.iterations = iterations
         self.latest_start_s = latest_start_s
-        self.frame = JointFrame(len(parts.skeleton))
-        self._whole, self._roots = parts.motion.window(), parts.motion.roots()
-        self._danced = self._whole[0].copy()  # (J, 4), not yet grounded
-        self.network_failed = False
+        self.frame, *others = (one.frame for one in parts.puppets)
+        self._others = tuple(others)
         self.readings: Sequence[SensorReading] = ()
         self.live_heard: LivePose | None = None
         self.sections_ms: NDArray[np.float32] = np.zeros(len(SECTIONS), np.float32)
         self._section_ends = [0.0] * len(SECTIONS)
         self._monotonic = monotonic
-        self._stand()
+        for puppet in parts.puppets:
+            puppet.stand()
+
+    @property
+    def network_failed(self) -> bool:
+        """Whether the network gave the first puppet no sound poses."""
+        return self.parts.first.network_failed
 
     def run(self, slot: Slot) -> None:
         """Everything from the sensors' datagrams to the receivers'."""
         parts, frame, ends, now = self.parts, self.frame, self._section_ends, self._monotonic
         frame.tick, frame.frame_time = slot.tick, slot.deadline
         frame.late = slot.lateness_s > self.latest_start_s
+        for other in self._others:
+            other.tick, other.frame_time, other.late = frame.tick, frame.frame_time, frame.late
 
         self.readings = parts.link.drain(slot.started)
         for reading in self.readings:
@@ -67,22 +72,25 @@ class Tick:
         ends[DRAIN] = ends[MOTION] = ends[HANDS] = ends[PUPPET] = ends[BLEND] = ends[FIGURE] = now()
 
         if not frame.late:
-            self._whole, self._roots = parts.starts_from(slot.started)
-            window = parts.puppet.select(self._whole)
+            for puppet in parts.puppets:
+                puppet.start(slot.started)
             ends[MOTION] = now()
-            parts.hands.pull(slot.started, window)
+            for puppet in parts.puppets:
+                puppet.pull(slot.started)
             ends[HANDS] = now()
-            if parts.blending.is_due:
-                self._regenerate(window)
+            for puppet in parts.puppets:
+                if puppet.blending.is_due:
+                    puppet.dance()
+                    self._name_reading()
             ends[PUPPET] = now()
-            if not self.network_failed:
-                self._danced[:] = self._whole[0]
-                parts.puppet.restore(parts.blending.take(), self._danced)
+            for puppet in parts.puppets:
+                puppet.blend()
             ends[BLEND] = now()
-            self._stand()
+            for puppet in parts.puppets:
+                puppet.stand()
             ends[FIGURE] = now()
 
-        parts.outputs.publish_frame(frame)
+        parts.outputs.publish_frame(frame, *self._others)
         ends[SEND] = now()
 
     def warm_up(self) -> None:
@@ -91,18 +99,17 @@ class Tick:
         In 18 ms of pause the caches cool down: ten iterations of the default then took 1.45 ms (p50) and 2.1
         (p99), after this 1.1 and 1.5, against 0.87 and 1.3 back to back.
         """
-        parts, hands = self.parts, self.parts.hands
-        if parts.blending.is_due:
-            window = parts.puppet.select(parts.motion.window())
-            parts.puppet.dance(window, hands.mask, hands.targets, hands.weights, 1, 0)
+        first = self.parts.first  # all of them share its network
+        if first.blending.is_due:
+            first.warm_up()
 
     def after(self, slot: Slot) -> float:
         """What can wait until the frame has left: the motion moves on, sensors are answered and looked at,
         times are noted. The cost of what came before, in ms.
         """
         if not self.frame.late:
-            self.parts.motion.advance()
-            self.iterations.advance()
+            for puppet in self.parts.puppets:
+                puppet.advance()
         self.parts.link.send_due(self._monotonic())
         self.wearing.look(slot.started)
         begin = slot.started
@@ -115,55 +122,31 @@ class Tick:
         """All that the frames to come depend on, beside readings and slots, for `restore`: plain values and
         copies of arrays.
         """
-        frame = self.frame
+        frame, (first, *others) = self.frame, self.parts.puppets
+        more = {"puppets": [one.parts_state() | one.frame_state() for one in others]} if others else {}
         return {
             "parts": self.parts.state(),
             "wearing": self.wearing.state(),
-            "iterations": self.iterations.state(),
             "latest_start_s": self.latest_start_s,
-            "network_failed": self.network_failed,
-            "danced": self._danced.copy(),
-            "frame": {name: getattr(frame, name).copy() for name in _STANDING},
             "sensor": [frame.sensor_sequence, frame.sensor_arrival],
+            **first.frame_state(),
+            **more,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on as the tick of the same show did that gave this state."""
-        frame = self.frame
+        frame, (first, *others) = self.frame, self.parts.puppets
         self.parts.restore(state["parts"])
         self.wearing.restore(state["wearing"])
-        self.iterations.restore(state["iterations"])
-        self.latest_start_s, self.network_failed = state["latest_start_s"], state["network_failed"]
-        self._danced[:] = state["danced"]
-        for name in _STANDING:
-            getattr(frame, name)[:] = state["frame"][name]
+        self.latest_start_s = state["latest_start_s"]
+        first.restore_frame(state)
+        for one, kept in zip(others, state.get("puppets", ()), strict=True):
+            one.restore_parts(kept)
+            one.restore_frame(kept)
         frame.sensor_sequence, frame.sensor_arrival = state["sensor"]
 
-    def _regenerate(self, window: NDArray[np.float32]) -> None:
-        """Let the puppet dance a window and blend it in; the frame names the reading that went into it."""
-        parts, frame, hands, times = self.parts, self.frame, self.parts.hands, self.iterations
-        poses = parts.puppet.dance(
-            window, hands.mask, hands.targets, hands.weights, times.coding, times.interaction
-        )
-        self.network_failed = parts.puppet.is_broken
-        if not self.network_failed:
-            parts.blending.add(poses)
-        if parts.newest_primary is not None:
-            frame.sensor_sequence = parts.newest_primary.sequence
-            frame.sensor_arrival = parts.newest_primary.arrival
-
-    def _stand(self) -> None:
-        """Put the danced pose on the floor and into the world."""
-        parts, frame, motion = self.parts, self.frame, self.parts.motion
-        parts.puppet.restore(parts.hands.weights, frame.holds)
-        figure = parts.grounding.ground_pose(
-            self._danced,
-            self._roots[0],
-            parts.lift,
-            motion.rest_heights,
-            frame.holds,
-        )
-        frame.pose[:] = parts.grounding.pose
-        frame.world[:] = figure.world
-        frame.positions[:] = figure.positions
-        frame.root[:] = parts.grounding.root
+    def _name_reading(self) -> None:
+        """The frame names the reading that went into it."""
+        newest, frame = self.parts.newest_primary, self.frame
+        if newest is not None:
+            frame.sensor_sequence, frame.sensor_arrival = newest.sequence, newest.arrival

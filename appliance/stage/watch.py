@@ -175,7 +175,7 @@ class Watch:
                     if is_gone
                     else f"Receiver {receiver.name} gets the dance again."
                 )
-        is_broken = self._parts.puppet.is_broken
+        is_broken = any(one.puppet.is_broken for one in self._parts.puppets)
         if self._changes("network", "", is_broken):
             yield (
                 "The network gives poses that are not numbers. The dancer holds the last good pose. "

@@ -70,18 +70,18 @@ def pack_with_python_osc(frame: JointFrame) -> list[bytes]:
 def test_python_osc(measured: Callable[..., Any], frame: JointFrame) -> None:
     benchmark = measured("python-osc", OSC_GROUP, reference=True)
     packed = benchmark(pack_with_python_osc, frame)
-    ours = DIALECTS["ai-toolbox"](skeleton(), OscConfig()).encode(frame)
+    ours = DIALECTS["ai-toolbox"](skeleton(), OscConfig(), 0).encode(frame)
     assert packed == [bytes(datagram) for datagram in ours]
 
 
 def test_ai_toolbox(measured: Callable[..., Any], frame: JointFrame) -> None:
-    encoder = DIALECTS["ai-toolbox"](skeleton(), OscConfig())
+    encoder = DIALECTS["ai-toolbox"](skeleton(), OscConfig(), 0)
     assert len(measured("ours", OSC_GROUP)(encoder.encode, frame)) == 3
 
 
 @pytest.mark.parametrize("dialect", sorted(DIALECTS.keys() - {"ai-toolbox"}))
 def test_dialect(measured: Callable[..., Any], frame: JointFrame, dialect: str) -> None:
-    encoder = DIALECTS[dialect](skeleton(), OscConfig())
+    encoder = DIALECTS[dialect](skeleton(), OscConfig(), 0)
     assert measured(dialect, DIALECTS_GROUP)(encoder.encode, frame)
 
 

@@ -71,6 +71,7 @@ _names = st.text(max_size=60)
         restarts=st.integers(0, 65535),
         ended=st.booleans(),
         tries=st.integers(0, 255),
+        motion=st.lists(st.tuples(_names, st.lists(_finite, max_size=4).map(tuple)), max_size=3).map(tuple),
     )
 )
 def test_comes_back_as_it_was(place: Checkpoint) -> None:
@@ -80,6 +81,7 @@ def test_comes_back_as_it_was(place: Checkpoint) -> None:
 def test_numbers_that_are_none_are_no_place() -> None:
     assert unpacked(packed(replace(PLACE, position_s=math.nan))) is None
     assert unpacked(packed(replace(PLACE, strayed=(0.0, math.inf)))) is None
+    assert unpacked(packed(replace(PLACE, motion=(("motion vary sigma", (math.inf,)),)))) is None
 
 
 @pytest.mark.parametrize("length", range(len(packed(PLACE))))
@@ -95,6 +97,11 @@ def test_counts_that_grow_for_years_still_fit() -> None:
 def test_names_that_are_too_long_are_refused() -> None:
     with pytest.raises(ValueError, match=str(LARGEST)):
         packed(replace(PLACE, cue="x" * LARGEST))
+
+
+def test_the_place_counts_for_more_than_what_was_declared_for_the_generator() -> None:
+    many = (("motion path points", (0.123456789,) * LARGEST),)
+    assert unpacked(packed(replace(PLACE, motion=many))) == PLACE
 
 
 def test_outlives_its_writer_and_is_written_on_by_the_next(tmp_path: Path) -> None:

@@ -62,6 +62,12 @@ def test_a_look_that_is_left_before_it_was_there_is_left_from_what_is_seen_most(
     assert (show_state.look_before, show_state.look, show_state.look_mix(NOW + 0.5)) == ("", "ink", 0.25)
     assert show_state.with_look("lines", NOW + 0.5, 2.0).look_before == ""
     assert show_state.with_look("lines", NOW + 1.5, 2.0).look_before == "ink"
+    carded = ShowState().with_card("title", NOW, 2.0)
+    assert carded.card_mix(NOW + 0.5) == 0.25
+    assert carded.with_card("", NOW + 1.5, 2.0).card_before == "title"
+    turned = ShowState().with_camera({"angle_deg": 90.0}, NOW, 2.0)
+    assert turned.with_camera({}, NOW + 1.5, 2.0).camera_before == {"angle_deg": 90.0}
+    assert turned.for_show("another").camera == {} and turned.camera_mix(NOW + 1.0) == 0.5
     lit = ShowState().with_lights("cold", NOW, 2.0)
     assert lit.with_lights("warm", NOW + 1.5, 2.0).lights_before == "cold"
 

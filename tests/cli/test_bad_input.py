@@ -30,6 +30,7 @@ control --box {}
 console --box {}
 console pin --box {}
 keep --box {}
+kept --box {}
 firewall --box {}
 journal list --journal {}
 journal export {out}/j --journal {}

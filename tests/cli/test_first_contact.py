@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from appliance.cli.pictures import RecordedDance
+from appliance.cli.pictures import RecordedDance, load_dance
 from appliance.cli.rehearsal import PICTURED_S, pictured_from
 from hw_sim.peers import free_ports
 from tests.bundles import swaying_phrase, write_show
@@ -61,6 +61,15 @@ def test_a_default_receiver_is_nothing_to_warn_of_and_no_emulator_outlives_a_kil
     while is_running(emulators[0]):
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+def test_the_first_seconds_show_a_hand_that_leads(tmp_path: Path) -> None:
+    with rehearsal(tmp_path, "--seconds", "4", "--journal", str(tmp_path / "journal")) as process:
+        said_until(process, "Danced")
+    dance = load_dance(tmp_path / "journal")
+    assert dance.holds is not None
+    led = np.flatnonzero(dance.holds.max(axis=1) > 0.5) / dance.recording.fps
+    assert len(led) and led[0] < 1.7  # standing still for the 1.5 s of a new sensor takes longer
 
 
 def is_running(pid: int) -> bool:

@@ -16,6 +16,8 @@ from appliance.cli.examples import EXAMPLES, ORDER, OTHER_WORDS
 from appliance.cli.help_page import MACHINERY
 from tests.command import Command
 
+READING = {"metres_per_unit", "up", "facing", "true_fps", "root", "all_frames"}
+
 
 def whole() -> Any:
     """The parser of all commands."""
@@ -91,3 +93,12 @@ def test_flags_take_no_value_and_required_options_stand_in_the_usage(bunraku: Co
     )
     assert bunraku("train", "-h").out.startswith("Usage: bunraku train --out FOLDER [OPTIONS]\n")
     assert "[SPARE]" in bunraku("sensors", "replace", "-h").out
+
+
+def test_every_command_that_reads_recordings_takes_the_same_options() -> None:
+    commands = whole().commands
+    readers = {name for name, one in commands.items() if {part.name for part in one.params} >= READING}
+    assert readers == {
+        *("filmstrip", "convert", "retarget", "inspect", "train", "evaluate", "export", "experiment"),
+        *("granular", "improvise", "vary", "map", "path"),
+    }

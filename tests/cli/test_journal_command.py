@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from appliance.cli import journal
-from appliance.exchange.formats import read_recording
+from appliance.exchange.formats import read_as_told
 from appliance.pose import quaternion
 from appliance.recorder.reading import read_journal
 from appliance.release import choice
@@ -65,7 +65,7 @@ def test_the_dance_of_the_night_is_a_recording(recorded: Path, tmp_path: Path, b
     said = bunraku("journal", "export", "--journal", recorded, "--bvh", bvh, "--glb", glb).out
     assert said.count("1.0 s of dance") == 2
     danced = read_journal(recorded)
-    for found in (read_recording(bvh), read_recording(glb)):
+    for found in (read_as_told(bvh)[0], read_as_told(glb)[0]):
         assert found.skeleton.same_joints(danced.skeleton)
         np.testing.assert_allclose(found.roots, danced.ticks["root"], atol=1e-5)
         assert np.degrees(quaternion.angle_between(found.poses, danced.ticks["pose"])).max() < 0.1

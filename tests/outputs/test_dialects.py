@@ -76,11 +76,11 @@ def test_a_frame_message_carries_tick_time_sequence_and_lateness() -> None:
 
 @pytest.mark.parametrize("dialect", sorted(DIALECTS))
 def test_the_same_buffers_carry_the_next_frame(dialect: str, skeleton: Skeleton, frame: JointFrame) -> None:
-    encoder = DIALECTS[dialect](skeleton, OscConfig())
+    encoder = DIALECTS[dialect](skeleton, OscConfig(), 0)
     first = encoder.encode(frame)
     second = encoder.encode(fill(frame, skeleton, seed=2))
     assert all(a is b for a, b in zip(first, second, strict=True))
-    fresh = DIALECTS[dialect](skeleton, OscConfig())
+    fresh = DIALECTS[dialect](skeleton, OscConfig(), 0)
     fresh.encode(fill(JointFrame(len(skeleton)), skeleton, seed=1))  # the same first frame time
     assert [bytes(d) for d in second] == [bytes(d) for d in fresh.encode(frame)]
 
@@ -90,7 +90,7 @@ def test_the_same_buffers_carry_the_next_frame(dialect: str, skeleton: Skeleton,
 def test_bundles_fit_an_ethernet_frame_and_lose_nothing(dialect: str, count: int, longest: int) -> None:
     names = tuple(f"{'n' * (index % longest)}{index}" for index in range(count))
     parents = tuple(range(-1, count - 1))
-    encoder = DIALECTS[dialect](Skeleton(names, parents, np.zeros((count, 3))), OscConfig())
+    encoder = DIALECTS[dialect](Skeleton(names, parents, np.zeros((count, 3))), OscConfig(), 0)
     datagrams = encoder.encode(JointFrame(count))
     assert max(map(len, datagrams)) < ETHERNET_PAYLOAD
     assert len(read(datagrams)) == (2 * count if dialect == "joint" else 3 + 1)
@@ -111,6 +111,6 @@ def test_bundles_are_as_few_as_they_can_be_in_order(sizes: list[int]) -> None:
 def test_the_documentation_names_every_address(dialect: str, skeleton: Skeleton, frame: JointFrame) -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "osc.md").read_text(encoding="utf-8")
     names = {f"/{name}/" for name in skeleton.names}
-    for address, _ in read(DIALECTS[dialect](skeleton, OscConfig()).encode(frame)):
+    for address, _ in read(DIALECTS[dialect](skeleton, OscConfig(), 0).encode(frame)):
         spoken = next((address.replace(name, "/<joint>/") for name in names if name in address), address)
         assert f"`{spoken}`" in page

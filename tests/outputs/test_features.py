@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from appliance.outputs.joint_frame import JointFrame
-from appliance.outputs.osc.features import PAUSE_S, WINDOW, Features
+from appliance.outputs.motion_features import PAUSE_S, WINDOW
+from appliance.outputs.osc.features import Features
 from appliance.pose.skeleton import Skeleton
 from appliance.show.osc import OscConfig
 from hw_sim.osc_receiver import decode

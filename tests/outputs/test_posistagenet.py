@@ -17,6 +17,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.show.posistagenet import PosiStageNetConfig, misfits
+from appliance.show.yaml_file import YamlFile
 from hw_sim.peers import free_ports
 from hw_sim.posistagenet import MalformedPsnError, Packet, PsnReceiver, decode
 from tests.outputs.conftest import fill
@@ -238,13 +239,30 @@ def test_joints_that_the_show_has_not_are_named_with_line_and_nearest(
 ) -> None:
     path = box_file(tmp_path, "    - joints: [head]\n    - joints:\n        - hip\n        - lhnd\n")
     box = load_box(path)
-    (problem,) = misfits(box.outputs.posistagenet, skeleton.names, box.file)
+    (problem,) = misfits(box.outputs.posistagenet, skeleton.names, 1, box.file)
     assert str(problem) == f"{path}:6: The show's skeleton has no joint 'lhnd'. Did you mean 'lHand'?"
 
 
 def test_trackers_beyond_the_last_number_are_refused(tmp_path: Path, skeleton: Skeleton) -> None:
     path = box_file(tmp_path, "    - first_tracker: 65530\n")
     box = load_box(path)
-    (problem,) = misfits(box.outputs.posistagenet, skeleton.names, box.file)
+    (problem,) = misfits(box.outputs.posistagenet, skeleton.names, 1, box.file)
     assert problem.line == 3 and f"would end at {65529 + len(skeleton)}" in problem.message
-    assert misfits([PosiStageNetConfig(first_tracker=65530, joints=["hip"])], skeleton.names, box.file) == []
+    assert (
+        misfits([PosiStageNetConfig(first_tracker=65530, joints=["hip"])], skeleton.names, 1, box.file) == []
+    )
+
+
+def test_the_trackers_of_a_second_puppet_follow_and_have_its_name(skeleton: Skeleton) -> None:
+    frames = [fill(JointFrame(len(skeleton)), skeleton, seed) for seed in (3, 4)]
+    settings = PosiStageNetConfig(joints=["head", "hip"], first_tracker=10, speed=True)
+    psn = PosiStageNet(settings, skeleton, ("left", "right"))
+    info, *data = (decode(bytes(one)) for one in psn.encode(*frames))
+    assert info.names == {10: "head", 11: "hip", 12: "right head", 13: "right hip"}
+    found = positions(data)
+    for number, (frame, joint) in enumerate([(f, j) for f in frames for j in ("head", "hip")], 10):
+        assert found[number] == tuple(frame.positions[skeleton.names.index(joint)])
+    (problem,) = misfits(
+        [PosiStageNetConfig(first_tracker=65500)], skeleton.names, 2, YamlFile(Path("box.yaml"))
+    )
+    assert "would end at 65545" in problem.message

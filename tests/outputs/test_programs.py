@@ -181,5 +181,5 @@ def test_joints_that_the_show_does_not_have_are_refused(tmp_path: Path) -> None:
     box = tmp_path / "box.yaml"
     box.write_text("outputs:\n  osc:\n    - {joints: [Hipps]}\n")
     loaded = load_box(box)
-    (problem,) = osc_misfits(loaded.outputs.osc, names, loaded.file)
+    (problem,) = osc_misfits(loaded.outputs.osc, names, 1, loaded.file)
     assert "no joint 'Hipps'" in str(problem) and f"{box}:3" in str(problem)

@@ -9,13 +9,16 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from appliance.outputs.datagram_sender import LONGEST_PAUSE_S
 from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.osc.vmc import Vmc
 from appliance.outputs.receivers import OscOutputs
 from appliance.pose.skeleton import Skeleton
 from appliance.show.osc import OscConfig
@@ -155,6 +158,7 @@ import socket
 import subprocess
 import numpy as np
 from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.osc.vmc import Vmc
 from appliance.outputs.receivers import OscOutputs
 from appliance.pose.skeleton import Skeleton
 from appliance.show.osc import OscConfig
@@ -283,3 +287,40 @@ def test_oscdump_reads_every_message(
                 assert float(dumped_value) == pytest.approx(ours_value, abs=1e-6)
             else:
                 assert dumped_value.strip('"') == str(ours_value)
+
+
+def test_each_puppet_goes_out_under_its_own_addresses(skeleton: Skeleton) -> None:
+    frames = [fill(JointFrame(len(skeleton)), skeleton, seed) for seed in (7, 8, 9)]
+    wanted: list[dict[str, Any]] = [
+        {"messages": ["rot_local"], "frame_message": True},
+        {"messages": ["rot_local"], "prefix": "/mocap/joint"},  # it has room for one
+        {"dialect": "features", "prefix": "/mocap/3/joint"},
+        {"dialect": "joint"},
+        {"dialect": "vmc"},
+        {"messages": ["rot_local"], "puppet": 2},
+    ]
+    with ExitStack() as opened:
+        peers = [opened.enter_context(OscReceiver(LOOPBACK)) for _ in wanted]
+        configs = [OscConfig(port=peer.port, **one) for peer, one in zip(peers, wanted, strict=True)]
+        outputs = OscOutputs(configs, skeleton, puppets=3)
+        outputs.send_frame(*frames)
+        toolbox = take(peers[0], 4)
+        assert [said[1] for said in toolbox[:1]] == ["/bunraku/frame"]
+        for number, (said, frame) in enumerate(zip(toolbox[1:], frames, strict=True)):
+            assert said[1] == f"/mocap/{number}/joint/rot_local"
+            np.testing.assert_array_equal(np.array(said[2], np.float32), frame.pose.ravel())
+        assert [said[1] for said in take(peers[1], 1)] == ["/mocap/joint/rot_local"]
+        features = [said[1] for said in take(peers[2], 30)]
+        assert features[::10] == [f"/mocap/{number}/joint/velocity" for number in (3, 4, 5)]
+        joints = take(peers[3], 3 * 2 * len(skeleton))
+        hips = {said[1]: said[2] for said in joints if said[1].endswith("/hip/rot")}
+        for dancer, frame in zip(("", "/1", "/2"), frames, strict=True):
+            said = hips[f"/dancer{dancer}/hip/rot"]
+            np.testing.assert_array_equal(np.array(said, np.float32), frame.pose[0])
+        last = take(peers[5], 1)
+        assert last[0][1] == "/mocap/0/joint/rot_local"
+        np.testing.assert_array_equal(np.array(last[0][2], np.float32), frames[2].pose.ravel())
+        assert outputs.receivers[1].sent == 1 and outputs.receivers[4].sent == len(
+            Vmc(skeleton).encode(frames[0])
+        )
+        outputs.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import resource
 import tarfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,11 @@ from appliance.box.clock import TICK_S
 from appliance.recorder import chunks
 from appliance.recorder.export import export
 from appliance.recorder.journal_error import JournalError
+from appliance.recorder.log import Entry, Pieces, pieces_of
 from appliance.recorder.reading import read_journal
+from appliance.recorder.record import PIECE
 from appliance.recorder.segments import segment_paths
-from appliance.stage.recorder import EVENT_BYTES, FILE, LOG_SLOTS
+from appliance.stage.recorder import EVENT_BYTES, FILE, LOG_SLOTS, LONGEST_EVENT
 from tests.bundles import FIGURE, WORN, write_show
 from tests.recorder.night import Night, reading
 
@@ -46,17 +49,37 @@ def test_every_tick_the_readings_and_the_figure_are_read_back(night: Night, tmp_
     np.testing.assert_allclose(run.skeleton.offsets, FIGURE.offsets)
 
 
-def test_events_are_kept_in_their_place_and_long_ones_lose_their_end(night: Night, tmp_path: Path) -> None:
+def test_events_are_kept_in_their_place_and_the_longest_lose_their_end(night: Night, tmp_path: Path) -> None:
     night.dance(3)
-    night.recorder.event("said", 12.5, words="x" * 5 * EVENT_BYTES, count=3)
+    night.recorder.event("said", 12.5, words="x" * 5 * LONGEST_EVENT, count=3)
     night.dance(2)
     night.recorder.event("odd", 13.0, what=object())
     (run,) = read_journal(night.kept(tmp_path / "journal")).runs
-    assert run.tick_numbers.tolist() == [1, 2, 3, 5, 6]
     ((number, event),) = run.events
-    assert (number, event["kind"], event["now"], event["count"]) == (4, "said", 12.5, 3)
-    assert 100 < len(event["words"]) < EVENT_BYTES
+    assert (event["kind"], event["now"], event["count"]) == ("said", 12.5, 3)
+    assert LONGEST_EVENT / 3 < len(event["words"]) < LONGEST_EVENT
+    assert run.tick_numbers.tolist() == [1, 2, 3, number + 1, number + 2]
     assert night.recorder.lost == 1
+
+
+def test_a_long_event_is_whole(night: Night, tmp_path: Path) -> None:
+    recipe = "".join(chr(97 + place % 26) for place in range(4 * EVENT_BYTES))
+    night.dance(2)
+    night.recorder.event("order", 12.5, order={"text": recipe})
+    night.dance(1)
+    (run,) = read_journal(night.kept(tmp_path / "journal")).runs
+    ((number, event),) = run.events
+    assert event["order"]["text"] == recipe
+    assert run.tick_numbers.tolist() == [1, 2, number + 1]
+
+
+def test_an_event_that_lost_a_piece_is_left_out_and_the_next_one_is_whole() -> None:
+    text = bytes(range(256)) * 10
+    entries = [Entry(7 + place, PIECE, data) for place, data in enumerate(pieces_of(text, EVENT_BYTES))]
+    later = [replace(entry, number=entry.number + 40) for entry in entries]
+    pieces = Pieces()
+    found = [pieces.whole(entry) for entry in (entries[0], *entries[2:], *later)]
+    assert found == [None] * (len(found) - 1) + [text]
 
 
 def test_what_a_keeper_missed_is_fetched_by_the_next_one_and_nothing_comes_twice(

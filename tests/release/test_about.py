@@ -20,8 +20,8 @@ def test_the_shows_stand_in_the_order_in_which_they_are_tried(tmp_path: Path) ->
     Choice(pairs, ("show.yaml:3: wrong.",), (Aside("c+", "It did not dance."),)).write(chosen)
     told = about(chosen, None, tmp_path)
     assert told["shows"] == [
-        {"source": "from the stick", "good": False},
-        {"source": "comes with the box", "good": True},
+        {"id": "a+b", "source": "from the stick", "good": False},
+        {"id": "", "source": "comes with the box", "good": True},
     ]
     assert (told["refused"], told["aside"]) == (["show.yaml:3: wrong."], ["It did not dance."])
     assert told["box_file"] == str(venue)

@@ -35,6 +35,8 @@ CUES: tuple[dict[str, Any], ...] = (
     {
         "name": "storm",
         "look": "ink",
+        "card": "blank",
+        "camera": {"angle_deg": 30.0, "figure": None},
         "lights": "cold",
         "master": 0.5,
         "fade_s": 4.0,
@@ -57,6 +59,7 @@ def facts(**changes: Any) -> Facts:
         "phrases": ("main", "quiet"),
         "cues": CUES,
         "looks": ("plaster", "lines", "ink", "cloud"),
+        "cards": ("blank",),
         "lights": ("warm", "cold"),
         "coding": 3,
         "interaction": 2,

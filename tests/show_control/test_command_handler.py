@@ -137,6 +137,25 @@ def test_master_look_and_lights_fade(folder: Path, stage: StageDouble, asker: As
     assert (now.lights, now.lights_before, now.lights_fade_s) == ("cold", "", 2.0)
 
 
+def test_cards_and_the_camera_come_and_go_with_fades(folder: Path, stage: StageDouble, asker: Asker) -> None:
+    assert asker.ask("/card", "blank", 3)[2] == 1
+    now = show_state(folder)
+    assert (now.card, now.card_before, now.card_fade_s) == ("blank", "", 3.0)
+    off, on, end = asker.ask_all("/cards")
+    assert (off, on, end) == (["/cards/card", "none", 0], ["/cards/card", "blank", 1], ["/end", "/cards", 2])
+    asker.ask("/card", "none")
+    assert (show_state(folder).card, show_state(folder).card_fade_s) == ("", 2.0)
+    assert asker.ask("/camera", 90, 20, 0.4, 5)[2] == 1
+    now = show_state(folder)
+    assert (now.camera, now.camera_fade_s) == (
+        {"angle_deg": 90.0, "elevation_deg": 20.0, "figure": pytest.approx(0.4)},
+        5.0,
+    )
+    assert "figure (0.1 to 0.9)" in asker.ask("/camera", 90, 20, 3)[3]
+    asker.ask("/camera/look", 1)
+    assert (show_state(folder).camera, show_state(folder).camera_fade_s) == ({}, 1.0)
+
+
 @pytest.mark.parametrize(
     ("message", "cure"),
     [
@@ -173,6 +192,7 @@ def test_a_cue_declares_picture_lights_and_dance_and_is_answered_when_the_dance_
     assert asker.ask("/cue", "storm") == ["/reply", "/cue", 1, "Cue storm. At most 8 iterations fit."]
     now = show_state(folder)
     assert (now.cue, now.look, now.lights, now.master) == ("storm", "ink", "cold", 0.5)
+    assert (now.card, now.camera) == ("blank", {"angle_deg": 30.0})
     assert (now.look_fade_s, now.lights_fade_s, now.master_fade_s) == (4.0, 4.0, 4.0)
     assert declared(folder, "phrase") == ("quiet", 4.0)
     assert declared(folder, "hand lShldr") == ("lShldr", 0.0)

@@ -16,7 +16,7 @@ from appliance.show_control.show_state_commands import DECLARATIONS
 from appliance.show_control.stage_observer import StageObserver
 from tests.show_control.doubles import facts
 
-SOURCES = ("main", "quiet", "vary", "granular", "path")
+SOURCES = ("main", "quiet", "vary", "granular", "path", "improvise")
 NOW = 100.0
 
 

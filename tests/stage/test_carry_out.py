@@ -44,15 +44,15 @@ def test_playback_jumps_and_plays_excerpts(parts: StageParts) -> None:
 def test_a_joint_is_held_and_released_by_osc(parts: StageParts) -> None:
     assert obey(Order("hold", (1.0, 0.0, 0.0, np.pi / 2), "lShldr"), parts, ITERATIONS) == (True, "")
     for tick in range(100):
-        parts.hands.pull(10.0 + 0.02 * tick, parts.puppet.select(parts.motion.window()))
-    place = parts.hand_places[0]
+        parts.hands.pull(10.0 + 0.02 * tick, parts.first.puppet.select(parts.motion.window()))
+    place = parts.first.hand_places[0]
     assert (
         quaternion.angle_between(parts.hands.targets[0, place], np.array([0.5**0.5, 0.5**0.5, 0, 0])) < 1e-3
     )
     assert parts.hands.weights[place] == 1.0
     assert obey(Order("release", (), "lShldr"), parts, ITERATIONS) == (True, "")
     for tick in range(100):
-        parts.hands.pull(12.0 + 0.02 * tick, parts.puppet.select(parts.motion.window()))
+        parts.hands.pull(12.0 + 0.02 * tick, parts.first.puppet.select(parts.motion.window()))
     assert parts.hands.weights[place] == 0.0
 
 

@@ -112,7 +112,7 @@ def test_a_stage_that_starts_again_goes_on_with_its_guest(show: Path, tmp_path: 
     """A checkpoint knows phrases only; what show control declares knows the guest."""
     night = Night(show, tmp_path / "runtime")
     night.command("/phrase", 0.2, text=LIVE)
-    assert night.parts.source == LIVE
+    assert night.parts.first.source == LIVE
     assert night.parts.live is not None
     night.parts.live.choose(False, 0.0)
     (order,) = night.reconciler.pending(1.0)
@@ -122,12 +122,12 @@ def test_a_stage_that_starts_again_goes_on_with_its_guest(show: Path, tmp_path: 
 def test_a_guest_who_falls_silent_is_told_once_and_counted(parts: StageParts) -> None:
     stream, watch = Stream(), Watch(parts, FITS)
     parts.live_inbox = stream
-    parts.play(LIVE, 0.2)
+    parts.first.play(LIVE, 0.2)
     for tick in range(200):
         now = tick * 0.02
         stream.coming = LivePose(now, (math.nan,) * 3, pose(0.1)) if tick < 50 or tick > 150 else None
         parts.hear_live()
-        parts.starts_from(now)
+        parts.first.start(now)
         watch.count_silences(now)
     fallen = {one.name: one for one in watch.fallbacks.happened(4.0)}
     assert fallen[rows.SOURCE_LATE.name].times == 1

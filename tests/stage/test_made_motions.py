@@ -11,8 +11,11 @@ import pytest
 
 from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionWriter
 from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
+from appliance.dancer.loop import Loop
 from appliance.dancer.material.maker import Maker
 from appliance.dancer.material.material_file import Material, recipe_text, write_material
+from appliance.dancer.material.prompt import end_of, prompt_of
+from appliance.dancer.phrase import NUMBER
 from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
 from appliance.show.show import Show, load_show
 from appliance.stage import fallback as rows
@@ -55,16 +58,31 @@ class Dance:
             self.watch.count_silences(self.now)
             self.parts.motion.advance()
             self.now += TICK_S
-            seen.add(self.parts.source)
+            seen.add(self.parts.first.source)
         return seen
 
     def make(self, writer: MadeMotionWriter, at_once: bool, **recipe: Any) -> None:
         """What the generator does."""
         whole = {"source": "vary", "phrase": "main", "sigma": 1.0, "seed": 1} | recipe
+        self.hand_over(writer, at_once, whole)
+
+    def improvise(
+        self, writer: MadeMotionWriter, at_once: bool, number: int, after: Loop, frame: int
+    ) -> Loop:
+        """The same of an improvisation that goes on from a frame of a loop."""
+        network = self._maker.network("improvise")
+        recipe = {"source": "improvise", "temperature": 1.0, "seconds": 5.0, "seed": number, "number": number}
+        prompt = prompt_of(after, frame, FIGURE, network, network.places)  # type: ignore[arg-type]
+        from_s = after.start_s + frame / 50
+        recipe |= {"after": round(float(after.track[0, NUMBER])), "from_s": from_s, "prompt": prompt}
+        return self.hand_over(writer, at_once, recipe)
+
+    def hand_over(self, writer: MadeMotionWriter, at_once: bool, whole: dict[str, Any]) -> Loop:
         file = f"{whole['number']}.material"
         loop, text = self._maker.make(whole), recipe_text(whole)
         write_material(self.folder / FOLDER / file, Material(text, loop), FIGURE.names)
-        writer.write(MadeMotion(text, file, whole["source"], at_once))
+        writer.write(MadeMotion(text, file, whole["source"], at_once, whole.get("from_s")))
+        return loop
 
     def late(self) -> int:
         """How often a source was late."""
@@ -110,10 +128,10 @@ def test_the_phrase_plays_on_until_it_is_made_and_the_wait_is_told_once(
     dance.run(2.0)
     assert dance.late() == 1
     dance.make(writer, True, number=1001)
-    assert dance.run(1.0) == {"main", "vary"} and dance.parts.source == "vary"
+    assert dance.run(1.0) == {"main", "vary"} and dance.parts.first.source == "vary"
     declare(tmp_path, "vary", "main")
     dance.run(1.0)
-    assert dance.parts.source == "main" and dance.parts.motion.made is None
+    assert dance.parts.first.source == "main" and dance.parts.motion.made is None
 
 
 def test_what_is_made_for_the_return_waits_for_it_and_what_is_not_does_not(
@@ -134,10 +152,39 @@ def test_what_is_made_for_the_return_waits_for_it_and_what_is_not_does_not(
     assert number.made.number == 1003
     assert dance.late() == 0
     dance.run(4.0)  # nothing more comes: the last one plays on, and that is told
-    assert number.made.number == 1003 and dance.parts.source == "vary" and dance.late() == 1
+    assert number.made.number == 1003 and dance.parts.first.source == "vary" and dance.late() == 1
     dance.make(writer, False, number=1004, seed=3)
     dance.run(3.2)
     assert number.made.number == 1004
+
+
+def test_improvisations_follow_each_other_in_step_and_come_round_where_none_is_there(
+    dance_of: Callable[..., Dance], writer: MadeMotionWriter, tmp_path: Path
+) -> None:
+    dance = dance_of()
+    motion = dance.parts.motion
+    declare(tmp_path, "improvise")
+    dance.run(0.5)
+    first = dance.improvise(writer, True, 1001, motion.loop_of("main"), 75)
+    dance.run(0.9)
+    assert motion.made is None, "it waits for the moment that it goes on from"
+    dance.run(0.2)
+    assert motion.made is not None and motion.made.number == 1001
+    dance.run(0.2)
+    assert motion.position_s == pytest.approx(0.3, abs=0.05), "in step: as far on as the phrase is"
+    end = end_of(first)
+    second = dance.improvise(writer, False, 1002, first, end)
+    dance.run(end / 50 - motion.position_s - 0.1)
+    assert motion.made.number == 1001
+    dance.run(0.3)
+    assert motion.made.number == 1002 and dance.late() == 0
+    dance.run(0.4)
+    assert 0.4 < motion.position_s < 0.7, "in step with what is left"
+    dance.run(second.length / 50)
+    assert motion.made.number == 1002 and dance.late() == 1, "nothing came: it comes round, and that is told"
+    dance.improvise(writer, True, 1003, second, 0)
+    dance.run(0.1)
+    assert motion.made.number == 1003, "its moment is over: it does not wait"
 
 
 def test_backwards_a_return_is_the_other_end(
@@ -158,7 +205,7 @@ def test_a_show_may_start_from_it(dance_of: Callable[..., Dance], writer: MadeMo
     dance = dance_of(source="vary")
     dance.make(writer, True, number=1001)
     dance.run(1.5)
-    assert dance.parts.source == "vary"
+    assert dance.parts.first.source == "vary"
 
 
 def test_a_file_that_is_gone_or_foreign_changes_nothing(
@@ -195,5 +242,5 @@ def test_after_a_power_cut_it_goes_on_with_its_source(
     resumed = Resumption("A test", runtime, None, "always")
     assert "After a power cut" in resumed.go_on(again.reconciler, again.now)
     again.run(0.5)
-    assert again.reconciler.wanted == "vary" and again.parts.source == "vary"
+    assert again.reconciler.wanted == "vary" and again.parts.first.source == "vary"
     resumed.close()

@@ -121,12 +121,12 @@ def tick(parts: StageParts, iterations: Iterations) -> Tick:
 
 
 def test_springs_follow_what_is_declared_also_after_a_restart(tmp_path: Path, declared: Declared) -> None:
-    cues = [{"name": "gale", "springs": "storm"}]
+    cues = [{"name": "gale", "springs": "storm", "fade_s": 0}]
     show = load_show(write_show(tmp_path / "sprung", [{"springs": "stiff", "joint": "Hips"}], cues=cues))
     parts, again = assemble(show, BOX), assemble(show, BOX)
     facts = facts_of(show, None, Iterations(3, 2, most=8), NOW)
     reconciler = Reconciler("A test", parts, Iterations(3, 2, most=8), declared)  # type: ignore[arg-type]
-    assert parts.springs is not None and again.springs is not None
+    assert parts.first.springs is not None and again.first.springs is not None
 
     def say(address: str, *values: float, text: str = "") -> None:
         declared.now, _ = DECLARATIONS[address](declared.now, Command(address, values, text), facts, NOW)
@@ -134,8 +134,10 @@ def test_springs_follow_what_is_declared_also_after_a_restart(tmp_path: Path, de
 
     say("/springs/wind", 1.0, 2.0, 3.0)
     say("/cue", text="gale")
-    assert parts.springs.setting == "storm"
-    assert parts.springs.wind.tolist() == list(parts.springs.settings["storm"].wind)  # the older wind is over
+    assert parts.first.springs.setting == "storm"
+    assert parts.first.springs.wind.tolist() == list(
+        parts.first.springs.settings["storm"].wind
+    )  # the older wind is over
     say("/springs", text="loose")
     say("/springs/wind", 3.0, 0.0, -1.0)
     say("/springs/gravity", 5.0)
@@ -143,12 +145,34 @@ def test_springs_follow_what_is_declared_also_after_a_restart(tmp_path: Path, de
     restarted.generation = reconciler.generation  # as its checkpoint says
     follow(restarted)
     assert not restarted.pending(NOW)
-    for springs in (parts.springs, again.springs):
+    for springs in (parts.first.springs, again.first.springs):
         assert (springs.setting, springs.gravity, springs.wind.tolist()) == ("loose", 5.0, [3.0, 0.0, -1.0])
     with pytest.raises(ValueError, match="Did you mean 'loose'"):
         say("/springs", text="lose")
     parts.close()
     again.close()
+
+
+def test_strings_drive_no_joint_in_panic_blackout_and_after_a_stop(
+    tmp_path: Path, declared: Declared
+) -> None:
+    strung = [{"springs": "stiff", "joint": "Hips"}]
+    show = load_show(write_show(tmp_path / "strung", strung, springs=[{"name": "stiff", "feedback": 1}]))
+    parts = assemble(show, BOX)
+    reconciler = Reconciler("A test", parts, Iterations(3, 2, most=8), declared)  # type: ignore[arg-type]
+    springs = parts.first.springs
+    assert springs is not None and springs.feedback == 1.0
+    for away, back in (("/panic", "/go"), ("/stop", "/go"), ("/blackout", "/blackout")):
+        for address, values in ((away, (1.0,)), (back, () if back == "/go" else (0.0,))):
+            declared.now, _ = DECLARATIONS[address](declared.now, Command(address, values), None, NOW)
+            follow(reconciler)
+            assert springs.feedback == 0.0
+        gains = []
+        for tick in range(60):
+            springs.pull(NOW + 0.02 * tick)
+            gains.append(springs.feedback)
+        assert gains[-1] == 1.0 and max(np.diff(gains)) < 0.05  # and comes back evenly
+    parts.close()
 
 
 def test_springs_of_which_there_are_none_are_refused(command: Commanded, parts: StageParts) -> None:
@@ -302,7 +326,7 @@ def test_a_phrase_that_is_called_again_plays_as_a_whole(parts: StageParts, comma
 
 
 def test_a_hand_lets_go_and_holds(parts: StageParts, command: Commanded, tick: Tick) -> None:
-    place = parts.hand_places[0]
+    place = parts.first.hand_places[0]
     danced(tick, 50)
     assert parts.hands.weights[place] == 1.0
     command("/hold", 0.0, text="lShldr")
@@ -335,11 +359,11 @@ def test_a_hand_by_osc_that_was_told_nothing_holds_its_joint_where_it_is(
 
 def test_a_kept_joint_holds_and_lets_go(tmp_path: Path) -> None:
     parts = assemble(load_show(write_show(tmp_path / "kept", [{"kept": True, "joint": "Chest"}])), BOX)
-    place = parts.hand_places[0]
+    place = parts.first.hand_places[0]
     for holds, begins in ((True, 0), (False, 60), (True, 120)):
         obey(Order("hand", (float(holds),), "Chest"), parts, Iterations(3, 3, 8))
         for tick in range(60):
-            window = parts.puppet.select(parts.motion.window())
+            window = parts.first.puppet.select(parts.motion.window())
             parts.hands.pull(10.0 + 0.02 * (begins + tick), window)
             assert np.array_equal(parts.hands.targets[:, place], window[:, place])
             parts.motion.advance()

@@ -60,7 +60,13 @@ def eventful(night: Night) -> Night:
     night.order("hold", 0.0, 0.0, 1.0, 0.7, text="Chest")
     night.order("kick", 1.0, -2.0, 0.5)
     night.order("wind", 3.0, 0.0, -3.0)
+    night.order("feedback", 0.8, 2.0)
     night.dance(200, reading(OTHER))
+    night.order("springs", 1.5, text="loose")
+    night.order("stiffness", 4.0)
+    night.order("gate", 0.0, 0.0)
+    night.order("feedback", 1.0, 0.0)
+    night.order("gate", 1.0, 1.0)
     night.command("/cue", text="storm")
     night.dance(40, reading(TURNED))
     night.dance(70)  # the sensor falls silent

@@ -234,9 +234,9 @@ def test_what_grounding_moved_the_figure_by_comes_back(
     dance_of: Callable[[], Reconciler], runtime: Path
 ) -> None:
     before, after = dance_of(), dance_of()
-    before.parts.grounding.strayed = (0.2, -0.1)
+    before.parts.first.grounding.strayed = (0.2, -0.1)
     goes_on(before, runtime, after)
-    assert after.parts.grounding.strayed == (0.2, -0.1)
+    assert after.parts.first.grounding.strayed == (0.2, -0.1)
 
 
 PLACE = Checkpoint("A test", "walk", 2.0, (0.0, 5.0), coding=3, interaction=2, boot="another")

@@ -104,7 +104,7 @@ class Evening:
 
     @property
     def _weight(self) -> float:
-        return float(self.stage.parts.hands.weights[self.stage.parts.hand_places[0]])
+        return float(self.stage.parts.hands.weights[self.stage.parts.first.hand_places[0]])
 
     def _overshoot_s(self) -> float:
         return self.each_s + self.stops.get(self.stage.health.ticks, 0.0)

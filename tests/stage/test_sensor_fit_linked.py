@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from appliance.stage.stage_parts import assemble
 from hw_sim.device import Device
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.firmware import FirmwareSensor, firmware_maker
-from hw_sim.motions import IDENTITY, Motion, Quaternion, about, multiply
+from hw_sim.motions import IDENTITY, Motion, Quaternion, about, dance, multiply
 from hw_sim.network import PERFECT, VenueNetwork
 from hw_sim.wearer import Wearer
 from tests.bundles import write_show
@@ -71,13 +72,13 @@ class Evening:
         self.box_on()
 
     def run(self, seconds: float) -> None:
-        place = self.parts.puppet.joints.index("lShldr")
+        place = self.parts.first.puppet.joints.index("lShldr")
         for _ in range(round(seconds / TICK_S)):
             for reading in self.show.run(TICK_S):
                 self.wearing.hear(reading)
                 self.parts.hear(reading)
                 self.newest = reading
-            self.parts.hands.pull(self.show.now, self.parts.puppet.select(self.parts.motion.window()))
+            self.parts.hands.pull(self.show.now, self.parts.first.puppet.select(self.parts.motion.window()))
             self.wearing.look(self.show.now)
             if self.newest is not None:
                 self.errors.append(self._error(self.newest, self.parts.hands.targets[0, place]))
@@ -98,9 +99,12 @@ def begin(tmp_path: Path) -> Iterator[Begin]:
     evenings: list[Evening] = []
 
     def begun(
-        maker: str, motion: Motion = evening_of_a_dancer, reboot_every_s: float | None = None
+        maker: str,
+        motion: Motion = evening_of_a_dancer,
+        reboot_every_s: float | None = None,
+        **stands: Any,
     ) -> Evening:
-        wearer = Wearer(motion)
+        wearer = Wearer(motion, **stands)
         device: Device
         if maker == "firmware":
             make = firmware_maker(seed=5)
@@ -126,6 +130,16 @@ def test_switched_on_stood_still_danced(begin: Begin, maker: str) -> None:
     evening.run(10.0)
     assert max(evening.errors) < 1.0
     assert evening.device.light == "on"
+
+
+def test_after_a_double_tap_half_a_second_of_stillness_is_enough(begin: Begin) -> None:
+    evening = begin("emulated", motion=dance(3), stand_still_s=0.8, taps=True)
+    while not evening.show.sent:
+        evening.run(TICK_S)
+    evening.run(0.8)
+    assert sum("neutral pose taken" in words for words in evening.said) == 1
+    evening.run(3.0)
+    assert max(evening.errors[-50:]) < 1.0
 
 
 @pytest.mark.parametrize("maker", MAKERS)

@@ -6,14 +6,19 @@ import contextlib
 import fcntl
 import json
 import os
+import shutil
 import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from appliance.box.checkpoint import Checkpoint, packed, read_checkpoint
+from appliance.box.record import SlotFile
 from appliance.sensor.keys import SensorKey, create_keys
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST, free_ports
@@ -148,6 +153,18 @@ def ending_emulators(box: int) -> Iterator[None]:
     for pid in emulators:
         if has_argument(pid, "emulate"):
             os.kill(pid, signal.SIGKILL)
+
+
+def cut_power(box: Box, file: Path) -> Checkpoint:
+    """What a power cut takes is gone: processes, the runtime folder, this boot. The place on the disk."""
+    box.end(signal.SIGKILL)
+    await_end_of_keeper(box.runtime)
+    shutil.rmtree(box.runtime)
+    place = read_checkpoint(file)
+    assert place is not None
+    with closing(SlotFile(file)) as slots:
+        slots.write(packed(replace(place, boot="of another boot")))
+    return place
 
 
 def await_end_of_keeper(runtime: Path) -> None:

@@ -53,6 +53,12 @@ def test_the_page_is_let_in_from_listed_viewers_alone(tmp_path: Path) -> None:
     assert "tcp dport" not in rules(load_box(None))
 
 
+def test_the_stream_is_let_in_from_listed_viewers_alone(tmp_path: Path) -> None:
+    box = tmp_path / "box.yaml"
+    box.write_text("projector:\n  stream: {host: 0.0.0.0, port: 8097, viewers: [192.168.0.0/24]}\n")
+    assert 'ip saddr { 192.168.0.0/24 } tcp dport 8097 accept comment "the stream"' in rules(load_box(box))
+
+
 def test_an_access_point_gives_addresses() -> None:
     text = rules(load_box(None), ["wlan0"])
     assert 'iifname "wlan0" udp dport 67 accept' in text

@@ -12,10 +12,12 @@ from typing import Any
 
 import pytest
 
+from appliance.box.checkpoint import FILE as PLACE
+from appliance.box.checkpoint import read_checkpoint
 from appliance.outputs.frame_reader import FrameReader
 from tests.show_control.doubles import Asker
 from tests.sources import write_show_with_sources
-from tests.system.box import JOURNAL, Box, playing
+from tests.system.box import JOURNAL, Box, cut_power, playing
 from tests.system.processes import children_running, run_bunraku, wait_until
 
 pytestmark = pytest.mark.realtime
@@ -78,6 +80,10 @@ def test_varied_kept_killed_and_danced_again(show: Path, tmp_path: Path) -> None
         await_made(box, reader, source="path", points=[0.2, 0.8])
         assert desk.order("/phrase", "granular", 0.2)[2] == 1
         await_made(box, reader, source="granular")
+        assert desk.order("/motion/improvise/temperature", 0.5)[2] == 1
+        assert desk.order("/phrase", "improvise", 0.2)[2] == 1
+        going_on = await_made(box, reader, source="improvise", temperature=0.5)
+        await_made(box, reader, source="improvise", after=going_on["number"], seed=going_on["seed"] + 1)
         wait_until(lambda: (tmp_path / "state/kept/anna.material").exists(), "nothing was kept on the disk")
         assert box.end() == 0
     assert "Traceback" not in box.words
@@ -93,4 +99,14 @@ def test_varied_kept_killed_and_danced_again(show: Path, tmp_path: Path) -> None
         box.frames(1)
         assert desk.order("/cue", "memory")[2] == 1
         await_made(box, reader, source="kept", name="anna", of=called["of"])
+        assert desk.order("/phrase", "improvise", 0.2)[2] == 1
+        assert desk.order("/motion/improvise/temperature", 0.25, 3.0)[2] == 1
+        place = tmp_path / "state" / PLACE
+        wait_until(
+            lambda: (kept := read_checkpoint(place)) is not None and kept.motion != (), "no values are kept"
+        )
+        cut_power(box, place)
+        box.start()
+        await_made(box, reader, source="improvise", temperature=0.25)
+        assert "After a power cut the show goes on" in box.words
         assert box.end() == 0

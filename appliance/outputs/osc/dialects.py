@@ -22,9 +22,10 @@ class Encoder(Protocol):
         ...
 
 
-DIALECTS: dict[str, Callable[[Skeleton, OscConfig], Encoder]] = {
-    "ai-toolbox": AiToolbox,
-    "features": Features,
-    "joint": lambda skeleton, _: Joint(skeleton),
-    "vmc": lambda skeleton, _: Vmc(skeleton),
+# Of a skeleton and a receiver: what it gets of the puppet with this number in its addresses.
+DIALECTS: dict[str, Callable[[Skeleton, OscConfig, int], Encoder]] = {
+    "ai-toolbox": lambda skeleton, config, _: AiToolbox(skeleton, config),
+    "features": lambda skeleton, config, _: Features(skeleton, config),
+    "joint": lambda skeleton, _, puppet: Joint(skeleton, puppet),
+    "vmc": lambda skeleton, _, __: Vmc(skeleton),
 }

@@ -11,6 +11,7 @@ from appliance.outputs.osc.humanoid import humanoid_bones
 from appliance.outputs.osc.template import bundles, message
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
+from appliance.pose.t_pose import humanoid_rest
 
 # Ours is right-handed, Unity's left-handed; both have Y up and a figure that faces +Z. Mirroring X turns one
 # into the other: (x, y, z) -> (-x, y, z). A rotation by some angle about an axis becomes one by minus the
@@ -20,14 +21,16 @@ _MIRRORED_ROTATION = np.array([1, 1, -1, -1], np.float32)
 _WXYZ_IN_MESSAGE = [6, 3, 4, 5]  # a bone's floats are px, py, pz, qx, qy, qz, qw
 TIME_WRAP_S = 65536.0  # 32-bit seconds still tell two ticks apart just below it (steps of 7.8 ms)
 _LOADED, _CALIBRATED, _NORMAL_MODE = 1, 3, 0
+_TURNED_DEGREES = 0.01
 
 
 class Vmc:
     """`/VMC/Ext/OK`, `/VMC/Ext/T`, `/VMC/Ext/Root/Pos` and a `/VMC/Ext/Bone/Pos` for each Unity bone.
 
     Each bone: name, position (metres) and rotation (x, y, z, w) in Unity's axes, relative to the next bone
-    above it that has a Unity name; joints between the two are folded in. Hips are relative to the root,
-    which stays at the origin. Bundles that fit an Ethernet frame.
+    above it that has a Unity name; joints between the two are folded in. Rotations count from a T-pose in
+    which no bone is turned, whatever the skeleton's zero pose is. Hips are relative to the root, which stays
+    at the origin. Bundles that fit an Ethernet frame.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -43,7 +46,14 @@ class Vmc:
         )
         self._folded_joints, self._folded_above = self._joints[self._folded], np.array(above)[self._folded]
         self._rotations = np.empty((len(joints), 4), np.float32)
-        self._positions = skeleton.offsets[joints].astype(np.float32) * _MIRRORED_POSITION
+        rest = humanoid_rest(skeleton)
+        self._above_at_rest = rest[above].astype(np.float32)
+        self._above_at_rest[0] = quaternion.IDENTITY
+        self._back_to_rest = quaternion.inverse(rest[joints]).astype(np.float32)
+        turned = np.degrees(quaternion.angle_between(rest[joints], quaternion.IDENTITY))
+        self._counts_from_rest = bool((turned > _TURNED_DEGREES).any())
+        reach = quaternion.rotate(rest[above], skeleton.offsets[joints])
+        self._positions = reach.astype(np.float32) * _MIRRORED_POSITION
 
         self._template = bundles(
             [
@@ -69,6 +79,10 @@ class Vmc:
         self._positions[0] = frame.positions[self._hips] * _MIRRORED_POSITION
         if len(self._folded):
             self._fold(frame)
+        if self._counts_from_rest:
+            self._rotations[:] = quaternion.multiply(
+                self._above_at_rest, quaternion.multiply(self._rotations, self._back_to_rest)
+            )
         self._rotations *= _MIRRORED_ROTATION
         numbers = self._template.numbers
         numbers[self._time_place] = (frame.frame_time - self._first_time) % TIME_WRAP_S
@@ -81,7 +95,8 @@ class Vmc:
         from_world = quaternion.inverse(frame.world[self._folded_above])
         reach = frame.positions[self._folded_joints] - frame.positions[self._folded_above]
         self._rotations[self._folded] = quaternion.multiply(from_world, frame.world[self._folded_joints])
-        self._positions[self._folded] = quaternion.rotate(from_world, reach) * _MIRRORED_POSITION
+        reach = quaternion.rotate(quaternion.multiply(self._above_at_rest[self._folded], from_world), reach)
+        self._positions[self._folded] = reach * _MIRRORED_POSITION
 
 
 def _bone_above(skeleton: Skeleton, joint: int, bones: list[int]) -> int:

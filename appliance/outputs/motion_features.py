@@ -1,0 +1,82 @@
+"""What moves, as numbers: speeds of each joint, quantity of motion, bounds, efforts after Laban.
+
+Definitions: C. Larboulette and S. Gibet, 'A review of computable expressive descriptors of human motion'
+(MOCO 2015); every joint weighs the same.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+WINDOW = 25  # frames that efforts look back: half a second
+PAUSE_S = 0.2  # after which motion begins anew
+LEAST_M = 0.001  # no way is shorter: one who stands still goes straight
+EFFORTS = ("weight_effort", "time_effort", "flow_effort", "space_effort")
+
+Floats = NDArray[np.float32]
+
+
+class MotionFeatures:
+    """Differences between one frame and the next, not smoothed.
+
+    derived (3, J, 3): velocity, acceleration and jerk of each joint, metres and seconds, world frame.
+    numbers: `qom` (1), `bbox` (6: lowest, highest), `bsphere` (4: centre, radius), each of EFFORTS (1).
+    """
+
+    def __init__(self, joints: int) -> None:
+        self._before = np.zeros((3, joints, 3), np.float32)  # position, velocity, acceleration
+        self.derived = np.zeros((3, joints, 3), np.float32)
+        self._sizes = np.zeros((WINDOW, 3, joints), np.float32)  # of these, the newest frames
+        self._steps = np.zeros((WINDOW, joints), np.float32)  # metres from the frame before
+        self._ways = np.zeros((WINDOW, joints, 3), np.float32)  # positions
+        self.numbers: dict[str, Floats] = {
+            name: np.zeros(count, np.float32)
+            for name, count in {"qom": 1, "bbox": 6, "bsphere": 4, **dict.fromkeys(EFFORTS, 1)}.items()
+        }
+        self._frames, self._time = 0, -np.inf
+
+    def take_frame(self, positions: Floats, seconds: float) -> bool:
+        """Positions (J, 3), metres, at a time; whether the numbers are new: time must have passed."""
+        passed_s = seconds - self._time
+        if passed_s <= 0.0:
+            return False
+        self._measure(positions, passed_s)
+        self._time = seconds
+        return True
+
+    def _measure(self, positions: Floats, passed_s: float) -> None:
+        if passed_s > PAUSE_S:
+            self._frames, passed_s = 0, 1.0
+        now = positions
+        for order in range(3):  # a derivative begins with the frame that has all that it needs
+            if self._frames > order:
+                np.divide(now - self._before[order], np.float32(passed_s), out=self.derived[order])
+            else:
+                self.derived[order] = 0.0
+            self._before[order] = now
+            now = self.derived[order]
+        place = self._frames % WINDOW
+        self._sizes[place] = np.sqrt(np.einsum("djk,djk->dj", self.derived, self.derived))
+        self._steps[place] = self._sizes[place, 0] * passed_s
+        self._ways[place] = positions
+        self._frames += 1
+        self._describe(positions, place)
+
+    def _describe(self, positions: Floats, place: int) -> None:
+        numbers, seen = self.numbers, min(self._frames, WINDOW)
+        sizes = self._sizes[:seen]
+        centre = positions.mean(axis=0)
+        numbers["qom"][:] = sizes[place, 0].mean()
+        numbers["bbox"][:] = np.concatenate([positions.min(axis=0), positions.max(axis=0)])
+        apart = positions - centre
+        radius = np.sqrt(np.einsum("jk,jk->j", apart, apart).max())
+        numbers["bsphere"][:] = [*centre, radius]
+        numbers["weight_effort"][:] = np.square(sizes[:, 0]).mean(axis=1).max()
+        numbers["time_effort"][:] = sizes[:, 1].mean()
+        numbers["flow_effort"][:] = sizes[:, 2].mean()
+        oldest = self._frames % WINDOW if self._frames >= WINDOW else 0
+        way = self._steps[:seen].sum(axis=0) - self._steps[oldest]
+        apart = positions - self._ways[oldest]
+        far = np.sqrt(np.einsum("jk,jk->j", apart, apart))
+        numbers["space_effort"][:] = (np.maximum(way, LEAST_M) / np.maximum(far, LEAST_M)).mean()

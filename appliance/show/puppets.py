@@ -1,0 +1,120 @@
+"""show.yaml's section about the puppets: several figures of one network, each at its place on the stage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from appliance.show.config_error import Problem, did_you_mean
+from appliance.show.cues import MOST_ITERATIONS, require_coding_then_interaction
+from appliance.show.dance import MotionConfig
+from appliance.show.hand import HandConfig
+from appliance.show.light_rules import MappingConfig
+from appliance.show.section import Section, key, refuse_repeats
+from appliance.show.sources import LIVE
+from appliance.show.yaml_file import YamlFile
+
+MOST_PUPPETS = 4
+MAX_HANDS = 8
+LED_BY_THE_SHOW = ("phrase", "start_s", "hands", "iterations")  # of the first puppet: not its to say
+_Times = Annotated[int, Field(ge=0, le=MOST_ITERATIONS)]
+
+
+class PuppetConfig(Section):
+    """A figure on the stage. The first dances what `motion`, `hands` and `dancer` say; cues lead it."""
+
+    name: str = key("What lights and receivers call it.", length=(1, 32))
+    x: float = key(
+        "Where its phrase begins on the stage, metres to the right as the audience sees it.",
+        0.0,
+        within=(-20, 20),
+    )
+    z: float = key("The same, metres towards the audience.", 0.0, within=(-20, 20))
+    turned: float = key(
+        "Degrees by which its dance is turned to the dancer's left; 180 shows its back.",
+        0.0,
+        within=(-360, 360),
+    )
+    phrase: str | None = key(
+        "Not for the first puppet: what it starts from, `main`, a name under motion.phrases or `live`. "
+        "null: the phrase that the show starts with.",
+        None,
+        length=(1, 64),
+    )
+    start_s: float = key(
+        "Not for the first puppet: the second of its phrase at which it begins; two puppets in the same "
+        "phrase become a canon.",
+        0.0,
+        within=(0, 86400),
+    )
+    hands: list[HandConfig] = key(
+        "Not for the first puppet: which puppeteer holds which of its joints. A sensor may lead several "
+        "puppets.",
+        [],
+        length=(0, MAX_HANDS),
+    )
+    iterations: Annotated[tuple[_Times, _Times], Field(strict=False)] | None = key(
+        "Not for the first puppet: coding and interaction iterations; null: as many as the first one's at "
+        "the start.",
+        None,
+    )
+
+    @field_validator("hands")
+    @classmethod
+    def _each_joint_once(cls, hands: list[HandConfig]) -> list[HandConfig]:
+        return require_each_joint_once(hands)
+
+    @field_validator("iterations")
+    @classmethod
+    def _coding_then_interaction(cls, times: tuple[int, int] | None) -> tuple[int, int] | None:
+        return require_coding_then_interaction(times, "A puppet")
+
+
+def require_each_joint_once(hands: list[HandConfig]) -> list[HandConfig]:
+    """The hands of one puppet, none of whose joints is held twice. Raises a refusal."""
+    refuse_repeats(
+        [hand.joint for hand in hands],
+        "Two hands hold the joint '{value}' (hands[{first}] and hands[{place}]).",
+        "Give one of them another joint.",
+    )
+    return hands
+
+
+def _light_problems(
+    puppets: Sequence[PuppetConfig], mappings: Sequence[MappingConfig], file: YamlFile
+) -> Iterator[Problem]:
+    names = [puppet.name for puppet in puppets]
+    for place, mapping in enumerate(mappings):
+        for number, rule in enumerate(mapping.rules):
+            if rule.puppet is not None and rule.puppet not in names:
+                cure = did_you_mean(rule.puppet, names) if names else "Remove it: the show has one puppet."
+                at = ("lights", "mappings", place, "rules", number, "puppet")
+                yield file.problem(at, f"The show has no puppet '{rule.puppet}'.", cure)
+
+
+def puppet_problems(
+    puppets: Sequence[PuppetConfig], motion: MotionConfig, mappings: Sequence[MappingConfig], file: YamlFile
+) -> Iterator[Problem]:
+    """What the first puppet has that is not its to say, phrases of the others that the show lacks, and
+    puppets that it lacks in rules of lights.
+    """
+    yield from _light_problems(puppets, mappings, file)
+    known = [*motion.files, *([LIVE] if motion.live else [])]
+    for place, puppet in enumerate(puppets):
+        if place == 0:
+            for name in (name for name in LED_BY_THE_SHOW if name in puppet.model_fields_set):
+                words = f"'{name}' does not stand with the first puppet: it dances what the show says."
+                cure = "Write it under `motion`, `hands` or `dancer`, or give it to another puppet."
+                yield file.problem(("puppets", 0, name), words, cure)
+        elif puppet.phrase is not None and puppet.phrase not in known:
+            words = (
+                f"The puppet '{puppet.name}' starts from '{puppet.phrase}', which is no phrase of the show."
+            )
+            yield file.problem(("puppets", place, "phrase"), words, did_you_mean(puppet.phrase, known))
+        for number, hand in enumerate(puppet.hands if place else ()):
+            if not hand.from_start:
+                words = "Nothing lets this hand hold: cues and `/hold` lead the hands of the first puppet."
+                at = ("puppets", place, "hands", number, "from_start")
+                yield file.problem(at, words, "Remove it, or give the hand to the first puppet.")

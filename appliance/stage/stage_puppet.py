@@ -1,0 +1,221 @@
+"""One puppet on the stage: what it starts from, its hands, its network, its body and where that stands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from appliance.box.checkpoint import Standing
+from appliance.dancer.blending import Blending
+from appliance.dancer.grounding import Grounding
+from appliance.dancer.hands import Hands
+from appliance.dancer.live import Live
+from appliance.dancer.loop import Placement, turns_about_y
+from appliance.dancer.motion_source import Playback
+from appliance.dancer.puppet import Puppet
+from appliance.dancer.slerp import FloatArray
+from appliance.dancer.springs import Springs
+from appliance.outputs.joint_frame import JointFrame
+from appliance.pose import quaternion
+from appliance.show.puppets import PuppetConfig
+from appliance.show.sources import LIVE
+from appliance.stage.iterations import Iterations
+
+_STANDING = ("pose", "world", "positions", "root")  # arrays of a frame
+
+
+class Place:
+    """Where a puppet's dance stands on the stage: its first root at x, z (metres), turned about it."""
+
+    def __init__(self, config: PuppetConfig, root: FloatArray) -> None:
+        """root (3,): of the puppet's first pose, metres."""
+        moved = Placement(math.radians(config.turned), config.x, config.z)
+        moved = moved.after(Placement(0.0, -float(root[0]), -float(root[2])))
+        x, z = moved.x, moved.z
+        cosine, sine = math.cos(moved.yaw), math.sin(moved.yaw)
+        self._turn = turns_about_y(np.array(moved.yaw)).astype(np.float32)
+        self._columns = np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]], np.float32)
+        self._shift = np.array([x, 0.0, z], np.float32)
+
+    def put(self, frame: JointFrame) -> None:
+        """Move a frame from where the puppet danced it to its place."""
+        frame.positions[:] = frame.positions @ self._columns + self._shift
+        frame.root[:] = frame.root @ self._columns + self._shift
+        frame.world[:] = quaternion.multiply(self._turn, frame.world)
+        frame.pose[0] = quaternion.multiply(self._turn, frame.pose[0])
+
+
+@dataclass(slots=True)
+class StagePuppet:
+    """A figure, its parts, and what they make of a tick, in the order in which data flows: start, pull,
+    dance, blend, stand.
+
+    hand_places: where the hands' joints stand among the moving ones; place None: where its phrase has it;
+    network_failed: the last good pose stays, because the network gave none.
+    """
+
+    puppet: Puppet
+    motion: Playback
+    blending: Blending
+    grounding: Grounding
+    hands: Hands
+    hand_places: list[int]
+    iterations: Iterations
+    frame: JointFrame
+    crossfade_s: float
+    live: Live | None = None  # None: the show has no such source
+    springs: Springs | None = None  # those among the hands
+    place: Place | None = None
+    network_failed: bool = False
+    _whole: FloatArray = field(init=False)  # (T, J, 4)
+    _roots: FloatArray = field(init=False)  # (T, 3)
+    _window: FloatArray = field(init=False)  # (T, M, 4)
+    _danced: NDArray[np.float32] = field(init=False)  # (J, 4), not yet grounded
+
+    def __post_init__(self) -> None:
+        self._whole, self._roots = self.motion.window(), self.motion.roots()
+        self._window = self.puppet.select(self._whole)
+        self._danced = self._whole[0].copy()
+
+    @property
+    def lift(self) -> float:
+        """How far the figure is to be above the floor, metres: in a jump of the phrase."""
+        return self.motion.lift * (1.0 - (self.live.share if self.live is not None else 0.0))
+
+    @property
+    def source(self) -> str:
+        """The name of what the puppet starts from: a phrase's, or `live`."""
+        return LIVE if self.live is not None and self.live.is_chosen else self.motion.phrase
+
+    def start(self, now: float) -> None:
+        """Take the window and the roots of this tick; call it once a tick."""
+        window, roots = self.motion.window(), self.motion.roots()
+        if self.live is not None:
+            window, roots = self.live.lay_over(now, window, roots)
+        if self.springs is not None:
+            self.springs.follow_phrase(window[0], roots[0])
+        self._whole, self._roots = window, roots
+        self._window = self.puppet.select(window)
+
+    def pull(self, now: float) -> None:
+        """Let the hands say where they hold their joints."""
+        self.hands.pull(now, self._window)
+
+    def dance(self) -> None:
+        """Let the puppet dance the window and blend it in."""
+        hands, times = self.hands, self.iterations
+        poses = self.puppet.dance(
+            self._window, hands.mask, hands.targets, hands.weights, times.coding, times.interaction
+        )
+        self.network_failed = self.puppet.is_broken
+        if not self.network_failed:
+            self.blending.add(poses)
+
+    def warm_up(self) -> None:
+        """One pass over the last window; its poses go nowhere."""
+        hands = self.hands
+        window = self.puppet.select(self.motion.window())
+        self.puppet.dance(window, hands.mask, hands.targets, hands.weights, 1, 0)
+
+    def blend(self) -> None:
+        """Take the pose of this tick from the windows that cover it."""
+        if not self.network_failed:
+            self._danced[:] = self._whole[0]
+            self.puppet.restore(self.blending.take(), self._danced)
+
+    def stand(self) -> None:
+        """Put the danced pose on the floor and into the world."""
+        frame, grounding = self.frame, self.grounding
+        self.puppet.restore(self.hands.weights, frame.holds)
+        figure = grounding.ground_pose(
+            self._danced,
+            self._roots[0],
+            self.lift,
+            self.motion.rest_heights,
+            frame.holds,
+        )
+        frame.pose[:] = grounding.pose
+        frame.world[:] = figure.world
+        frame.positions[:] = figure.positions
+        frame.root[:] = grounding.root
+        if self.place is not None:
+            self.place.put(frame)
+
+    def advance(self) -> None:
+        """The frame has left: the motion moves on."""
+        self.motion.advance()
+        self.iterations.advance()
+
+    def play(self, name: str, *fade_s: float) -> str:
+        """Switch to a phrase, or to `live`; a sentence where nothing changes. Raises ValueError."""
+        if name != LIVE or self.live is None:
+            plays_already = not self.motion.play(name, *fade_s)
+            if self.live is None or not self.live.is_chosen:
+                return f"The phrase '{name}' plays already, and goes on." if plays_already else ""
+        self.live.choose(name == LIVE, *(fade_s or (self.crossfade_s,)))
+        return ""  # whether it is heard is news of its own
+
+    @property
+    def noted(self) -> Standing:
+        """Where a restarted stage lets this puppet go on, unless it is the first."""
+        phrase, position_s = self.motion.going_on
+        let_go = [puppeteer.joint for puppeteer in self.hands.puppeteers if not puppeteer.enabled]
+        return Standing(
+            phrase,
+            position_s,
+            self.motion.excerpt_s,
+            self.motion.rate,
+            self.motion.standing,
+            self.grounding.strayed,
+            *self.iterations.asked,
+            tuple(let_go),
+        )
+
+    def go_on(self, noted: Standing, rate: float) -> None:
+        """Before the first tick: continue where another stage's puppet was. Raises ValueError."""
+        self.motion.start_at(noted.phrase, noted.excerpt, noted.position_s, rate, noted.standing)
+        self.grounding.strayed = noted.strayed
+        self.iterations.ask(noted.coding, noted.interaction)
+        for puppeteer in self.hands.puppeteers:
+            puppeteer.enabled = puppeteer.joint not in noted.let_go
+
+    def parts_state(self) -> dict[str, Any]:
+        """What the dance to come depends on, for `restore_parts`: plain values and copies of arrays."""
+        return {
+            "motion": self.motion.state(),
+            "blending": self.blending.state(),
+            "grounding": self.grounding.state(),
+            "hands": self.hands.state(),
+            "live": None if self.live is None else self.live.state(),
+        }
+
+    def restore_parts(self, state: dict[str, Any]) -> None:
+        """Go on from a state that the same puppet of the same show gave."""
+        self.motion.restore(state["motion"])
+        self.blending.restore(state["blending"])
+        self.grounding.restore(state["grounding"])
+        self.hands.restore(state["hands"])
+        if self.live is not None:
+            self.live.restore(state["live"])
+
+    def frame_state(self) -> dict[str, Any]:
+        """What the next frame repeats where it has nothing newer, and the iterations: for `restore_frame`."""
+        frame = self.frame
+        return {
+            "iterations": self.iterations.state(),
+            "network_failed": self.network_failed,
+            "danced": self._danced.copy(),
+            "frame": {name: getattr(frame, name).copy() for name in _STANDING},
+        }
+
+    def restore_frame(self, state: dict[str, Any]) -> None:
+        """Go on from a `frame_state`."""
+        self.iterations.restore(state["iterations"])
+        self.network_failed = state["network_failed"]
+        self._danced[:] = state["danced"]
+        for name in _STANDING:
+            getattr(self.frame, name)[:] = state["frame"][name]
