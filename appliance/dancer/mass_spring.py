@@ -16,8 +16,8 @@ Vectors = NDArray[np.float64]  # (N, 3), world frame
 SUBSTEPS = 10
 SUBSTEP_S = 0.02 / SUBSTEPS
 FASTEST_M_S = 30.0
-# How far a bone may be stretched beyond its rest vector's length when a tick begins. Bounding velocities alone can
-# feed a stretched spring: symplectic Euler keeps an energy with a term of position times velocity.
+# How far a bone may be stretched beyond its rest vector's length when a tick begins. A bound on velocities
+# alone can feed a stretched spring: symplectic Euler keeps an energy with a term of position times velocity.
 STRETCHED_M = 3.0
 # A substep is stable while the frequency of the stiffest mode is below 2 / SUBSTEP_S. By Gershgorin's theorem
 # a mass at the end of several bones is safe when the stiffness of each is below this share of mass / bones.
@@ -46,7 +46,9 @@ class MassSpring:
         self._bones_of[0, 0] = 0.0
         for node, parent in enumerate(parents[1:], 1):
             self._bones_of[node, parent] = -1.0
-        self._nodes_of = np.linalg.inv(self._bones_of + np.diag(np.eye(count)[0]))  # and back, the first as it is
+        to_bones = self._bones_of.copy()
+        to_bones[0, 0] = 1.0
+        self._nodes_of = np.linalg.inv(to_bones)  # times bones: the positions; the first is one of both
         self._bones, self._push, self._drift = np.empty((3, count, 3))
         self._squares, self._pull = np.empty((2, count, 1))
         self.set_parameters(*(np.full(count, value) for value in (1.0, 1000.0, 100.0, 1.0)))
