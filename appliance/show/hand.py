@@ -48,7 +48,9 @@ class HandConfig(Section):
     )
     joint: Joint = key("Name of the held joint, one that the network moves.", length=(1, None))
     weight: float = key(
-        "How firmly it is held: 0 not at all, 1 fully overwritten in each interaction.", 1.0, within=(0, 1)
+        "How firmly it is held: how far all interactions together bring the joint to the hand; 0 not at all.",
+        1.0,
+        within=(0, 1),
     )
     from_start: bool = key("Whether it holds from the start on; else a cue or `/hold` lets it.", True)
     facing: Axis = key(

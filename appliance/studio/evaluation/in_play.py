@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from appliance.dancer.blending import Blending, Shape
 from appliance.dancer.hands import Hands
+from appliance.dancer.puppet import weights_of_one_pass
 from appliance.dancer.puppeteers import TAKE_S, Puppeteer
 from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
@@ -72,7 +73,9 @@ class Rehearsal:
             hands.pull(now, windows[row])
             targets[row] = hands.targets
             shown[row] = hand.pull(now).orientation
-        hold: HeldJoints[NDArray[Any]] = HeldJoints(hands.mask, targets, hands.weights)
+        hold: HeldJoints[NDArray[Any]] = HeldJoints(
+            hands.mask, targets, weights_of_one_pass(hands.weights, interaction_iterations)
+        )
         return self._danced(windows, coding_iterations, interaction_iterations, hold), shown[WINDOW - 1 :]
 
     def whole(self, danced: Poses) -> Array:
