@@ -26,7 +26,7 @@ class Played:
         return self._repertoire.find(name)[1]
 
     def make_by(self, make: Callable[[str], Loop]) -> None:
-        """Who makes the loops that a state names by their recipes."""
+        """Set what makes the loops that a state names by their recipes."""
         self._repertoire.make = make
 
     def window(self) -> FloatArray:

@@ -86,7 +86,7 @@ class Port:
             return ""
         sender, self._newest_stranger, self._said_at = self._newest_stranger, "", now
         return (
-            f"Somebody at {sender} sends commands and is not listed ({self.strangers} dropped so far). "
+            f"{sender} sends commands and is not listed ({self.strangers} dropped so far). "
             "Nothing is changed. To let them: `senders` under control in the box file."
         )
 

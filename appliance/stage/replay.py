@@ -222,4 +222,4 @@ class _RecordedLink(SensorLink):
 
 
 def _nobody(words: str) -> None:
-    """Who replays hears what was said then from the events."""
+    """A replay tells what was said then from the events."""

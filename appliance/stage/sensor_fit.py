@@ -182,7 +182,7 @@ class SensorFit:
                 self._news.append(upright(wearer.name, hand, axis))
 
     def _give_up(self, wearer: SensorBinding) -> None:
-        """Who asked did not stand still. A power-on that still waits for its first pose goes on waiting."""
+        """The dancer asked for a neutral pose and moved. A power-on without its first pose still waits."""
         self._news.append(
             f"Sensor {wearer.name} did not keep still within {ASKED_WITHIN_S:g} s: no new neutral pose. "
             "Its joint goes on as before. Ask again, and stand still at once."

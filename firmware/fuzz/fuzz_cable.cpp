@@ -44,7 +44,7 @@ void answer_line(Console& console, const char* line, bool knows_secrets) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t count) {
-  // Who writes a secret himself may read it back, say as a name.
+  // An input that contains a secret may read it back, say as a name.
   const bool knows_secrets = memmem(data, count, kPassword, strlen(kPassword)) != nullptr ||
                              memmem(data, count, kKeyAsHex, strlen(kKeyAsHex)) != nullptr;
   CableInput input;
