@@ -22,7 +22,10 @@ class SlowStrings:
 
     A string is a mode, one complex number an axis: its real part is how far the string is drawn out, and the
     bone's motion draws it; it pulls the bone back by stiffness times that. What the bone loses the string
-    gains, and loses by its decay: so neither can drive the other up, whatever the gain.
+    gains, and loses by its decay: so neither can drive the other up, whatever the gain. In a step that is so
+    because the pull is the mean over the turn that the string makes in it: the exact flow of a Hamiltonian,
+    as are the masses' drift and the springs' kick. By the string's place before the step, an undamped body
+    was driven to ten times its energy.
     """
 
     def __init__(
@@ -34,22 +37,25 @@ class SlowStrings:
         pitch = dict(zip(bones[:, 1].tolist(), (hertz / 2**octaves).tolist(), strict=True))
         self.hertz: NDArray[np.float64] = np.array([pitch.get(node, 0.0) for node in nodes])
         self.modes = np.zeros((len(nodes), 3), complex)
-        self.stiffness = np.zeros((len(nodes), 1))  # newtons a metre
+        self.stiffness, self._held = np.zeros((2, len(nodes), 1))  # newtons a metre
         self._has_string = (self.hertz > 0.0)[:, None]
         decay = decays(self.hertz, hertz.min(initial=config.base_hz), config.decay_s)
-        pole = -decay + 2j * np.pi * self.hertz
-        self._turn = np.exp(pole * step_s)[:, None] * self._has_string
-        self._drawn, self._force = self.modes.real, np.zeros((len(nodes), 3))
+        turned = np.where(self._has_string, step_s * (2j * np.pi * self.hertz - decay)[:, None], -1.0)
+        self._turn = np.exp(turned) * self._has_string
+        self._mean = np.expm1(turned) / turned
+        self._drawn, self._pulling = self.modes.real, np.zeros_like(self.modes)
+        self._force = np.zeros((len(nodes), 3))
 
     def tune(self, gain: float, mass: NDArray[np.float64], most: NDArray[np.float64]) -> None:
         """gain 0..1; mass (N,) at the bones' ends, kilograms; most (N,): stiffness that its step carries."""
         wanted = gain * (2 * np.pi * TIED_HZ) ** 2 * mass
         self.stiffness[:] = np.minimum(wanted, most)[:, None] * self._has_string
+        np.negative(self.stiffness, out=self._held)
 
     def pull(self) -> NDArray[np.float64]:
         """Forces (N, 3) on the bones' ends, newtons; the bones' starts get their opposites."""
-        np.multiply(self._drawn, self.stiffness, out=self._force)
-        np.negative(self._force, out=self._force)
+        np.multiply(self.modes, self._mean, out=self._pulling)
+        np.multiply(self._pulling.real, self._held, out=self._force)
         return self._force
 
     def follow(self, moves: NDArray[np.float64]) -> None:
