@@ -27,13 +27,9 @@ def sound(
 ) -> None:
     """Play the strings of the show that the stage dances, through the sound card."""
     if file is None and recording is None:
-        from appliance.sound.card import CardError
         from appliance.sound.run import run_sound
 
-        try:
-            run_sound(box_of(box, chosen), chosen is None)
-        except CardError as error:
-            raise StageError(str(error)) from error
+        run_sound(box_of(box, chosen), chosen is None)
         return
     if file is None or recording is None:
         raise StageError("A file needs both: bunraku sound dance.journal --file out.wav")

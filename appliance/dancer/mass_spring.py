@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from appliance.dancer.slow_strings import SlowStrings
 
 Vectors = NDArray[np.float64]  # (N, 3), world frame
+Floats = NDArray[np.float64]  # (N,)
 
 SUBSTEPS = 10
 SUBSTEP_S = 0.02 / SUBSTEPS
@@ -41,36 +42,35 @@ class MassSpring:
         """parents: of each node, before it in order; the first has none. anchored False: it moves freely."""
         count = len(parents)
         self.positions, self.velocities, self.rest = np.zeros((3, count, 3))
-        self._parents, self._anchored = parents, anchored
-        self._bones_of = np.eye(count)  # times positions: the bones; the first has none
-        self._bones_of[0, 0] = 0.0
+        self._anchored, self._above = anchored, np.maximum(parents, 0)
+        # Times positions: the bones, and in the place of the first node's its own position.
+        self._bones_of = np.eye(count)
         for node, parent in enumerate(parents[1:], 1):
             self._bones_of[node, parent] = -1.0
-        to_bones = self._bones_of.copy()
-        to_bones[0, 0] = 1.0
-        self._nodes_of = np.linalg.inv(to_bones)  # times bones: the positions; the first is one of both
-        self._bones, self._push, self._drift = np.empty((3, count, 3))
+        self._nodes_of = np.linalg.inv(self._bones_of)  # times these: the positions
+        self._to_bones = self._bones_of.copy()  # the bones alone
+        self._to_bones[0, 0] = 0.0
+        # Newtons a metre that each bone's springs may have for each kilogram at its end.
+        self._carried_by = _STABLE / np.maximum(np.count_nonzero(self._to_bones, axis=0), 1) / SUBSTEP_S**2
+        if anchored:
+            self._carried_by[0] = 1e9
+        self._pushes = np.empty((count, count))
+        self._bones, self._force, self._push, self._drift, self._kept = np.empty((5, count, 3))
         self._squares, self._pull = np.empty((2, count, 1))
         self.set_parameters(*(np.full(count, value) for value in (1.0, 1000.0, 100.0, 1.0)))
 
-    def set_parameters(self, mass: Any, stiffness: Any, directional: Any, damping: Any) -> None:
+    def set_parameters(self, mass: Floats, stiffness: Floats, directional: Floats, damping: Floats) -> None:
         """All (N,): kilograms, newtons a metre twice, and the share of its velocity that a mass loses in a
         second, as a rate (1/s). Springs too stiff for the substep are made as stiff as it carries.
         """
-        self.mass = np.asarray(mass, float)
-        bones = np.count_nonzero(self._bones_of, axis=0)
-        carried = _STABLE * self.mass / np.maximum(bones, 1) / SUBSTEP_S**2
-        if self._anchored:
-            carried[0] = np.inf
-        most = np.minimum(carried, carried[np.maximum(self._parents, 0)])
-        self.carried = np.minimum(most, 1e9)
-        wanted = np.asarray(stiffness, float) + np.asarray(directional, float)
-        share = np.minimum(1.0, most / np.maximum(wanted, 1e-9))
+        self.mass, self.damping = mass, damping
+        carried = self._carried_by * mass
+        self.carried = np.minimum(carried, carried[self._above])
+        share = self.carried / np.maximum(stiffness + directional, self.carried)
         self.stiffness, self.directional = stiffness * share, directional * share
-        self.damping = np.asarray(damping, float)
         self._both = (self.stiffness + self.directional)[:, None]
-        self._kept = np.exp(-self.damping * SUBSTEP_S)[:, None]
-        self._pushes = (SUBSTEP_S**2 / self.mass)[:, None] * self._bones_of.T
+        self._kept[:] = np.exp(-SUBSTEP_S * damping)[:, None]
+        np.multiply((SUBSTEP_S**2 / mass)[:, None], self._to_bones.T, out=self._pushes)
         if self._anchored:
             self._kept[0], self._pushes[0] = 1.0, 0.0
 
@@ -86,56 +86,55 @@ class MassSpring:
         mass, metres a second; acceleration (N, 3) or (3,): of gravity. `rest` is in force the whole tick.
         strings: those that the bones draw, and that pull them back.
         """
-        positions, moves, bones = self.positions, self.velocities, self._bones
-        lengths = np.sqrt(np.einsum("nk,nk->n", self.rest, self.rest))[:, None]
+        moves, bones, force, push, drift = self.velocities, self._bones, self._force, self._push, self._drift
+        add, multiply, matmul, kept, pull = np.add, np.multiply, np.matmul, self._kept, self._pull
+        lengths = np.sqrt(np.vecdot(self.rest, self.rest))[:, None]
         tension, rest_pull = self.stiffness[:, None] * lengths, self.directional[:, None] * self.rest
-        np.multiply(1.0 - self._kept, flow, out=self._drift)
-        self._drift += SUBSTEP_S * acceleration
+        multiply(1.0 - kept, flow, out=drift)
+        drift += SUBSTEP_S * acceleration
         if self._anchored:
-            self._drift[0] = 0.0
-            moves[0] = (anchor - positions[0]) / (SUBSTEPS * SUBSTEP_S)
+            drift[0] = 0.0
+            moves[0] = (anchor - self.positions[0]) / (SUBSTEPS * SUBSTEP_S)
+        matmul(self._bones_of, self.positions, out=bones)
         self._bound_stretch(lengths)
         np.maximum(moves, -FASTEST_M_S, out=moves)
         np.minimum(moves, FASTEST_M_S, out=moves)
-        np.multiply(moves, SUBSTEP_S, out=moves)  # metres a substep: spares an operation in each
-        np.multiply(self._drift, SUBSTEP_S, out=self._drift)
+        moves *= SUBSTEP_S  # metres a substep: spares an operation in each
+        drift *= SUBSTEP_S
         for _ in range(SUBSTEPS):
-            np.matmul(self._bones_of, positions, out=bones)
-            np.einsum("nk,nk->n", bones, bones, out=self._squares[:, 0])
-            np.add(self._squares, _SHORTEST_M2, out=self._squares)
-            np.sqrt(self._squares, out=self._squares)
-            np.divide(tension, self._squares, out=self._pull)
-            np.subtract(self._pull, self._both, out=self._pull)
-            np.multiply(bones, self._pull, out=bones)
-            np.add(bones, rest_pull, out=bones)
-            np.matmul(self._pushes, bones, out=self._push)
-            np.multiply(moves, self._kept, out=moves)
-            np.add(moves, self._push, out=moves)
-            np.add(moves, self._drift, out=moves)
+            np.vecdot(bones, bones, out=self._squares[:, 0])
+            add(self._squares, _SHORTEST_M2, out=pull)
+            np.sqrt(pull, out=pull)
+            np.divide(tension, pull, out=pull)
+            np.subtract(pull, self._both, out=pull)
+            multiply(bones, pull, out=force)
+            add(force, rest_pull, out=force)
             if strings is not None:
-                np.matmul(self._pushes, strings.pull(), out=self._push)
-                np.add(moves, self._push, out=moves)
-                np.matmul(self._bones_of, moves, out=bones)
-                strings.follow(bones)
-            np.add(positions, moves, out=positions)
+                add(force, strings.pull(), out=force)
+            matmul(self._pushes, force, out=push)
+            multiply(moves, kept, out=moves)
+            add(moves, push, out=moves)
+            add(moves, drift, out=moves)
+            matmul(self._bones_of, moves, out=push)
+            add(bones, push, out=bones)
+            if strings is not None:
+                strings.follow(push)
         if strings is not None:
             strings.bound()
-        np.divide(moves, SUBSTEP_S, out=moves)
+        matmul(self._nodes_of, bones, out=self.positions)
+        moves /= SUBSTEP_S
 
     def _bound_stretch(self, lengths: NDArray[np.float64]) -> None:
         """Shortens bones that are stretched by more than STRETCHED_M; what hangs on them comes along."""
-        np.matmul(self._bones_of, self.positions, out=self._bones)
         lasting = lengths + STRETCHED_M
-        squares = np.einsum("nk,nk->n", self._bones, self._bones)[:, None]
-        if np.all(squares <= lasting**2):
-            return
-        self._bones *= np.minimum(1.0, lasting / np.sqrt(np.maximum(squares, _SHORTEST_M2)))
-        self._bones[0] = self.positions[0]
-        np.matmul(self._nodes_of, self._bones, out=self.positions)
+        squares = np.vecdot(self._bones, self._bones)[:, None]
+        if np.any((squares > lasting * lasting)[1:]):
+            shortened = np.minimum(1.0, lasting / np.sqrt(np.maximum(squares, _SHORTEST_M2)))
+            self._bones[1:] *= shortened[1:]
 
     def energy(self, gravity: Vectors | None = None) -> float:
         """Joules: of motion, of both kinds of springs, and in a field of gravity (3,), metres a second^2."""
-        bones = self._bones_of @ self.positions
+        bones = self._to_bones @ self.positions
         stretch = np.linalg.norm(bones, axis=1) - np.linalg.norm(self.rest, axis=1)
         aside = np.sum((bones - self.rest) ** 2, axis=1)
         motion = self.mass @ np.sum(self.velocities**2, axis=1)

@@ -17,16 +17,41 @@ EFFORTS = ("weight_effort", "time_effort", "flow_effort", "space_effort")
 Floats = NDArray[np.float32]
 
 
-class MotionFeatures:
-    """Differences between one frame and the next, not smoothed.
+class Derivatives:
+    """Of vectors, by differences between one frame and the next, not smoothed.
 
-    derived (3, J, 3): velocity, acceleration and jerk of each joint, metres and seconds, world frame.
+    found (orders, J, 3): the first derivative, the second and so on, by seconds; each begins, after zeros,
+    with the frame that has all that it needs.
+    """
+
+    def __init__(self, joints: int, orders: int) -> None:
+        self.found = np.zeros((orders, joints, 3), np.float32)
+        self._before = np.zeros_like(self.found)
+        self._frames = 0
+
+    def begin(self) -> None:
+        """Forget what was before."""
+        self._frames = 0
+        self.found[:] = 0.0
+
+    def take(self, vectors: Floats, passed_s: float) -> None:
+        """The next vectors (J, 3), so long after the last ones."""
+        for order, found in enumerate(self.found):
+            if self._frames > order:
+                np.divide(vectors - self._before[order], np.float32(passed_s), out=found)
+            self._before[order] = vectors
+            vectors = found
+        self._frames += 1
+
+
+class MotionFeatures:
+    """derived (3, J, 3): velocity, acceleration and jerk of each joint, metres and seconds, world frame.
     numbers: `qom` (1), `bbox` (6: lowest, highest), `bsphere` (4: centre, radius), each of EFFORTS (1).
     """
 
     def __init__(self, joints: int) -> None:
-        self._before = np.zeros((3, joints, 3), np.float32)  # position, velocity, acceleration
-        self.derived = np.zeros((3, joints, 3), np.float32)
+        self._derivatives = Derivatives(joints, 3)
+        self.derived = self._derivatives.found
         self._sizes = np.zeros((WINDOW, 3, joints), np.float32)  # of these, the newest frames
         self._steps = np.zeros((WINDOW, joints), np.float32)  # metres from the frame before
         self._ways = np.zeros((WINDOW, joints, 3), np.float32)  # positions
@@ -48,14 +73,8 @@ class MotionFeatures:
     def _measure(self, positions: Floats, passed_s: float) -> None:
         if passed_s > PAUSE_S:
             self._frames, passed_s = 0, 1.0
-        now = positions
-        for order in range(3):  # a derivative begins with the frame that has all that it needs
-            if self._frames > order:
-                np.divide(now - self._before[order], np.float32(passed_s), out=self.derived[order])
-            else:
-                self.derived[order] = 0.0
-            self._before[order] = now
-            now = self.derived[order]
+            self._derivatives.begin()
+        self._derivatives.take(positions, passed_s)
         place = self._frames % WINDOW
         self._sizes[place] = np.sqrt(np.einsum("djk,djk->dj", self.derived, self.derived))
         self._steps[place] = self._sizes[place, 0] * passed_s

@@ -15,7 +15,19 @@ from appliance.show.section import Axes, Ipv4, Section, key, refusal, refuse_rep
 from appliance.show.yaml_file import YamlFile
 
 Dialect = Literal["ai-toolbox", "joint", "vmc", "features"]
-Message = Literal["pos_local", "pos_world", "rot_local", "rot_world"]
+Message = Literal[
+    "pos_local",
+    "pos_world",
+    "rot_local",
+    "rot_world",
+    "rot",
+    "lin_vel",
+    "lin_acc",
+    "lin_jerk",
+    "rot_vel",
+    "rot_acc",
+    "ang_jerk",
+]
 Program = Literal["mocap-analysis", "clustering", "classifier", "vae-rnn", "ray-marching", "supercollider"]
 Prefix = Annotated[str, Field(pattern=r"^(/[A-Za-z0-9_.-]+)+$")]
 
@@ -26,7 +38,12 @@ PROGRAMS: Mapping[str, Mapping[str, Any]] = {
     "classifier": {"port": 9007, "messages": ["pos_local", "rot_local"], "scale": 100.0},
     "vae-rnn": {"port": 9007, "messages": ["rot_local"], "ends": True},
     "ray-marching": {"port": 9004, "messages": ["pos_world", "rot_world"], "scale": 100.0, "axes": _Z_UP},
-    "supercollider": {"port": 9005, "messages": ["pos_world"], "prefix": "/mocap/joint", "axes": _Z_UP},
+    "supercollider": {
+        "port": 9005,
+        "messages": ["pos_world", "rot", "rot_acc", "lin_acc", "ang_jerk"],
+        "prefix": "/mocap/joint",
+        "axes": _Z_UP,
+    },
 }
 _NUMBER = re.compile(r"(?<=/)\d+(?=/|$)")
 _OF_ONE_DIALECT = ("messages", "prefix", "joints", "ends", "scale", "axes", "rotations")
@@ -53,7 +70,7 @@ class OscConfig(Section):
     messages: list[Message] = key(
         "ai-toolbox: which lists it gets, in this order.",
         ["rot_local", "pos_world", "rot_world"],
-        length=(1, 4),
+        length=(1, 11),
     )
     prefix: Prefix = key(
         "ai-toolbox, features: the address before a list's name; /mocap/joint for older programs, "

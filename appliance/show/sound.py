@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from appliance.show.section import Section, key
 
+BOWED_SAMPLES = 32  # from one push of the bow to the next: 1500 a second at 48 kHz
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
@@ -32,5 +33,12 @@ class SoundConfig(Section):
     channels: Literal[2, 8] = key("Loudspeakers: a pair, or eight in a ring around the stage.", 2)
     rate: int = key("Samples a second.", 48000, within=(22050, 96000))
     block: int = key(
-        "Samples computed at once: fewer answer sooner, more drop out later.", 256, within=(64, 1024)
+        "Samples computed at once: fewer answer sooner, more drop out later; a multiple of 32.",
+        256,
+        within=(64, 1024),
     )
+
+    @field_validator("block")
+    @classmethod
+    def _whole_steps(cls, block: int) -> int:
+        return block // BOWED_SAMPLES * BOWED_SAMPLES

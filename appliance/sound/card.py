@@ -14,11 +14,9 @@ from appliance.box.realtime import thread_priority
 from appliance.show.sound import SoundConfig
 
 RETRY_S = 1.0
+LIBRARY_RETRY_S = 10.0  # to look for it costs a tenth of a second
+STALLED_S = 1.0  # a card that asks for no block for so long is gone, whatever its driver says
 _ALSA = "libasound.so.2"
-
-
-class CardError(OSError):
-    """The card, or the library, is not here: what is missing, and what to do."""
 
 
 class Card:
@@ -33,27 +31,31 @@ class Card:
     ) -> None:
         """priority: real-time, of PortAudio's thread; None: as the process has it."""
         self._config, self._render, self._priority = config, render, priority
+        self._wanted_priority = priority
         self._library: Any = None
         self._stream: Any = None
         self._tries_at = 0.0
+        self._blocks, self._seen = 0, (0, 0.0)  # seen: so many blocks, at that time
         self.trouble, self.dropouts, self.is_missing, self.refused = "", 0, False, ""
 
     def look(self, now: float) -> None:
         """Open the card where it is not; call it often. Monotonic seconds."""
-        if self._stream is not None and not self._stream.active:
-            self._drop("The sound card was unplugged.")
+        if self._stream is not None:
+            if self._blocks != self._seen[0]:
+                self._seen = self._blocks, now
+            if not self._stream.active or now - self._seen[1] > STALLED_S:
+                self._drop("The sound card was unplugged. The strings are silent until it is back.")
         if self._stream is None and now >= self._tries_at:
             self._tries_at = now + RETRY_S
-            self._open()
+            self._open(now)
 
     def close(self) -> None:
         """Give the card back."""
         self._drop("")
 
-    def _open(self) -> None:
-        """Raises CardError where the library is missing: trying again would not help."""
-        config, self.is_missing = self._config, not _has_sound()
-        if self.is_missing:
+    def _open(self, now: float) -> None:
+        config, self.is_missing = self._config, True
+        if not _has_sound():
             self.trouble = (
                 "This system has no sound: ALSA, through which Linux reaches sound cards, is not configured. "
                 "The strings are silent, and are looked for each second. Install the Debian package "
@@ -62,12 +64,22 @@ class Card:
             return
         try:
             library = self._library or _loaded()
+        except (ImportError, OSError) as error:
+            self._tries_at = now + LIBRARY_RETRY_S
+            self.trouble = (
+                f"The sound library is not here ({error}). The strings are silent, and it is looked for "
+                f"again each {LIBRARY_RETRY_S:.0f} s. Install the Debian package libportaudio2, or remove "
+                "`sound:` from the box file."
+            )
+            return
+        self.is_missing = False
+        try:
             library._terminate()  # PortAudio lists the cards once, when it starts
             library._initialize()
-            self._library = library
+            self._library, self._priority = library, self._wanted_priority
             stream = library.OutputStream(
                 samplerate=config.rate,
-                blocksize=config.block // 32 * 32,
+                blocksize=config.block,
                 device=config.device,
                 channels=config.channels,
                 dtype="float32",
@@ -75,19 +87,18 @@ class Card:
                 callback=self._fill,
             )
             stream.start()
-        except CardError:
-            raise
         except Exception as error:  # PortAudio's own class is not known before it is loaded
             self.trouble = (
                 f"No sound card plays {config.channels} channels at {config.rate} Hz ({error}). The strings "
                 "are silent. Plug one in, or give another `sound:` in the box file."
             )
             return
-        self._stream, self.trouble = stream, ""
+        self._stream, self.trouble, self._seen = stream, "", (self._blocks, now)
 
     def _fill(self, out: NDArray[np.float32], frames: int, time: Any, status: Any) -> None:
         if self._priority is not None:  # in the thread that has to have it
             self.refused, self._priority = thread_priority(self._priority), None
+        self._blocks += 1
         self.dropouts += bool(status.output_underflow)
         out[:] = self._render(frames)
 
@@ -100,13 +111,8 @@ class Card:
 
 
 def _loaded() -> Any:
-    try:
-        import sounddevice
-    except (ImportError, OSError) as error:
-        raise CardError(
-            f"The sound library is not here ({error}). Nothing sounds. Install the Debian package "
-            "libportaudio2, and `pip install bunraku[sound]`."
-        ) from error
+    import sounddevice
+
     return sounddevice
 
 

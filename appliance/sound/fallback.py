@@ -11,8 +11,8 @@ CARD_AWAY = Fallback(
 )
 NO_CARD = Fallback(
     "no-sound-card",
-    "This system has no sound at all: the strings are silent, and are looked for each second. Install the "
-    "Debian package libasound2-data, or remove `sound:` from the box file.",
+    "This system has no sound at all: the strings are silent until it has. Install the Debian package "
+    "libportaudio2, which brings libasound2-data, or remove `sound:` from the box file.",
 )
 DROPOUTS = Fallback(
     "sound-dropouts",

@@ -29,6 +29,8 @@ from appliance.sound.instrument import Instrument
 
 LOOK_S = 0.005  # how often frame and show state are read: panic is heard a block later
 LOST_S = 0.5  # without a frame: as the projector
+FADE_S = 0.5  # in which the strings then fade out
+CHANGE_S = 0.1  # for the strings of one show to fall silent before those of another sound
 _REPORT_S = 1.0
 
 
@@ -65,6 +67,8 @@ class Sound:
         fallbacks: Fallbacks,
     ) -> None:
         self.instrument: Instrument | None = None
+        self._next: Instrument | None = None
+        self._changes_at = 0.0  # when the next one takes its place
         self._config, self._stage, self._show_state = config, stage, show_state
         self._say, self._fallbacks = say, fallbacks
         self._strings, self._entrance = StringsConfig(), Entrance()
@@ -80,6 +84,12 @@ class Sound:
             self._generation = self._stage.generation
             self._fades = {str(cue["name"]): float(cue["fade_s"]) for cue in self._stage.facts.cues}
             self._begin(self._stage.facts.show_directory)
+            self._changes_at = now if self.instrument is None else now + CHANGE_S
+        if now >= self._changes_at:
+            self.instrument = self._next
+        elif self.instrument is not None:
+            self.instrument.level = 0.0
+            return
         if self.instrument is None:
             return
         if frame is not None and frame.tick != self._tick:
@@ -92,7 +102,7 @@ class Sound:
         state = self._show_state.read()
         entered = self._entrance.share(state.cue, self._strings.cues, self._fades, now)
         loud = state.level(now) * state.strings_level(now) * entered
-        self.instrument.level = loud if age_s < LOST_S else 0.0
+        self.instrument.level = loud * min(max(1.0 - (age_s - LOST_S) / FADE_S, 0.0), 1.0)
 
     def report(self, card: Card, now: float) -> None:
         """Once a second: what has changed about the card."""
@@ -115,13 +125,13 @@ class Sound:
             show = load_show(directory)
         except ConfigError as error:
             self._say(f"{error}\nThe strings stay silent until the stage dances another show.")
-            self.instrument = None
+            self._next = None
             return
         strings = show.config.strings
-        self.instrument = None if strings is None else Instrument(show.skeleton, strings, self._config)
+        self._next = None if strings is None else Instrument(show.skeleton, strings, self._config)
         self._strings = strings or StringsConfig()
         name = show.config.name
-        count = 0 if self.instrument is None else len(self.instrument.strings.bones)
+        count = 0 if self._next is None else len(self._next.strings.bones)
         self._say(f"{name}: {count} strings." if count else f"{name} has no `strings:`, and is silent.")
 
 
@@ -139,7 +149,7 @@ def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
 
     by_hand: without a box file the system's own sound card is meant.
 
-    Raises NotAskedForError, CardError where the sound library is missing, RuntimeFolderError.
+    Raises NotAskedForError, RuntimeFolderError.
     """
     box = load_box(box_file)
     config = SoundConfig() if by_hand and box_file is None else require_sound(box)
@@ -154,7 +164,9 @@ def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
         for one in (notifier, stage, show_state, process_health):
             opened.callback(one.close)
         sound = Sound(config, stage, show_state, speaker.say, fallbacks)
-        priority = box.realtime.priority // 2 if box.realtime.enabled else None  # the dance goes first
+        priority = (
+            max(box.realtime.priority // 2, 1) if box.realtime.enabled else None
+        )  # the dance goes first
         card = Card(config, lambda frames: _rendered(sound, frames, config.channels), priority)
         opened.callback(card.close)
         share_the_interpreter()

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from appliance.pose.skeleton import Skeleton
-from appliance.show.sound import StringsConfig
+from appliance.show.sound import BOWED_SAMPLES, StringsConfig
 from appliance.show.string_pitches import decays, string_pitches
 
 Samples = NDArray[np.floating[Any]]
 
-STEP = 32  # samples from one push of the strings to the next: 1500 pushes a second at 48 kHz
+STEP = BOWED_SAMPLES
 _HIGHEST = 0.45  # of the sample rate
 
 

@@ -133,7 +133,11 @@ def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
 
 
 def _spring(order: Order, parts: StageParts) -> None:
-    """Give the springs another setting, a kick (m/s), or turn one of their knobs."""
+    """The first puppet's springs get a setting, a kick (m/s), a turned knob; the gate is of them all."""
+    if order.name == "gate":
+        for springs in parts.springs:
+            springs.turn("gate", order.values[:1], *order.values[1:])
+        return
     springs = parts.first.springs
     if springs is None:
         raise ValueError("No hand of this show is springs. Add {springs: loose, joint: ...} to its hands.")

@@ -66,7 +66,7 @@ class Reconciler:
             self._is_first = False
         if (gate := show_state.going and not (show_state.panic or show_state.blackout)) != self._gate:
             self._gate = gate
-            if self.parts.first.springs is not None:
+            if self.parts.springs:
                 orders.append(Order("gate", (float(gate), GATE_S if gate else 0.0)))
         live, is_ours = self.parts.live, show_state.show == self._show
         declared = show_state.dance.get("phrase") if is_ours else None

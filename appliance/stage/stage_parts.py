@@ -88,6 +88,11 @@ class StageParts:
         """The first puppet's."""
         return self.first.hands
 
+    @property
+    def springs(self) -> list[Springs]:
+        """Of all puppets that have some among their hands."""
+        return [one.springs for one in self.puppets if one.springs is not None]
+
     def run_with(self, measured: Admission) -> None:
         """Let each puppet run with as many of its iterations as fit."""
         for one in self.puppets:

@@ -27,14 +27,27 @@ def parts() -> Iterator[StageParts]:
     made.close()
 
 
-def test_springs(measured: Callable[..., Any], parts: StageParts) -> None:
+@pytest.mark.parametrize(
+    ("what", "setting", "fade_s"),
+    [
+        ("alone", "loose", 0.0),
+        ("with feedback", "strings", 0.0),
+        ("with feedback, in a fade", "strings", 1e6),
+    ],
+)
+def test_springs(
+    measured: Callable[..., Any], parts: StageParts, what: str, setting: str, fade_s: float
+) -> None:
     springs = parts.first.springs
     assert springs is not None
     springs.enabled = True
+    springs.call(setting)
+    if fade_s:
+        springs.call("loose", fade_s)
     now = iter(range(10**9))
     for _ in range(100):  # until they hold
         springs.pull(0.02 * next(now))
-    measured("springs.pull", GROUP)(lambda: springs.pull(0.02 * next(now)))
+    measured(f"springs {what}", GROUP)(lambda: springs.pull(0.02 * next(now)))
     assert springs.is_holding
 
 

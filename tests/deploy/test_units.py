@@ -16,6 +16,7 @@ import typer
 from appliance.cli.app import command_line
 from appliance.cli.preflight import parsed
 from appliance.keeper.keeper import END_S
+from appliance.show.box import RealtimeConfig
 
 SYSTEM = Path(__file__).resolve().parents[2] / "deploy" / "system"
 UNITS = SYSTEM / "usr/lib/systemd/system"
@@ -44,7 +45,8 @@ needs_systemd = pytest.mark.skipif(
 def settings(name: str) -> dict[str, list[str]]:
     """What a service's file says and what all share, in systemd's order; each key with all of its values."""
     found: dict[str, list[str]] = {}
-    for line in ((UNITS / name).read_text() + SHARED.read_text()).splitlines():
+    own = sorted((UNITS / f"{name}.d").glob("*.conf"))
+    for line in "".join(path.read_text() for path in (UNITS / name, SHARED, *own)).splitlines():
         if (match := re.match(r"(\w+)=(.*)", line)) is not None:
             found.setdefault(match[1], []).append(match[2])
     return found
@@ -127,6 +129,15 @@ def test_a_stage_that_hangs_dances_again_within_three_seconds() -> None:
     said = settings("bunraku-stage.service")
     pause_s = sum(seconds(said[key][0]) for key in ("WatchdogSec", "TimeoutAbortSec", "RestartSec"))
     assert pause_s + STAGE_STARTS_WITHIN_S <= 3.0
+
+
+def test_the_sound_cards_thread_may_take_the_priority_that_it_asks_for() -> None:
+    """Half of the stage's (appliance/sound/run.py); what all services share would refuse it any."""
+    said = settings("bunraku-sound.service")
+    asked = RealtimeConfig().priority // 2
+    assert int(said["LimitRTPRIO"][-1]) >= asked
+    assert said["RestrictRealtime"][-1] == "no"
+    assert "sched_setscheduler" in said["SystemCallFilter"][-1].split()
 
 
 def test_nobody_keeps_the_stage_from_dancing() -> None:

@@ -132,3 +132,28 @@ def test_a_body_that_stands_is_silent_and_the_same_dance_sounds_the_same() -> No
         assert not still.render(256).any()
     one, other = (moving(Instrument(FIGURE, StringsConfig(), SoundConfig()), 0.5) for _ in range(2))
     assert np.array_equal(one, other) and one.any()
+
+
+def test_a_change_of_loudness_does_not_click() -> None:
+    """Strings that ring have nothing above 3 kHz here; a jump of the loudness would have."""
+
+    def played(*levels: float) -> np.ndarray:
+        instrument = Instrument(ONE, StringsConfig(partials=2, decay_s=30.0), SoundConfig())
+        pluck(instrument.strings, np.full(1, 0.1))
+        sound = []
+        for level in levels:
+            instrument.level = level
+            sound.append(instrument.render(256))
+        return np.concatenate(sound)[512:, 0]  # from where they are as loud as at first
+
+    def above_db(sound: np.ndarray) -> float:
+        spectrum = np.abs(np.fft.rfft(sound * np.hanning(len(sound)))) ** 2
+        return float(10 * np.log10(spectrum[3000 * len(sound) // RATE :].sum() / spectrum.sum()))
+
+    steady = played(*[1.0] * 85)
+    middle = len(steady) // 2
+    top = middle + int(np.argmax(np.abs(steady[middle : middle + 400])))
+    jumping = np.where(np.arange(len(steady)) < top, 1.0, 0.2) * steady
+    changed = played(*[1.0] * 40, 0.2, 0.9, 0.0, 1.0, 0.5, *[0.5] * 40)
+    assert above_db(steady) < -100.0 and above_db(jumping) > -40.0
+    assert above_db(changed) < -60.0

@@ -153,15 +153,18 @@ def test_springs_follow_what_is_declared_also_after_a_restart(tmp_path: Path, de
     again.close()
 
 
+@pytest.mark.parametrize("puppets", [1, 2])
 def test_strings_drive_no_joint_in_panic_blackout_and_after_a_stop(
-    tmp_path: Path, declared: Declared
+    tmp_path: Path, declared: Declared, puppets: int
 ) -> None:
     strung = [{"springs": "stiff", "joint": "Hips"}]
-    show = load_show(write_show(tmp_path / "strung", strung, springs=[{"name": "stiff", "feedback": 1}]))
-    parts = assemble(show, BOX)
+    settings, two = [{"name": "stiff", "feedback": 1}], [{"name": "left"}, {"name": "right", "hands": strung}]
+    first = strung if puppets == 1 else []
+    config = {"springs": settings, **({"puppets": two} if puppets == 2 else {})}
+    parts = assemble(load_show(write_show(tmp_path / "strung", first, **config)), BOX)
     reconciler = Reconciler("A test", parts, Iterations(3, 2, most=8), declared)  # type: ignore[arg-type]
-    springs = parts.first.springs
-    assert springs is not None and springs.feedback == 1.0
+    (springs,) = parts.springs
+    assert springs.feedback == 1.0
     for away, back in (("/panic", "/go"), ("/stop", "/go"), ("/blackout", "/blackout")):
         for address, values in ((away, (1.0,)), (back, () if back == "/go" else (0.0,))):
             declared.now, _ = DECLARATIONS[address](declared.now, Command(address, values), None, NOW)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from appliance.outputs.axes import turn_of
 from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.osc.kinematics import KINEMATICS, Kinematics
 from appliance.outputs.osc.template import message, single
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
@@ -18,7 +19,8 @@ Floats = NDArray[np.float32]
 
 
 class AiToolbox:
-    """rot_local and rot_world (J x w, x, y, z), pos_world and pos_local (J x x, y, z), a datagram each.
+    """rot_local and rot_world (J x w, x, y, z), pos_world and pos_local (J x x, y, z), a datagram each; rot
+    (J x x, y, z: radians about fixed axes, in the world) and the lists of kinematics.py likewise.
 
     Axes and units are the box's own (right-handed, Y up, metres) unless the receiver wants others. Local
     positions are relative to the parent joint, in its axes; the root's is its place in the world. A list
@@ -30,12 +32,14 @@ class AiToolbox:
         self._layout = _Layout(skeleton, config)
         count, self._is_euler = len(self._layout.rows), config.rotations == "euler"
         turns = 3 if self._is_euler else 4
+        widths = KINEMATICS | {"rot": 3, "pos_world": 3, "pos_local": 3}
         self._template = single(
             [
-                message(f"{config.prefix}/{name}", floats=count * (3 if name.startswith("pos") else turns))
+                message(f"{config.prefix}/{name}", floats=count * widths.get(name, turns))
                 for name in config.messages
             ]
         )
+        self._kinematics = Kinematics(count) if KINEMATICS.keys() & {*config.messages} else None
         numbers = self._template.numbers
         self._lists: list[tuple[str, Floats]] = [
             (name, numbers[place[0] : place[-1] + 1].reshape(count, -1))
@@ -44,13 +48,21 @@ class AiToolbox:
 
     def encode(self, frame: JointFrame) -> Sequence[memoryview]:
         """Datagrams of this frame; the same buffers each time."""
-        layout = self._layout
+        layout, kinematics = self._layout, self._kinematics
+        if kinematics is not None and not frame.late:  # a late frame repeats the numbers before it
+            turned = layout.rotations(frame.world, "rot_world")
+            kinematics.take_frame(layout.positions(frame), turned, frame.frame_time)
         for name, numbers in self._lists:
-            if name.startswith("pos"):
+            if kinematics is not None and name in KINEMATICS:
+                numbers[...] = kinematics.lists[name]
+            elif name.startswith("pos"):
                 numbers[...] = layout.positions(frame) if name == "pos_world" else layout.offsets(frame)
             else:
                 turned = layout.rotations(frame.pose if name == "rot_local" else frame.world, name)
-                numbers[...] = _degrees(turned) if self._is_euler else turned
+                if name == "rot":
+                    numbers[...] = _radians(turned)
+                else:
+                    numbers[...] = np.degrees(_radians(turned)) if self._is_euler else turned
         return self._template.datagrams
 
 
@@ -109,11 +121,11 @@ class _Layout:
         return found if self._scale == 1.0 else found * self._scale
 
 
-def _degrees(turned: Floats) -> Floats:
-    """(R, 3): degrees about the fixed axes x, then y, then z, of rotations (R, 4)."""
+def _radians(turned: Floats) -> Floats:
+    """(R, 3): radians about the fixed axes x, then y, then z, of rotations (R, 4)."""
     w, x, y, z = turned.T
     about_x = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     about_y = np.arcsin(np.clip(2 * (w * y - z * x), -1, 1))
     about_z = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    degrees: Floats = np.degrees(np.stack([about_x, about_y, about_z], axis=-1))
-    return degrees
+    radians: Floats = np.stack([about_x, about_y, about_z], axis=-1)
+    return radians
