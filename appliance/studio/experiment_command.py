@@ -16,7 +16,9 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 @app.command()
 @reading_options
 def experiment(
-    out: Annotated[Path, typer.Option(help="Folder for the page, the strips, the BVH and the figures.")],
+    out: Annotated[
+        Path, typer.Option(help="Folder for the page, the strips, the BVH and the figures.")
+    ] = Path("out/experiment"),
     show: Annotated[
         Path | None,
         typer.Option(help="Show whose network dances. Default: the show that comes with the box."),
@@ -37,7 +39,11 @@ def experiment(
         ),
     ] = None,
     joint: Annotated[
-        str | None, typer.Option(help="What the hand holds. Default: the left upper arm.")
+        list[str] | None,
+        typer.Option(
+            help="What the hand holds; repeatable: all are kept, the first is turned and led.",
+            show_default="the left upper arm",
+        ),
     ] = None,
     trace: Annotated[
         Path | None,
@@ -65,7 +71,7 @@ def experiment(
                 recordings=recordings,
                 excerpts=excerpts,
                 networks=tuple(network or ()),
-                joint=joint,
+                joints=tuple(joint or ()),
                 trace=trace,
                 pictures=pictures,
                 reading=reading,

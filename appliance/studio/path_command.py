@@ -62,7 +62,9 @@ def path(
 def map_(
     files: Annotated[list[Path], typer.Argument(help="BVH recordings to lay over the map.")],
     model: Model,
-    out: Annotated[Path, typer.Option(help="Folder for the page, the pictures and the sheet to draw on.")],
+    out: Annotated[
+        Path, typer.Option(help="Folder for the page, the pictures and the sheet to draw on.")
+    ] = Path("out/map"),
     seconds: Annotated[float, typer.Option(min=1.0, help="How much of each recording.")] = 60.0,
     recordings: Moved = None,
     *,

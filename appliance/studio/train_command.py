@@ -15,7 +15,7 @@ from appliance.dancer.material.improvising import MOVE
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.autoencoder.models import MODELS, AnySettings, settings_for, settings_from
 from appliance.studio.autoencoder.training import Settings, Training
-from appliance.studio.autoencoder.training_run import TrainingRun, parameters
+from appliance.studio.autoencoder.training_run import LOSSES_PICTURE, TrainingRun, parameters
 from appliance.studio.data import sources
 from appliance.studio.data.dataset import WINDOW
 from appliance.studio.data.sources import Sources
@@ -119,7 +119,7 @@ def _train(options: TrainOptions, device: str, processes: Processes) -> bool:
     done = (
         TrainingRun(training, options.out, console).run()
         if isinstance(training, Training)
-        else train_until_done(training, checkpoint, console)
+        else train_until_done(training, checkpoint, options.out / LOSSES_PICTURE, console)
     )
     if done and processes.leads:
         _finish(training, options, source, console)

@@ -26,10 +26,12 @@ class Region(StrEnum):
 @reading_options
 def vary(
     model: Annotated[Path, typer.Option(help="checkpoint.pt of bunraku train --model sequence.")],
-    out: Annotated[Path, typer.Option(help="Folder for the variations, their strip and their figures.")],
     phrase: Annotated[
         Path | None, typer.Argument(help="BVH of the phrase; left out with --free.", show_default=False)
     ] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for the variations, their strip and their figures.")
+    ] = Path("out/variations"),
     sigma: Annotated[
         float | None,
         typer.Option(

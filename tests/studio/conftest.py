@@ -14,6 +14,7 @@ from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.commands import app
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.evaluation import answer_picture, own_answer, pictures
+from appliance.studio.experiments import strips
 from appliance.studio.improviser import own_output
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.pose_space import path
@@ -38,7 +39,7 @@ def _small_answers() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(answer_picture, "COLUMNS", 2)
         patch.setattr(own_answer, "MOST_TICKS", 150)
-        for module in (pictures, sweep, vary, path, own_output):
+        for module in (pictures, sweep, vary, path, own_output, strips):
             patch.setattr(module, "COLUMNS", 2)
         patch.setattr(sweep, "WINDOWS", 3)
         patch.setattr(own_output, "SECONDS", 2.0)

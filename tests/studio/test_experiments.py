@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from appliance.pictures.filmstrip import draw_strips
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.recording import Recording
@@ -25,9 +26,11 @@ from appliance.studio.data.dataset import FPS, WINDOW, Take
 from appliance.studio.data.regions import regions_of
 from appliance.studio.evaluation.coders import Poses
 from appliance.studio.experiments.claims import claims, pauses
+from appliance.studio.experiments.claims_picture import COLOURS, draw_claims
 from appliance.studio.experiments.excerpts import FRAMES, Excerpt, choose, measured, named
 from appliance.studio.experiments.families import CONDITIONS, Condition, Trial, usual_trace
 from appliance.studio.experiments.page import write_page
+from appliance.studio.experiments.strips import strip_of_excerpts
 from appliance.studio.studio_error import StudioError
 
 SECONDS = 12.0
@@ -183,11 +186,11 @@ class Pretender:
         return made, np.zeros((len(windows), 2), dtype=np.float32)
 
 
-def trials(takes: list[Take], coder: Pretender) -> list[Trial]:
+def trials(takes: list[Take], coder: Pretender, joints: tuple[str, ...] = (JOINT,)) -> list[Trial]:
     excerpts = choose(takes, JOINTS)
     trace = usual_trace(excerpts, takes[0].recording.skeleton.index(JOINT))
     found = [
-        Trial(coder, one, JOINT, trace) for one in excerpts if one.name in ("still", "coordinated", "torso")
+        Trial(coder, one, joints, trace) for one in excerpts if one.name in ("still", "coordinated", "torso")
     ]
     for trial in found:
         trial.run()
@@ -248,7 +251,8 @@ def test_the_command_writes_page_strips_recordings_and_figures_of_two_networks_s
     page = (tmp_path / "out/experiments.html").read_text()
     assert "".join(f"<th>{name}</th>" for name in ("claim", *report["networks"])) in page
     assert "http" not in page, "it opens without a network"
-    assert page.count("data:image/jpeg;base64,") == (12 if long_run else 0)
+    assert page.count("data:image/jpeg;base64,") == (13 if long_run else 0)
+    assert (tmp_path / "out/experiments.png").exists() == long_run
     danced = sorted((tmp_path / "out").glob("conditional*/mine/*.bvh"))
     assert len(danced) == len(CONDITIONS) + 1
     assert len(read_bvh(next(path for path in danced if path.name == "turning_5s_10_10.bvh"))) == 750
@@ -267,6 +271,46 @@ def test_the_page_has_its_pictures_inside(takes: list[Take], tmp_path: Path) -> 
     _, data = text.split("data:image/jpeg;base64,")
     shown = Image.open(io.BytesIO(base64.b64decode(data.split('"')[0])))
     assert shown.size == (64, 32)
+
+
+def test_several_joints_are_kept_and_one_is_in_the_hand(takes: list[Take]) -> None:
+    trial = trials(takes, Pretender(pausing=True), ("lForeArm", "rThigh"))[0]
+    kept = trial.dances[Condition("kept", (10, 10))].poses
+    off = quaternion.angle_between(kept, trial.once.phrase[: len(kept)]).max(axis=0)
+    places = [JOINTS.index(name) for name in ("lForeArm", "rThigh")]
+    assert off[places].max() < 1e-3 < off[JOINTS.index("rForeArm")]
+    turned = trial.dances[Condition("turning", (10, 10), "1s")]
+    assert turned.hand is not None
+    assert quaternion.angle_between(turned.poses[:, places[0]], turned.hand).max() < 0.2, "the first one"
+    assert quaternion.angle_between(turned.poses[:, places[1]], turned.hand[: len(turned.poses)]).max() > 1
+    assert [trial.held_joints(Condition(family, (1, 1))) for family in ("coding", "kept", "turning")] == [
+        (),
+        ("lForeArm", "rThigh"),
+        ("lForeArm",),
+    ]
+
+
+def test_the_report_is_one_picture_with_a_field_for_each_verdict(takes: list[Take], tmp_path: Path) -> None:
+    found = claims(trials(takes, Pretender()))
+    excerpts = draw_strips(*strip_of_excerpts(tmp_path / "excerpts.png", choose(takes, JOINTS)))
+    one, two = (
+        np.asarray(
+            Image.open(
+                draw_claims(tmp_path / f"{len(names)}.png", "T", dict.fromkeys(names, found), excerpts)
+            )
+        )
+        for names in (["a"], ["a", "b"])
+    )
+    assert one.shape[1] == two.shape[1] and two.shape[0] > one.shape[0] + 300
+
+    def area(picture: np.ndarray, holds: bool) -> int:
+        colour = [int(COLOURS[holds][at : at + 2], 16) for at in (1, 3, 5)]
+        return int((np.abs(picture[..., :3].astype(int) - colour).max(axis=-1) < 3).sum())
+
+    held = [verdict for claim in found for verdict in claim.holds.values()]
+    fields = [area(one, holds) / held.count(holds) for holds in (True, False)]
+    assert fields[0] == pytest.approx(fields[1], rel=0.1) and fields[0] > 2000
+    assert area(two, True) == pytest.approx(2 * area(one, True), rel=0.1)
 
 
 def test_an_excerpt_reports_its_measures(takes: list[Take]) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from appliance.pose.bvh import read_bvh
 from appliance.studio.evaluation.coders import load_checkpoint
 from appliance.studio.pose_space.drawing import read_line
 from appliance.studio.pose_space.latent_poses import PoseMap, latents_of, poses_of
+from appliance.studio.pose_space.projections import projections
 from appliance.studio.studio_error import StudioError
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import moving, swaying
@@ -129,6 +132,36 @@ def test_a_line_on_the_map_becomes_a_dance(model: Path, recordings: Path, tmp_pa
     result = bunraku("path", "--draw", tmp_path / "drawn.svg", "--model", model, "--out", out, "--seconds", 3)
     assert result.exit_code == 0, result.output
     assert len(read_bvh(out)) == 150
+
+
+def test_umap_stands_beside_the_others_where_it_is_installed(
+    model: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Umap:
+        """A stand-in with the interface of umap-learn: the first two numbers of what it was fitted to."""
+
+        def __init__(self, random_state: int) -> None: ...
+
+        def fit(self, shapes: np.ndarray) -> Umap:
+            self.middle = shapes.mean(axis=0)
+            return self
+
+        def transform(self, shapes: np.ndarray) -> np.ndarray:
+            return (shapes - self.middle)[:, -3:-1]
+
+    monkeypatch.setitem(sys.modules, "umap", SimpleNamespace(UMAP=Umap))
+    autoencoder, phrase = load_checkpoint(model)[0].autoencoder, swaying(2.0, 0)
+    pose_map = PoseMap.of(latents_of(autoencoder, phrase.poses[:, list(moving())])[0], np.eye(100, 6), 2)
+    found = {one.name: one.points for one in projections(autoencoder, [phrase], moving(), pose_map)}
+    kinds = ("heading kept", "heading removed")
+    assert list(found) == [
+        *(f"PCA, {kind}" for kind in kinds),
+        "pose autoencoder",
+        *(f"UMAP, {kind}" for kind in kinds),
+    ]
+    assert not np.allclose(found["UMAP, heading kept"][0], found["UMAP, heading removed"][0])
+    monkeypatch.setitem(sys.modules, "umap", None)
+    assert len(projections(autoencoder, [phrase], moving(), pose_map)) == 3
 
 
 def test_the_page_of_the_map_needs_no_network(model: Path, recordings: Path, tmp_path: Path) -> None:

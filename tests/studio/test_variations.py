@@ -54,13 +54,25 @@ def test_another_timing_of_the_same_form_is_timing_and_another_form_is_not() -> 
     assert form.degrees > 10 and form.timing < 0.2
 
 
-def test_a_warping_path_leads_from_corner_to_corner_without_a_step_back() -> None:
-    costs = np.random.default_rng(3).random((40, 40))
-    path = np.array(warping_path(costs, 10))
-    assert path[0].tolist() == [0, 0] and path[-1].tolist() == [39, 39]
+def test_a_warping_path_leads_from_corner_to_corner_without_a_step_back_and_none_is_cheaper() -> None:
+    count, reach = 40, 10
+    whole = np.random.default_rng(3).random((count, count))
+    costs = np.full((count, 2 * reach + 1), np.inf)
+    for row in range(count):
+        for column in range(max(0, row - reach), min(count, row + reach + 1)):
+            costs[row, column - row + reach] = whole[row, column]
+    path = np.array(warping_path(costs))
+    assert path[0].tolist() == [0, 0] and path[-1].tolist() == [count - 1, count - 1]
     steps = np.diff(path, axis=0)
     assert steps.min() >= 0 and steps.max() == 1 and (steps.sum(axis=1) >= 1).all()
-    assert np.abs(path[:, 0] - path[:, 1]).max() <= 10
+    assert np.abs(path[:, 0] - path[:, 1]).max() <= reach
+    cheapest = np.full((count + 1, count + 1), np.inf)
+    cheapest[0, 0] = 0
+    for row, column in np.ndindex(count, count):
+        if abs(row - column) <= reach:
+            before = min(cheapest[row, column], cheapest[row, column + 1], cheapest[row + 1, column])
+            cheapest[row + 1, column + 1] = whole[row, column] + before
+    assert whole[tuple(path.T)].sum() == pytest.approx(cheapest[-1, -1])
 
 
 def test_the_more_noise_the_further_from_the_phrase(model: Path) -> None:
@@ -94,7 +106,8 @@ def test_training_ends_with_what_noise_of_each_strength_does(model: Path) -> Non
     report = json.loads((model / "report.json").read_text())["variations"]
     rows = report["rows"]
     assert list(rows) == ["0.0", "0.5", "1.0", "2.0", "3.0", "4.0"]
-    assert rows["4.0"]["degrees"] > rows["0.5"]["degrees"] and 0 <= rows["1.0"]["timing"] <= 1
+    changed = [row["changed"] for row in rows.values()]
+    assert changed[0] == 0 and (np.diff(changed) > 0).all() and 0 <= rows["1.0"]["timing"] <= 1
     assert report["recorded_nearest"] > 0 and report["divergence"] > 0
     said = (model / "said.txt").read_text()
     assert "by the strength of the noise" in said and "bunraku vary" in said

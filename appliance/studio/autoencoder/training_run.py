@@ -19,6 +19,7 @@ from appliance.studio.data.dataset import window_starts
 from appliance.studio.evaluation.coders import TorchCoder
 from appliance.studio.evaluation.pictures import draw_losses, draw_reconstruction
 
+LOSSES_PICTURE = Path("pictures") / "losses.png"
 REPORT_S = 30.0  # measuring on held-out takes costs a large LSTM seconds
 FIRST_STRIP_S, STRIP_SHARE = 60.0, 0.1  # a filmstrip after a minute and at every tenth of the training
 
@@ -96,7 +97,7 @@ class TrainingRun:
         self._write_history()
         if self.training.history:
             history = [asdict(line) for line in self.training.history]
-            draw_losses(self.folder / "pictures" / "losses.png", history)
+            draw_losses(self.folder / LOSSES_PICTURE, history)
 
     def _write_history(self) -> None:
         record = {

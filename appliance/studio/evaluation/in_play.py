@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -59,14 +60,20 @@ class Rehearsal:
         return self._free[coding_iterations]
 
     def held(
-        self, coding_iterations: int, interaction_iterations: int, hand: Puppeteer, part: slice = slice(None)
+        self,
+        coding_iterations: int,
+        interaction_iterations: int,
+        hand: Puppeteer,
+        part: slice = slice(None),
+        others: Sequence[Puppeteer] = (),
     ) -> tuple[Poses, Poses]:
         """The dance (T, M, 4) with a hand, and where the hand was (T, 4).
 
         part: which windows; the hand's time begins with the first of them, the dance 7 ticks later.
+        others: more hands, on other joints.
         """
         windows = self.windows[part]
-        hands = Hands([hand], self.coder.joints)
+        hands = Hands([hand, *others], self.coder.joints)
         targets, shown = np.empty_like(windows), np.empty((len(windows), 4), dtype=np.float32)
         for tick in range(-TAKING_TICKS, len(windows)):
             row, now = max(tick, 0), tick * TICK_S

@@ -59,6 +59,23 @@ def draw_losses(path: Path, history: Sequence[dict[str, Any]]) -> Path:
     return save(figure, path)
 
 
+def draw_learning(path: Path, history: Sequence[dict[str, Any]]) -> Path:
+    """An improviser's losses over the minutes, and the same on held-out takes. history: training reports."""
+    figure = new_figure(12, 5.2)
+    minutes = [line["seconds"] / 60 for line in history]
+    titles = {"parts": "Losses", "held_out": "On takes kept apart"}
+    for axes, (key, title) in zip(panels(figure, 1, 2), titles.items(), strict=True):
+        for name, colour in zip(history[-1][key], (VERMILION, SLATE, IVORY), strict=False):
+            values = [line[key].get(name, np.nan) for line in history]
+            axes.plot(minutes, values, label=f"{name}: {values[-1]:.3g}", color=colour, linewidth=1.6)
+        axes.set_yscale("symlog", linthresh=0.1)
+        axes.set_title(title, color=INK, loc="left")
+        axes.set_xlabel("minutes of training", color=FAINT)
+        if history[-1][key]:
+            axes.legend(facecolor=PANEL, edgecolor=PANEL, labelcolor=INK, fontsize=8)
+    return save(figure, path)
+
+
 def draw_reconstruction(path: Path, coder: Coder, take: Take, title: str, iterations: int = 1) -> Path:
     """A filmstrip of a take above its reconstruction after `iterations` iterations."""
     excerpt = longest_sound(take, STRIP_S)

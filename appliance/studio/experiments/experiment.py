@@ -9,14 +9,13 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from appliance.pictures.filmstrip import Strip, draw_strips, held_throughout
+from appliance.pictures.filmstrip import draw_strips
 from appliance.pose import quaternion
 from appliance.pose.bvh import write_bvh
 from appliance.pose.quaternion import Array
@@ -29,43 +28,14 @@ from appliance.studio.data.remembered import remembered_reading
 from appliance.studio.evaluation.coders import Coder, open_coder
 from appliance.studio.evaluation.evaluation import load_takes
 from appliance.studio.experiments.claims import Claim, claims
+from appliance.studio.experiments.claims_picture import draw_claims
 from appliance.studio.experiments.excerpts import Excerpt, choose, named
-from appliance.studio.experiments.families import (
-    AS_IN_THE_PAPER,
-    CONDITIONS,
-    FIXED_DEGREES,
-    TURNS_S,
-    WITH_SENSOR,
-    Condition,
-    Trial,
-    usual_trace,
-)
+from appliance.studio.experiments.families import CONDITIONS, Trial, usual_trace
 from appliance.studio.experiments.page import write_page
+from appliance.studio.experiments.strips import FIGURES, strip_of_excerpts, strips_of_trial
 from appliance.studio.studio_error import StudioError
 
-COLUMNS = 8
-FIGURES = (
-    ("coding iterations alone", "once", tuple(Condition("coding", (count, 0)) for count in (1, 2, 5, 10))),
-    (
-        "the joint kept where the recording has it",
-        "once",
-        tuple(Condition("kept", each) for each in AS_IN_THE_PAPER),
-    ),
-    *(
-        (
-            f"the joint turning, {seconds:g} s a turn",
-            "looped",
-            tuple(Condition("turning", each, f"{seconds:g}s") for each in AS_IN_THE_PAPER),
-        )
-        for seconds in TURNS_S
-    ),
-    ("the joint led by a sensor", "looped", tuple(Condition("sensor", each) for each in WITH_SENSOR)),
-    (
-        "the joint held still",
-        "looped",
-        tuple(Condition("fixed", (10, 9), f"{degrees}deg") for degrees in FIXED_DEGREES),
-    ),
-)
+TITLE = "Experiments with a puppet"
 
 
 @dataclass(frozen=True)
@@ -77,7 +47,7 @@ class ExperimentOptions:
     recordings: Path | None = None
     excerpts: Path | None = None
     networks: tuple[Path, ...] = ()
-    joint: str | None = None
+    joints: tuple[str, ...] = ()
     trace: Path | None = None
     pictures: bool = True
     reading: ReadingOptions = AS_THE_FILES_SAY
@@ -88,7 +58,7 @@ def run(options: ExperimentOptions) -> None:
     console = Console(stderr=True)
     coders = _coders(options)
     first = next(iter(coders.values()))
-    joint = _joint(options.joint, first)
+    joints = _joints(options.joints, first)
     takes = _takes(options, first)
     excerpts = (
         choose(takes, first.joints)
@@ -99,40 +69,50 @@ def run(options: ExperimentOptions) -> None:
         console.print(f"- {one.name}: {one.take} from {one.first / FPS:.1f} s; {one.why}.", highlight=False)
     skeleton = takes[0].recording.skeleton
     trace = (
-        usual_trace(excerpts, skeleton.index(joint)) if options.trace is None else read_trace(options.trace)
+        usual_trace(excerpts, skeleton.index(joints[0]))
+        if options.trace is None
+        else read_trace(options.trace)
     )
     options.out.mkdir(parents=True, exist_ok=True)
     found, pictures, work = {}, dict[str, list[Path]](), len(coders) * len(excerpts)
+    figure_2 = options.out / "excerpts.png"
     drawing: list[Future[Path]] = []
     with (
         ProcessPoolExecutor(mp_context=get_context("spawn")) as pool,  # a strip takes seconds
         Progress(console=console, transient=True, disable=not console.is_terminal) as bar,
     ):
-        task = bar.add_task("dancing", total=work * (len(CONDITIONS) + len(FIGURES) * options.pictures))
+        task = bar.add_task(
+            "dancing", total=work * len(CONDITIONS) + (1 + work * len(FIGURES)) * options.pictures
+        )
 
         def advance(words: str) -> None:
             bar.update(task, advance=1, description=words)
 
+        if options.pictures:
+            pictures["The five as recorded"] = [figure_2]
+            drawing.append(pool.submit(draw_strips, *strip_of_excerpts(figure_2, excerpts)))
         for name, coder in coders.items():
             folder = options.out / _file_name(name)
-            trials = [Trial(coder, one, joint, trace) for one in excerpts]
+            trials = [Trial(coder, one, joints, trace) for one in excerpts]
             for trial in trials:
                 trial.run(advance)
                 _write_dances(trial, folder / trial.excerpt.name)
-                wanted = _pictures(trial, folder / trial.excerpt.name, name) if options.pictures else []
+                wanted = strips_of_trial(trial, folder / trial.excerpt.name, name) if options.pictures else []
                 drawing += [pool.submit(draw_strips, *one) for one in wanted]
                 pictures[f"{name}: {trial.excerpt.name}, {trial.excerpt.why}"] = [one[0] for one in wanted]
             found[name] = claims(trials)
         for done in as_completed(drawing):
             done.result()
             advance("drawing")
+    if options.pictures:
+        draw_claims(options.out / "experiments.png", TITLE, found, figure_2)
     (options.out / "experiments.json").write_text(
-        json.dumps(_report(coders, excerpts, joint, found), indent=1) + "\n"
+        json.dumps(_report(coders, excerpts, joints, found), indent=1) + "\n"
     )
     write_page(
         options.out / "experiments.html",
-        "Experiments with a puppet",
-        _words(joint, options, first),
+        TITLE,
+        _words(joints, options),
         excerpts,
         found,
         pictures,
@@ -191,16 +171,15 @@ def _coders(options: ExperimentOptions) -> dict[str, Coder]:
     return found
 
 
-def _joint(wanted: str | None, coder: Coder) -> str:
-    joint = wanted or held_joints(coder.joints).get("left upper arm")
-    if joint not in coder.joints:
-        words = (
-            f"'{wanted}' is not moved by the network"
-            if wanted
-            else "There is no left shoulder by a usual name"
-        )
-        raise StudioError(f"{words}. Say what to hold with --joint: {', '.join(coder.joints)}.")
-    return joint
+def _joints(wanted: Sequence[str], coder: Coder) -> tuple[str, ...]:
+    """As asked for, each once; else the left upper arm."""
+    usual = held_joints(coder.joints).get("left upper arm")
+    joints = tuple(dict.fromkeys(wanted)) or (() if usual is None else (usual,))
+    words = [f"'{joint}' is not moved by the network" for joint in joints if joint not in coder.joints]
+    if words or not joints:
+        words = words or ["There is no left shoulder by a usual name"]
+        raise StudioError(f"{words[0]}. Say what to hold with --joint: {', '.join(coder.joints)}.")
+    return joints
 
 
 def _takes(options: ExperimentOptions, coder: Coder) -> list[Take]:
@@ -222,30 +201,14 @@ def _write_dances(trial: Trial, folder: Path) -> None:
         write_bvh(folder / f"{condition.name}.bvh", trial.whole(dance))
 
 
-def _pictures(trial: Trial, folder: Path, network: str) -> list[tuple[Any, ...]]:
-    """What draw_strips needs for each of the FIGURES: the recording, and the conditions under it."""
-    skeleton = trial.excerpt.recording.skeleton
-    wanted: list[tuple[Any, ...]] = []
-    for number, (words, base, conditions) in enumerate(FIGURES, 1):
-        rehearsal = trial.once if base == "once" else trial.looped
-        recorded = rehearsal.recording
-        held = () if conditions[0].family == "coding" else (skeleton.index(trial.joint),)
-        strips = [Strip(recorded.poses, recorded.roots, "recorded")]
-        for condition in conditions:
-            danced = trial.whole(trial.dances[condition])
-            holds = held_throughout(danced.poses, held)
-            strips.append(Strip(danced.poses, danced.roots, condition.label, holds=holds))
-        path = folder / f"{number}_{conditions[0].family}.png"
-        title = f"{trial.excerpt.name}: {words} ({network})"
-        wanted.append((path, skeleton, strips, FPS, title, COLUMNS))
-    return wanted
-
-
 def _report(
-    coders: Mapping[str, Coder], excerpts: Sequence[Excerpt], joint: str, found: Mapping[str, Sequence[Claim]]
+    coders: Mapping[str, Coder],
+    excerpts: Sequence[Excerpt],
+    joints: Sequence[str],
+    found: Mapping[str, Sequence[Claim]],
 ) -> dict[str, object]:
     return {
-        "joint": joint,
+        "joints": list(joints),
         "excerpts": {one.name: one.as_json() for one in excerpts},
         "networks": {
             name: {"facts": coders[name].facts, "claims": {one.letter: one.as_json() for one in found[name]}}
@@ -254,14 +217,15 @@ def _report(
     }
 
 
-def _words(joint: str, options: ExperimentOptions, coder: Coder) -> list[str]:
+def _words(joints: Sequence[str], options: ExperimentOptions) -> list[str]:
     trace = "of the liveliest excerpt, there and back" if options.trace is None else options.trace.name
     return [
         "The experiments of 'Puppeteering an AI' (section 4). Five excerpts of 200 frames at 50 Hz are "
-        f"danced with 1 to 10 coding iterations and no hand; then {joint} is kept at its recorded "
-        "orientation pose by pose, turned about an axis at one and at five seconds a turn, led by a sensor's "
-        "trace, and held still. K/J are coding and interaction iterations.",
-        f"Windows of 8 poses, one a tick, blended as on the box. The sensor's trace: {trace}.",
+        f"danced with 1 to 10 coding iterations and no hand; then with {' and '.join(joints)} kept at the "
+        f"recorded orientation pose by pose; then with {joints[0]} turned about an axis at one and at five "
+        "seconds a turn, led by a sensor's trace, and held still. K/J are coding and interaction iterations.",
+        "Windows of 8 poses, one a tick, blended by Hann weights as in the paper. The sensor's trace: "
+        f"{trace}.",
     ]
 
 

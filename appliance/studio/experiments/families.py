@@ -74,18 +74,20 @@ CONDITIONS = (
 
 
 class Trial:
-    """One excerpt danced under every condition, with one joint in the hand.
+    """One excerpt danced under every condition, with one joint in the hand; several may be kept.
 
     once: the excerpt's frames as recorded; looped: the same over and over, as the box plays an excerpt, for
     the families whose hand takes longer than the excerpt.
     """
 
-    def __init__(self, coder: Coder, excerpt: Excerpt, joint: str, trace: Array) -> None:
-        """trace: (N, 4) orientations of the joint at 50 Hz, local to its parent, as a sensor gives them."""
-        self.excerpt, self.joint, self._trace = excerpt, joint, trace
+    def __init__(self, coder: Coder, excerpt: Excerpt, joints: Sequence[str], trace: Array) -> None:
+        """joints: the first is in the hand, all of them are kept; trace: (N, 4) orientations of the first at
+        50 Hz, local to its parent, as a sensor gives them.
+        """
+        self.excerpt, self.joints, self.joint, self._trace = excerpt, tuple(joints), joints[0], trace
         self.once = Rehearsal(coder, excerpt.recording, "hann")
         self.looped = Rehearsal(coder, _looped(excerpt.recording, TURNING_TICKS + 2 * LEAD), "hann")
-        self.place = coder.joints.index(joint)
+        self.place = coder.joints.index(self.joint)
         self.others = [place for place in range(len(coder.joints)) if place != self.place]
         self.dances: dict[Condition, Dance] = {}
 
@@ -98,6 +100,10 @@ class Trial:
     def dance(self, family: str, iterations: Iterations, variant: str = "") -> Dance:
         """One of those that were danced."""
         return self.dances[Condition(family, iterations, variant)]
+
+    def held_joints(self, condition: Condition) -> tuple[str, ...]:
+        """By name, the one in the hand first."""
+        return {"coding": (), "kept": self.joints}.get(condition.family, (self.joint,))
 
     def rehearsal(self, condition: Condition) -> Rehearsal:
         """What a condition was danced on."""
@@ -119,7 +125,8 @@ class Trial:
         if condition.family == "coding":
             return Dance(condition, self.once.free(coding))
         rehearsal = self.rehearsal(condition)
-        poses, hand = rehearsal.held(coding, interaction, self._hand(condition))
+        others = [Kept(joint) for joint in self.held_joints(condition)[1:]]
+        poses, hand = rehearsal.held(coding, interaction, self._hand(condition), others=others)
         return Dance(condition, poses, hand)
 
     def _hand(self, condition: Condition) -> Puppeteer:

@@ -47,11 +47,6 @@ def once(windows: Poses, hop: int) -> Poses:
     return _blended(windows, hop, len(windows) * hop)
 
 
-def to_the_end(windows: Poses, hop: int) -> Poses:
-    """The same to the end of the last window: (W - 1) * hop + T poses."""
-    return _blended(windows, hop, (len(windows) - 1) * hop + windows.shape[1])
-
-
 def cycle(windows: Poses, hop: int) -> Poses:
     """Windows (W, T, M, 4), `hop` ticks apart, as a cycle of W * hop poses.
 

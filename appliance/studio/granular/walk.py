@@ -18,7 +18,7 @@ from appliance.studio.evaluation.coders import Poses, load_checkpoint
 from appliance.studio.granular.granular import cycle, decoded, encoded, fed_back, once
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.improviser.naturalness import Yardstick, measure
-from appliance.studio.improviser.phrase import verdict
+from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.standing_dance import on_the_spot
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
@@ -63,7 +63,10 @@ def run(options: GranularOptions) -> None:
     natural = measure(phrase, Yardstick.of(dataset.training, dataset.moving))
     report = {"options": asdict(options), "naturalness": natural.as_json()}
     write_dance(options.out, phrase, f"{options.out.stem}: {_words(options)}", report, rows=2)
-    console.print(f"{options.out}: {verdict(natural)}", highlight=False, soft_wrap=True)
+    Console().print(naturalness_table({options.out.stem: natural}))
+    console.print(
+        f"{options.out}: {phrase.seconds:.1f} s, its figures and its strip beside it.", highlight=False
+    )
 
 
 def _poses(options: GranularOptions, autoencoder: Autoencoder, dataset: Dataset) -> Poses:

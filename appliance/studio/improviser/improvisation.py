@@ -31,6 +31,7 @@ from appliance.studio.improviser.learning import (
     train_until_done,
 )
 from appliance.studio.improviser.naturalness import Yardstick, measure
+from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.improviser.phrase import PhraseOptions, make_phrase, verdict
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesSettings, load_pose_improviser
 from appliance.studio.improviser.prompt import Follower, MovesFollower, continued
@@ -85,7 +86,8 @@ def run(options: ImproviseOptions) -> bool:
         improviser, settings, learned = load_improviser(options.model)[0], state["settings"], state["step"]
     else:
         training = _training(options, coder.autoencoder, dataset, steps, say)
-        if not train_until_done(training, improviser_file(options.out), console):
+        file = improviser_file(options.out)
+        if not train_until_done(training, file, file.with_suffix(".png"), console):
             say("Stopped; nothing is lost. The same command continues.")
             return False
         improviser, settings, learned = training.averaged, asdict(training.settings), training.step
@@ -101,6 +103,7 @@ def run(options: ImproviseOptions) -> bool:
     }
     title = f"{options.out.stem}: {phrase.seconds:.0f} s, seed {options.phrase.seed}"
     write_dance(options.out, phrase, title, report, rows=3)
+    Console().print(naturalness_table({options.out.stem: natural}))
     say(f"{options.out}: {verdict(natural)}")
     return True
 
@@ -131,7 +134,8 @@ def continue_prompt(
         f" The largest step of a joint around there is {made.seam:.1f} degrees, {made.usual:.1f} are usual "
         "in the prompt."
     )
-    say(f"{options.out}: {dance.seconds:.1f} s; {words}.{seam if figures else ''} {verdict(natural)}")
+    Console().print(naturalness_table({options.out.stem: natural}))
+    say(f"{options.out}: {dance.seconds:.1f} s; {words}.{seam if figures else ''}")
 
 
 def improviser_file(out: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import asdict
 from pathlib import Path
 
 import torch
@@ -15,6 +16,7 @@ from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.training_run import stop_signals
 from appliance.studio.data.dataset import Dataset
 from appliance.studio.evaluation.coders import load_puppet
+from appliance.studio.evaluation.pictures import draw_learning
 from appliance.studio.improviser.improviser_training import (
     ImproviserReport,
     ImproviserSettings,
@@ -91,8 +93,10 @@ def fingerprint(autoencoder: Autoencoder) -> str:
     return digest.hexdigest()[:16]
 
 
-def train_until_done(training: AnyTraining, file: Path, console: Console) -> bool:
-    """Train until done or stopped (Ctrl-C, SIGTERM); the improviser's file is written either way."""
+def train_until_done(training: AnyTraining, file: Path, picture: Path, console: Console) -> bool:
+    """Train until done or stopped (Ctrl-C, SIGTERM); the improviser's file is written either way, and with it
+    a picture of its losses.
+    """
     if training.fraction >= 1.0:
         return True
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -110,7 +114,12 @@ def train_until_done(training: AnyTraining, file: Path, console: Console) -> boo
             if not console.is_terminal:
                 console.print(f"{100 * line.fraction:5.1f} %  {words}", highlight=False, soft_wrap=True)
 
-        training.run(report, lambda: training.save_checkpoint(file), save_every_s=60.0, stop=stop)
+        def save() -> None:
+            training.save_checkpoint(file)
+            if training.history:
+                draw_learning(picture, [asdict(line) for line in training.history])
+
+        training.run(report, save, save_every_s=60.0, stop=stop)
     return training.fraction >= 1.0
 
 

@@ -14,7 +14,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.data.dataset import FPS, Take
 from appliance.studio.improviser.pace import Pace, mean_pace, mean_speed, pace
-from appliance.studio.standing import measure_standing
+from appliance.studio.standing import Standing, measure_standing
 
 EVERY_S = 0.2  # of poses that are compared with each other
 SECOND_S = 1.0  # length of the stretches that are searched for in the recordings
@@ -55,6 +55,7 @@ class Naturalness:
     slide_cm_s: float
     recorded_slide_cm_s: float
     float_cm: float
+    recorded_float_cm: float
     penetration_cm: float
     worst_penetration_cm: float
     stage_m: tuple[float, float]  # how wide and how deep the root's path is
@@ -68,14 +69,15 @@ class Naturalness:
 class Yardstick:
     """Measures of the recordings, with which phrases are compared.
 
-    pace: their own, glitches left out; shapes (K, M * 3): figures of theirs, centimetres; near (K,): how far
-    each is from the nearest one of another take; seconds: stretches of a second; shape_speed: of whole
-    figures, centimetres a second, root of the sum over joints.
+    pace, slide, float: their own, glitches left out; shapes (K, M * 3): figures of theirs, centimetres; near
+    (K,): how far each is from the nearest one of another take; seconds: stretches of a second; shape_speed:
+    of whole figures, centimetres a second, root of the sum over joints.
     """
 
     moving: tuple[int, ...]
     pace: Pace
     slide_cm_s: float
+    float_cm: float
     shapes: Array
     near: Array
     seconds: Array
@@ -89,7 +91,7 @@ class Yardstick:
         names = [take.take for take in takes for _ in sound_parts(take)]
         usual_speed = mean_speed(parts, moving)
         paces = [pace(part, moving, usual_speed) for part in parts]
-        slides = [measure_standing(p.skeleton, p.poses, p.roots, survey(p)).slide_cm_s for p in parts]
+        stood = [standing_of(part) for part in parts]
         shapes = [figure_shapes(part, moving) for part in parts]
         speeds = [np.linalg.norm(np.diff(shape, axis=0), axis=1).mean() * FPS for shape in shapes]
         lengths = [len(part) for part in parts]
@@ -100,7 +102,8 @@ class Yardstick:
         return Yardstick(
             tuple(moving),
             mean_pace(paces, lengths),
-            float(np.average(slides, weights=lengths)),
+            float(np.average([one.slide_cm_s for one in stood], weights=lengths)),
+            float(np.average([one.float_cm for one in stood], weights=lengths)),
             np.concatenate(few),
             np.where(np.isfinite(among), among, _middle_of_finite(among)),
             np.concatenate(seconds),
@@ -122,8 +125,7 @@ class Yardstick:
 def measure(phrase: Recording, yardstick: Yardstick, endless: bool = True) -> Naturalness:
     """Measure a phrase at 50 Hz against the recordings that its networks learned from."""
     own = pace(phrase, yardstick.moving, yardstick.pace.speed, cyclic=endless)
-    floor = survey(phrase)
-    standing = measure_standing(phrase.skeleton, phrase.poses, phrase.roots, floor, floor.lifts, phrase.fps)
+    standing = standing_of(phrase)
     wide, deep = np.ptp(phrase.roots[:, [0, 2]], axis=0).tolist()
     return Naturalness(
         seconds=phrase.seconds,
@@ -134,11 +136,19 @@ def measure(phrase: Recording, yardstick: Yardstick, endless: bool = True) -> Na
         slide_cm_s=standing.slide_cm_s,
         recorded_slide_cm_s=yardstick.slide_cm_s,
         float_cm=standing.float_cm,
+        recorded_float_cm=yardstick.float_cm,
         penetration_cm=standing.penetration_cm,
         worst_penetration_cm=standing.worst_penetration_cm,
         stage_m=(wide, deep),
         seam=_seam(phrase) if endless else None,
     )
+
+
+def standing_of(recording: Recording) -> Standing:
+    """Feet against the recording's own floor; a jump is no float."""
+    floor = survey(recording)
+    poses, roots = recording.poses, recording.roots
+    return measure_standing(recording.skeleton, poses, roots, floor, floor.lifts, recording.fps)
 
 
 def sound_parts(take: Take, shortest_s: float = 2.0) -> list[Recording]:

@@ -15,7 +15,7 @@ from appliance.studio.data.dataset import FPS
 from appliance.studio.evaluation.dance_figures import degrees_apart, energy
 from appliance.studio.evaluation.nearest import reference_of, without_heading
 from appliance.studio.improviser.naturalness import Yardstick, measure
-from appliance.studio.improviser.phrase import verdict
+from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.pose_space.drawing import read_line
 from appliance.studio.pose_space.latent_poses import latents_of, poses_of
 from appliance.studio.pose_space.pose_model import map_of
@@ -79,7 +79,8 @@ def run(options: PathOptions) -> None:
     report = {"options": asdict(options), "figures": figures, "naturalness": natural.as_json()}
     write_report(options.out.with_suffix(".json"), report)
     said = ", ".join(f"{name.replace('_', ' ')} {value:.1f}" for name, value in figures.items())
-    console.print(f"{options.out}: {said}; {verdict(natural)}", highlight=False, soft_wrap=True)
+    Console().print(naturalness_table({options.out.stem: natural}))
+    console.print(f"{options.out}: {said}.", highlight=False, soft_wrap=True)
 
 
 def _words(options: PathOptions) -> str:

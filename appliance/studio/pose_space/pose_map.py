@@ -15,7 +15,7 @@ from rich.console import Console
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
-from appliance.studio.data.dataset import FPS, Dataset
+from appliance.studio.data.dataset import FPS
 from appliance.studio.pose_space import map_pictures
 from appliance.studio.pose_space.drawing import UNITS
 from appliance.studio.pose_space.ground import Ground
@@ -27,6 +27,7 @@ from appliance.studio.trained_on import open_model
 
 PAGE_EVERY = 2  # poses from one to the next on the page
 MOST_PAGE_POSES = 6000
+MOST_KNOWN = 3000  # recorded poses that the page shows as dots
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ def run(options: MapOptions) -> None:
     paths = {name: ground.path(one.poses[:, moving]) for name, one in recordings.items()}
     frame = ground.draw(options.out / "map.png", paths)
     _write_sheet(options.out / "map.svg", options.out / "map.png", frame)
-    _write_page(options.out / "map.html", dataset, recordings, paths)
+    _write_page(options.out / "map.html", ground, recordings, paths)
     report: dict[str, Any] = {
         "explained": ground.pose_map.explained,
         "projections": {
@@ -102,29 +103,36 @@ def _write_sheet(path: Path, picture: Path, frame: tuple[float, float, float, fl
 
 
 def _write_page(
-    path: Path, dataset: Dataset, recordings: dict[str, Recording], paths: dict[str, Array]
+    path: Path, ground: Ground, recordings: dict[str, Recording], paths: dict[str, Array]
 ) -> None:
-    """A page that opens without a network: the paths in three dimensions, and the figure at each point."""
+    """A page that opens without a network: the paths in three dimensions, and the figure at each point.
+
+    Two recordings are shown at the same moment, with their distance.
+    """
+    skeleton, dances = ground.dataset.skeleton, []
     every = max(PAGE_EVERY, sum(map(len, recordings.values())) // MOST_PAGE_POSES)
-    dances = []
     for name, recording in recordings.items():
-        positions, _ = dataset.skeleton.forward_kinematics(
-            recording.poses[::every], np.zeros((len(recording.poses[::every]), 3))
-        )
-        points = paths[name][::every]
-        if points.shape[1] < 3:
-            points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+        poses = recording.poses[::every]
+        positions, _ = skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
         dances.append(
             {
                 "name": name,
-                "path": np.round(points, 3).tolist(),
+                "path": _in_three(paths[name][::every]),
                 "figures": np.round(positions.reshape(len(positions), -1), 3).tolist(),
             }
         )
-    bones = [[joint, parent] for joint, parent in enumerate(dataset.skeleton.parents) if parent >= 0]
-    data = json.dumps({"bones": bones, "fps": FPS / every, "dances": dances}).replace("</", "<\\/")
+    known = _in_three(ground.known[:: max(1, len(ground.known) // MOST_KNOWN)])
+    bones = [[joint, parent] for joint, parent in enumerate(skeleton.parents) if parent >= 0]
+    facts = {"bones": bones, "fps": FPS / every, "known": known, "dances": dances}
+    data = json.dumps(facts).replace("</", "<\\/")
     template = resources.files("appliance.studio.pose_space").joinpath("map.html").read_text("utf-8")
     path.write_text(template.replace("/*DATA*/", data), encoding="utf-8")
+
+
+def _in_three(points: Array) -> list[list[float]]:
+    """Points (T, D) of a map with D up to 3, as numbers for the page."""
+    found: list[list[float]] = np.round(np.pad(points, ((0, 0), (0, 3 - points.shape[1]))), 3).tolist()
+    return found
 
 
 def _continuity(projection: Projection) -> str:

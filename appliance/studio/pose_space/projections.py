@@ -49,8 +49,10 @@ def projections(
         Projection("PCA, heading removed", _principal(level)),
         Projection("pose autoencoder", tuple(pose_map.points(one)[:, :2] for one in latents)),
     ]
-    neighbours = _umap(level)
-    return found if neighbours is None else [*found, Projection("UMAP, heading removed", neighbours)]
+    for name, shapes in (("UMAP, heading kept", turned), ("UMAP, heading removed", level)):
+        neighbours = _umap(shapes)
+        found += [] if neighbours is None else [Projection(name, neighbours)]
+    return found
 
 
 def _shapes_with_heading(recording: Recording, moving: Sequence[int]) -> Array:

@@ -23,7 +23,7 @@ from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.autoencoder.losses import divergence
 from appliance.studio.data.dataset import FPS, Dataset, Take, window_starts
 from appliance.studio.evaluation.coders import Poses
-from appliance.studio.evaluation.dance_figures import energy
+from appliance.studio.evaluation.dance_figures import degrees_apart, energy
 from appliance.studio.evaluation.nearest import Reference, reference_of, without_heading
 from appliance.studio.standing_dance import standing
 from appliance.studio.variations.timing import difference
@@ -37,12 +37,13 @@ ACTIVE = 0.1  # standard deviation of a number's mean over the recordings: it sa
 
 @dataclass(frozen=True)
 class Row:
-    """Means over windows and seeds. degrees from the recording, after time warping, share of timing, degrees
-    from the nearest recorded pose, energy of the recording's.
+    """Means over windows and seeds. degrees from the recording; changed: degrees from what the model makes
+    without noise, and the share of that which is timing; degrees from the nearest recorded pose; energy of
+    the recording's.
     """
 
     degrees: float
-    warped: float
+    changed: float
     timing: float
     nearest: float
     energy: float
@@ -91,15 +92,16 @@ def sweep(
         track(windows, "varying", console=console, disable=hidden, transient=True)
     ):
         phrase, pace = encode_phrase(autoencoder, window), energy(without_heading(window))
+        own = varied(autoencoder, phrase, 0.0, 0)
         for sigma in SIGMAS:
             for seed in range(SEEDS if sigma else 1):
                 made = varied(autoencoder, phrase, sigma, SEEDS * number + seed)
-                off = difference(window, made)
+                change = difference(own, made)
                 rows[sigma].append(
                     Row(
-                        off.degrees,
-                        off.warped,
-                        off.timing,
+                        float(degrees_apart(without_heading(window), without_heading(made)).mean()),
+                        change.degrees,
+                        change.timing,
                         float(reference.nearest(made).mean()),
                         energy(without_heading(made)) / max(pace, 1e-9),
                     )
@@ -122,11 +124,12 @@ def sweep(
 def table(found: Sweep) -> Table:
     """For people."""
     shown = Table(title="Variations of takes kept apart, by the strength of the noise")
-    for name in ("sigma", "degrees from the recording", "of that timing", "nearest recorded pose", "energy"):
+    changes = ("degrees from the recording", "changed by the noise", "of that timing")
+    for name in ("sigma", *changes, "nearest recorded pose", "energy"):
         shown.add_column(name, justify="right")
     for sigma, row in found.rows.items():
-        cells = (f"{row.degrees:.1f}", f"{row.timing:.0%}", f"{row.nearest:.1f}", f"{row.energy:.2f}")
-        shown.add_row(f"{sigma:g}", *cells)
+        change = (f"{row.degrees:.1f}", f"{row.changed:.1f}", f"{row.timing:.0%}")
+        shown.add_row(f"{sigma:g}", *change, f"{row.nearest:.1f}", f"{row.energy:.2f}")
     return shown
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,43 +35,54 @@ class Difference:
 def difference(phrase: Array, variation: Array) -> Difference:
     """Of poses (T, M, 4) each; the headings are removed, the longer one is cut."""
     count = min(len(phrase), len(variation))
-    costs = _costs(without_heading(phrase[:count]), without_heading(variation[:count]))
-    pairs = warping_path(costs, round(REACH_S * FPS))
-    one, other = np.array(pairs).T
+    reach = min(round(REACH_S * FPS), count - 1)
+    costs = _costs(without_heading(phrase[:count]), without_heading(variation[:count]), reach)
+    pairs = np.array(warping_path(costs))
+    lags = pairs[:, 1] - pairs[:, 0]
     return Difference(
-        degrees=float(np.trace(costs)) / count,
-        warped=float(costs[one, other].mean()),
-        shift_s=float(np.abs(one - other).mean()) / FPS,
+        degrees=float(costs[:, reach].mean()),
+        warped=float(costs[pairs[:, 0], reach + lags].mean()),
+        shift_s=float(np.abs(lags).mean()) / FPS,
     )
 
 
-def warping_path(costs: Array, reach: int) -> list[tuple[int, int]]:
-    """The cheapest way through costs (T, T) from corner to corner, at most `reach` beside the diagonal.
+def warping_path(costs: Array) -> list[tuple[int, int]]:
+    """The cheapest way from the first tick of both to the last; costs (T, 2 * reach + 1): of tick t of one
+    with tick t - reach, ..., t + reach of the other, infinite where there is none.
 
     A step along one side alone costs as a step along both, so a detour pays only if it fits better.
     """
-    count = len(costs)
-    total = np.full((count + 1, count + 1), np.inf)
-    total[0, 0] = 0.0
-    for row in range(count):
-        for column in range(max(0, row - reach), min(count, row + reach + 1)):
-            before = min(total[row, column], total[row, column + 1], total[row + 1, column])
-            total[row + 1, column + 1] = costs[row, column] + before
-    row = column = count - 1
-    path = [(row, column)]
-    while row or column:
+    count, width = costs.shape
+    reach = width // 2
+    nothing = [math.inf] * (width + 2)  # a column more on both sides
+    totals = [nothing]
+    for row, line in enumerate(costs.tolist()):
+        before, total = totals[-1], nothing.copy()
+        for place, cost in enumerate(line, 1):
+            total[place] = cost + min(before[place], before[place + 1], total[place - 1])
+        if row == 0:  # begins at the first tick of both
+            total = [math.inf] * (reach + 1) + list(itertools.accumulate(line[reach:])) + [math.inf]
+        totals.append(total)
+    row, place = count, reach + 1
+    path = [(count - 1, count - 1)]
+    while path[-1] != (0, 0):
         ways = {
-            (row - 1, column - 1): total[row, column],
-            (row - 1, column): total[row, column + 1],
-            (row, column - 1): total[row + 1, column],
+            (row - 1, place): totals[row - 1][place],
+            (row - 1, place + 1): totals[row - 1][place + 1],
+            (row, place - 1): totals[row][place - 1],
         }
-        row, column = min(ways, key=lambda way: ways[way])
-        path.append((row, column))
+        row, place = min(ways, key=lambda way: ways[way])
+        path.append((row - 1, row + place - reach - 2))
     return path[::-1]
 
 
-def _costs(one: Array, other: Array) -> Array:
-    """(T, T): mean joint angle in degrees between every two poses."""
-    rows = [np.degrees(quaternion.angle_between(pose[None], other)).mean(axis=1) for pose in one]
-    costs: Array = np.stack(rows)
+def _costs(one: Array, other: Array, reach: int) -> Array:
+    """(T, 2 * reach + 1): mean joint angle in degrees between poses (T, M, 4) at most `reach` ticks apart."""
+    count = len(one)
+    costs = np.full((count, 2 * reach + 1), np.inf)
+    for lag in range(-reach, reach + 1):
+        rows = slice(max(0, -lag), count - max(0, lag))
+        columns = slice(max(0, lag), count - max(0, -lag))
+        apart = quaternion.angle_between(one[rows], other[columns])
+        costs[rows, reach + lag] = np.degrees(apart).mean(axis=1)
     return costs

@@ -21,7 +21,8 @@ from appliance.studio.data.regions import regions_of
 from appliance.studio.evaluation.coders import Poses, TorchCoder
 from appliance.studio.evaluation.dance_figures import energy
 from appliance.studio.evaluation.nearest import Reference, reference_of
-from appliance.studio.improviser.naturalness import Naturalness, Yardstick, measure
+from appliance.studio.improviser.naturalness import Yardstick, measure
+from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.pose_space.ground import Ground
 from appliance.studio.standing_dance import excerpt_of, standing
 from appliance.studio.trained_on import open_model
@@ -104,7 +105,8 @@ def run(options: VaryOptions) -> None:
         "naturalness": {name: one.as_json() for name, one in natural.items()},
     }
     write_report(options.out / "variations.json", report)
-    Console().print(_table(figures, natural, title))
+    Console().print(_table(figures, title))
+    Console().print(naturalness_table(natural))
     console.print(f"{options.out}: BVH of each, variations.png and variations.json.", highlight=False)
 
 
@@ -179,10 +181,10 @@ def _words(options: VaryOptions) -> str:
     return f"{options.phrase.stem}, varied by {options.sigma:g} sigma{where}"
 
 
-def _table(figures: dict[str, Figures], natural: dict[str, Naturalness], title: str) -> Table:
+def _table(figures: dict[str, Figures], title: str) -> Table:
     table = Table(title=title, box=SIMPLE_HEAD)
     table.add_column(no_wrap=True)
-    for name in ("from the phrase", "of that timing", "from recorded", "energy", "above 8 Hz", "slide"):
+    for name in ("from the phrase", "of that timing", "from recorded", "energy"):
         table.add_column(name, justify="right")
     for name, one in figures.items():
         table.add_row(
@@ -191,20 +193,5 @@ def _table(figures: dict[str, Figures], natural: dict[str, Naturalness], title: 
             "" if one.timing is None else f"{one.timing:.0%}",
             f"{one.nearest:.1f}°",
             "" if one.energy is None else f"{one.energy:.2f}",
-            *_motion(natural.get(name)),
         )
-    if natural:
-        any_of_them = next(iter(natural.values()))
-        table.add_row("recordings", "", "", "", "", *_usual(any_of_them))
     return table
-
-
-def _motion(natural: Naturalness | None) -> tuple[str, str]:
-    """Trembling and sliding feet, for people."""
-    if natural is None:
-        return "", ""
-    return f"{natural.pace.trembling:.1%}", f"{natural.slide_cm_s:.0f} cm/s"
-
-
-def _usual(natural: Naturalness) -> tuple[str, str]:
-    return f"{natural.recorded_pace.trembling:.1%}", f"{natural.recorded_slide_cm_s:.0f} cm/s"

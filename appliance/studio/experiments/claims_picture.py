@@ -1,0 +1,67 @@
+"""The report of the experiments as one picture: the excerpts, and the paper's claims with all figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+from appliance.studio.evaluation.pictures import FAINT, INK, PANEL, new_figure, save
+from appliance.studio.experiments.claims import Claim
+
+WIDTH, CLAIM_SHARE = 15.0, 0.34  # inches; of the width for the claim's words
+ROW, HEAD = 0.62, 0.5  # inches
+COLOURS = {True: "#2f5a3a", False: "#6e2a1f", None: PANEL}  # holds, does not, is not spoken of
+
+
+def draw_claims(path: Path, title: str, networks: Mapping[str, Sequence[Claim]], excerpts: Path) -> Path:
+    """excerpts: their strip, a PNG. For each network a table: claims by excerpts, green where they hold."""
+    import matplotlib.image
+
+    strip = matplotlib.image.imread(excerpts)
+    heights = [WIDTH * strip.shape[0] / strip.shape[1]]
+    heights += [2 * HEAD + ROW * len(claims) for claims in networks.values()]
+    figure = new_figure(WIDTH, sum(heights) + HEAD)
+    figure.suptitle(title, color=INK, fontsize=15, x=0.01, ha="left")
+    rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    axes = figure.add_subplot(rows[0])
+    axes.imshow(strip, interpolation="antialiased")
+    axes.set_axis_off()
+    for number, (name, claims) in enumerate(networks.items(), 1):
+        _table(figure.add_subplot(rows[number]), name, claims)
+    return save(figure, path)
+
+
+def _table(axes: Any, name: str, claims: Sequence[Claim]) -> None:
+    from matplotlib.patches import Rectangle
+
+    names = list(dict.fromkeys(excerpt for claim in claims for excerpt in claim.figures))
+    width = (1 - CLAIM_SHARE) / len(names)
+    axes.set_axis_off()
+    axes.set_xlim(0, 1)
+    axes.set_ylim(len(claims) + HEAD / ROW, -HEAD / ROW)
+    axes.set_title(f"{name}: green where the claim holds, red where not", color=INK, loc="left", fontsize=11)
+    for column, excerpt in enumerate(names):
+        axes.text(CLAIM_SHARE + (column + 0.5) * width, -0.3, excerpt, color=FAINT, fontsize=9, ha="center")
+    for row, claim in enumerate(claims):
+        measured = next(iter(claim.figures.values()))
+        words = fill(f"({claim.letter}) {claim.words}", 78)
+        axes.text(0, row + 0.06, words, color=INK, fontsize=7.5, va="top")
+        told = " / ".join(name.replace("_", " ") for name in measured)
+        axes.text(0, row + 0.92, told, color=FAINT, fontsize=6.5, va="bottom")
+        for column, excerpt in enumerate(names):
+            figures = claim.figures.get(excerpt)
+            if figures is None:
+                continue
+            left = CLAIM_SHARE + column * width
+            colour = COLOURS[claim.holds.get(excerpt)]
+            axes.add_patch(Rectangle((left + 0.003, row + 0.06), width - 0.006, 0.86, color=colour))
+            said = " / ".join(map(_short, figures.values()))
+            axes.text(left + width / 2, row + 0.5, said, color=INK, fontsize=7, ha="center", va="center")
+
+
+def _short(value: float) -> str:
+    """Two digits, or '-' where there is nothing to measure."""
+    return "-" if not math.isfinite(value) else f"{value:.0f}" if abs(value) >= 10 else f"{value:.2g}"
