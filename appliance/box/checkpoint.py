@@ -34,6 +34,7 @@ class Standing(NamedTuple):
     coding: int
     interaction: int
     let_go: tuple[str, ...] = ()
+    made: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,8 @@ class Checkpoint:
     the show state that all this follows; boot: the machine's boot id; tick: of the last frame; restarts,
     power_cuts: how often the show went on after one; ended: the show was ended as it should; tries: starts
     from here that produced no frame; others: the puppets beside the first; motion: parts of the show state
-    for the generator, by name, with their values.
+    for the generator, by name, with their values; made: number of what was made ahead and is danced, whose
+    seconds position_s then counts, else 0.
     """
 
     show: str
@@ -73,6 +75,7 @@ class Checkpoint:
     source: str = ""
     others: tuple[Standing, ...] = ()
     motion: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    made: int = 0
 
 
 def packed(place: Checkpoint) -> bytes:
@@ -93,10 +96,10 @@ def packed(place: Checkpoint) -> bytes:
         _ENDED * place.ended,
         place.tries,
     )
-    others = tuple([(other.phrase, other.let_go) for other in place.others])
+    others = tuple([(other.phrase, other.let_go, other.made) for other in place.others])
     payload = numbers + _names(
         *(place.show, place.phrase, place.cue, place.let_go, place.boot, place.applied, place.source),
-        *((others, place.motion) if others or place.motion else ()),
+        *((others, place.motion, place.made) if others or place.motion or place.made else ()),
     )
     payload += b"\0" if others else b""
     for one in place.others:
@@ -142,6 +145,7 @@ def unpacked(payload: bytes) -> Checkpoint | None:
             str(later[0]) if later else "",
             tuple(map(_standing, *later[1:2], numbers_of_others)) if later[1:] else (),
             tuple((str(name), tuple(map(float, values))) for name, values in later[2]) if later[2:] else (),
+            int(later[3]) if later[3:] else 0,
         )
     except (struct.error, ValueError, TypeError):
         return None
@@ -161,7 +165,7 @@ def _split(payload: bytes) -> tuple[bytes, list[tuple[float, ...]]]:
 
 def _standing(names: list[Any], numbers: tuple[float, ...]) -> Standing:
     position_s, start_s, end_s, rate, x, z, heading, strayed_x, strayed_z, coding, interaction = numbers
-    phrase, let_go = names
+    phrase, let_go, *made = names
     return Standing(
         str(phrase),
         position_s,
@@ -172,6 +176,7 @@ def _standing(names: list[Any], numbers: tuple[float, ...]) -> Standing:
         int(coding),
         int(interaction),
         tuple(map(str, let_go)),
+        int(*made),
     )
 
 

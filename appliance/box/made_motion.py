@@ -1,4 +1,4 @@
-"""Made motion: what the generator made last, on its way to the stage, and the names of what it keeps."""
+"""Made motion: what the generator made last for a puppet, on its way to the stage, and what it keeps."""
 
 from __future__ import annotations
 
@@ -30,31 +30,25 @@ class MadeMotion(NamedTuple):
 
 
 class MadeMotionWriter:
-    """The generator's end. Raises OSError where the folder takes no file."""
+    """The generator's end for one puppet, by its number. Raises OSError where the folder takes no file."""
 
-    def __init__(self, folder: Path) -> None:
-        self._made = BlockWriter(folder / FILE, KIND, _LARGEST, fresh=True)
-        self._kept = BlockWriter(folder / KEPT_FILE, KEPT_KIND, _LARGEST_KEPT, fresh=True)
+    def __init__(self, folder: Path, puppet: int = 0) -> None:
+        self._block = BlockWriter(_file(folder, puppet), KIND, _LARGEST, fresh=True)
 
     def write(self, made: MadeMotion) -> None:
         """Publish. Raises ValueError for a recipe that is too long."""
-        self._made.write(json.dumps(made._asdict()).encode())
-
-    def write_kept(self, names: list[str]) -> None:
-        """Publish the names of all motions that were kept."""
-        self._kept.write(json.dumps(names).encode())
+        self._block.write(json.dumps(made._asdict()).encode())
 
     def close(self) -> None:
-        """Release the files; they stay."""
-        self._made.close()
-        self._kept.close()
+        """Release the file; it stays."""
+        self._block.close()
 
 
 class MadeMotionReader:
-    """The stage's end. The same object until there is a newer one."""
+    """The stage's end for one puppet. The same object until there is a newer one."""
 
-    def __init__(self, folder: Path) -> None:
-        self._block = BlockReader(folder / FILE, KIND, writer="the generator")
+    def __init__(self, folder: Path, puppet: int = 0) -> None:
+        self._block = BlockReader(_file(folder, puppet), KIND, writer="the generator")
         self._payload: bytes | None = None
         self._made: MadeMotion | None = None
 
@@ -67,6 +61,21 @@ class MadeMotionReader:
 
     def close(self) -> None:
         """Release the file."""
+        self._block.close()
+
+
+class KeptNamesWriter:
+    """The generator's end. Raises OSError where the folder takes no file."""
+
+    def __init__(self, folder: Path) -> None:
+        self._block = BlockWriter(folder / KEPT_FILE, KEPT_KIND, _LARGEST_KEPT, fresh=True)
+
+    def write(self, names: list[str]) -> None:
+        """Publish the names of all motions that were kept."""
+        self._block.write(json.dumps(names).encode())
+
+    def close(self) -> None:
+        """Release the file; it stays."""
         self._block.close()
 
 
@@ -92,8 +101,12 @@ class KeptNamesReader:
 def forget_made_motion(folder: Path) -> None:
     """A show that ended as it should leaves nothing for the next one to take up."""
     shutil.rmtree(folder / FOLDER, ignore_errors=True)
-    (folder / FILE).unlink(missing_ok=True)
-    (folder / KEPT_FILE).unlink(missing_ok=True)
+    for file in (*folder.glob(f"{FILE}*"), folder / KEPT_FILE):
+        file.unlink(missing_ok=True)
+
+
+def _file(folder: Path, puppet: int) -> Path:
+    return folder / (f"{FILE}_{puppet}" if puppet else FILE)
 
 
 def _parsed(payload: bytes) -> MadeMotion | None:

@@ -108,15 +108,17 @@ class Playback(Played):
         return loop.start_s, loop.start_s + loop.length / FPS
 
     @property
-    def going_on(self) -> tuple[str, float]:
-        """Phrase and second where a restarted playback continues: where the last request leads."""
+    def going_on(self) -> tuple[str, float, int]:
+        """Where a restarted playback continues: phrase, second, and the number of what was made, else 0."""
+        made = self.made
+        number = 0 if made is None else made.number
         if self._request is not None:
             loop, position, _ = self._request
         elif self._on_the_way:
             loop, position = self._head.loop, self._entered_at
         else:
-            return (self.phrase if self.made is None else self.base), self.position_s
-        return self._asked.name, loop.start_s + position / FPS
+            return (self.phrase if made is None else self.base), self.position_s, number
+        return self._asked.name, loop.start_s + position / FPS, number
 
     def jump(self, to_s: float) -> None:
         """Continue at another second of the phrase, clamped to the excerpt, with a crossfade.
@@ -150,8 +152,7 @@ class Playback(Played):
 
     def enter(self, recipe: str, loop: Loop, fade_s: float) -> None:
         """Switch within fade_s to a loop that was made ahead: in step with the phrase that it follows or the
-        loop that it goes on from, else from its start. Raises ValueError, LookupError or TypeError for no
-        recipe.
+        loop that it goes on from, else from its start. Raises ValueError for no recipe.
         """
         made = self._repertoire.take(recipe, loop)
         here, position, _ = self._request or (self._head.loop, self._head.position, 0)
@@ -176,16 +177,20 @@ class Playback(Played):
         position_s: float,
         rate: float,
         standing: tuple[float, float, float],
+        made: tuple[str, Loop] | None = None,
     ) -> None:
         """Before the first tick: continue another playback from its going_on, excerpt_s and standing.
 
-        Without a crossfade, at once at this rate. Raises ValueError for what this show does not have.
+        made: recipe and loop that it danced, if they were made ahead. Without a crossfade, at once at this
+        rate. Raises ValueError for what this show does not have.
         """
         phrase, loop = self._repertoire.find(name)
         whole_s = loop.start_s, loop.start_s + loop.length / FPS
         if max(abs(one - other) for one, other in zip(whole_s, excerpt_s, strict=True)) > 0.5 / FPS:
             loop = phrase.cut(*excerpt_s)
         self._rate = self._wanted_rate = _checked_rate(rate)
+        if made is not None:
+            loop = self._repertoire.take(*made).loop
         self._asked, self._excerpt = phrase, loop
         position = round((position_s - loop.start_s) * FPS, _FRAME_DIGITS)
         self._begin(min(max(position, 0.0), loop.length - 1.0), standing)

@@ -26,8 +26,12 @@ class Played:
         return self._repertoire.find(name)[1]
 
     def make_by(self, make: Callable[[str], Loop]) -> None:
-        """Set what makes the loops that a state names by their recipes."""
+        """Set where the loops of recipes come from; it raises ValueError."""
         self._repertoire.make = make
+
+    def made_by(self, recipe: str) -> Loop:
+        """The loop of a recipe. Raises ValueError."""
+        return self._repertoire.make(recipe)
 
     def window(self) -> FloatArray:
         """The next poses (window, J, 4) of the motion, without sign jumps; valid until advance()."""

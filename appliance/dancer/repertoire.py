@@ -80,13 +80,16 @@ class Repertoire:
         return self._phrases[name]
 
     def take(self, recipe: str, loop: Loop) -> Made:
-        """Take in a loop that was made ahead. Raises ValueError, LookupError or TypeError for no recipe."""
-        values = json.loads(recipe)
-        kind = values.get("of", values)
-        own = kind.get("points") or kind["source"] in (GRANULAR, IMPROVISE)
-        phrase = "" if own else str(kind["phrase"])
-        after = (int(values["after"]), float(values["from_s"])) if "after" in values else None
-        name, number = str(values.get("name") or values["source"]), int(values["number"])
+        """Take in a loop that was made ahead. Raises ValueError for no recipe of this show."""
+        try:
+            values = json.loads(recipe)
+            kind = values.get("of", values)
+            own = kind.get("points") or kind["source"] in (GRANULAR, IMPROVISE)
+            phrase = "" if own else str(kind["phrase"])
+            after = (int(values["after"]), float(values["from_s"])) if "after" in values else None
+            name, number = str(values.get("name") or values["source"]), int(values["number"])
+        except (AttributeError, LookupError, TypeError) as error:
+            raise ValueError(f"It was made by no sound recipe ({error}).") from None
         if loop.track.shape[1] != self._phrases[MAIN][1].track.shape[1] or number < FIRST_MADE:
             raise ValueError("It was made for another floor, or another show.")
         made = self._made[number] = Made(recipe, name, phrase, number, loop, after)

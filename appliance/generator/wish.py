@@ -12,6 +12,7 @@ from appliance.show.sources import GRANULAR, IMPROVISE, KEPT, MADE, PARAMETERS, 
 
 STEP_S = 1.5  # of a fade: each step is a motion of its own, melted into the one before
 AGAIN = 1000  # how far `again` counts the seed on: each return counts it on by one
+APART = 10_000_000  # seeds of one puppet and the next: no two dance the same variation
 _DIGITS = 4
 
 
@@ -37,15 +38,24 @@ class Wishes:
         self._newest: dict[str, float] = {}  # by part: the value that was asked for last
 
     def wish(
-        self, state: ShowState, base: str, kept: Mapping[str, dict[str, Any]], now: float, wanted: str = ""
+        self,
+        state: ShowState,
+        base: str,
+        kept: Mapping[str, dict[str, Any]],
+        now: float,
+        wanted: str = "",
+        puppet: int = 0,
     ) -> Wish | None:
-        """What the stage waits for; None: phrases or a live dancer. base: the phrase that it danced last.
+        """What a puppet waits for; None: phrases or a live dancer. base: the phrase that it danced last.
 
-        kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the stage waits for while
-        nothing is declared, after a power cut.
+        kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the first puppet waits for
+        while nothing is declared, after a power cut.
         """
         dance: Mapping[str, Part] = state.dance if state.show == self._config.name else {}
-        name = dance["phrase"][1] if "phrase" in dance else wanted or self._config.motion.source
+        if puppet:
+            name = self._config.puppets[puppet].phrase or ""
+        else:
+            name = dance["phrase"][1] if "phrase" in dance else wanted or self._config.motion.source
         if name in kept:
             return Wish(name, {"source": KEPT, "name": name, "of": kept[name]})
         if name not in MADE or name not in self._sections:
@@ -54,7 +64,7 @@ class Wishes:
         for parameter, about in PARAMETERS[name].items():
             value = self._value(dance, name, parameter, now)
             recipe[parameter] = int(value) if about.is_whole else round(value, _DIGITS)
-        recipe["seed"] += AGAIN * int(dance.get(f"{MOTION}again", (0, "", (0.0,)))[2][0])
+        recipe["seed"] += AGAIN * int(dance.get(f"{MOTION}again", (0, "", (0.0,)))[2][0]) + APART * puppet
         if name == GRANULAR:
             section = self._sections[name]
             recipe |= {"from": getattr(section, "from_", None), "to": getattr(section, "to", None)}

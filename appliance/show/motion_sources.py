@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field, model_serializer
+from pydantic import Field, field_validator, model_serializer
 
-from appliance.show.section import BundleFile, Section, key
-from appliance.show.sources import GRANULAR, IMPROVISE, PARAMETERS, PATH, VARY
+from appliance.show.section import BundleFile, Section, key, refusal
+from appliance.show.sources import GRANULAR, IMPROVISE, MOST_POINTS, PARAMETERS, PATH, VARY
+
+_Share = Annotated[float, Field(ge=0, le=1)]
 
 
 def _parameter(source: str, name: str, default: Any = ...) -> Any:
@@ -45,6 +47,9 @@ class GranularConfig(Section):
     speed: float = _parameter(GRANULAR, "speed")
     spread: float = _parameter(GRANULAR, "spread")
     mix: float = _parameter(GRANULAR, "mix")
+    from_start_s: float = _parameter(GRANULAR, "from_start_s")
+    to_start_s: float = _parameter(GRANULAR, "to_start_s")
+    seconds: float = _parameter(GRANULAR, "seconds")
     offset: float = _parameter(GRANULAR, "offset")
     seed: int = _parameter(GRANULAR, "seed")
 
@@ -90,6 +95,9 @@ class GranularChanges(_Changes):
     speed: float | None = _parameter(GRANULAR, "speed", None)
     spread: float | None = _parameter(GRANULAR, "spread", None)
     mix: float | None = _parameter(GRANULAR, "mix", None)
+    from_start_s: float | None = _parameter(GRANULAR, "from_start_s", None)
+    to_start_s: float | None = _parameter(GRANULAR, "to_start_s", None)
+    seconds: float | None = _parameter(GRANULAR, "seconds", None)
     offset: float | None = _parameter(GRANULAR, "offset", None)
     seed: int | None = _parameter(GRANULAR, "seed", None)
 
@@ -97,9 +105,22 @@ class GranularChanges(_Changes):
 class PathChanges(_Changes):
     """Of the source path."""
 
+    points: list[_Share] | None = key(
+        "x and y of a point of the map, or of each point of a line over it, as `/motion/path` takes them. "
+        "[]: the phrase's own path.",
+        None,
+        length=(0, 2 * MOST_POINTS),
+    )
     wobble: float | None = _parameter(PATH, "wobble", None)
     frequency: float | None = _parameter(PATH, "frequency", None)
     seed: int | None = _parameter(PATH, "seed", None)
+
+    @field_validator("points")
+    @classmethod
+    def _in_pairs(cls, points: list[float] | None) -> list[float] | None:
+        if points is not None and len(points) % 2:
+            raise refusal("The last of the points has no y.", "Write x and y of each point.")
+        return points
 
 
 class ImproviseChanges(_Changes):

@@ -13,7 +13,6 @@ from appliance.show.dance import MotionConfig
 from appliance.show.hand import HandConfig
 from appliance.show.light_rules import MappingConfig
 from appliance.show.section import Section, key, refuse_repeats
-from appliance.show.sources import LIVE
 from appliance.show.yaml_file import YamlFile
 
 MOST_PUPPETS = 4
@@ -38,8 +37,9 @@ class PuppetConfig(Section):
         within=(-360, 360),
     )
     phrase: str | None = key(
-        "Not for the first puppet: what it starts from, `main`, a name under motion.phrases or `live`. "
-        "null: the phrase that the show starts with.",
+        "Not for the first puppet: what it starts from, `main`, a name under motion.phrases, `live`, `vary`, "
+        "`granular`, `path`, `improvise` or a name under motion.kept. null: the phrase that the show starts "
+        "with.",
         None,
         length=(1, 64),
     )
@@ -101,18 +101,16 @@ def puppet_problems(
     puppets that it lacks in rules of lights.
     """
     yield from _light_problems(puppets, mappings, file)
-    known = [*motion.files, *([LIVE] if motion.live else [])]
     for place, puppet in enumerate(puppets):
         if place == 0:
             for name in (name for name in LED_BY_THE_SHOW if name in puppet.model_fields_set):
                 words = f"'{name}' does not stand with the first puppet: it dances what the show says."
                 cure = "Write it under `motion`, `hands` or `dancer`, or give it to another puppet."
                 yield file.problem(("puppets", 0, name), words, cure)
-        elif puppet.phrase is not None and puppet.phrase not in known:
-            words = (
-                f"The puppet '{puppet.name}' starts from '{puppet.phrase}', which is no phrase of the show."
-            )
-            yield file.problem(("puppets", place, "phrase"), words, did_you_mean(puppet.phrase, known))
+        elif puppet.phrase is not None and puppet.phrase not in motion.sources:
+            words = f"The puppet '{puppet.name}' starts from '{puppet.phrase}', which the show does not have."
+            cure = did_you_mean(puppet.phrase, motion.sources)
+            yield file.problem(("puppets", place, "phrase"), words, cure)
         for number, hand in enumerate(puppet.hands if place else ()):
             if not hand.from_start:
                 words = "Nothing lets this hand hold: cues and `/hold` lead the hands of the first puppet."

@@ -114,7 +114,9 @@ def _cue(show_state: ShowState, command: Command, facts: Facts | None, now: floa
     if cue.get("springs") is not None:
         show_state, parts["springs"] = _without_knobs(show_state), (cue["springs"], (fade_s,))
     for source, changes in (cue.get("motion") or {}).items():
-        parts |= {f"{MOTION}{source} {key}": ("", (float(value), fade_s)) for key, value in changes.items()}
+        for key, value in changes.items():
+            values = tuple(map(float, value)) if key == POINTS else (float(value), fade_s)
+            parts[f"{MOTION}{source} {key}"] = "", values
     if cue.get("iterations") is not None:
         parts["iterations"] = "", (*map(float, cue["iterations"]), fade_s)
     return in_cue(show_state, cue, PARTS, now).with_dance(now, parts), f"Cue {name}."

@@ -50,7 +50,7 @@ def obey(order: Order, parts: StageParts, iterations: Iterations) -> Outcome:
         elif order.name == "phrase":
             words = parts.first.play(order.text, *order.values)
         elif order.name == "made":
-            parts.dance_made(order.text, order.values[0])
+            _dance_made(order, parts)
         elif order.name == "rate":
             for puppet in parts.puppets:
                 puppet.motion.rate = order.values[0]
@@ -118,6 +118,12 @@ def _enable(order: Order, parts: StageParts) -> None:
             puppeteer.enabled = bool(order.values[0])
             if puppeteer.enabled and isinstance(puppeteer, Remote):
                 puppeteer.hold_here(_orientation(puppeteer.joint, parts).tolist())
+
+
+def _dance_made(order: Order, parts: StageParts) -> None:
+    """Let a puppet go over to what the generator made for it; the first, where no number follows the fade."""
+    fade_s, *number = order.values
+    parts.puppets[int(number[0]) if number else 0].play_made(str(order.text), fade_s)
 
 
 def _orientation(joint: str, parts: StageParts) -> quaternion.Array:

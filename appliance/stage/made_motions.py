@@ -6,10 +6,10 @@ from pathlib import Path
 
 from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionReader
 from appliance.dancer.loop import Loop
-from appliance.dancer.material.material_file import read_material
+from appliance.dancer.material.material_file import SUFFIX, Material, parsed_recipe, read_material
 from appliance.dancer.motion_source import Playback
 from appliance.show.show import Show
-from appliance.show.sources import GRANULAR, IMPROVISE, VARY
+from appliance.show.sources import GRANULAR, IMPROVISE, LIVE, VARY
 from appliance.show_control.orders import Order
 from appliance.stage.stage_parts import StageParts
 
@@ -22,14 +22,18 @@ _AHEAD_S = 3.0  # what goes on from a moment that is farther ahead does not wait
 
 
 class MadeMotions:
-    """Follows the generator at the price of a small read a tick, while a source of it is wanted.
+    """Follows what the generator makes for one puppet, at the price of a small read a tick, while a source of
+    it is wanted.
 
-    is_late: the dance goes on with what is there, because nothing newer came in time.
+    source: what the puppet starts from by the show; "" for none that is made. is_late: the dance goes on with
+    what is there, because nothing newer came in time.
     """
 
-    def __init__(self, folder: Path, joints: tuple[str, ...], motion: Playback) -> None:
-        self._reader, self._folder, self._joints = MadeMotionReader(folder), folder / FOLDER, joints
-        self._motion = motion
+    def __init__(
+        self, folder: Path, joints: tuple[str, ...], motion: Playback, puppet: int = 0, source: str = ""
+    ) -> None:
+        self._reader, self._folder, self._joints = MadeMotionReader(folder, puppet), folder / FOLDER, joints
+        self._motion, self._puppet, self.source = motion, puppet, source
         self._wanted, self._since = "", 0.0
         self._place = (0, 0.0)  # number of the loop, second in it
         self._tried: MadeMotion | None = None
@@ -59,7 +63,7 @@ class MadeMotions:
         if not is_due:
             return None
         self._tried, self.is_late = newest, False
-        return Order(ORDER, (MELT_S if is_here else fade_s,), newest.recipe)
+        return Order(ORDER, (MELT_S if is_here else fade_s, float(self._puppet)), newest.recipe)
 
     def _reaches(self, newest: MadeMotion, before: tuple[int, float], now: float) -> bool:
         """Whether the dance is where this one goes on from; one that is wanted at once waits a moment."""
@@ -70,29 +74,49 @@ class MadeMotions:
 
     def loop(self, recipe: str) -> Loop:
         """The loop of a recipe that the generator has made. Raises ValueError."""
-        newest = self._reader.read()
-        if newest is None or newest.recipe != recipe:
-            raise ValueError("What was made is not there any more; the phrase plays on.")
         try:
-            material = read_material(self._folder / newest.file, self._joints)
+            material = self._material(int(parsed_recipe(recipe)["number"]))
         except OSError as error:
             raise ValueError(
                 f"What was made cannot be read ({error.strerror}); the phrase plays on."
             ) from None
+        except LookupError:
+            raise ValueError("What was made has no sound recipe; the phrase plays on.") from None
         if material.recipe != recipe:
             raise ValueError("What was made was made by another recipe; the phrase plays on.")
         return material.loop
+
+    def danced_before(self, number: int) -> Material | None:
+        """What the stage danced before it was restarted, if it is still there."""
+        try:
+            material = self._material(number)
+        except (OSError, ValueError):
+            return None
+        newest = self._reader.read()
+        if newest is not None and newest.recipe == material.recipe:
+            self._tried = newest
+        return material
+
+    def _material(self, number: int) -> Material:
+        """What the generator made under this number. Raises OSError, ValueError."""
+        return read_material(self._folder / f"{number}{SUFFIX}", self._joints)
 
     def close(self) -> None:
         """Release the file."""
         self._reader.close()
 
 
-def open_made_motions(folder: Path, show: Show, parts: StageParts) -> MadeMotions | None:
-    """What the generator makes, if the show has sources of it; the parts take their loops from there."""
-    if not show.config.motion.made_sources:
-        return None
-    made = MadeMotions(folder, show.skeleton.names, parts.motion)
-    parts.loop_of = made.loop
-    parts.motion.make_by(made.loop)
+def open_made_motions(folder: Path, show: Show, parts: StageParts) -> tuple[MadeMotions, ...]:
+    """What the generator makes for each puppet, if the show has sources of it; the parts take their loops
+    from there.
+    """
+    config, phrases = show.config, show.phrases
+    if not config.motion.made_sources:
+        return ()
+    wanted = [config.motion.source, *(one.phrase or "" for one in config.puppets[1:])]
+    made = tuple(
+        MadeMotions(folder, show.skeleton.names, one.motion, number, "" if name in (*phrases, LIVE) else name)
+        for number, (one, name) in enumerate(zip(parts.puppets, wanted, strict=True))
+    )
+    parts.make_by(made[0].loop)
     return made

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from appliance.box.show_state import MOTION, ShowStateReader
+from appliance.dancer.material.material_file import Material
 from appliance.show.sources import LIVE, MAIN
 from appliance.show_control.orders import Order
 from appliance.stage.carry_out import SPRINGS_ORDERS, obey
@@ -31,10 +32,12 @@ class Reconciler:
         parts: StageParts,
         iterations: Iterations,
         reader: ShowStateReader,
-        made: MadeMotions | None = None,
+        made: Sequence[MadeMotions] = (),
         source: str = MAIN,
     ) -> None:
-        """made: what the generator makes, for a show that has sources of it. source: it starts from that."""
+        """made: what the generator makes for each puppet, in a show that has sources of it. source: it starts
+        from that.
+        """
         self.parts, self.iterations = parts, iterations
         self.generation, self.cue, self.words = 0, "", ""
         self.rate = self._usual_rate = parts.motion.rate
@@ -74,10 +77,12 @@ class Reconciler:
         self.wanted = "" if wanted in self.parts.motion.phrases else wanted
         if wanted == LIVE and live is not None and not (orders or live.is_chosen):
             orders.append(Order("phrase", fade, LIVE))  # after a restart: checkpoints know phrases only
-        if self._made is not None:
-            source = wanted if self._is_made(wanted) else ""
-            if (made := self._made.order(source, fade[0] if fade else MELT_S, now)) is not None:
-                orders.append(made)
+        for puppet, made in enumerate(self._made):
+            source, fade_s = made.source, MELT_S
+            if puppet == 0:
+                source, fade_s = wanted if self._is_made(wanted) else "", fade[0] if fade else MELT_S
+            if (order := made.order(source, fade_s, now)) is not None:
+                orders.append(order)
         rate = 0.0 if show_state.stands(now) else self.rate
         if rate != self.parts.motion.rate:
             orders.append(Order("rate", (rate,)))
@@ -85,7 +90,16 @@ class Reconciler:
 
     def _is_made(self, name: str) -> bool:
         """Whether the generator makes it: a source, or a motion that was kept."""
-        return self._made is not None and name != LIVE and name not in self.parts.motion.phrases
+        return bool(self._made) and name != LIVE and name not in self.parts.motion.phrases
+
+    def danced_before(self, *numbers: int) -> list[Material | None]:
+        """What the puppets danced before a restart, by the numbers of what was made; None: a phrase, or it is
+        not there any more.
+        """
+        if not self._made:
+            return [None] * len(numbers)
+        known = zip(self._made, numbers, strict=False)
+        return [made.danced_before(number) if number else None for made, number in known]
 
     def stands(self, now: float) -> bool:
         """Whether the phrase has to stand still, because the show is stopped and dark."""

@@ -58,9 +58,7 @@ class Replay:
         for one, recorded in zip(parts.puppets, self._puppets, strict=True):
             one.puppet = recorded
         parts.live_inbox = self._live = _RecordedLive(run)
-        maker = maker_of(show, parts.motion)
-        parts.loop_of = maker
-        parts.motion.make_by(maker)
+        parts.make_by(maker_of(show, parts.motion))
         self._wearing = SensorFit(parts, SensorMemory(None, _nobody), _nobody)
         self.tick = Tick(parts, self._wearing, Iterations(1, 0, 1), 0.0)
 

@@ -103,12 +103,13 @@ class Resumption:
         rate = place.rate or (reconciler.rate if self._after_power_cut else 0.0)
         standing = place.x, place.z, place.heading
         now_rate = 0.0 if reconciler.stands(now) else rate
-        parts.motion.start_at(place.phrase, place.excerpt, place.position_s, now_rate, standing)
+        made = reconciler.danced_before(place.made, *(one.made for one in place.others))
+        parts.motion.start_at(place.phrase, place.excerpt, place.position_s, now_rate, standing, made[0])
         parts.first.grounding.strayed = place.strayed
         for puppeteer in parts.hands.puppeteers:
             puppeteer.enabled = puppeteer.joint not in place.let_go
-        for one, noted in zip(parts.puppets[1:], place.others, strict=False):
-            one.go_on(noted, now_rate)
+        for one, noted, material in zip(parts.puppets[1:], place.others, made[1:], strict=False):
+            one.go_on(noted, now_rate, material)
         reconciler.cue, reconciler.rate = place.cue, rate
         reconciler.generation = 0 if self._after_power_cut else place.applied
         if self._after_power_cut and place.source:
@@ -118,7 +119,7 @@ class Resumption:
 
     def _place(self, reconciler: Reconciler, tick: int) -> Checkpoint:
         motion, hands = reconciler.parts.motion, reconciler.parts.hands
-        phrase, position_s = motion.going_on
+        phrase, position_s, made = motion.going_on
         coding, interaction = reconciler.iterations.asked
         return Checkpoint(
             self._show,
@@ -140,6 +141,7 @@ class Resumption:
             source=reconciler.wanted,
             motion=reconciler.motion,
             others=tuple([puppet.noted for puppet in reconciler.parts.puppets[1:]]),
+            made=made,
         )
 
     def _write(self, place: Checkpoint) -> None:

@@ -82,8 +82,8 @@ class Stage:
             if self.recorder is not None:
                 opened.callback(self.recorder.close)
             self.made = open_made_motions(self.sharing.folder, show, self.parts)
-            if self.made is not None:
-                opened.callback(self.made.close)
+            for made in self.made:
+                opened.callback(made.close)
             show_state = ShowStateReader(self.sharing.folder)
             opened.callback(show_state.close)
             self.admission: Admission = admitted(
@@ -163,7 +163,7 @@ class Stage:
         health.tick(cost_ms, self.box.limits.tick_budget_ms)
         health.late += late
         health.skipped += slot.skipped
-        health.not_finite += tick.network_failed
+        health.not_finite += any(one.network_failed for one in self.parts.puppets)
         if health.ticks == 1:
             self.notifier.ready()
         self.notifier.ping(slot.started)

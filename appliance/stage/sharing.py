@@ -117,6 +117,15 @@ class Sharing:
             "motion": dict(reconciler.motion),
             "made": parts.motion.made.recipe if parts.motion.made else "",
             "position_s": parts.motion.position_s,
+            "others": [
+                {
+                    "phrase": one.source,
+                    "base": one.motion.base,
+                    "made": one.motion.made.recipe if one.motion.made else "",
+                    "position_s": one.motion.position_s,
+                }
+                for one in parts.puppets[1:]
+            ],
             "cue": reconciler.cue,
             "applied": [reconciler.generation, reconciler.words],
             "let_go": [puppeteer.joint for puppeteer in parts.hands.puppeteers if not puppeteer.enabled],

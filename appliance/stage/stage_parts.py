@@ -43,10 +43,6 @@ from appliance.stage.stage_error import StageError
 from appliance.stage.stage_puppet import Place, StagePuppet
 
 
-def _nothing_made(recipe: str) -> Loop:
-    raise ValueError("Nothing was made ahead here.")
-
-
 @dataclass(slots=True)
 class StageParts:
     """Everything that dances, hears and speaks.
@@ -66,7 +62,6 @@ class StageParts:
     live_refused: int = 0  # poses of another figure, or none
     complaints: tuple[str, ...] = ()
     newest_primary: SensorReading | None = field(default=None)
-    loop_of: Callable[[str], Loop] = field(default=_nothing_made)  # of a recipe
 
     @property
     def first(self) -> StagePuppet:
@@ -123,14 +118,10 @@ class StageParts:
         self.live_refused += 1
         return None
 
-    def dance_made(self, recipe: str, fade_s: float) -> None:
-        """Go over to what the generator made. Raises ValueError, and the phrase plays on."""
-        try:
-            self.motion.enter(recipe, self.loop_of(recipe), fade_s)
-        except (LookupError, TypeError) as error:
-            raise ValueError(f"What was made has no sound recipe ({error}); the phrase plays on.") from None
-        if self.live is not None and self.live.is_chosen:
-            self.live.choose(False, fade_s)
+    def make_by(self, make: Callable[[str], Loop]) -> None:
+        """Where loops of recipes come from; it raises ValueError."""
+        for one in self.puppets:
+            one.motion.make_by(make)
 
     def state(self) -> dict[str, Any]:
         """What the first puppet's dance to come depends on, for `restore`: plain values, copies of arrays."""
@@ -169,7 +160,7 @@ def assemble(
         motion, floor = _playback(show, puppet.window, PhraseCache(show.directory, memory))
         puppets = [_stage_puppet(show, 0, puppet, motion, floor)]
         for number, one in enumerate(config.puppets[1:], 1):
-            other = motion.another(MAIN if one.phrase in (None, LIVE) else one.phrase, one.start_s)
+            other = motion.another(one.phrase if one.phrase in motion.phrases else MAIN, one.start_s)
             puppets.append(_stage_puppet(show, number, puppet.another(), other, floor))
     except PuppetError as error:
         raise StageError(str(error)) from error

@@ -15,6 +15,7 @@ from appliance.dancer.grounding import Grounding
 from appliance.dancer.hands import Hands
 from appliance.dancer.live import Live
 from appliance.dancer.loop import Placement, turns_about_y
+from appliance.dancer.material.material_file import Material
 from appliance.dancer.motion_source import Playback
 from appliance.dancer.puppet import Puppet
 from appliance.dancer.slerp import FloatArray
@@ -159,10 +160,16 @@ class StagePuppet:
         self.live.choose(name == LIVE, *(fade_s or (self.crossfade_s,)))
         return ""  # whether it is heard is news of its own
 
+    def play_made(self, recipe: str, fade_s: float) -> None:
+        """Go over to what the generator made. Raises ValueError, and the phrase plays on."""
+        self.motion.enter(recipe, self.motion.made_by(recipe), fade_s)
+        if self.live is not None and self.live.is_chosen:
+            self.live.choose(False, fade_s)
+
     @property
     def noted(self) -> Standing:
         """Where a restarted stage lets this puppet go on, unless it is the first."""
-        phrase, position_s = self.motion.going_on
+        phrase, position_s, made = self.motion.going_on
         let_go = [puppeteer.joint for puppeteer in self.hands.puppeteers if not puppeteer.enabled]
         return Standing(
             phrase,
@@ -173,11 +180,14 @@ class StagePuppet:
             self.grounding.strayed,
             *self.iterations.asked,
             tuple(let_go),
+            made,
         )
 
-    def go_on(self, noted: Standing, rate: float) -> None:
-        """Before the first tick: continue where another stage's puppet was. Raises ValueError."""
-        self.motion.start_at(noted.phrase, noted.excerpt, noted.position_s, rate, noted.standing)
+    def go_on(self, noted: Standing, rate: float, made: Material | None = None) -> None:
+        """Before the first tick: continue where another stage's puppet was. made: what it danced, if that was
+        made ahead and is still there. Raises ValueError.
+        """
+        self.motion.start_at(noted.phrase, noted.excerpt, noted.position_s, rate, noted.standing, made)
         self.grounding.strayed = noted.strayed
         self.iterations.ask(noted.coding, noted.interaction)
         for puppeteer in self.hands.puppeteers:

@@ -27,7 +27,7 @@ _FOREIGN = ("length", "magic", "version", "kind", "device", "tag", "old_session"
 class Watch:
     """Checks for silent sensors at each tick, for all else once a second, after the frame has left."""
 
-    def __init__(self, parts: StageParts, admission: Admission, made: MadeMotions | None = None) -> None:
+    def __init__(self, parts: StageParts, admission: Admission, made: Sequence[MadeMotions] = ()) -> None:
         self._parts, self._made = parts, made
         self.fallbacks = Fallbacks(rows.OF_THE_STAGE)
         self._worn = [joints[0] for joints in parts.worn.values()]
@@ -41,9 +41,12 @@ class Watch:
 
     def count_silences(self, now: float) -> None:
         """At each tick: sensors, and a live dancer, that have just fallen silent. Allocates nothing."""
-        live, made = self._parts.live, self._made
-        late = live is not None and live.is_chosen and LIVE_SILENT_S < live.silent_s(now) < math.inf
-        late = late or (made is not None and made.is_late)
+        late = False
+        for puppet in self._parts.puppets:
+            live = puppet.live
+            late |= live is not None and live.is_chosen and LIVE_SILENT_S < live.silent_s(now) < math.inf
+        for made in self._made:
+            late |= made.is_late
         if late and not self._is_source_late:
             self.fallbacks.count(rows.SOURCE_LATE.name, now)
         self._is_source_late = late
@@ -153,11 +156,11 @@ class Watch:
 
     def _source_news(self, now: float) -> Iterator[str]:
         """What a person should know of the live dancer."""
-        live = self._parts.live
-        if live is None:
+        chosen = [one.live for one in self._parts.puppets if one.live is not None and one.live.is_chosen]
+        if not chosen:
             return
-        heard = live.silent_s(now) <= LIVE_SILENT_S
-        if live.is_chosen and self._changes("source", LIVE, not heard):
+        heard = chosen[0].silent_s(now) <= LIVE_SILENT_S
+        if self._changes("source", LIVE, not heard):
             yield (
                 "The live dancer takes the phrase's place."
                 if heard

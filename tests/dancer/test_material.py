@@ -30,6 +30,7 @@ WALK = {
     "seed": 1,
     "number": 1002,
 }
+EXCERPTS = WALK | {"from": "main", "to": "main", "from_start_s": 0.4, "to_start_s": 1.6, "seconds": 1.2}
 PATH = {"source": "path", "phrase": "main", "wobble": 0.5, "frequency": 0.5, "seed": 1, "number": 1003}
 
 
@@ -58,6 +59,7 @@ def steps(loop: Loop) -> np.ndarray[Any, Any]:
         VARY,
         WALK,
         WALK | {"from": "main", "to": "main", "offset": 0.5},
+        EXCERPTS | {"offset": 0.5},
         PATH,
         PATH | {"points": [0.2, 0.8]},
         PATH | {"points": [0.1, 0.1, 0.9, 0.2, 0.5, 0.9]},
@@ -85,6 +87,16 @@ def test_a_variation_keeps_the_phrases_way_seconds_and_still_joints(maker: Maker
     plain = maker.make(VARY | {"sigma": 0.0})
     far = quaternion.angle_between(loop.poses, plain.poses).mean()
     assert 0 < quaternion.angle_between(nearer.poses, plain.poses).mean() < far / 3
+
+
+def test_excerpts_of_a_phrase_are_mixed_by_their_share(maker: Maker, phrase: Loop) -> None:
+    one, half, other = (maker.make(EXCERPTS | {"mix": mix}) for mix in (0.0, 0.5, 1.0))
+    assert one.start_s == pytest.approx(0.4, abs=0.6) and one.length <= 60
+    apart = [float(quaternion.angle_between(loop.poses, half.poses).mean()) for loop in (one, other)]
+    assert 0 < max(apart) < quaternion.angle_between(one.poses, other.poses).mean()
+    late = maker.make(EXCERPTS | {"from_start_s": 3000.0, "seconds": 60.0})
+    whole = maker.make(EXCERPTS | {"seconds": 0.0})
+    assert late.length == pytest.approx(whole.length, abs=phrase.fade + 25), "as far as the phrase has them"
 
 
 def test_a_phrase_that_walks_and_turns_goes_on_doing_so(maker: Maker, tmp_path: Path) -> None:

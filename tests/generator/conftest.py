@@ -14,7 +14,7 @@ from appliance.box.fallback import Fallbacks
 from appliance.box.made_motion import MadeMotionReader
 from appliance.box.show_state import ShowState, ShowStateReader, ShowStateWriter
 from appliance.generator.fallback import OF_THE_GENERATOR
-from appliance.generator.run import Generator
+from appliance.generator.generator import Generator
 from appliance.outputs.frame_reader import FrameReader
 from appliance.show.box import BoxConfig
 from appliance.show.show import load_show

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.box.made_motion import MadeMotionReader
 from appliance.generator import wish as wishes
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
 from appliance.pose import quaternion
@@ -74,6 +76,31 @@ def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: 
     fourth = other.recipe()
     assert fourth["after"] == third["number"] and fourth["seed"] == third["seed"] + 1
     assert not other.made.read().at_once  # type: ignore[union-attr]
+
+
+def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
+    puppets = [{"name": "a"}, {"name": "b", "phrase": "vary"}, {"name": "c"}, {"name": "d", "phrase": "path"}]
+    one = bench(write_show_with_sources(tmp_path / "show", puppets=puppets))
+    told = [{"base": "main", "made": "", "position_s": 0.0} for _ in puppets[1:]]
+    one.health |= {"others": told, "looked_at": time.monotonic()}
+    made = [MadeMotionReader(one.folder, puppet) for puppet in range(4)]
+    for _ in range(3):  # a motion a look
+        one.recipe()
+    varied, path = (json.loads(made[puppet].read().recipe) for puppet in (1, 3))  # type: ignore[union-attr]
+    assert (varied["source"], path["source"]) == ("vary", "path")
+    assert made[0].read() is None and made[2].read() is None
+    one.declare(phrase=("vary", NO_FADE), motion_vary_sigma=("", (2.0,)))
+    own = one.recipe()
+    assert own["sigma"] == 2.0 and own["seed"] != varied["seed"], "no two dance the same variation"
+    one.recipe()
+    again = json.loads(made[1].read().recipe)  # type: ignore[union-attr]
+    assert (again["sigma"], again["seed"]) == (2.0, varied["seed"]), "values are those of all puppets"
+    told[0]["made"] = made[1].read().recipe  # type: ignore[union-attr]
+    one.recipe()
+    assert json.loads(made[1].read().recipe)["seed"] == varied["seed"] + 1  # type: ignore[union-attr]
+    assert one.recipe() == own, "what it made for the others changes nothing of the first"
+    for reader in made:
+        reader.close()
 
 
 def test_what_the_stage_could_not_take_over_is_made_again(bench: Benches, tmp_path: Path) -> None:

@@ -43,5 +43,12 @@ def test_a_cue_names_the_parameters_that_it_changes_and_no_others(tmp_path: Path
     assert show.config.cues[0].model_dump(mode="json")["motion"] == {"vary": {"sigma": 2.0}}
     assert show.config.names["phrase"] == ("main", "vary", "granular", "path", "improvise")
     assert show.motion_networks["path"] == tmp_path / "pose.onnx"
+    drawn: dict[str, Any] = {"path": {"points": [0.1, 0.9, 0.5, 0.5]}}
+    show = load_show(write_show_with_sources(tmp_path, cues=[cue | {"motion": drawn}]))
+    assert show.config.cues[0].model_dump(mode="json")["motion"] == drawn
+    for points in ([0.5], [0.5, 1.5]):
+        with pytest.raises(ConfigError, match="points"):
+            wrong = {"path": {"points": points}}
+            load_show(write_show_with_sources(tmp_path, cues=[cue | {"motion": wrong}]))
     with pytest.raises(ConfigError, match="sigma"):
         load_show(write_show_with_sources(tmp_path, cues=[cue | {"motion": {"vary": {"sigma": -1.0}}}]))

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from appliance.box.made_motion import MadeMotionWriter
+from appliance.box.made_motion import KeptNamesWriter
 from appliance.box.show_state import ShowState
 from appliance.show.sources import MOST_POINTS, PARAMETERS
 from appliance.show_control.command import command
@@ -66,15 +66,17 @@ def test_a_show_without_the_source_is_told_so() -> None:
 
 
 def test_a_cue_declares_the_parameters_that_it_names_with_its_fade() -> None:
-    cue = {"name": "wild", "phrase": "vary", "motion": {"vary": {"sigma": 2.0}}, "fade_s": 8.0}
+    changes = {"vary": {"sigma": 2.0}, "path": {"points": [0.25, 0.75]}}
+    cue = {"name": "wild", "phrase": "vary", "motion": changes, "fade_s": 8.0}
     state, _ = declared("/cue", "wild", cues=(cue,))
     assert state.dance["motion vary sigma"][2] == (2.0, 8.0)
     assert state.dance["phrase"][1:] == ("vary", (8.0,))
-    assert [name for name in state.dance if name.startswith("motion")] == ["motion vary sigma"]
+    assert state.dance["motion path points"][2] == (0.25, 0.75)
+    assert len([name for name in state.dance if name.startswith("motion")]) == 2
 
 
 def test_kept_motions_are_known_by_name(tmp_path: Path) -> None:
-    with closing(MadeMotionWriter(tmp_path)) as writer, closing(StageObserver(tmp_path)) as observer:
+    with closing(KeptNamesWriter(tmp_path)) as writer, closing(StageObserver(tmp_path)) as observer:
         assert observer.kept() == ()
-        writer.write_kept(["anna", "bert"])
+        writer.write(["anna", "bert"])
         assert observer.kept() == ("anna", "bert")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from appliance.box.made_motion import FOLDER, MadeMotion, MadeMotionWriter
@@ -56,7 +57,8 @@ class Dance:
                 done, words = obey(order, self.parts, self.iterations)
                 assert done, words
             self.watch.count_silences(self.now)
-            self.parts.motion.advance()
+            for puppet in self.parts.puppets:
+                puppet.motion.advance()
             self.now += TICK_S
             seen.add(self.parts.first.source)
         return seen
@@ -100,8 +102,8 @@ def writer(tmp_path: Path) -> Iterator[MadeMotionWriter]:
 def dance_of(tmp_path: Path) -> Iterator[Callable[..., Dance]]:
     opened: list[Dance] = []
 
-    def made(**motion: Any) -> Dance:
-        show = load_show(write_show_with_sources(tmp_path / "show", motion))
+    def made(puppets: Sequence[dict[str, Any]] = (), **motion: Any) -> Dance:
+        show = load_show(write_show_with_sources(tmp_path / "show", motion, puppets=[*puppets]))
         opened.append(Dance(show, tmp_path))
         return opened[-1]
 
@@ -216,13 +218,68 @@ def test_a_file_that_is_gone_or_foreign_changes_nothing(
     recipe = recipe_text({"source": "vary", "phrase": "main", "sigma": 1.0, "seed": 1, "number": 1001})
     (tmp_path / FOLDER / "1001.material").write_bytes(b"damaged")
     with pytest.raises(ValueError, match="no material"):
-        dance.parts.dance_made(recipe, 0.2)
+        dance.parts.first.play_made(recipe, 0.2)
     (tmp_path / FOLDER / "1001.material").unlink()
     with pytest.raises(ValueError, match="cannot be read"):
-        dance.parts.dance_made(recipe, 0.2)
-    with pytest.raises(ValueError, match="not there any more"):
-        dance.parts.dance_made("{}", 0.2)
+        dance.parts.first.play_made(recipe, 0.2)
+    with pytest.raises(ValueError, match="no sound recipe"):
+        dance.parts.first.play_made("{}", 0.2)
     assert dance.run(0.2) == {"main"}
+
+
+def test_each_puppet_dances_its_own_source(
+    dance_of: Callable[..., Dance], writer: MadeMotionWriter, tmp_path: Path
+) -> None:
+    puppets = [{"name": "a"}, {"name": "b", "phrase": "vary", "x": 1.0}, {"name": "c"}]
+    dance = dance_of(puppets=puppets)
+    with closing(MadeMotionWriter(tmp_path, 1)) as second:
+        dance.make(second, True, number=1001)
+        dance.run(1.5)
+        assert [one.source for one in dance.parts.puppets] == ["main", "vary", "main"]
+        declare(tmp_path, "vary")
+        dance.make(writer, True, number=1002, seed=5)
+        dance.make(second, False, number=1003, seed=2)
+        dance.run(3.2)
+    first, other, _ = dance.parts.puppets
+    assert first.source == "vary" and first.motion.going_on[2] == 1002
+    assert other.motion.going_on[2] == 1003, "the second's next variation came with its return"
+    dance.run(4.0)
+    assert dance.late() == 1, "nothing more comes"
+
+
+def test_a_restarted_stage_goes_on_in_what_was_made(
+    dance_of: Callable[..., Dance], writer: MadeMotionWriter, tmp_path: Path
+) -> None:
+    puppets = [{"name": "a"}, {"name": "b", "phrase": "vary"}]
+    dance = dance_of(puppets=puppets)
+    declare(tmp_path, "improvise")
+    dance.improvise(writer, True, 1001, dance.parts.motion.loop_of("main"), 75)
+    with closing(MadeMotionWriter(tmp_path, 1)) as second:
+        dance.make(second, True, number=1002)
+    dance.run(3.0)
+    assert [one.source for one in dance.parts.puppets] == ["improvise", "vary"]
+    (runtime := tmp_path / "place").mkdir()
+    noted = Resumption("A test", runtime, None, "always")
+    noted.write_checkpoint(dance.reconciler, 7)
+    noted.close()
+    windows = [one.motion.window().copy() for one in dance.parts.puppets]
+    roots = [one.motion.roots().copy() for one in dance.parts.puppets]
+    again = dance_of(puppets=puppets)
+    resumed = Resumption("A test", runtime, None, "always")
+    assert "After a restart" in resumed.go_on(again.reconciler, again.now)
+    resumed.close()
+    for one, window, root in zip(again.parts.puppets, windows, roots, strict=True):
+        assert np.abs(np.sum(one.motion.window() * window, axis=-1)).min() > 0.9999, "the very poses"
+        assert one.motion.roots() == pytest.approx(root, abs=1e-3)
+    again.run(0.5)
+    assert not any(one.motion.jumped for one in again.parts.puppets)
+    assert [one.motion.going_on[2] for one in again.parts.puppets] == [1001, 1002]
+    (tmp_path / FOLDER / "1001.material").unlink()
+    third = dance_of(puppets=puppets)
+    resumed = Resumption("A test", runtime, None, "always")
+    resumed.go_on(third.reconciler, third.now)
+    resumed.close()
+    assert [one.motion.going_on[2] for one in third.parts.puppets] == [0, 1002], "the phrase, if it is gone"
 
 
 def test_after_a_power_cut_it_goes_on_with_its_source(

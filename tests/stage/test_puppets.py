@@ -178,7 +178,7 @@ def test_the_shared_frame_has_room_for_them(night: Night, tmp_path: Path) -> Non
     ("puppets", "words"),
     [
         ([{"name": "a", "phrase": "slow"}], "it dances what the show says"),
-        ([{"name": "a"}, {"name": "b", "phrase": "solw"}], "'b' starts from 'solw', which is no phrase"),
+        ([{"name": "a"}, {"name": "b", "phrase": "solw"}], "'b' starts from 'solw', which the show"),
         ([{"name": "a"}, {"name": "b", "hands": [SENSOR | {"from_start": False}]}], "Nothing lets this hand"),
         ([{"name": "a"}, {"name": "a"}], "Two puppets are called 'a'"),
         ([{"name": "a"}, {"name": "b", "iterations": [2, 3]}], "more than 2 coding iterations"),

@@ -188,7 +188,7 @@ def test_what_was_declared_before_an_order_comes_before_it(evening: Evening) -> 
         writer.write(ShowState(show="A test").with_dance(evening.time.now, {"phrase": ("other", (0.5,))}))
     evening.inbox.waiting = [Order("jump", (0.5,))]
     evening.stage._take_orders(evening.time.now, evening.time.monotonic)
-    assert evening.stage.parts.motion.going_on == ("other", pytest.approx(0.5))
+    assert evening.stage.parts.motion.going_on == ("other", pytest.approx(0.5), 0)
 
 
 def test_an_order_is_carried_out_at_the_time_at_which_it_is_taken(

@@ -32,6 +32,7 @@ from appliance.pose.skeleton import Skeleton
 from appliance.show.sources import GRANULAR, IMPROVISE, KEPT, MAIN, PATH, VARY
 
 GRANULAR_S, POINT_S = 20.0, 12.0  # of a walk; of a point or a stroke of the map, there and back
+_FEWEST, _FADE = 50, 25  # frames of an excerpt, and of the fade from its end to its start
 Recipe = Mapping[str, Any]
 
 
@@ -81,11 +82,12 @@ class Maker:
         return cycle, cycle.blended(windows, starts, network.places)
 
     def _walked(self, network: MotionNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
-        """A walk through the prior, or the path between two phrases, that leads into its own start."""
+        """A walk through the prior, or the path between two excerpts, that leads into its own start."""
         seed = recipe["seed"]
         if recipe.get("from"):
-            cycle = Cycle.of(self._loop_of(recipe["from"]))
-            other = Cycle.of(self._loop_of(recipe.get("to") or recipe["from"]))
+            seconds = recipe.get("seconds", 0.0)
+            cycle = self._excerpt(recipe["from"], recipe.get("from_start_s", 0.0), seconds)
+            other = self._excerpt(recipe.get("to") or recipe["from"], recipe.get("to_start_s", 0.0), seconds)
             starts, one, facing = _encoded(network, cycle)
             _, two, _ = _encoded(network, other)
             two = np.resize(two, one.shape)  # the shorter one goes round
@@ -97,6 +99,16 @@ class Maker:
         waves = recipe["speed"] * GRANULAR_S
         path = latent_paths.walked(len(starts), network.latent, recipe["spread"], waves, seed)
         return cycle, cycle.blended(network.decode(path), starts, network.places)
+
+    def _excerpt(self, name: str, start_s: float, seconds: float) -> Cycle:
+        """The whole cycle of a phrase, or so many of its seconds from there on, as far as it has them."""
+        loop = self._loop_of(name)
+        if not seconds:
+            return Cycle.of(loop)
+        count = min(max(round(seconds * FPS), _FEWEST), loop.length)
+        first = min(max(round((start_s - loop.start_s) * FPS), 0), loop.length - count)
+        part = slice(first, first + count)
+        return Cycle.of(Loop(loop.poses[part], loop.track[part], _FADE, loop.start_s + first / FPS))
 
     def _path(self, network: MotionNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
         """A phrase's own path, or a point or stroke of the map, that wobbles."""
