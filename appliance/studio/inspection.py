@@ -143,7 +143,7 @@ def doubts(skeleton: Skeleton, height: float) -> list[str]:
         asked.append(
             f"The body is {height:.2f} m tall, a dancer has 1.2 to 2.2 m. If the unit is wrong, give it with "
             f"--metres-per-unit: {times:.3g} times the present one makes {USUAL_HEIGHT_M} m"
-            + (f"; of centimetres that is {likely[0]}." if likely else ".")
+            + (f", as if {likely[0]} had been taken for centimetres." if likely else ".")
         )
     missing = missing_roles(skeleton.roles)
     if missing:
