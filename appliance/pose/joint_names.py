@@ -90,8 +90,8 @@ class Place(NamedTuple):
 def place_of(name: str) -> Place | None:
     """Where on a human figure a joint of this name is; None for a name that is not in the table."""
     folded = "".join(letter for letter in _without_frills(name).casefold() if letter.isalnum())
-    folded = _FINGER.sub(_numbered, folded)
-    for side, word in ((0, folded), *_sided(folded)):
+    for side, bone in ((0, folded), *_sided(folded)):
+        word = _FINGER.sub(_numbered, bone)
         plain = word if (word, side == 0) in _PLACES else word.rstrip("0123456789")
         if not plain:
             continue

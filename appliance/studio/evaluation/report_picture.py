@@ -75,6 +75,7 @@ def draw_joints(axes: Any, report: dict[str, Any]) -> None:
     crowded = len(once) * max(map(len, once)) > LETTERS_IN_A_ROW
     size = min(LABEL_PT, SLANTED_LABELS_PT / len(once))
     axes.set_xticks(places, list(once), color=INK, fontsize=size, **(SLANTED if crowded else {}))
+    axes.set_ylim(top=1.2 * axes.get_ylim()[1])  # room for the legend
     _titled(axes, "Which joints it knows best (mean error in degrees)")
     _legend(axes)
 
