@@ -32,7 +32,7 @@ def emulated(show: Show, box: BoxConfig, scratch: Path) -> Iterator[BoxConfig]:
     The venue's own sensors are not admitted meanwhile, and what the box learns about the emulated ones is
     discarded with them. That box has no journal: the venue's is not for rehearsals. Raises StageError.
     """
-    names = list(dict.fromkeys(hand.sensor for hand in show.config.hands if hand.sensor))
+    names = list(dict.fromkeys(hand.sensor for _, hand in show.config.hands_at if hand.sensor))
     if not names:
         raise StageError("This show has no sensors to emulate. Leave --emulate out.")
     keys, words = scratch / "sensors.keys", scratch / _WORDS

@@ -10,6 +10,8 @@ from typing import Annotated
 import typer
 
 from appliance.pose.reading_options import ReadingOptions, reading_options
+from appliance.pose.recording import Recording
+from appliance.pose.stage_frame import Guess
 
 
 class Unit(StrEnum):
@@ -44,9 +46,7 @@ def convert(
     from appliance.exchange.formats import read_as_told, require_known_ending, write_recording
 
     require_known_ending(out)
-    recording, guesses = read_as_told(source, reading)
-    for guess in guesses:
-        print(f"{source.name}: {guess.sentence()}.", file=sys.stderr)
+    recording = _told(source, *read_as_told(source, reading))
     if fps is not None:
         recording = recording.resampled(fps)
     write_recording(out, recording)
@@ -70,13 +70,17 @@ def retarget(
     from appliance.exchange.exchange_error import ExchangeError
     from appliance.exchange.formats import read_as_told, require_known_ending, write_recording
     from appliance.exchange.retargeting import retarget as put_on
+    from appliance.pose.body_facts import with_stance
+    from appliance.pose.bvh import read_bvh
 
     require_known_ending(out)
-    dance, _ = read_as_told(phrase, reading)
-    of_a_show = to.is_dir()  # its skeleton is in the stage's frame already
-    other, _ = read_as_told(to / "skeleton.bvh") if of_a_show else read_as_told(to, reading)
+    dance = _told(phrase, *read_as_told(phrase, reading))
+    if to.is_dir():  # a show's skeleton is in the stage's frame already
+        other = with_stance(read_bvh(to / "skeleton.bvh"))
+    else:
+        other = _told(to, *read_as_told(to, reading)).skeleton
     try:
-        found = put_on(dance, other.skeleton)
+        found = put_on(dance, other)
     except ValueError as error:
         raise ExchangeError(
             out, f"{error} Nothing was written. Rename joints; see bunraku inspect."
@@ -85,6 +89,13 @@ def retarget(
     print(
         f"{out}: {found.seconds:.1f} s of {phrase.name} with the {len(found.skeleton)} joints of {to.name}."
     )
+
+
+def _told(file: Path, recording: Recording, guesses: list[Guess]) -> Recording:
+    """The recording; what was changed in it is said."""
+    for guess in guesses:
+        print(f"{file.name}: {guess.sentence()}.", file=sys.stderr)
+    return recording
 
 
 def import_(

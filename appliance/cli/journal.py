@@ -96,6 +96,7 @@ def write_stretch(
 ) -> None:
     """Write a stretch of a run for the page."""
     from appliance.exchange.formats import write_recording
+    from appliance.pose.counted import counted
     from appliance.pose.recording import Recording
     from appliance.recorder.journal_error import JournalError
     from appliance.recorder.reading import read_journal
@@ -103,7 +104,7 @@ def write_stretch(
 
     runs = read_journal(_recorded(box, chosen, recorded)).runs
     if run > len(runs):
-        raise JournalError(f"The journal has {len(runs)} runs, and no run {run}.")
+        raise JournalError(f"The journal has {counted(len(runs), 'run')}, and no run {run}.")
     one = runs[run - 1]
     if out is None:
         for part in stretch(one, start, seconds):

@@ -73,7 +73,7 @@ def play_show(
             box = opened.enter_context(emulated(show, box, scratch))
         keeps, minutes = journal is not None, box.journal.minutes
         journal = _new_folder(journal) if journal is not None else box.journal.folder
-        if (filmstrip or rehearse) is not None and scratch and (alone or journal is None):
+        if (filmstrip or rehearse) is not None and scratch and not keeps and (alone or journal is None):
             keeps, journal, minutes = True, scratch / "dance.journal", PICTURED_MINUTES
         elif not alone:
             keeps = journal is not None or (box.state_folder is not None and not emulate)

@@ -38,10 +38,10 @@ def rehearsal_picture(journal: Path, out: Path, show: Show) -> list[str]:
     whole = load_dance(journal)
     start_s = pictured_from(whole)
     trouble = _render(journal, out, show.directory, look, start_s)
-    if trouble is None:
-        return [f"What was just danced, as the projector shows it: {out}"]
     dance = whole.part(start_s, PICTURED_S)
-    marked = ", held joints highlighted" if dance.holds is not None and dance.holds.any() else ""
+    marked = ", what a hand holds in colour" if dance.holds is not None and dance.holds.any() else ""
+    if trouble is None:
+        return [f"What was just danced, as the projector shows it{marked}: {out}"]
     return [
         f"The projection cannot be rendered here: {trouble}",
         f"What was just danced{marked}: {draw_dance(dance, out)}",

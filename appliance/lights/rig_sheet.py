@@ -16,6 +16,7 @@ from appliance.lights.plan import draw_plan
 from appliance.lights.run import rig_problems, say
 from appliance.pictures.filmstrip import MissingPicturesError
 from appliance.pose.bvh import read_bvh
+from appliance.pose.counted import counted
 from appliance.pose.recording import Recording
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.bundle import default_show_path
@@ -57,7 +58,9 @@ def print_rig(
 
 
 def _table(config: LightsConfig, show: Show, box: BoxConfig) -> Table:
-    table = Table(title=f"{show.config.name}: {len(config.fixtures)} fixtures", title_justify="left")
+    table = Table(
+        title=f"{show.config.name}: {counted(len(config.fixtures), 'fixture')}", title_justify="left"
+    )
     for heading in ("fixture", "profile", "universe", "channels", "place x, y, z (m)", "pose"):
         table.add_column(heading, overflow="fold")
     for fixture in sorted(config.fixtures, key=lambda one: (one.universe, one.address)):

@@ -23,6 +23,7 @@ from appliance.lights.rig import LOST_S, Rig
 from appliance.outputs.dmx.open_wire import open_universes
 from appliance.outputs.dmx.pace import Universe
 from appliance.outputs.frame_reader import FrameReader, SeenFrame
+from appliance.pose.counted import counted
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import ConfigError, NotAskedForError, Problem
 from appliance.show.lights import LightsConfig
@@ -62,7 +63,7 @@ class Lights:
         mappings = [mapping.name for mapping in self.show.config.lights.mappings]
         wires = " and ".join(universe.wire.name for universe in self.universes)
         rules = f"mappings {', '.join(mappings)}" if mappings else "no mapping: they rest at their defaults"
-        self._say(f"Lights: {len(self.rig.patch.fixtures)} fixtures by {wires}; {rules}.")
+        self._say(f"Lights: {counted(len(self.rig.patch.fixtures), 'fixture')} by {wires}; {rules}.")
         for sentence in unwired(self.show, self.box):
             self._say(sentence)
 

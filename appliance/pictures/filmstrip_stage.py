@@ -15,7 +15,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.skeleton import Skeleton
 
 COLUMN_PX, TILE_PX = 176, 320  # figures stand closer than their arms reach: tiles overlap; at least
-MARGIN_PX, HEADER_PX, FOOTER_PX = 56, 104, 44
+MARGIN_PX, HEADER_PX, FOOTER_PX, LABEL_PX = 56, 104, 44, 22
 HEIGHT_PX = 300  # of the figure in its rest pose
 AZIMUTH, ELEVATION = np.radians(32), np.radians(11)
 TRAIL_S = 0.6
@@ -56,7 +56,8 @@ class Stage:
         self.trails: list[tuple[Array, Array]] = []  # pixels (n, 2) from old to new, how firmly held (n,)
         columns = max(len(row.chosen) for row in rows)
         above = self._highest(rows)
-        self.floor_px = round(above * self.scale * np.cos(ELEVATION)) + 24
+        labels = LABEL_PX if any(row.label for row in rows) else 0
+        self.floor_px = round(above * self.scale * np.cos(ELEVATION)) + 24 + labels
         self.row_px = self.floor_px + FOOTER_PX + 34
         reach_px = math.ceil(self._widest(rows) * self.scale) + MARGIN_PX // 2
         self.tile_px = max(TILE_PX, 2 * reach_px)

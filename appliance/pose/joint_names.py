@@ -15,26 +15,26 @@ from typing import NamedTuple
 CHAINS: dict[str, tuple[tuple[str, ...], ...]] = {
     "spine": (
         ("hips", "hip", "pelvis", "root", "hipmaster", "hipsmaster"),
-        ("abdomen", "ab", "lowerback", "waist", "l5"),
+        ("abdomen", "abdomenlower", "abdomenupper", "ab", "lowerback", "waist", "l5"),
         ("spine", "back", "upperback", "l3"),
-        ("torso", "torsoa", "torsob", "torsoc", "chest", "thorax", "t12"),
-        ("upperchest", "sternum", "spineshoulder", "t8"),
-        ("neck", "lowerneck", "upperneck"),
+        ("torso", "torsoa", "torsob", "torsoc", "chest", "chestlower", "thorax", "t12"),
+        ("upperchest", "chestupper", "sternum", "spineshoulder", "t8"),
+        ("neck", "lowerneck", "necklower", "upperneck", "neckupper"),
         ("head", "skull"),
         ("headtop", "headend", "topofhead", "nose"),
     ),
     "arm": (
         ("collar", "clavicle"),
         ("shoulder",),
-        ("shldr", "upperarm", "arm", "uparm", "uarm", "humerus"),
-        ("elbow", "forearm", "lowerarm", "farm", "radius"),
+        ("shldr", "shldrbend", "upperarm", "arm", "uparm", "uarm", "humerus"),
+        ("elbow", "forearm", "forearmbend", "lowerarm", "farm", "radius"),
         ("wrist",),
         ("hand",),
         ("handtip", "handend"),
     ),
     "leg": (
         ("buttock", "hipjoint"),
-        ("hip", "upleg", "upperleg", "thigh", "femur"),
+        ("hip", "upleg", "upperleg", "thigh", "thighbend", "femur"),
         ("knee", "leg", "shin", "calf", "lowerleg", "tibia"),
         ("ankle",),
         ("foot",),
@@ -66,6 +66,8 @@ _IN_FRONT = re.compile(
     r"cc_base_|def[-_]|b_|valvebiped[._]|bip\d+_)+(?=.)",
     re.IGNORECASE,
 )
+_PHALANXES = {"metacarpal": "4", "proximal": "1", "intermediate": "2", "medial": "2", "distal": "3"}
+_FINGER = re.compile(rf"(?:finger(?P<finger>[1-5]))?(?P<phalanx>{'|'.join(_PHALANXES)})$")
 _BEHIND = re.compile(r"[_.\- ](jnt|joint|bone)$", re.IGNORECASE)
 _SIDES = (  # where a name has its side, the most explicit first; the rest must be a word of the table
     re.compile(r"^(?P<side>left|right)(?P<rest>.+)$"),
@@ -88,7 +90,8 @@ class Place(NamedTuple):
 def place_of(name: str) -> Place | None:
     """Where on a human figure a joint of this name is; None for a name that is not in the table."""
     folded = "".join(letter for letter in _without_frills(name).casefold() if letter.isalnum())
-    for side, word in ((0, folded), *_sided(folded)):
+    for side, bone in ((0, folded), *_sided(folded)):
+        word = _FINGER.sub(_numbered, bone)
         plain = word if (word, side == 0) in _PLACES else word.rstrip("0123456789")
         if not plain:
             continue
@@ -114,6 +117,11 @@ def side_of(name: str) -> int:
         re.IGNORECASE if re.search(r"(^|[_.\- ])[lr]([_.\- ]|$)", plain, re.IGNORECASE) else re.NOFLAG,
     )
     return 0 if words is None else 1 if words[0].casefold().startswith("l") else -1
+
+
+def _numbered(bone: re.Match[str]) -> str:
+    """'finger2proximal' (Rokoko) as 'index1', 'proximal' (Unity, behind the finger) as '1'."""
+    return (FINGERS[int(bone["finger"]) - 1] if bone["finger"] else "") + _PHALANXES[bone["phalanx"]]
 
 
 def _without_frills(name: str) -> str:

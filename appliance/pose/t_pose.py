@@ -24,8 +24,14 @@ def t_pose(skeleton: Skeleton, tolerance_degrees: float = 0.0) -> Anatomy:
     roles = skeleton.roles
 
     def aim(start: str, end: str, way: Array) -> None:
-        if start in roles and end in roles and skeleton.parents[roles[end]] == roles[start]:
-            aims[roles[start], roles[end]] = way
+        """Each bone from one role to another, also where unnamed joints lie between."""
+        joint, first = roles.get(end, -1), roles.get(start, -1)
+        chain: dict[tuple[int, int], Array] = {}
+        while joint > first >= 0:  # parents come before children
+            chain[skeleton.parents[joint], joint] = way
+            joint = skeleton.parents[joint]
+        if joint == first:
+            aims.update(chain)
 
     for start, end in (("hips", "spine"), ("spine", "chest"), ("chest", "neck"), ("neck", "head")):
         aim(start, end, _UP)

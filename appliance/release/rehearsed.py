@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from appliance.box.durable import write_whole
+from appliance.pose.counted import counted
 from appliance.release.arrivals import SHOW
 from appliance.show.bundle import write_checksums
 from appliance.show.config_error import ConfigError
@@ -45,7 +46,9 @@ def keep_cue(show: Path, folder: Path, cue: Mapping[str, Any]) -> str:
         raise
     write_checksums(copy)
     _pack(copy, folder / ZIP)
-    return f"The cue {cue['name']} is in the copy of the show, which has {len(config.cues)} cues now."
+    return (
+        f"The cue {cue['name']} is in the copy of the show, which has {counted(len(config.cues), 'cue')} now."
+    )
 
 
 def _pack(copy: Path, path: Path) -> None:

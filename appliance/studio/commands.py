@@ -60,7 +60,9 @@ class Device(StrEnum):
 Recordings = Annotated[Path | None, typer.Option(help="Folder with the dancer's BVH recordings.")]
 Phrase = Annotated[
     Path | None,
-    typer.Option(help="BVH that the show plays. Default: the one in --out, else an excerpt of a recording."),
+    typer.Option(
+        help="BVH that the show plays. Default: the one in --out, else the recorded stretch that loops best."
+    ),
 ]
 Name = Annotated[str | None, typer.Option(help="Name of the show. Default: the folder's name.")]
 Hand = Annotated[str | None, typer.Option(help="Joint of the first hand. Default: left upper arm.")]

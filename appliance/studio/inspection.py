@@ -18,7 +18,7 @@ from appliance.pose.body_facts import (
     sampled_positions,
     stands,
 )
-from appliance.pose.roles import missing_roles
+from appliance.pose.roles import SIDES, missing_roles, places_of, trunk_of
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.takes import Take
 from appliance.studio.evaluation.masked import masked_stretches
@@ -96,6 +96,10 @@ def inspect(take: Take) -> Inspection:
 def joint_facts(skeleton: Skeleton) -> list[dict[str, Any]]:
     """Each joint's name, parent, what it was taken for ('': nothing), and its bone's length in metres."""
     called = {joint: role for role, joint in skeleton.roles.items()}
+    places = places_of(skeleton.names)
+    for joint, place in enumerate(places):  # beyond the roles: fingers, eyes, more of the trunk
+        if place is not None and (place.chain not in ("arm", "leg", "spine") or joint in trunk_of(places)):
+            called.setdefault(joint, f"{SIDES.get(place.side, '')} {place.chain}".strip())
     return [
         {
             "name": name,
@@ -143,7 +147,7 @@ def doubts(skeleton: Skeleton, height: float) -> list[str]:
         asked.append(
             f"The body is {height:.2f} m tall, a dancer has 1.2 to 2.2 m. If the unit is wrong, give it with "
             f"--metres-per-unit: {times:.3g} times the present one makes {USUAL_HEIGHT_M} m"
-            + (f"; of centimetres that is {likely[0]}." if likely else ".")
+            + (f", as if {likely[0]} had been taken for centimetres." if likely else ".")
         )
     missing = missing_roles(skeleton.roles)
     if missing:

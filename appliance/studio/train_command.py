@@ -12,6 +12,7 @@ from rich.console import Console
 from torch import nn
 
 from appliance.dancer.material.improvising import MOVE
+from appliance.pose.counted import counted
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.studio.autoencoder.models import MODELS, AnySettings, settings_for, settings_from
 from appliance.studio.autoencoder.training import Settings, Training
@@ -245,9 +246,9 @@ def _paced(settings: AnySettings, options: TrainOptions) -> AnySettings:
 
 def _plan(training: Training | AnyTraining, device: str) -> str:
     settings, processes = training.settings, training.processes
-    bound = f"{settings.steps} steps" if settings.steps else f"{settings.minutes:g} minutes"
+    bound = counted(settings.steps, "step") if settings.steps else f"{settings.minutes:g} minutes"
     done = f", {100 * training.fraction:.0f} % done" if training.step else ""
-    where = "the GPU" if device == "cuda" else f"the CPU ({torch.get_num_threads()} threads)"
+    where = "the GPU" if device == "cuda" else f"the CPU ({counted(torch.get_num_threads(), 'thread')})"
     shared = f" in each of {processes.count} processes" if processes.count > 1 else ""
     network, words = _described(training)
     return (

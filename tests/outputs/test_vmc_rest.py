@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ from appliance.outputs.osc.vmc import Vmc
 from appliance.pose import quaternion
 from appliance.pose.skeleton import Skeleton
 from appliance.pose.stage_frame import in_stage_frame
+from appliance.pose.t_pose import t_pose
 from appliance.show_control.vmc_input import BONE, VmcInput
 from tests.outputs.test_vmc import MIRROR, matrix, sent
 from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of, skeleton_of
@@ -30,7 +33,8 @@ WAYS_DEGREES, TWIST_DEGREES = 2.0, 20.0
 
 
 def posed_avatar(messages: dict[str, list[float]]) -> dict[str, NDArray[np.float64]]:
-    """World transforms of an avatar of Unity's: a T-pose in which no bone is turned, given the rotations."""
+    """World transforms of an avatar of Unity's with all bones: a T-pose in which no bone is turned, given the
+    rotations; a bone that none was sent for stays as it is."""
     body = skeleton_of("Mixamo")
     joint_of = humanoid_bones(body.names)
     bone_of = {joint: bone for bone, joint in joint_of.items()}
@@ -40,7 +44,8 @@ def posed_avatar(messages: dict[str, list[float]]) -> dict[str, NDArray[np.float
         if parent < 0:
             posed[bone] = matrix(np.array(messages[bone][:3]), *messages[bone][3:])
         else:
-            posed[bone] = posed[bone_of[parent]] @ matrix(offset, *messages[bone][3:])
+            turn = messages[bone][3:] if bone in messages else (0.0, 0.0, 0.0, 1.0)
+            posed[bone] = posed[bone_of[parent]] @ matrix(offset, *turn)
     return posed
 
 
@@ -83,3 +88,13 @@ def test_an_avatar_takes_the_pose_of_every_system_s_figure(convention: str) -> N
             turned = (MIRROR @ matrix(np.zeros(3), x, y, z, w) @ MIRROR)[:3, :3]
             for column in range(3):
                 assert degrees(avatar[bone][:3, column], turned[:, column]) < TWIST_DEGREES, (number, bone)
+
+
+def test_the_rest_is_upright_from_hips_to_head_whatever_the_stance_bends() -> None:
+    given = in_stage_frame(as_the_system_writes(dance_of("LAFAN", 2.0), "LAFAN"))[0].skeleton
+    assert given.stance is not None
+    bent, between = given.stance.copy(), given.index("Spine1")  # a joint without a role
+    bent[between] = quaternion.multiply(quaternion.from_axis_angle([0.0, 1.0, 0.0], 0.6), bent[between])
+    rest = t_pose(replace(given, stance=bent)).positions
+    up = rest[given.roles["head"]] - rest[given.roles["spine"]]
+    assert up[1] > 0.999 * np.linalg.norm(up)

@@ -6,6 +6,7 @@ Everything here is made by this script after the systems' documentation; nothing
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,9 +16,8 @@ from appliance.pose.recording import Recording
 from appliance.pose.skeleton import Skeleton
 from tests.pose.other_frames import axes_turned, rezeroed, scaled
 
-Bone = tuple[
-    str, str, tuple[float, float, float]
-]  # role, role of its parent, metres in a T-pose that faces +z
+# role, role of its parent, metres in a T-pose that faces +z
+Bone = tuple[str, str, tuple[float, float, float]]
 
 _TRUNK: list[Bone] = [
     ("hips", "", (0, 0, 0)),
@@ -36,22 +36,30 @@ _SIDE: list[Bone] = [
     ("foot", "shin", (0, -0.41, 0)),
     ("toe", "foot", (0, -0.07, 0.14)),
 ]
-ENDS = {"head": (0.0, 0.2, 0.0), "hand": (0.17, 0.0, 0.0), "toe": (0.0, 0.0, 0.06)}
+_MIDDLE, _PARTS = [bone[0] for bone in _TRUNK], [bone[0] for bone in _SIDE]
+_ENDS = {"head": (0.0, 0.2, 0.0), "toe": (0.0, 0.0, 0.06)}
+_PHALANXES = ("Proximal", "Intermediate", "Distal")
+_FINGERS = ("Thumb", "Index", "Middle", "Ring", "Pinky")  # across the palm, from the front to the back
+_FINGERTIPS = {f"{finger} 3": (0.02, 0.0, 0.0) for finger in _FINGERS}
 
 
 @dataclass(frozen=True)
 class Convention:
     """How a system writes a dancer. names: of hips, spine, chest, neck, head, then of a side's eight joints.
 
-    side: a pattern of `word` and of `side`, one of the two in `sides`; metres: in a unit of length; up: the
-    vertical axis; turned_degrees: how far the dancer is turned from +z about the vertical; zero: what the
-    zero pose is (T, A, or x: all bones along x); floor_root: the name of a root on the floor, '' without.
+    between: of the joints between spine and chest; side: a pattern of `word` and of `side`, one of the two in
+    `sides`; finger: the word of a finger's joint, as a pattern of `finger` or its `place`, of `number` or
+    `bone`, '' without fingers; metres: in a unit of length; up: the vertical axis; turned_degrees: how far
+    the dancer is turned from +z about the vertical; zero: what the zero pose is (T, A, or x: all bones along
+    x); floor_root: the name of a root on the floor, '' without.
     """
 
     names: str
+    between: str = ""
     sides: tuple[str, str] = ("Left", "Right")
     side: str = "{side}{word}"
     prefix: str = ""
+    finger: str = ""
     metres: float = 0.01
     up: str = "y"
     turned_degrees: float = 0.0
@@ -62,34 +70,80 @@ class Convention:
     def name(self, role: str) -> str:
         words = self.names.split()
         side, _, part = role.partition(" ")
+        if side == "between":
+            return self.prefix + self.between.split()[int(part)]
         if side not in ("left", "right"):
-            middle = [name for name, _, _ in _TRUNK]
-            return self.prefix + words[middle.index(role)]
-        word = words[len(_TRUNK) + [name for name, _, _ in _SIDE].index(part)]
+            return self.prefix + words[_MIDDLE.index(role)]
+        finger, _, number = part.partition(" ")
+        if finger in _FINGERS:
+            place, bone = 1 + _FINGERS.index(finger), _PHALANXES[int(number) - 1]
+            word = self.finger.format(finger=finger, place=place, number=number, bone=bone)
+        else:
+            word = words[len(_MIDDLE) + _PARTS.index(part)]
         return self.prefix + self.side.format(word=word, side=self.sides[side == "right"])
 
     def roles(self) -> dict[str, str]:
-        """Role to name."""
-        return {role: self.name(role) for role, _, _ in bones()}
+        """Role to name, without fingers and what lies between spine and chest."""
+        sides = [f"{side} {part}" for side in ("left", "right") for part in _PARTS]
+        return {role: self.name(role) for role in (*_MIDDLE, *sides)}
+
+    def bones(self) -> list[Bone]:
+        """The whole body in the order of a BVH file."""
+        between = [f"between {number}" for number in range(len(self.between.split()))]
+        spine = ["spine", *between, "chest"]
+        found = [bone for bone in _TRUNK if bone[0] != "chest"]
+        found += [(above, below, (0.0, 0.22 / (len(spine) - 1), 0.0)) for below, above in pairwise(spine)]
+        for side, sign in (("left", 1), ("right", -1)):
+            parts = _SIDE + (_fingers() if self.finger else [])
+            found += [
+                (f"{side} {role}", above if above in _MIDDLE else f"{side} {above}", (sign * x, y, z))
+                for role, above, (x, y, z) in parts
+            ]
+        return _depth_first(found)
 
 
 _MOTIONBUILDER = "Hips Spine Spine1 Neck Head Shoulder Arm ForeArm Hand UpLeg Leg Foot ToeBase"
 CONVENTIONS = {
     "Rokoko": Convention(
-        "Hips Spine1 Spine2 Neck Head Shoulder Arm ForeArm Hand Thigh Shin Foot Toe", fps=100.0
+        "Hips Spine1 Spine4 Neck Head Shoulder Arm ForeArm Hand Thigh Shin Foot Toe",
+        between="Spine2 Spine3",
+        finger="Finger{place}{bone}",
+        fps=100.0,
     ),
     "Xsens": Convention(
-        "Hips Chest Chest2 Neck Head Collar Shoulder Elbow Wrist Hip Knee Ankle Toe", fps=240.0
+        "Hips Chest Chest4 Neck Head Collar Shoulder Elbow Wrist Hip Knee Ankle Toe",
+        between="Chest2 Chest3",
+        fps=240.0,
     ),
     "Captury": Convention(
-        _MOTIONBUILDER.replace("Spine1", "Spine4"), metres=0.001, floor_root="Root", fps=50.0
+        _MOTIONBUILDER.replace("Spine1", "Spine4"),
+        between="Spine1 Spine2 Spine3",
+        finger="Hand{finger}{number}",
+        metres=0.001,
+        floor_root="Root",
+        fps=50.0,
     ),
-    "OptiTrack": Convention(_MOTIONBUILDER, prefix="Skeleton 001:", metres=1.0, fps=120.0),
-    "Mixamo": Convention(_MOTIONBUILDER, prefix="mixamorig:", fps=30.0),
+    "OptiTrack": Convention(
+        "Hips Ab Chest Neck Head Shoulder UArm FArm Hand Thigh Shin Foot Toe",
+        sides=("L", "R"),
+        prefix="Skeleton 001:",
+        finger="{finger}{number}",
+        metres=1.0,
+        fps=120.0,
+    ),
+    "Mixamo": Convention(
+        _MOTIONBUILDER.replace("Spine1", "Spine2"),
+        between="Spine1",
+        prefix="mixamorig:",
+        finger="Hand{finger}{number}",
+        fps=30.0,
+    ),
     "Unreal": Convention(
         "pelvis spine_01 spine_03 neck_01 head clavicle upperarm lowerarm hand thigh calf foot ball",
         sides=("l", "r"),
         side="{word}_{side}",
+        between="spine_02",
+        finger="{finger}_0{number}",
         up="z",
         floor_root="root",
         zero="A",
@@ -98,6 +152,7 @@ CONVENTIONS = {
         "Hips Spine Chest Neck Head Shoulder UpperArm LowerArm Hand UpperLeg LowerLeg Foot Toes",
         side="{word}_{side}",
         sides=("L", "R"),
+        finger="{finger}{bone}",
         metres=1.0,
         turned_degrees=180.0,
     ),
@@ -113,15 +168,22 @@ CONVENTIONS = {
         "Pelvis Spine1 Spine3 Neck Head Collar Shoulder Elbow Wrist Hip Knee Ankle Foot",
         sides=("L", "R"),
         side="{side}_{word}",
+        between="Spine2",
         metres=1.0,
         fps=30.0,
     ),
     "CMU": Convention(_MOTIONBUILDER, metres=0.0564, fps=120.0),
-    "LAFAN": Convention(_MOTIONBUILDER.replace("ToeBase", "Toe"), zero="x", fps=30.0),
+    "LAFAN": Convention(
+        _MOTIONBUILDER.replace("ToeBase", "Toe").replace("Spine1", "Spine2"),
+        between="Spine1",
+        zero="x",
+        fps=30.0,
+    ),
     "joint_Root": Convention(
         "HipMaster TorsoA TorsoC Neck Head Clavicle Shoulder Elbow Hand Hip Knee Foot Toe",
         sides=("LT", "RT"),
         side="{word}{side}",
+        between="TorsoB",
         prefix="joint_",
         floor_root="joint_Root",
         fps=30.0,
@@ -129,16 +191,13 @@ CONVENTIONS = {
 }
 
 
-def bones() -> list[Bone]:
-    """The whole body in the order of a BVH file."""
-    found = list(_TRUNK)
-    middle = {role for role, _, _ in _TRUNK}
-    for side, sign in (("left", 1), ("right", -1)):
-        found += [
-            (f"{side} {role}", above if above in middle else f"{side} {above}", (sign * x, y, z))
-            for role, above, (x, y, z) in _SIDE
-        ]
-    return _depth_first(found)
+def _fingers() -> list[Bone]:
+    """Of one hand: three joints each, as in a T-pose with the palms to the floor."""
+    return [
+        (f"{finger} {n}", f"{finger} {n - 1}" if n > 1 else "hand", (0.03 if n > 1 else 0.085, 0, across))
+        for place, finger in enumerate(_FINGERS)
+        for n, across in ((1, 0.03 - 0.02 * place), (2, 0.0), (3, 0.0))
+    ]
 
 
 def _depth_first(given: list[Bone], above: str = "") -> list[Bone]:
@@ -147,14 +206,16 @@ def _depth_first(given: list[Bone], above: str = "") -> list[Bone]:
 
 def skeleton_of(convention: str) -> Skeleton:
     """The skeleton in metres, Y up, facing +z, its zero pose a T, with the convention's names and root."""
-    system, whole = CONVENTIONS[convention], bones()
+    system = CONVENTIONS[convention]
+    whole = system.bones()
     names = [system.name(role) for role, _, _ in whole]
     order = [role for role, _, _ in whole]
     parents = [order.index(above) if above else -1 for _, above, _ in whole]
     offsets = [offset for _, _, offset in whole]
+    tips = _ENDS | (_FINGERTIPS if system.finger else {"hand": (0.17, 0.0, 0.0)})
     ends = []
     for joint, role in enumerate(order):
-        tip = ENDS.get(role.rpartition(" ")[2] if role.startswith(("left", "right")) else role)
+        tip = tips.get(role.removeprefix("left ").removeprefix("right "))
         if tip is not None:
             sign = -1.0 if role.startswith("right") else 1.0
             ends.append((joint, (sign * tip[0], tip[1], tip[2])))
@@ -220,9 +281,11 @@ def _zero_world(skeleton: Skeleton, convention: str) -> Array:
     kind = CONVENTIONS[convention].zero
     for joint in range(len(skeleton)):
         role = next((r for r, j in skeleton.roles.items() if j == joint), "")
-        if kind == "A" and role.endswith(("upper arm", "forearm", "hand")):
+        if kind == "A" and role.endswith("upper arm"):
             angle = np.radians(-45.0 if role.startswith("left") else 45.0)
             zero[joint] = quaternion.from_axis_angle([0.0, 0.0, 1.0], angle)
+        elif kind == "A" and joint:
+            zero[joint] = zero[skeleton.parents[joint]]
         if kind == "x":
             children = [c for c, parent in enumerate(skeleton.parents) if parent == joint]
             tips = [np.array(end) for j, end in skeleton.ends if j == joint]

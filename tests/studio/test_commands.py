@@ -46,7 +46,7 @@ def test_training_tells_what_it_found_and_how_it_went(trained: Trained) -> None:
         "17 of 20 joints move",
         "The others never turn and stay as they are",
         "Kept apart to measure on, by take: sway_2",
-        "60 steps on the CPU (1 threads)",
+        "60 steps on the CPU (1 thread)",
         "degrees on held-out takes",
         "computes what was trained",
         "The bundle contains a recording",

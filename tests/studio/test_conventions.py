@@ -8,21 +8,34 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from PIL import Image
 
 from appliance.exchange.retargeting import lowest_m
+from appliance.lights.beams import beams_of
+from appliance.lights.patch import Patch
+from appliance.lights.phrase_run import passes
 from appliance.outputs.osc.humanoid import humanoid_bones
 from appliance.pose.body_facts import fronts, height_m
-from appliance.pose.bvh import write_bvh
+from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import read_upright
 from appliance.pose.skeleton import Skeleton
-from appliance.recorder.reading import read_journal
+from appliance.projector.strip import COLUMNS, ROWS
+from appliance.recorder.reading import JournalRecording, read_journal
+from appliance.recorder.record import holds_of
+from appliance.show.show import load_show
+from hw_sim.osc_receiver import OscReceiver
 from tests.cli.test_cli import write_box
 from tests.command import Command
+from tests.outputs.test_vmc_rest import LIMBS, WAYS_DEGREES, degrees, posed_avatar
 from tests.pose.conventions import CONVENTIONS, as_the_system_writes, dance_of
 from tests.studio.conftest import bunraku as studio
 from tests.studio.test_commands import said
 
+LOOKS = ("plaster", "lines", "ink", "cloud", "veil")
+NO_PORTS = {"control": None, "console": None, "sensors": {"udp": None}}
+BEAM_M = 0.1
+HELD_RED = 60  # of 255: how much redder than green and blue
 SMALL = ("--steps", 2, "--width", 16, "--latent", 4, "--threads", 1, "--device", "cpu")
 FLOOR_M = 0.02
 
@@ -68,24 +81,86 @@ def test_a_system_s_recordings_become_a_show_that_dances(
 ) -> None:
     if convention not in ("LAFAN", "Unreal") and not long_run:
         pytest.skip("every system's: --long")
-    folder, show = tmp_path / "recordings", tmp_path / "show"
+    folder, show, system = tmp_path / "recordings", tmp_path / "show", CONVENTIONS[convention]
     for take in range(2):
         write(folder / f"take_{take}.bvh", convention, 6.0, seed=take)
     trained = studio("train", "--recordings", folder, "--out", show, *SMALL)
     assert trained.exit_code == 0, said(trained)
-    arm = CONVENTIONS[convention].name("left upper arm")
-    assert yaml.safe_load((show / "show.yaml").read_text())["hands"][0]["joint"] == arm
+    arm = system.name("left upper arm")
+    hand = yaml.safe_load((show / "show.yaml").read_text())["hands"][0]
+    assert hand["joint"] == arm
     measured = studio("evaluate", show, folder / "take_1.bvh", "--json")
     assert measured.exit_code == 0, said(measured)
-    box = write_box(tmp_path)
-    journal = tmp_path / "journal"
-    bunraku("play", "--alone", "--show", show, "--box", box, "--seconds", "0.5", "--journal", journal)
-    danced = read_journal(journal)
+    light(show, system.name("left hand"), hold=arm)
+    danced, avatar = played(tmp_path, show, bunraku)
     assert danced.header["hands"][0]["joint"] == arm
+    holds = holds_of(danced.header, danced.ticks)[-1]
+    assert danced.skeleton.names[int(np.argmax(holds))] == arm and np.count_nonzero(holds) == 1
     poses, roots = danced.ticks["pose"].astype(float), danced.ticks["root"].astype(float)
     assert_a_dancer(danced.skeleton, poses, roots)
     assert (danced.skeleton.stance is not None) == (convention == "LAFAN")
-    for look in ("plaster", "lines", "ink", "cloud", "veil") if long_run else ():
+    assert_an_avatar_like(avatar, danced.skeleton, poses[-1], roots[-1])
+    assert_the_head_follows(show, system.name("left hand"))
+    for look in LOOKS if long_run else LOOKS[:1]:
         picture = tmp_path / f"{look}.png"
-        bunraku("filmstrip", show / "phrase.bvh", "--seconds", "1", "--look", look, "--out", picture)
-        assert picture.stat().st_size > 10_000
+        bunraku("filmstrip", tmp_path / "journal", "--look", look, "--start", "0.6", "--out", picture)
+        assert_held_on_the_right(picture)
+
+
+def light(show: Path, joint: str, hold: str) -> None:
+    """Gives the show a moving head that follows a joint, and a hand that keeps another, without a sensor."""
+    config = yaml.safe_load((show / "show.yaml").read_text())
+    config["hands"] = [{"kept": True, "joint": hold}]
+    follow = {"reads": "place", "joint": joint, "drives": "aim"}
+    config["lights"] = {
+        "fixtures": [{"name": "spot", "profile": "moving-spot", "address": 1, "place": [-2, 4, 1]}],
+        "mappings": [{"name": "follow", "rules": [follow]}],
+    }
+    (show / "show.yaml").write_text(yaml.safe_dump(config, allow_unicode=True))
+
+
+def played(folder: Path, show: Path, bunraku: Command) -> tuple[JournalRecording, dict[str, list[float]]]:
+    """The journal of a second of the show, and what an avatar heard last by VMC: bone to numbers."""
+    with OscReceiver("127.0.0.1") as avatar:
+        receiver = {"host": "127.0.0.1", "port": avatar.port, "dialect": "vmc"}
+        box = write_box(folder, yaml.safe_dump({**NO_PORTS, "outputs": {"osc": [receiver]}}))
+        journal = ("--journal", folder / "journal")
+        bunraku("play", "--alone", "--show", show, "--box", box, "--seconds", "1", *journal)
+        messages = avatar.poll(1.0)
+    heard = {str(words[0]): words[1:] for _, address, words in messages if address.endswith("/Bone/Pos")}
+    return read_journal(folder / "journal"), heard
+
+
+def assert_an_avatar_like(
+    heard: dict[str, list[float]], skeleton: Skeleton, pose: Array, root: Array
+) -> None:
+    """An avatar in a T-pose that is turned as it was told has the limbs of the figure, mirrored."""
+    positions, _ = skeleton.forward_kinematics(pose, root)
+    avatar, joint_of = posed_avatar(heard), humanoid_bones(skeleton.names)
+    for start, end in LIMBS:
+        ours = (positions[joint_of[end]] - positions[joint_of[start]]) * [-1, 1, 1]
+        assert degrees(ours, avatar[end][:3, 3] - avatar[start][:3, 3]) < WAYS_DEGREES, (start, end)
+
+
+def assert_the_head_follows(show: Path, joint: str) -> None:
+    """The light meets the joint, at a dancer's height."""
+    loaded = load_show(show)
+    patch, phrase = Patch(loaded.config.lights.fixtures, show), read_bvh(loaded.phrase)
+    *_, last = passes(loaded.config.lights, patch, phrase, "", 0, 100, 5)
+    (beam,) = beams_of(patch, last.values)
+    place = last.dancer[phrase.skeleton.index(joint)]
+    off = np.cross(place - beam.place, beam.direction)
+    assert np.linalg.norm(off) < BEAM_M and 0.3 < place[1] < 2.2
+
+
+def assert_held_on_the_right(picture: Path) -> None:
+    """The left arm of a figure that faces the audience is on the picture's right, where the colour is."""
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    across = pixels.shape[1] // COLUMNS
+    right = []
+    for column in range(COLUMNS):
+        panel = pixels[: pixels.shape[0] // ROWS, column * across : (column + 1) * across]
+        red = panel[..., 0] - panel[..., 1:].max(axis=-1) > HELD_RED
+        if red.any():
+            right.append(float(np.flatnonzero(red.any(axis=0)).mean()) > 0.5 * across)
+    assert len(right) == COLUMNS and np.mean(right) > 0.5, (picture.name, right)

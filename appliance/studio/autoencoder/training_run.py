@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn
 from torch import nn
 
+from appliance.pose.counted import counted
 from appliance.studio.autoencoder.training import Report, Training
 from appliance.studio.data.dataset import window_starts
 from appliance.studio.evaluation.coders import TorchCoder
@@ -87,7 +88,8 @@ class TrainingRun:
     def _draw_strip(self, report: Report) -> None:
         dataset = self.training.dataset
         take = max(dataset.held_out or dataset.training, key=lambda take: len(window_starts(take)))
-        title = f"{take.name} after {report.seconds / 60:.0f} minutes ({report.step} steps)"
+        minutes, steps = counted(round(report.seconds / 60), "minute"), counted(report.step, "step")
+        title = f"{take.name} after {minutes} ({steps})"
         path = self.folder / "pictures" / f"filmstrip_{round(100 * report.fraction):03d}.png"
         coder = TorchCoder(self.training.averaged, dataset.moving_names, {})
         draw_reconstruction(path, coder, take, title)

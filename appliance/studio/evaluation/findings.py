@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from appliance.pose.body_facts import height_m, sampled_positions
+from appliance.pose.counted import counted
 from appliance.studio.data.dataset import FPS, WINDOW, Dataset, DatasetError, Take, window_starts
 from appliance.studio.inspection import doubts, zero_pose
 
 MASKED_PICTURE = "pictures/masked.png"
 FEW_S = 120.0  # of sound dance to learn from
+_ENOUGH = f"{FEW_S / 60:g} minutes of dance are enough to begin with, ten for a stage"
 
 
 def findings(dataset: Dataset) -> list[str]:
@@ -22,9 +24,10 @@ def findings(dataset: Dataset) -> list[str]:
     files, performances = len({take.file for take in takes}), len({take.take for take in takes})
     why_not = dataset.asymmetry
     images = " (their mirror images besides)" if not why_not else ""
+    learned = counted(learned_windows(dataset), "window")
     apart = sum(len(window_starts(take)) for take in dataset.held_out)
     return [
-        f"{_count(files, 'recording')} of {_count(performances, 'take')}, "
+        f"{counted(files, 'recording')} of {counted(performances, 'take')}, "
         f"{_minutes(takes):.1f} minutes, resampled to {FPS:g} poses a second.",
         f"{len(moving)} of {len(names)} joints move: {', '.join(moving)}."
         + (f" The others never turn and stay as they are: {', '.join(still)}." if still else ""),
@@ -33,7 +36,7 @@ def findings(dataset: Dataset) -> list[str]:
         *_notes(takes),
         *_masked(takes),
         _kept_apart(dataset),
-        f"{learned_windows(dataset):,} windows of 8 poses to learn from{images}, {apart:,} kept apart.",
+        f"{learned} of {WINDOW} poses to learn from{images}, {apart:,} kept apart.",
         *([f"Not learned from the mirror's side too: {why_not}."] if why_not else []),
         *few_data(dataset),
     ]
@@ -52,9 +55,9 @@ def require_windows(dataset: Dataset, least: int, window: int = WINDOW) -> None:
     masked = sum(int(np.count_nonzero(~take.sound)) for take in dataset.training) / FPS
     why = f" {masked:.1f} s are masked as capture errors ({MASKED_PICTURE})." if masked else ""
     raise DatasetError(
-        f"Only {_count(found, 'window')} of {window} sound poses (about {found / FPS:.1f} s) to learn from: "
-        f"too few to learn anything. At least {least} are needed (about {least / FPS:.0f} s in a row), some "
-        f"minutes are better.{why} Bring more or longer recordings."
+        f"Only {counted(found, 'window')} of {window} sound poses (about {found / FPS:.1f} s) to learn from: "
+        f"too few to learn anything. At least {least} are needed (about {least / FPS:.0f} s in a row); "
+        f"{_ENOUGH}.{why} Bring more or longer recordings."
     )
 
 
@@ -74,8 +77,8 @@ def few_data(dataset: Dataset) -> list[str]:
         return []
     return [
         f"{seconds:.0f} s are little to learn from: expect a dancer that knows these few moves, and that "
-        f"answers a hand far from all of them with the nearest one. {FEW_S / 60:g} minutes of dance are "
-        "enough to begin with, ten for a stage: the show that comes along learned from 11."
+        f"answers a hand far from all of them with the nearest one. {_ENOUGH}: the show that comes along "
+        "learned from 11."
     ]
 
 
@@ -107,7 +110,7 @@ def _rates(takes: Sequence[Take]) -> list[str]:
         if abs(take.true_fps - take.header_fps) > 0.01:
             pairs.setdefault((round(take.header_fps, 2), take.true_fps), []).append(take.name)
     return [
-        f"{_count(len(names), 'file')} read at {true:g} poses a second where the header says {header:g}: "
+        f"{counted(len(names), 'file')} read at {true:g} poses a second where the header says {header:g}: "
         f"{_few(sorted(names))}."
         for (header, true), names in pairs.items()
     ]
@@ -123,7 +126,7 @@ def _masked(takes: Sequence[Take]) -> list[str]:
     named = _few([f"{take.name} ({counts[take.name]:,}: {_joints(take)})" for take in worst])
     return [
         f"Masked as capture errors: {total:,} of {frames:,} frames ({100 * total / frames:.1f} %) in "
-        f"{_count(len(worst), 'recording')}: {named}.",
+        f"{counted(len(worst), 'recording')}: {named}.",
         f"{MASKED_PICTURE} shows the worst. What is no error: --keep '{worst[0].file}', or keep: with its "
         "seconds in catalogue.yaml.",
     ]
@@ -145,7 +148,3 @@ def _few(names: Sequence[str], most: int = 4) -> str:
 
 def _minutes(takes: Sequence[Take]) -> float:
     return sum(take.recording.seconds for take in takes) / 60
-
-
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}" + ("" if number == 1 else "s")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from typing import Any
+from typing import Any, Literal
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -14,8 +14,8 @@ from appliance.pose.roles import UPPER_ARMS, held_joints
 ANSWERS, ANSWERS_A_LITTLE = 8.0, 4.0  # degrees
 LIVELY = (0.7, 1.3)  # energy
 PLAUSIBLE = 1.1  # the phrase has 1; release 0.1.0, the arm more or less pasted on, 1.1 to 1.25
-COLUMNS = ["held", "K/J", "answer", "fit", "own / foreign"]
-COLUMNS += ["plausibility", "energy", "roughness", "off the hand"]
+COLUMNS = ["held", "K/J", "answer", "fit", "own/foreign"]
+COLUMNS += ["plausibility", "energy", "roughness", "off hand"]
 ENOUGH_MINUTES = 8.0  # the default show's dancer answers with what it learned in 11
 
 
@@ -65,10 +65,12 @@ def table(found: dict[str, Any]) -> Table:
     made = Table(
         title="Does the hand move the body? Degrees; plausibility, energy, roughness: the phrase is 1",
         box=SIMPLE_HEAD,
+        padding=0,  # figures and headings are whole in 80 columns, long names of joints are folded
+        pad_edge=False,
     )
     for heading in COLUMNS:
-        is_name = heading == "held"
-        made.add_column(heading, justify="left" if is_name else "right", no_wrap=is_name)
+        justify: Literal["left", "right"] = "left" if heading == "held" else "right"
+        made.add_column(heading, justify=justify, min_width=len(heading), overflow="fold")
     for joint in joints_of(found):
         for key, row in iterations_of(found[joint]).items():
             made.add_row(joint, key.replace("_", "/"), *_row(row))
@@ -171,7 +173,7 @@ def reservations(row: dict[str, Any]) -> list[str]:
 
 
 def _row(row: dict[str, Any]) -> list[str]:
-    baselines = " / ".join(_number(row[key], 1) for key in ("fit_own", "fit_bare"))
+    baselines = "/".join(_number(row[key], 1) for key in ("fit_own", "fit_bare"))
     return [
         _number(row["answer"], 1),
         _number(row["fit"], 1),

@@ -24,8 +24,10 @@ from appliance.studio.evaluation.pictures import (
     save,
 )
 
+WIDTH_INCHES = 15.0
 STRIP_SHARE = 0.58  # height of the filmstrip by its width
-LETTERS_IN_A_ROW = 160  # of joints' names; more run into each other
+LETTERS_IN_A_ROW = 200  # were all joints' names as long as the longest; more run into each other
+LABEL_PT, SLANTED_LABELS_PT = 8.0, 540.0  # slanted ones are smaller where more than 67 stand side by side
 SLANTED: dict[str, Any] = {"rotation": 40, "ha": "right", "rotation_mode": "anchor"}
 
 
@@ -35,10 +37,10 @@ def draw_report(
     """Filmstrip of a take and its reconstruction; errors by joint and by iterations; latents; int8."""
     import matplotlib.image
 
-    figure = new_figure(15, 15 * STRIP_SHARE + 8.4)
+    figure = new_figure(WIDTH_INCHES, WIDTH_INCHES * STRIP_SHARE + 8.4)
     figure.suptitle(_headline(name, report), color=INK, fontsize=15, x=0.01, ha="left")
     figure.get_layout_engine().set(w_pad=0.15, h_pad=0.12)
-    grid = figure.add_gridspec(3, 3, height_ratios=[15 * STRIP_SHARE, 3.6, 3.6])
+    grid = figure.add_gridspec(3, 3, height_ratios=[WIDTH_INCHES * STRIP_SHARE, 3.6, 3.6])
     with tempfile.TemporaryDirectory() as folder:
         title = (
             f"{take.name}, a take that it never saw"
@@ -49,7 +51,7 @@ def draw_report(
     axes = figure.add_subplot(grid[0, :])
     axes.imshow(strip, interpolation="antialiased")
     axes.set_axis_off()
-    _by_joint(dressed(figure.add_subplot(grid[1, :])), report)
+    draw_joints(dressed(figure.add_subplot(grid[1, :])), report)
     _by_iterations(dressed(figure.add_subplot(grid[2, 0])), report)
     _latents(dressed(figure.add_subplot(grid[2, 1])), evaluation)
     _quantization(dressed(figure.add_subplot(grid[2, 2])), report)
@@ -64,13 +66,16 @@ def _headline(name: str, report: dict[str, Any]) -> str:
     )
 
 
-def _by_joint(axes: Any, report: dict[str, Any]) -> None:
+def draw_joints(axes: Any, report: dict[str, Any]) -> None:
+    """The error of each joint, coded once and ten times; long rows of names are slanted."""
     once, often = report["by_joint_degrees"]["1"], report["by_joint_degrees"]["10"]
     places = np.arange(len(once))
     axes.bar(places - 0.2, list(often.values()), 0.4, color=SLATE, label="coded ten times")
     axes.bar(places + 0.2, list(once.values()), 0.4, color=VERMILION, label="coded once")
-    crowded = sum(map(len, once)) > LETTERS_IN_A_ROW
-    axes.set_xticks(places, list(once), color=INK, **(SLANTED if crowded else {}))
+    crowded = len(once) * max(map(len, once)) > LETTERS_IN_A_ROW
+    size = min(LABEL_PT, SLANTED_LABELS_PT / len(once))
+    axes.set_xticks(places, list(once), color=INK, fontsize=size, **(SLANTED if crowded else {}))
+    axes.set_ylim(top=1.2 * axes.get_ylim()[1])  # room for the legend
     _titled(axes, "Which joints it knows best (mean error in degrees)")
     _legend(axes)
 

@@ -17,6 +17,7 @@ from rich.console import Console
 from appliance.pose import quaternion
 from appliance.pose.anatomy import Anatomy
 from appliance.pose.recording import Recording
+from appliance.pose.roles import UPPER_ARMS
 from appliance.pose.skeleton import Skeleton
 from appliance.studio.data.dataset import Dataset, Take
 from appliance.studio.data.remembered import KEY, Remembered, reading_facts
@@ -39,6 +40,7 @@ EQUALITY_WINDOWS = 16
 PHRASE_S = 60.0
 SHORT_PHRASE_S = 20.0  # a held-out excerpt shorter than this gives way to a longer one from training
 HANGING_DEGREES = 80.0  # below horizontal: a hanging arm does not touch the hip
+LEVEL_DEGREES = 45.0  # above horizontal: a bone that points further up is no arm
 _PHRASE_OF_ITS_OWN = "Its own: bunraku improvise CHECKPOINT --out FILE, then bunraku export --phrase FILE."
 FIRST_HANDS = ("left upper arm", "left forearm", "left hand", "right upper arm", "head")
 
@@ -155,19 +157,24 @@ def _arm_by_shape(skeleton: Skeleton, joints: Sequence[str]) -> str | None:
 def hanging_orientation(skeleton: Skeleton, joint: str) -> list[float] | None:
     """Local orientation (w, x, y, z) of an arm that hangs while the dancer stands still.
 
-    None for a joint whose bone is not horizontal in the rest pose: only arms of a T-pose are lowered.
+    None for what is not an upper arm, and for one that hangs in the rest pose: those stay as they are there.
     """
     place = skeleton.index(joint)
     if skeleton.stance is not None:
         return [round(float(part), 3) for part in skeleton.stance[place]]
+    arms = [skeleton.roles[role] for role in UPPER_ARMS if role in skeleton.roles]
+    if arms and place not in arms:
+        return None
     bones = [
         offset for offset, parent in zip(skeleton.offsets, skeleton.parents, strict=True) if parent == place
     ]
-    bone = max(bones, key=lambda offset: float(np.linalg.norm(offset)), default=np.zeros(3))
+    bone = max(bones, key=lambda offset: float(np.linalg.norm(offset)), default=np.array([0.0, -1.0, 0.0]))
     level = np.array([bone[0], 0.0, bone[2]])
-    if np.linalg.norm(level) <= abs(bone[1]):
+    slope = float(np.degrees(np.arctan2(-bone[1], np.linalg.norm(level))))
+    if not -LEVEL_DEGREES < slope < HANGING_DEGREES:
         return None
-    down = quaternion.from_axis_angle(np.cross(level, [0.0, -1.0, 0.0]), np.radians(HANGING_DEGREES))
+    lowered = np.radians(HANGING_DEGREES - slope)
+    down = quaternion.from_axis_angle(np.cross(level, [0.0, -1.0, 0.0]), lowered)
     return [round(float(part), 3) for part in down]
 
 
