@@ -237,7 +237,8 @@ class Projector:
                 f"{error} The audience sees the built-in looks. Correct the show, then start the stage again."
             )
             looks, cards = looks_by_name(()), cards_by_name(())
-        names = [*(look.image for look in looks.values()), *(card.image for card in cards.values())]
+        names = [*(look.image or look.video for look in looks.values())]
+        names += [card.image for card in cards.values()]
         names += [card.font for card in cards.values()]
         changed = tuple(_changed_at(directory / name) for name in names if name is not None)
         return ShownShow(facts.skeleton, looks, cards, directory, changed)

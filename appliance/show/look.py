@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, get_args
 
+from pydantic import model_validator
+
 from appliance.show.picture_file import Colour, PictureFile
-from appliance.show.section import Section, key, part
+from appliance.show.section import BundleFile, Section, key, part, refusal
 
 Style = Literal["plaster", "lines", "ink", "cloud", "veil"]
 STYLES: tuple[Style, ...] = get_args(Style)
@@ -87,6 +89,11 @@ class LookConfig(Section):
     image: PictureFile | None = key(
         "PNG or JPEG file in the bundle, behind the figure; it fills the picture.", None
     )
+    video: BundleFile | None = key(
+        "Video file in the bundle (MP4, WebM and others), instead of an image; it is looped, without sound. "
+        "The box needs ffmpeg for it.",
+        None,
+    )
     exposure: float = key("Brightness of the whole picture.", 1.0, within=(0.1, 4))
     fog: float = key("How much haze hangs in the air.", 0.5, within=(0, 1))
     shadow: float = key("How dark shadows are (plaster), how clear the floor mirrors.", 0.8, within=(0, 1))
@@ -103,16 +110,23 @@ class LookConfig(Section):
     held: HeldConfig = part(HeldConfig)
     camera: CameraConfig = part(CameraConfig)
 
+    @model_validator(mode="after")
+    def _has_one_backdrop(self) -> LookConfig:
+        if self.image is not None and self.video is not None:
+            raise refusal("A look has an image or a video behind the figure.", "Remove one.", at="video")
+        return self
+
 
 def looks_by_name(looks: Sequence[LookConfig], directory: Path | None = None) -> dict[str, LookConfig]:
     """The looks in their order, by name; without any the built-in ones by the names of their styles.
 
-    directory: of the show; the looks' images then have their whole paths.
+    directory: of the show; the looks' images and videos then have their whole paths.
     """
     chosen = list(looks) or [LookConfig(name=style, style=style) for style in STYLES]
     if directory is not None:
+        files = [{"image": look.image, "video": look.video} for look in chosen]
         chosen = [
-            look.model_copy(update={"image": str(directory / look.image)}) if look.image else look
-            for look in chosen
+            look.model_copy(update={key: str(directory / name) for key, name in named.items() if name})
+            for look, named in zip(chosen, files, strict=True)
         ]
     return {look.name: look for look in chosen}

@@ -28,15 +28,27 @@ Message = Literal[
     "rot_acc",
     "ang_jerk",
 ]
-Program = Literal["mocap-analysis", "clustering", "classifier", "vae-rnn", "ray-marching", "supercollider"]
+Program = Literal[
+    "mocap-analysis",
+    "clustering",
+    "classifier",
+    "vae-rnn",
+    "rnn",
+    "motion2audio",
+    "ray-marching",
+    "supercollider",
+]
 Prefix = Annotated[str, Field(pattern=r"^(/[A-Za-z0-9_.-]+)+$")]
 
 _Z_UP = ("z", "x", "y")  # the front along x, height along z, as his motion capture has them
+_LIVE_MOCAP: Mapping[str, Any] = {"port": 9007, "messages": ["rot_local"], "ends": True}
 PROGRAMS: Mapping[str, Mapping[str, Any]] = {
     "mocap-analysis": {"port": 9007, "messages": ["pos_world"], "scale": 100.0},
     "clustering": {"port": 9007, "messages": ["rot_local", "rot_world", "pos_world"], "scale": 100.0},
     "classifier": {"port": 9007, "messages": ["pos_local", "rot_local"], "scale": 100.0},
-    "vae-rnn": {"port": 9007, "messages": ["rot_local"], "ends": True},
+    "vae-rnn": _LIVE_MOCAP,
+    "rnn": _LIVE_MOCAP,
+    "motion2audio": _LIVE_MOCAP,
     "ray-marching": {"port": 9004, "messages": ["pos_world", "rot_world"], "scale": 100.0, "axes": _Z_UP},
     "supercollider": {
         "port": 9005,

@@ -19,6 +19,12 @@ class StreamConfig(Section):
         "Devices that may fetch it: addresses or networks. This machine always may.", [], length=(0, 32)
     )
     rate: float = key("Pictures a second at most.", 25.0, within=(1, 60))
+    ndi: str | None = key(
+        "Name under which NDI programs see it, where NDI's library (libndi) is installed; null: not by NDI.",
+        None,
+        length=(1, 64),
+    )
+    ndi_alpha: bool = key("NDI pictures have alpha, as much as a pixel shines.", False)
     quality: int = key("Of the JPEGs: more is finer and larger.", 85, within=(10, 100))
 
     @model_validator(mode="after")

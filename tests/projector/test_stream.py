@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
 import socket
 import subprocess
@@ -14,11 +15,13 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from aiohttp import web
 from PIL import Image
 
 from appliance.pose.recording import Recording
 from appliance.projector.picture.renderer import Renderer
 from appliance.projector.still import draw_still, moment_of
+from appliance.projector.stream import server
 from appliance.projector.stream.feed import Feed
 from appliance.projector.stream.keying import keyed
 from appliance.show.box import load_box
@@ -159,6 +162,29 @@ def test_a_client_that_reads_nothing_holds_up_nobody(shown: tuple[Shown, int]) -
         assert np.abs(seen - 20 * number).max() <= 20 + 2, "the newest, or the one before it"
     assert projector.worst_s < 0.5
     stuck.close()
+
+
+def test_a_client_that_takes_nothing_for_long_makes_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "_STUCK_S", 0.2)
+    noise = bytes(1 << 20)
+
+    async def until_it_is_gone() -> None:
+        newest = server.Newest(StreamConfig(), BytesIO())
+        runner = web.AppRunner(server._app(StreamConfig(), newest))
+        await runner.setup()
+        await web.TCPSite(runner, HOST, port := free_port()).start()
+        _, writer = await asyncio.open_connection(HOST, port, limit=64)
+        writer.write(b"GET /picture.mjpg HTTP/1.1\r\nHost: box\r\n\r\n")
+        async with asyncio.timeout(WITHIN_S):
+            while not newest.watching:
+                await asyncio.sleep(0.01)
+            while newest.clients:
+                await newest.put((1, 1, bytes(4)), noise)
+                await asyncio.sleep(0.01)
+        writer.close()
+        await runner.cleanup()
+
+    asyncio.run(until_it_is_gone())
 
 
 def test_a_projector_serves_what_its_display_shows_and_takes_the_process_along(tmp_path: Path) -> None:

@@ -151,6 +151,7 @@ def test_an_arm_in_the_trunk_is_seen_and_a_hanging_one_is_not() -> None:
     assert body.arm_in_trunk(poses) == 0.0
     poses[4:, place] = quaternion.from_axis_angle([0.0, 0.0, 1.0], np.radians(-130))  # through the ribs
     assert body.arm_in_trunk(poses) == pytest.approx(0.6)
+    assert 3.0 < body.arm_depth_cm(poses) < 30.0
 
 
 def test_feet_that_stand_do_not_skate_and_feet_that_swing_do() -> None:

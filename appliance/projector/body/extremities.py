@@ -15,6 +15,9 @@ _CRANIUM = ((-0.018, 0.010), (0.012, 0.004), (0.052, 0.049), (0.000, 0.000))
 _JAW = ((0.006, -0.014), (0.032, -0.064), (0.040, 0.018), (0.002, 0.005))
 _RIDGE = ((0.048, 0.014), (0.059, -0.020), (0.006, 0.008), (0.000, 0.000))
 _FACE_AT, _FACE_TURNED = 0.050, 0.42  # the two halves of the face: how far before the middle, how turned
+PALM = 0.3  # of the fingers belongs to the palm: else they are claws
+CLOSED = 0.5  # of the fingers' spread at rest is taken away
+THUMB_AWAY = 0.3  # metres aside for each metre from its base: else it is lost beside the palm
 _REACH = 0.115  # from the head joint to the crown, where the skeleton does not say
 
 
@@ -55,34 +58,39 @@ def head(anatomy: Anatomy) -> list[Slab | Cut]:
 
 
 def hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:
-    """A mitten, with a thumb where the skeleton has one; and the bones that move it, finger by finger."""
+    """A palm, a thumb that stands off, and two groups of fingers; without fingers a mitten.
+
+    Returns what is modelled, and the bones that move it, finger by finger.
+    """
     height, wrist = anatomy.height, anatomy.positions[joint]
-    fingers = sorted(anatomy.children[joint], key=anatomy.length)[1:]
+    thumb, *fingers = sorted(anatomy.children[joint], key=anatomy.length) or [joint]
     if len(fingers) < 2:
         return _plain_hand(anatomy, joint)
-    thumb = min(anatomy.children[joint], key=anatomy.length)
-    knuckles = anatomy.positions[fingers]
+    knuckles, thumb_at = anatomy.positions[fingers], anatomy.positions[thumb]
     tips = np.array([_furthest(anatomy, finger, wrist) for finger in fingers])
     aside = np.linalg.svd(knuckles - knuckles.mean(axis=0))[2][0]
-    half, end_half = (
-        float(np.abs((places - places.mean(axis=0)) @ aside).max()) for places in (knuckles, tips)
-    )
-    row, end = knuckles.mean(axis=0), tips.mean(axis=0)
-    end = end + 0.020 * height * (end - row) / max(float(np.linalg.norm(end - row)), 1e-9)
-    base = wrist + 0.35 * (anatomy.positions[thumb] - wrist)
-    thick = 0.0115 * height
+    tips -= CLOSED * np.outer((tips - knuckles) @ aside, aside)
+    row = (1 - PALM) * knuckles + PALM * tips
+    if float((_furthest(anatomy, thumb, wrist) - row.mean(axis=0)) @ aside) < 0.0:
+        aside = -aside
+    thick, half = 0.0115 * height, 0.5 * float(np.ptp(knuckles @ aside))
+    base = wrist + 0.35 * (thumb_at - wrist)
     steps: list[Slab | Cut] = [
-        Slab(joint, wrist, row, 0.0160 * height, thick, 0.0, aside, 0.2 * half, half),
-        Slab(joint, row, end, thick, 0.0085 * height, 0.0, aside, half, 0.66 * end_half),
-        Slab(joint, base, anatomy.positions[thumb], 0.014 * height, 0.011 * height, 0.012 * height, aside),
+        Slab(joint, wrist, row.mean(axis=0), 0.0160 * height, thick, 0.0, aside, 0.2 * half, half)
     ]
-    steps += [
-        Slab(*bone, 0.0105 * height, 0.0085 * height, 0.006 * height, aside)
-        for bone in anatomy.bones([thumb, *anatomy.below(thumb)])
-    ]
-    bones = [Slab(*bone, thick, thick, 0.0, aside) for bone in anatomy.bones(anatomy.below(joint))]
-    palm = [Slab(joint, wrist, knuckle, thick, thick, 0.0, aside) for knuckle in knuckles]
-    return steps, [*palm, Slab(joint, base, anatomy.positions[thumb], thick, thick, 0.0, aside), *bones]
+    by_place = np.argsort(row @ aside)
+    for group in (by_place[: len(fingers) // 2], by_place[len(fingers) // 2 :]):
+        start, end = row[group].mean(axis=0), tips[group].mean(axis=0)
+        end = end + 0.012 * height * (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+        halves = [0.5 * float(np.ptp(places @ aside)) for places in (row[group], tips[group])]
+        steps.append(Slab(joint, start, end, thick, 0.009 * height, 0.0, aside, halves[0], 0.5 * halves[1]))
+    steps.append(Slab(joint, base, thumb_at, 0.014 * height, thick, 0.012 * height, aside))
+    for owner, *ends in anatomy.bones([thumb, *anatomy.below(thumb)]):
+        start, end = (place + THUMB_AWAY * float(np.linalg.norm(place - base)) * aside for place in ends)
+        steps.append(Slab(owner, start, end, thick, 0.0095 * height, 0.006 * height, aside))
+    bones = [(joint, wrist, knuckle) for knuckle in knuckles] + [(joint, base, thumb_at)]
+    bones += anatomy.bones(anatomy.below(joint))
+    return steps, [Slab(*bone, thick, thick, 0.0, aside) for bone in bones]
 
 
 def _plain_hand(anatomy: Anatomy, joint: int) -> tuple[list[Slab | Cut], list[Slab]]:

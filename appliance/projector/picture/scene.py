@@ -25,6 +25,7 @@ from appliance.projector.picture.poses import Floats, HoldTexture, Poses, PoseTe
 from appliance.projector.picture.tally import BACKDROP, Tally
 from appliance.projector.picture.targets import Target
 from appliance.projector.picture.vertices import layout, packed
+from appliance.projector.picture.video import Video
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
 from appliance.show.puppets import MOST_PUPPETS
@@ -132,6 +133,7 @@ class Easel:
         self.noise.build_mipmaps()
         self.noise.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
         self._backdrops: dict[str, moderngl.Texture] = {}
+        self._videos: dict[str, Video] = {}
         self._canvases: dict[str, Target] = {}
         self._buffers: list[moderngl.Buffer] = []
         self._drawings: list[Drawing] = []
@@ -139,6 +141,8 @@ class Easel:
 
     def show(self, poses: Sequence[Poses], holds: Sequence[Floats | None]) -> None:
         """What the figures of the next picture do, at least one."""
+        for video in self._videos.values():
+            video.stop_unseen()
         self._shown = len(poses)
         while len(self._figures) < self._shown:
             self._figures.append(_FigureTextures(self.ctx, self._mesh, len(self.skeleton)))
@@ -177,7 +181,11 @@ class Easel:
         return {"held": look.held.strength if is_held else 0.0}
 
     def behind(self, look: LookConfig) -> dict[str, Any]:
-        """The inputs of the look's image behind the figure, if it has one."""
+        """The inputs of the look's image or video behind the figure, if it has one."""
+        if look.video is not None:
+            if look.video not in self._videos:
+                self._videos[look.video] = Video(self.ctx, look.video)
+            return {"backdrop": self._videos[look.video].texture()}
         if look.image is None:
             return {}
         if look.image not in self._backdrops:
@@ -261,6 +269,7 @@ class Easel:
     def gpu_bytes(self) -> int:
         """What all this takes on the GPU."""
         images = sum(4 * image.width * image.height for image in self._backdrops.values())
+        images += sum(video.gpu_bytes for video in self._videos.values())
         canvases = sum(canvas.bytes for canvas in self._canvases.values())
         buffers = sum(buffer.size for buffer in self._buffers)
         poses = sum(one.poses.gpu_bytes for one in self._figures)
@@ -268,7 +277,7 @@ class Easel:
 
     def release(self) -> None:
         shared: list[Any] = [self.body, *self._figures, self.noise]
-        shared += [*self._canvases.values(), *self._backdrops.values()]
+        shared += [*self._canvases.values(), *self._backdrops.values(), *self._videos.values()]
         for owned in (*self._drawings, *self._buffers, *shared):
             owned.release()
 

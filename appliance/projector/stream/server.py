@@ -1,4 +1,4 @@
-"""Serves the newest picture: as MJPEG to any number of clients, each at its own pace, and as one file."""
+"""Serves the newest picture: as MJPEG to several clients, each at its own pace, as one file, and by NDI."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import asyncio
 import ipaddress
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Awaitable, Callable
 from io import BytesIO
@@ -15,6 +16,7 @@ from aiohttp import web
 from PIL import Image
 
 from appliance.projector.stream.keying import keyed
+from appliance.projector.stream.ndi import NdiSource
 from appliance.projector.stream.pipe import WANTED, Picture, read_picture
 from appliance.show.stream import StreamConfig
 
@@ -22,6 +24,7 @@ BOUNDARY = "picture"
 MOST_CLIENTS = 8
 _BUFFER = 1 << 18  # bytes that the system keeps for a slow client: more would be old pictures
 _UNANSWERED_S = 1.0  # before a picture that did not come is asked for again
+_STUCK_S = 10.0  # before a client that takes nothing makes room for another: its machine may be gone
 _HEAD = "--{}\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n"
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -30,8 +33,8 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 class Newest:
     """The newest picture as JPEG; clients wait for the next one here."""
 
-    def __init__(self, config: StreamConfig, asks: BinaryIO) -> None:
-        self._config, self._asks = config, asks
+    def __init__(self, config: StreamConfig, asks: BinaryIO, ndi: NdiSource | None = None) -> None:
+        self._config, self._asks, self._ndi = config, asks, ndi
         self._come = asyncio.Condition()
         self._asked_at = 0.0
         self.picture: Picture = (1, 1, bytes(4))
@@ -39,12 +42,13 @@ class Newest:
         self.number = 0
         self.watching = self.clients = 0
 
-    async def put(self, picture: Picture, jpeg: bytes) -> None:
-        """A picture has come."""
-        async with self._come:
-            self.picture, self.jpeg, self.number = picture, jpeg, self.number + 1
-            self._asked_at = 0.0
-            self._come.notify_all()
+    async def put(self, picture: Picture, jpeg: bytes | None) -> None:
+        """A picture has come; jpeg None: nobody waits for it here."""
+        self._asked_at = 0.0
+        if jpeg is not None:
+            async with self._come:
+                self.picture, self.jpeg, self.number = picture, jpeg, self.number + 1
+                self._come.notify_all()
 
     async def after(self, number: int) -> int:
         """Wait for a picture that is newer than this one; its number."""
@@ -61,7 +65,8 @@ class Newest:
         loop = asyncio.get_running_loop()
         while True:
             await asyncio.sleep(1.0 / self._config.rate)
-            if self.watching and loop.time() - self._asked_at > _UNANSWERED_S:
+            is_wanted = self.watching or (self._ndi is not None and self._ndi.receivers)
+            if is_wanted and loop.time() - self._asked_at > _UNANSWERED_S:
                 self._asked_at = loop.time()
                 self._asks.write(WANTED)
                 self._asks.flush()
@@ -69,30 +74,43 @@ class Newest:
 
 async def serve(config: StreamConfig, pictures: BinaryIO, asks: BinaryIO) -> None:
     """Listen, until the pictures end or the process is asked to stop. Raises OSError where it cannot."""
-    newest, loop = Newest(config, asks), asyncio.get_running_loop()
+    ndi = _ndi_source(config)
+    newest, loop = Newest(config, asks, ndi), asyncio.get_running_loop()
     over = asyncio.Event()
     loop.add_signal_handler(signal.SIGTERM, over.set)
     runner = web.AppRunner(_app(config, newest), access_log=None, shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, config.host, config.port).start()
-    threading.Thread(
-        target=_read, args=(pictures, config.quality, newest, loop, over), name="pictures", daemon=True
-    ).start()
+
+    def take_pictures() -> None:
+        """In a thread of its own: as long as encoding takes, clients are served."""
+        try:
+            while (picture := read_picture(pictures)) is not None:
+                if ndi is not None and ndi.receivers:
+                    ndi.send(picture)
+                jpeg = jpeg_of(picture, config.quality) if newest.watching else None
+                asyncio.run_coroutine_threadsafe(newest.put(picture, jpeg), loop).result()
+        finally:
+            loop.call_soon_threadsafe(over.set)
+
+    threading.Thread(target=take_pictures, name="pictures", daemon=True).start()
     asking = loop.create_task(newest.ask())
     await over.wait()
     asking.cancel()
     await runner.cleanup()
 
 
-def _read(
-    pictures: BinaryIO, quality: int, newest: Newest, loop: asyncio.AbstractEventLoop, over: asyncio.Event
-) -> None:
-    """In a thread of its own: as long as encoding takes, clients are served."""
+def _ndi_source(config: StreamConfig) -> NdiSource | None:
+    """None where none is wanted or can be had."""
     try:
-        while (picture := read_picture(pictures)) is not None:
-            asyncio.run_coroutine_threadsafe(newest.put(picture, jpeg_of(picture, quality)), loop).result()
-    finally:
-        loop.call_soon_threadsafe(over.set)
+        return None if config.ndi is None else NdiSource(config.ndi, config.rate, config.ndi_alpha)
+    except OSError as error:
+        print(
+            f"The picture does not go out by NDI: {error}. Programs that fetch it by HTTP see it. Install "
+            "the NDI runtime, or remove `ndi` from the box file.",
+            file=sys.stderr,
+        )
+        return None
 
 
 def jpeg_of(picture: Picture, quality: int) -> bytes:
@@ -163,8 +181,13 @@ async def _stream(request: web.Request, newest: Newest) -> web.StreamResponse:
         while True:
             number = await newest.after(number)
             jpeg = newest.jpeg
-            await response.write(_HEAD.format(BOUNDARY, len(jpeg)).encode() + jpeg + b"\r\n")
+            async with asyncio.timeout(_STUCK_S):
+                await response.write(_HEAD.format(BOUNDARY, len(jpeg)).encode() + jpeg + b"\r\n")
     except ConnectionError:
+        return response
+    except TimeoutError:
+        if request.transport is not None:
+            request.transport.abort()
         return response
     finally:
         newest.clients -= 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from appliance.dancer.grounding import Floor, Grounding, GroundingError, survey
 from appliance.dancer.trunk import Trunk
@@ -12,7 +11,7 @@ from appliance.pose.quaternion import Array
 from appliance.pose.recording import Recording
 from appliance.studio.standing import measure_standing
 
-ROUGHNESS_PERCENTILE = 99.0
+ROUGHNESS_PERCENTILE = DEPTH_PERCENTILE = 99.0
 DEEP = 0.3  # of that radius below the surface: 3.5 cm
 ALONG_ARM = (0.5, 0.75, 1.0)  # of the upper arm: its inner half begins in the trunk
 
@@ -66,17 +65,15 @@ class BodyFigures:
 
     def arm_in_trunk(self, poses: Array) -> float:
         """Share of poses (T, J, 4) in which an upper arm is deep in the trunk."""
-        if self._trunk is None:
+        depths = self._arm_depths(poses)
+        return float("nan") if depths is None else float((depths > DEEP).mean())
+
+    def arm_depth_cm(self, poses: Array) -> float:
+        """How far an upper arm's axis is below the trunk's surface in the deepest of a hundred poses, cm."""
+        depths = self._arm_depths(poses)
+        if self._trunk is None or depths is None:
             return float("nan")
-        reach, spine = (1 - DEEP) * self._trunk.radius_m, self._trunk.spine
-        positions, _ = self._skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
-        deep: NDArray[np.bool_] = np.zeros(len(poses), dtype=bool)
-        for arm in self._trunk.arms:
-            for share in ALONG_ARM:
-                point = (1 - share) * positions[:, arm.shoulder] + share * positions[:, arm.elbow]
-                for low, high in zip(spine[1:], spine[:-1], strict=True):
-                    deep |= _distance(point, positions[:, low], positions[:, high]) < reach
-        return float(deep.mean())
+        return 100 * self._trunk.radius_m * float(np.percentile(depths, DEPTH_PERCENTILE))
 
     def foot_skate(self, poses: Array, roots: Array) -> float:
         """Sliding speed of the supporting foot, m/s, in grounded poses (T, J, 4) with roots (T, 3)."""
@@ -101,6 +98,21 @@ class BodyFigures:
             grounding.ground_pose(pose, path[tick], lift, held=weights if locked else None)
             standing[tick], roots[tick] = grounding.pose, grounding.root
         return standing, roots
+
+    def _arm_depths(self, poses: Array) -> Array | None:
+        """(T,): how far the deepest upper arm is below the trunk's surface, in its radii; 0 outside."""
+        if self._trunk is None:
+            return None
+        spine = self._trunk.spine
+        positions, _ = self._skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
+        nearest: Array = np.full(len(poses), np.inf)
+        for arm in self._trunk.arms:
+            for share in ALONG_ARM:
+                point = (1 - share) * positions[:, arm.shoulder] + share * positions[:, arm.elbow]
+                for low, high in zip(spine[1:], spine[:-1], strict=True):
+                    nearest = np.minimum(nearest, _distance(point, positions[:, low], positions[:, high]))
+        depths: Array = np.maximum(1.0 - nearest / self._trunk.radius_m, 0.0)
+        return depths
 
 
 def _distance(points: Array, starts: Array, ends: Array) -> Array:

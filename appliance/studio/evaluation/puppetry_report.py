@@ -105,11 +105,12 @@ def asides(found: dict[str, Any]) -> list[str]:
             f"While hands turn smoothly, a joint goes up to {max(turned):.0f} degrees in one tick; in the "
             f"recordings {found['reference']['largest_step']:.0f}."
         )
-    deep, skate = (_mean_of(found, name) for name in ("arm_in_trunk", "foot_skate"))
+    deep, depth, skate = (_mean_of(found, name) for name in ("arm_in_trunk", "arm_depth_cm", "foot_skate"))
     if deep is not None and phrase["arm_in_trunk"] is not None:
         lines.append(
-            f"An upper arm is deep in the trunk in {100 * deep:.0f} % of the ticks; "
-            f"in the phrase in {100 * phrase['arm_in_trunk']:.0f} %."
+            f"An upper arm is deep in the trunk in {100 * deep:.1f} % of the ticks (1 of 100 at least "
+            f"{depth or 0:.1f} cm); in the phrase in {100 * phrase['arm_in_trunk']:.1f} % "
+            f"({phrase['arm_depth_cm'] or 0:.1f} cm)."
         )
     if skate is not None and phrase["foot_skate"] is not None:
         lines.append(f"Feet slide at {skate:.2f} m/s; in the phrase at {phrase['foot_skate']:.2f}.")
