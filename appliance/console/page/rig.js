@@ -5,7 +5,7 @@ import { words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
 const LOOK_MS = 200, WIDE_PX = 640;
-const LONGEST_M = 12, MARGIN_M = 0.8, STAGE_M = 2;
+const LONGEST_M = 12, MARGIN_M = 1.2, STAGE_M = 2;
 const VIEWS = [["rig_front", 1, 1], ["rig_above", 2, -1]]; // words; the axis upwards, and its sense
 const INK = { floor: "#3d434b", quiet: "#b3b7bd", lamp: "#f3ece0", dark: "#22262b" };
 let beams = [], isLit = false;
@@ -82,17 +82,13 @@ function framed(title, axis, sense) {
   return {
     title, axis, sense,
     left: Math.min(-STAGE_M, ...xs) - MARGIN_M, right: Math.max(STAGE_M, ...xs) + MARGIN_M,
-    low: Math.min(...floor, ...ys) - MARGIN_M / 2, top: Math.max(...floor, ...ys) + MARGIN_M,
+    low: Math.min(...floor, ...ys) - (axis === 1 ? 0.3 : 1) * MARGIN_M, top: Math.max(...floor, ...ys) + (axis === 1 ? 0.5 : 1) * MARGIN_M,
   };
 }
 
 function drawView(ink, view, x, y, wide, ratio) {
   const scale = wide / (view.right - view.left), top = y + 26 * ratio;
   const at = (point) => [x + (point[0] - view.left) * scale, top + (view.top - view.sense * point[view.axis]) * scale];
-  ink.font = `600 ${13 * ratio}px system-ui, sans-serif`;
-  ink.fillStyle = INK.quiet;
-  ink.textAlign = "left";
-  ink.fillText(words(view.title), x + 10 * ratio, y + 18 * ratio);
   ink.strokeStyle = INK.floor;
   ink.lineWidth = ratio;
   ink.beginPath();
@@ -117,6 +113,9 @@ function drawView(ink, view, x, y, wide, ratio) {
     ink.fill();
     ink.stroke();
   }
+  ink.font = `600 ${13 * ratio}px system-ui, sans-serif`;
+  ink.fillStyle = INK.quiet;
+  ink.fillText(words(view.title), x + 10 * ratio, y + 18 * ratio);
 }
 
 // A cone to the floor, and from above the patch that it lights there; the brighter the denser.
@@ -129,8 +128,8 @@ function drawBeam(ink, [, place, way, colour, level, degrees], at, scale, view) 
   // To the side of the beam; on the floor, seen from the audience, along the floor.
   const aside = !isPlan && hitsFloor ? [radius, 0] : [-(to[1] - from[1]) / long * radius, (to[0] - from[0]) / long * radius];
   const cone = ink.createLinearGradient(...from, ...to);
-  cone.addColorStop(0, rgb(colour, 0.15 + 0.55 * level));
-  cone.addColorStop(1, rgb(colour, 0.03 + 0.17 * level));
+  cone.addColorStop(0, rgb(colour, 0.04 + 0.36 * level));
+  cone.addColorStop(1, rgb(colour, 0.01 + 0.09 * level));
   ink.fillStyle = cone;
   ink.beginPath();
   ink.moveTo(...from);
@@ -138,7 +137,7 @@ function drawBeam(ink, [, place, way, colour, level, degrees], at, scale, view) 
   ink.lineTo(to[0] - aside[0], to[1] - aside[1]);
   ink.fill();
   if (!isPlan || !hitsFloor) return;
-  ink.fillStyle = rgb(colour, 0.05 + 0.25 * level);
+  ink.fillStyle = rgb(colour, 0.02 + 0.16 * level);
   ink.beginPath();
   ink.arc(...to, radius, 0, 7);
   ink.fill();
