@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from appliance.box.durable import alone_in, write_beside, write_whole
 from appliance.cli.preflight import LATE_TURN_S, candidate_problems, publish
 from appliance.release.adoption import Outcome, Places, adopt, read_choice
-from appliance.release.arrivals import BOX, look
+from appliance.release.arrivals import BOX, Arrival, look
 from appliance.release.choice import CHOSEN, Choice
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
@@ -18,6 +18,7 @@ from appliance.show.yaml_edit import with_value
 from appliance.stage.stage_error import StageError
 
 FROM_PAGE = "page"  # the folder below /data/bunraku in which the page's box file arrives, as from a stick
+FROM_REHEARSAL = "rehearsal"
 _EMPTY = "# The box file of this venue; for what it leaves out the box has values built in.\n"
 _AT_ONCE, _LATER = 0.0, float("inf")
 
@@ -69,7 +70,10 @@ def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, A
     if problems:
         return {"problems": problems}
     if chosen is not None:
-        return _adopt(chosen, text, wanted.now)
+        arrival = _places(chosen).data / FROM_PAGE
+        arrival.mkdir(mode=0o700, exist_ok=True)
+        write_whole(arrival / BOX, text.encode())
+        return _adopt(chosen, look(FROM_PAGE, arrival), "box file", wanted.now)
     before = place.with_name(f"{place.name}.before")
     if place.exists():
         write_whole(before, place.read_bytes(), private=True)
@@ -79,6 +83,11 @@ def change(box: Path | None, chosen: Path | None, wanted: Change) -> dict[str, A
         "words": f"{place} is written; the one before is {before.name}. It counts from the next start of "
         "bunraku play on.",
     }
+
+
+def adopt_show(chosen: Path, folder: Path) -> dict[str, Any]:
+    """Let the copy of a rehearsal dance from now on, as a show from a stick would; for JSON, as `change`."""
+    return _adopt(chosen, look(FROM_REHEARSAL, folder), "show", True)
 
 
 def dance_again(chosen: Path, show: str) -> dict[str, Any]:
@@ -125,25 +134,25 @@ def _problems(place: Path, text: str) -> list[dict[str, Any]]:
     return []
 
 
-def _adopt(chosen: Path, text: str, now: bool) -> dict[str, Any]:
-    """As a box file from a stick: on the shelf under its content's id, the one before it kept, then tried."""
-    here = Choice.read(chosen) or Choice()
-    places = Places(here.data, chosen.parent)
-    arrival = places.data / FROM_PAGE
-    arrival.mkdir(mode=0o700, exist_ok=True)
-    write_whole(arrival / BOX, text.encode())
+def _places(chosen: Path) -> Places:
+    return Places((Choice.read(chosen) or Choice()).data, chosen.parent)
+
+
+def _adopt(chosen: Path, arrival: Arrival, what: str, now: bool) -> dict[str, Any]:
+    """As from a stick: on the shelf under its content's id, the one before it kept, then tried."""
+    places = _places(chosen)
     with alone_in(places.data, LATE_TURN_S), alone_in(places.run, LATE_TURN_S):
-        outcome = adopt(places, [look(FROM_PAGE, arrival)], candidate_problems, late=True)
+        outcome = adopt(places, [arrival], candidate_problems, late=True)
         said = list(outcome.words)
         if outcome.taken:
             publish(places, outcome, True, _AT_ONCE if now else _LATER, said.append, restarts=False)
     if not outcome.taken and outcome.choice.refused:
         return {"problems": [{"line": 0, "words": words} for words in outcome.choice.refused]}
     if not outcome.taken:
-        return {"problems": [], "words": "This box file counts already."}
+        return {"problems": [], "words": f"This {what} counts already."}
     when = "now: all but the release starts anew" if now else "after the next power-on"
     return {
         "problems": [],
         "anew": now,
-        "words": f"The box file is kept and counts {when}. The one before it stays on the box.",
+        "words": f"The {what} is kept and counts {when}. The one before it stays on the box.",
     }

@@ -162,6 +162,18 @@ def show_or_change_box_file(
     print(json.dumps(box_file.change(box, chosen, wanted)))
 
 
+@console.command("adopt-show", hidden=True)
+def adopt_show(
+    folder: Annotated[Path, typer.Argument(help="Where `bunraku console cue` keeps it.")],
+    chosen: ChosenFile = None,
+) -> None:
+    """Let the copy of a rehearsal dance from now on."""
+    from appliance.cli.box_file import adopt_show
+    from appliance.release.choice import CHOSEN, RUN
+
+    print(json.dumps(adopt_show(chosen or RUN / CHOSEN, folder)))
+
+
 @console.command("dance-again", hidden=True)
 def dance_again(
     show: Annotated[str, typer.Argument(help="Its id, as `bunraku console about` tells it.")],

@@ -13,7 +13,7 @@ from aiohttp import web
 
 from appliance.console.child import answer_of
 
-LONGEST_S = 20.0  # of the dance at once
+LONGEST_S = 60.0  # of the dance at once; 2 MB of frames
 _PATIENCE_S = 60.0  # for reading half an hour
 _FRESH_S = 5.0
 _ENDINGS = {"bvh": "text/plain", "glb": "model/gltf-binary"}

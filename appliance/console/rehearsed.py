@@ -18,7 +18,7 @@ from appliance.show.sources import MADE
 
 _PATIENCE_S = 120.0
 _LONGEST_NAME = 64
-_FOLDER, _ZIP = "rehearsed", "show.zip"
+FOLDER, ZIP = "rehearsed", "show.zip"
 
 
 class Rehearsed:
@@ -26,7 +26,7 @@ class Rehearsed:
 
     def __init__(self, guard: Guard, stage: StageView, box: BoxView, kept: Path) -> None:
         self._guard, self._stage, self._box = guard, stage, box
-        self._folder = kept / _FOLDER
+        self._folder = kept / FOLDER
         self._writing = asyncio.Lock()
 
     def routes(self) -> list[web.RouteDef]:
@@ -51,10 +51,10 @@ class Rehearsed:
     async def download(self, request: web.Request) -> web.StreamResponse:
         """The copy, packed as it lies on a stick."""
         self._guard.require_device(request)
-        if not (self._folder / _ZIP).is_file():
+        if not (self._folder / ZIP).is_file():
             raise web.HTTPNotFound(text="No cue was kept yet.")
         headers = {"Content-Disposition": 'attachment; filename="bunraku-show.zip"'}
-        return web.FileResponse(self._folder / _ZIP, headers=headers)
+        return web.FileResponse(self._folder / ZIP, headers=headers)
 
 
 def present_cue(name: str, value: dict[str, Any], facts: dict[str, Any]) -> dict[str, Any]:

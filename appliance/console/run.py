@@ -27,7 +27,8 @@ from appliance.console.happened import Happened
 from appliance.console.logs import Logs
 from appliance.console.pose_map import PoseMap
 from appliance.console.prove import Prove
-from appliance.console.rehearsed import Rehearsed
+from appliance.console.rehearsed import FOLDER, ZIP, Rehearsed
+from appliance.console.rig import Rig
 from appliance.console.sensor_changes import SensorChanges
 from appliance.console.server import Server
 from appliance.console.settings import Settings
@@ -62,15 +63,18 @@ async def _serve(settings: Settings) -> int:
     happened, about = Happened(settings.journal), About(settings.about)
     prove = Prove(guard, folder, Path(settings.kept).parent, settings.about, settings.is_installed)
     logs = Logs(guard, folder, settings.is_installed)
-    venue = Venue(guard, folder, settings.about, settings.is_installed)
-    hands, others = Hands(guard, desk, folder), [*prove.routes(), *logs.routes(), *venue.routes()]
+    rehearsed = Path(settings.kept).parent / FOLDER
+    venue = Venue(guard, folder, settings.about, settings.is_installed, rehearsed)
+    hands, rig = Hands(guard, desk, folder), Rig(folder)
+    others = [*prove.routes(), *logs.routes(), *venue.routes(), *rig.routes()]
     named = settings.about if settings.about[:1] == ("--box",) else ()
     others += SensorChanges(guard, stage, named).routes()
     if settings.rehearsal:
         others += Rehearsed(guard, stage, box, Path(settings.kept).parent).routes()
         others += [*hands.routes(), *PoseMap(stage).routes()]
     parts = (guard, devices, desk, stage, box, watchers, happened, about)
-    app = Server(*parts, settings.rehearsal, others).app()
+    told = {"rehearsal": settings.rehearsal, "installed": settings.is_installed}
+    app = Server(*parts, lambda: {**told, "cue_kept": (rehearsed / ZIP).is_file()}, others).app()
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=_LAST_REQUESTS_S, keepalive_timeout=30.0)
     await runner.setup()
     listening = socket.socket(fileno=settings.descriptor)
@@ -100,6 +104,7 @@ async def _serve(settings: Settings) -> int:
     health.end(time.monotonic())
     health.close()
     stage.close()
+    rig.close()
     return 0
 
 
@@ -127,7 +132,7 @@ async def _send_frames(stage: StageView, watchers: Watchers) -> None:
         if watchers.frames_wanted:
             frame = stage.newest(time.monotonic())
             if frame is not None:
-                watchers.put_frame(frame)
+                watchers.put_frame(frame, stage.with_ghost)
             await asyncio.sleep(TICK_S * watchers.every)
         else:
             stage.state(time.monotonic())

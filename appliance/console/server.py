@@ -6,7 +6,7 @@ import asyncio
 import math
 import secrets
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from aiohttp import web
 
@@ -31,7 +31,7 @@ _NOT_FROM_HERE = frozenset((*QUESTIONS, "/sensors/list", "/ping"))  # answered t
 
 
 class Server:
-    """Routes and what stands behind them."""
+    """Routes and what stands behind them. offers: what this box has for browsers and others may not."""
 
     def __init__(
         self,
@@ -43,11 +43,11 @@ class Server:
         watchers: Watchers,
         happened: Happened,
         about: About,
-        rehearsal: bool,
+        offers: Callable[[], dict[str, bool]],
         others: Iterable[web.RouteDef] = (),
     ) -> None:
         self._others = tuple(others)
-        self._happened, self._about, self._rehearsal = happened, about, rehearsal
+        self._happened, self._about, self._offers = happened, about, offers
         self._guard, self._devices, self._desk = guard, devices, desk
         self._stage, self._box, self._watchers = stage, box, watchers
         self._wrong_pins, self._languages = WrongPins(), languages()
@@ -96,7 +96,7 @@ class Server:
                 "known": device is not None,
                 "name": None if device is None else device.name,
                 "languages": self._languages,
-                "rehearsal": self._rehearsal,
+                **self._offers(),
             }
         )
 
@@ -110,12 +110,12 @@ class Server:
         )
 
     async def _take_pin(self, request: web.Request) -> web.Response:
-        asker, now = peer(request), time.monotonic()
+        values = await said(request)
+        pin, name = values.get("pin"), values.get("name", "")
+        asker, now = peer(request), time.monotonic()  # after the body: no other request comes in between
         if wait_s := self._wrong_pins.wait_s(asker, now):
             headers = {"Retry-After": str(math.ceil(wait_s))}
             raise web.HTTPTooManyRequests(text="Too many wrong PINs. Wait a minute.", headers=headers)
-        values = await said(request)
-        pin, name = values.get("pin"), values.get("name", "")
         if not isinstance(pin, str) or not isinstance(name, str) or not is_readable([name]):
             raise web.HTTPBadRequest(text="A PIN is six digits, and a name is a text.")
         if not secrets.compare_digest(pin.encode()[: 4 * DIGITS], self._devices.pin.encode()):

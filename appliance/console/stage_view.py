@@ -14,6 +14,7 @@ from appliance.outputs.frame_layout import (
     FORMAT,
     FRAME_HEAD,
     FRAMES,
+    GHOST,
     KIND,
     LATE,
     WRITER,
@@ -29,8 +30,8 @@ class StageView:
     """The shared frame of a runtime folder, read without numpy; never waits, never raises.
 
     facts: show, skeleton and hands, as the page gets them; empty before the first stage. show_directory: for
-    this box's own processes; None before the first stage. generation: another
-    number for each new stage.
+    this box's own processes; None before the first stage. generation: another number for each new stage.
+    with_ghost: the frame that `newest` gave last, with what the puppet starts from.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -38,6 +39,7 @@ class StageView:
         self._looked_at = -math.inf
         self._sequence = 0
         self._layout = FrameLayout(0)
+        self.with_ghost = b""
         self._frame_time = -math.inf
         self.facts: dict[str, Any] = {}
         self.show_directory: Path | None = None
@@ -58,8 +60,10 @@ class StageView:
         layout = self._layout
         ends = range(layout.root_at + layout.stride, layout.bytes + 1, layout.stride)
         left_out = layout.world_at - layout.root_at
-        seen = [payload[end - layout.stride + left_out : end] for end in ends]
-        return BROWSER_HEAD.pack(tick, flags & LATE, joints) + b"".join(seen)
+        seen = b"".join(payload[end - layout.stride + left_out : end] for end in ends)
+        source = payload[layout.source_at : layout.world_at]
+        self.with_ghost = BROWSER_HEAD.pack(tick, flags & LATE | GHOST, joints) + seen + source
+        return BROWSER_HEAD.pack(tick, flags & LATE, joints) + seen
 
     def state(self, now: float) -> Literal["absent", "fresh", "stale"]:
         """stale: its newest frame is older than half a second, or it died."""
@@ -99,6 +103,7 @@ def _for_browsers(facts: dict[str, Any]) -> dict[str, Any]:
         "show": facts["show_name"],
         "joints": skeleton["joints"],
         "parents": skeleton["parents"],
+        "offsets": skeleton["offsets"],
         "ends": skeleton["ends"],
         "held": [skeleton["joints"][joint] for joint in facts["held"]],
         "hands": facts["hands"],

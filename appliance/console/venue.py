@@ -23,11 +23,15 @@ _SHOW = re.compile(r"[0-9a-f]{0,64}\+[0-9a-f]{0,64}")
 class Venue:
     """Each by a process of its own, one at a time.
 
-    runtime: where the box's processes meet; options: the command's, which name the box.
+    runtime: where the box's processes meet; options: the command's, which name the box; rehearsed: where the
+    copy of the show with its new cues lies.
     """
 
-    def __init__(self, guard: Guard, runtime: Path, options: tuple[str, ...], is_installed: bool) -> None:
+    def __init__(
+        self, guard: Guard, runtime: Path, options: tuple[str, ...], is_installed: bool, rehearsed: Path
+    ) -> None:
         self._guard, self._options, self._is_installed = guard, options, is_installed
+        self._rehearsed = rehearsed
         self._anew = runtime / ANEW
         self._busy = asyncio.Lock()
 
@@ -37,6 +41,7 @@ class Venue:
             web.get("/api/box/file", self._file),
             web.post("/api/box/file", self._change),
             web.post("/api/box/show", self._dance_again),
+            web.post("/api/cue/dance", self._dance_rehearsed),
         ]
 
     async def _file(self, request: web.Request) -> web.Response:
@@ -58,6 +63,13 @@ class Venue:
         if not self._is_installed or not isinstance(show, str) or _SHOW.fullmatch(show) is None:
             raise web.HTTPBadRequest(text="There is no such show.")
         return await self._done("dance-again", "--", show)
+
+    async def _dance_rehearsed(self, request: web.Request) -> web.Response:
+        self._guard.require_device(request)
+        await said(request)
+        if not self._is_installed:
+            raise web.HTTPBadRequest(text="This box keeps no shows: give bunraku play the copy, with --show.")
+        return await self._done("adopt-show", "--", str(self._rehearsed))
 
     async def _done(self, *words: str, said: bytes | None = None) -> web.Response:
         if self._busy.locked():

@@ -22,7 +22,7 @@ class _Watcher:
     def __init__(self) -> None:
         self.words: str | None = None
         self.frame: bytes | None = None
-        self.wants_frames = False
+        self.wants_frames = self.wants_ghost = False
         self.ready = asyncio.Event()
 
     async def send_on(self, browser: web.WebSocketResponse) -> None:
@@ -64,11 +64,11 @@ class Watchers:
             one.words = words
             one.ready.set()
 
-    def put_frame(self, frame: bytes) -> None:
-        """The same for those that show the dance."""
+    def put_frame(self, frame: bytes, with_ghost: bytes) -> None:
+        """The same for those that show the dance, alone or beside what it starts from."""
         for one in self._watchers:
             if one.wants_frames:
-                one.frame = frame
+                one.frame = with_ghost if one.wants_ghost else frame
                 one.ready.set()
 
     async def serve(self, request: web.Request, words: str) -> web.StreamResponse:
@@ -91,7 +91,7 @@ class Watchers:
                 if wanted is None:
                     await browser.close(code=1008, message=b"not understood")
                     break
-                watcher.wants_frames = wanted
+                watcher.wants_frames, watcher.wants_ghost = wanted
         finally:
             del self._watchers[watcher]
             sending.cancel()
@@ -105,14 +105,16 @@ class Watchers:
                     await browser.close(code=1001, message=b"the page's process ends")
 
 
-def _wish(text: str) -> bool | None:
-    """Whether a browser wants frames; None for anything else that it may have said."""
+def _wish(text: str) -> tuple[bool, bool] | None:
+    """Whether a browser wants frames, and the ghost; None for anything else that it may have said."""
     try:
         said = json.loads(text)
     except (ValueError, RecursionError):
         return None
-    wanted = said.get("frames") if isinstance(said, dict) else None
-    return wanted if isinstance(wanted, bool) else None
+    if not isinstance(said, dict):
+        return None
+    frames, ghost = said.get("frames"), said.get("ghost", False)
+    return (frames, ghost) if isinstance(frames, bool) and isinstance(ghost, bool) else None
 
 
 def _keep_little(request: web.Request) -> None:

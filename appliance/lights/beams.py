@@ -58,9 +58,10 @@ def beams_of(patch: Patch, values: Values) -> list[Beam]:
 def _light(patch: Patch, values: Values, fixture: FixtureConfig) -> tuple[Array, float, float]:
     """Colour and level of a fixture, and its zoom in degrees; 0: it has none. Cells count by their mean."""
     shares: dict[str, list[float]] = {}
-    for slot, value in zip(patch.slots, values, strict=True):
-        if slot.fixture is fixture and (slot.channels or slot.base != DIMMER):
-            shares.setdefault(slot.base, []).append(float(value))
+    for place in patch.own(fixture):
+        slot = patch.slots[place]
+        if slot.channels or slot.base != DIMMER:
+            shares.setdefault(slot.base, []).append(float(values[place]))
     mean = {name: float(np.mean(several)) for name, several in shares.items()}
     lamps = [mean[name] * np.array(tint) for name, tint in _TINTS.items() if name in mean]
     light = np.minimum(np.sum(lamps, axis=0), 1.0) if lamps else np.ones(3)

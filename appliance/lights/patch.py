@@ -51,6 +51,10 @@ class Patch:
             found += exact or [place for place in own if self.slots[place].base == attribute]
         return np.array(found, np.intp)
 
+    def own(self, fixture: FixtureConfig) -> Sequence[int]:
+        """The slots of one fixture."""
+        return self._own[fixture.name]
+
     def dimmed(self, values: Values, level: Values | float) -> Values:
         """The values with dimmers scaled by `level` (a number or (S,)); colours stand in where none is."""
         shown = np.where(self.dims, values * level, values)

@@ -18,6 +18,7 @@ from appliance.box.show_state import ShowStateReader
 from appliance.box.stop_signals import stop_signals
 from appliance.lights.active_show import ActiveShow
 from appliance.lights.fallback import DMX_AWAY, OF_THE_LIGHTS, STAGE_UNSEEN
+from appliance.lights.live import LiveRig, OrderedWalk
 from appliance.lights.patch import Patch
 from appliance.lights.rig import LOST_S, Rig
 from appliance.outputs.dmx.open_wire import open_universes
@@ -29,6 +30,7 @@ from appliance.show.config_error import ConfigError, NotAskedForError, Problem
 from appliance.show.lights import LightsConfig
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import at_venue, misplaced, unwired
+from appliance.show_control.orders import OrderInbox
 
 _REPORT_S = 1.0
 _POLL_S = 0.1  # how often the stage is looked for
@@ -46,6 +48,8 @@ class Lights:
         show_state: ShowStateReader,
         say: Callable[[str], None],
         fallbacks: Fallbacks,
+        inbox: OrderInbox | None = None,
+        live: LiveRig | None = None,
     ) -> None:
         config = rig_here(show, box)
         patch = Patch(config.fixtures, show.directory)
@@ -53,6 +57,7 @@ class Lights:
         puppets = [puppet.name for puppet in show.config.puppets]
         self.rig = Rig(config, patch, show.skeleton, box.lights.rate_hz, puppets)
         self.universes = wired(patch, box)
+        self._walk, self._live = OrderedWalk(inbox, patch, box.lights.rate_hz), live
         self._stage, self._show_state, self._say, self._fallbacks = stage, show_state, say, fallbacks
         self._foreign: int | None = None
         self._was_lost = True
@@ -82,6 +87,7 @@ class Lights:
                 report_at = now + _REPORT_S
                 self._report()
             deadline = _wait_for(deadline, period_s)
+        self._walk.end()
         self.rig.fade_out()
         give_up = time.monotonic() + _GIVE_UP_S
         while self._next_pass() < give_up and self.rig.safety < 1.0:
@@ -95,8 +101,13 @@ class Lights:
             universe.close(now)
 
     def _next_pass(self) -> float:
-        now = time.monotonic()
-        levels = self.rig.render(self._frame(now), self._stage.generation, self._show_state.read(), now)
+        now, show_state, patch = time.monotonic(), self._show_state.read(), self.rig.patch
+        levels = self._walk.levels(show_state, now)
+        if levels is None:
+            levels = self.rig.render(self._frame(now), self._stage.generation, show_state, now)
+        if self._live is not None:
+            walked = self._walk.values
+            self._live.tell(patch, self.rig.values if walked is None else walked, self._walk.words, now)
         for universe in self.universes:
             universe.offer(levels[universe.number], now)
         return now
@@ -187,13 +198,18 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
         opened.callback(process_health.close)
         opened.callback(stage.close)
         opened.callback(show_state.close)
+        live, inbox = LiveRig(folder), _open_inbox(folder)
+        opened.callback(live.close)
+        if inbox is not None:
+            opened.callback(inbox.close)
+        parts = stage, show_state, speaker.say, fallbacks, inbox, live
 
         def pulse(now: float) -> None:
             notifier.ping(now)
             process_health.publish_health(now)
 
         if directory is not None:
-            lights = Lights(load_show(directory), box, stage, show_state, speaker.say, fallbacks)
+            lights = Lights(load_show(directory), box, *parts)
             notifier.ready("The lights dance.")
             _light(lights, stopped, pulse)
             process_health.end(time.monotonic())
@@ -203,7 +219,7 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
         while not stopped():
             if active.is_new(time.monotonic()):
                 try:
-                    lights = Lights(active.load(), box, stage, show_state, speaker.say, fallbacks)
+                    lights = Lights(active.load(), box, *parts)
                 except ConfigError as error:
                     speaker.say(f"{error}\nThe lights stay off until the stage dances another show.")
                 else:
@@ -211,6 +227,14 @@ def run_lights(directory: Path | None, box_file: Path | None) -> None:
             pulse(time.monotonic())
             time.sleep(_POLL_S)
         process_health.end(time.monotonic())
+
+
+def _open_inbox(folder: Path) -> OrderInbox | None:
+    """For the walk through the rig; without it the dance is lit nonetheless."""
+    try:
+        return OrderInbox(folder, "lights")
+    except OSError:
+        return None
 
 
 def _light(lights: Lights, stopped: Callable[[], bool], pulse: Callable[[float], None]) -> None:

@@ -56,6 +56,7 @@ class Walk:
     def __init__(self, patch: Patch) -> None:
         self._patch = patch
         self._aims: NDArray[np.float64] = np.tile([0.0, CHEST_M, 0.0], (len(patch.heads.heads), 1))
+        self.values: Values = patch.rest()  # (S,) what the last pass showed
 
     def levels(self, step: Step, part: float, seconds: float) -> dict[int, bytes]:
         """512 levels for each universe, `part` 0..1 of the step and `seconds` after the levels before."""
@@ -68,6 +69,7 @@ class Walk:
         heads.follow(heads.axes.angles(values), self._aims, aimed, seconds)
         shown = patch.dimmed(values, 1.0)
         shown[heads.axes.slots] = heads.axes.shares(heads.angles)
+        self.values = shown
         return patch.encode(shown)
 
     def dark(self) -> dict[int, bytes]:
@@ -118,6 +120,36 @@ def _words(slot: Slot) -> str:
     return f"{where}: dark, full, back" if slot.base == DIMMER else f"{where}: from 0 to full, and back"
 
 
+class Walking:
+    """A walk, pass by pass: each step takes `step_s`, or as long as its heads need.
+
+    step: what is to be looked at now; None before the first pass and after the last step.
+    """
+
+    def __init__(self, patch: Patch, to_see: Sequence[Step], step_s: float, rate_hz: float) -> None:
+        self._moving, self._to_see, self._step_s = Walk(patch), iter(to_see), step_s
+        self._longest_s = max(LONGEST_STEP_S, 1.5 / rate_hz)
+        self._before = self._walked_s = self._duration_s = 0.0
+        self.step: Step | None = None
+
+    @property
+    def values(self) -> Values:
+        """(S,) what the last pass showed."""
+        return self._moving.values
+
+    def levels(self, now: float) -> dict[int, bytes]:
+        """512 levels for each universe at `now` (monotonic seconds); zeros after the last step."""
+        seconds, self._before = min(now - self._before, self._longest_s), now
+        self._walked_s += seconds
+        if self.step is None or self._walked_s >= self._duration_s:
+            self.step, self._walked_s, seconds = next(self._to_see, None), 0.0, 0.0
+            if self.step is not None:
+                self._duration_s = self._moving.duration_s(self.step, self._step_s)
+        if self.step is None:
+            return self._moving.dark()
+        return self._moving.levels(self.step, self._walked_s / self._duration_s, seconds)
+
+
 def walk(
     patch: Patch,
     to_see: Sequence[Step],
@@ -131,18 +163,17 @@ def walk(
 
     `show` sends levels, waits for the next pass and gives the time then.
     """
-    moving, fixture = Walk(patch), ""
-    longest_s = max(LONGEST_STEP_S, 1.5 / rate_hz)
-    now = show(moving.dark())
-    for step in to_see:
-        if step.fixture != fixture:
-            fixture = step.fixture
-            say(introduction(patch, fixture))
-        say(f"  {step.attribute}, {step.words}")
-        walked_s = seconds = 0.0
-        duration_s = moving.duration_s(step, step_s)
-        while not stopped() and walked_s < duration_s:
-            before, now = now, show(moving.levels(step, walked_s / duration_s, seconds))
-            seconds = min(now - before, longest_s)
-            walked_s += seconds
-    show(moving.dark())
+    walking, said = Walking(patch, to_see, step_s, rate_hz), None
+    dark = Walk(patch).dark()
+    now = show(dark)
+    while not stopped():
+        levels = walking.levels(now)
+        if walking.step is None:
+            break
+        if walking.step is not said:
+            if said is None or walking.step.fixture != said.fixture:
+                say(introduction(patch, walking.step.fixture))
+            said = walking.step
+            say(f"  {said.attribute}, {said.words}")
+        now = show(levels)
+    show(dark)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import struct
 
-FILE, KIND, FORMAT, WRITER = "frame", "frame", 2, "the stage (bunraku play)"
+FILE, KIND, FORMAT, WRITER = "frame", "frame", 3, "the stage (bunraku play)"
 FACTS, HEALTH, FRAMES = range(3)  # the file's rings
 FRAME_SLOTS = 64  # a reader has 1.28 s to copy the newest frame
 HEALTH_SLOTS, HEALTH_BYTES = 2, 1 << 16
 LATE = 1  # flag
+GHOST = 2  # flag, for browsers alone
 # Tick, frame time, when it left the stage, the sensor's sequence and its arrival, flags, joints.
 FRAME_HEAD = struct.Struct("<qddqdII")
 # For browsers: tick, flags, joints; then each puppet's world rotations (w, x, y, z), positions and holds,
-# float32.
+# float32; with GHOST then the local rotations of what the first puppet starts from.
 BROWSER_HEAD = struct.Struct("<dII")
 
 
@@ -25,7 +26,8 @@ class FrameLayout:
         self.joints, self.puppets = joints, puppets
         self.root_at = FRAME_HEAD.size
         self.pose_at = self.root_at + 12
-        self.world_at = self.pose_at + 16 * joints
+        self.source_at = self.pose_at + 16 * joints
+        self.world_at = self.source_at + 16 * joints
         self.positions_at = self.world_at + 16 * joints
         self.holds_at = self.positions_at + 12 * joints
         self.stride = self.holds_at + 4 * joints - self.root_at

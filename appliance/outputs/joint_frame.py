@@ -22,6 +22,7 @@ class JointFrame:
     sensor_sequence: int = -1  # of the primary sensor's newest reading in this frame; -1 without one
     sensor_arrival: float = 0.0  # when that reading came in, seconds on the monotonic clock
     pose: NDArray[np.float32] = field(init=False)  # (J, 4) w, x, y, z local to the parent joint
+    source: NDArray[np.float32] = field(init=False)  # (J, 4) local: what the puppet starts from, the phrase
     world: NDArray[np.float32] = field(init=False)  # (J, 4) w, x, y, z
     positions: NDArray[np.float32] = field(init=False)  # (J, 3) world, metres
     root: NDArray[np.float32] = field(init=False)  # (3,) world, metres
@@ -30,7 +31,7 @@ class JointFrame:
     def __post_init__(self) -> None:
         self.pose = np.zeros((self.joints, 4), np.float32)
         self.pose[:, 0] = 1.0
-        self.world = self.pose.copy()
+        self.source, self.world = self.pose.copy(), self.pose.copy()
         self.positions = np.zeros((self.joints, 3), np.float32)
         self.root = np.zeros(3, np.float32)
         self.holds = np.zeros(self.joints, np.float32)

@@ -143,9 +143,10 @@ class FrameWriter:
 
     @staticmethod
     def _fill(arrays: _Arrays, frame: JointFrame) -> None:
-        root, pose, world, positions, holds = arrays
+        root, pose, source, world, positions, holds = arrays
         root[...] = frame.root
         pose[...] = frame.pose
+        source[...] = frame.source
         world[...] = frame.world
         positions[...] = frame.positions
         holds[...] = frame.holds
@@ -166,12 +167,15 @@ class FrameWriter:
 
 
 def _arrays(payload: memoryview, layout: FrameLayout, puppet: int) -> _Arrays:
-    """Where a puppet's root (3,), pose (J, 4), world (J, 4), positions (J, 3) and holds (J,) are written."""
+    """Where a puppet's root (3,), pose, source, world (J, 4), positions (J, 3) and holds (J,) are written."""
     joints, at = layout.joints, puppet * layout.stride
     root = np.frombuffer(payload, "<f4", 3, at + layout.root_at)
     holds = np.frombuffer(payload, "<f4", joints, at + layout.holds_at)
-    pose, world, positions = (
+    pose, source, world, positions = (
         np.frombuffer(payload, "<f4", joints * width, at + begin).reshape(joints, width)
-        for width, begin in ((4, layout.pose_at), (4, layout.world_at), (3, layout.positions_at))
+        for width, begin in (
+            *((4, layout.pose_at), (4, layout.source_at), (4, layout.world_at)),
+            (3, layout.positions_at),
+        )
     )
-    return root, pose, world, positions, holds
+    return root, pose, source, world, positions, holds

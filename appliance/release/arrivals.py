@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 SHOW, BOX = "show", "box.yaml"
-_WORDS = {"stick": "the stick", "page": "the page"}
+_WORDS = {"stick": "the stick", "page": "the page", "rehearsal": "the rehearsal"}
 _MOST_ENTRIES = 4000  # files, folders and all else: a folder may lie in itself on a damaged stick
 _UNREADABLE = [f"{SHOW}/?", 0, 0]  # it is there, and what reads it says that it cannot be read
 
@@ -17,7 +17,7 @@ _UNREADABLE = [f"{SHOW}/?", 0, 0]  # it is there, and what reads it says that it
 class Arrival(NamedTuple):
     """A show bundle, a box file, or both. listing: names, sizes and times of all files; [] without any."""
 
-    source: str  # stick, boot, page
+    source: str  # stick, boot, page, rehearsal
     folder: Path
     listing: list[list[Any]]
 

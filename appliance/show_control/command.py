@@ -96,6 +96,8 @@ FORMS: dict[str, Form] = {
     "/camera": Form(numbers=(*_STAND, _FADE), optional=1),
     "/camera/look": Form(numbers=(_FADE,), optional=1),
     "/lights": Form("light mappings", (_FADE,), optional=1),
+    "/lights/walk": Form("fixture", may_be_nameless=True),
+    "/lights/walk/stop": Form(),
     "/strings": Form(numbers=(Number("loudness", 0, 1), _FADE), optional=1),
     "/springs": Form("setting", (_FADE,), optional=1),
     "/springs/stiffness": Form(numbers=(Number("times the setting's", 0.1, 10), _FADE), optional=1),

@@ -50,6 +50,8 @@ ORDERS: Mapping[str, tuple[Place, str]] = {
     "/sensors/strobe": ("stage", "strobe"),
     "/sensors/reload": ("stage", "reload"),
     "/motion/keep": ("generator", "keep"),
+    "/lights/walk": ("lights", "walk"),
+    "/lights/walk/stop": ("lights", "walk/stop"),
     "/projector/corner": ("projector", "corner"),
     "/projector/corners": ("projector", "corners"),
     "/projector/corners/reset": ("projector", "corners/reset"),

@@ -35,6 +35,7 @@ class Order:
     joint), neutral, heading, strobe (text: the sensor or ""), reload (keys).
     For the projector:  corner (number 1..4, x, y), corners (x1, y1 .. x4, y4), corners/reset, brightness (b),
     mirror (0|1), grid (0|1), info (0|1).
+    For the lights:  walk (text: the fixture or "" for all), walk/stop.
     For the generator:  keep (text: the name).
 
     keys: those that a reload has read. ask: number of the answer that is waited for; 0: none.

@@ -48,6 +48,7 @@ class Place:
         frame.root[:] = frame.root @ self._columns + self._shift
         frame.world[:] = quaternion.multiply(self._turn, frame.world)
         frame.pose[0] = quaternion.multiply(self._turn, frame.pose[0])
+        frame.source[0] = quaternion.multiply(self._turn, frame.source[0])
 
 
 @dataclass(slots=True)
@@ -139,6 +140,7 @@ class StagePuppet:
             self.motion.rest_heights,
             frame.holds,
         )
+        frame.source[:] = self._whole[0]
         frame.pose[:] = grounding.pose
         frame.world[:] = figure.world
         frame.positions[:] = figure.positions

@@ -143,6 +143,24 @@ def test_a_changed_box_file_counts_at_once_and_the_one_before_comes_back(dancing
     assert device.ask("/api/box")[1]["shows"][0]["id"] == before
 
 
+def test_a_kept_cue_is_in_the_show_that_the_box_dances(dancing: Box) -> None:
+    """What reads the show, its map and its copy runs in the page's own sandbox, too."""
+    device, machine = Device(dancing), dancing.machine
+    machine.await_that(lambda: device.ask("/api/me")[1]["rehearsal"], "no rehearsal")
+    assert device.ask("/api/map")[0] in (200, 404), "404: a show without a map, in its own words"
+    status, words = device.ask("/api/cue", {"name": "found"})
+    assert status == 200, words
+    status, answer = device.ask("/api/cue/dance", {})
+    assert (status, answer.get("problems")) == (200, []), answer
+    machine.await_that(lambda: "found" in _cues(device), "the new cue is not in the show")
+    assert device.ask("/api/box")[1]["shows"][0]["source"] == "show from the rehearsal"
+
+
+def _cues(device: Device) -> list[str]:
+    status, value = device.ask("/status")
+    return [one["name"] for one in value.get("cues", ())] if status == 200 else []
+
+
 def _rehearses(device: Device) -> bool | None:
     status, me = device.ask("/api/me")
     return me["rehearsal"] if status == 200 else None

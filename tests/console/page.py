@@ -105,11 +105,13 @@ def page_alone(folder: Path, **console: Any) -> Iterator[tuple[Page, Process]]:
 
 
 @contextlib.contextmanager
-def box_with_page(show: Path, folder: Path, *arguments: str) -> Iterator[tuple[Box, Page]]:
-    """A box that dances with its emulated sensors, and its page."""
+def box_with_page(
+    show: Path, folder: Path, *arguments: str, settings: dict[str, Any] | None = None
+) -> Iterator[tuple[Box, Page]]:
+    """A box that dances with its emulated sensors, and its page; `settings`: more of the box file."""
     (port,) = free_ports(1, socket.SOCK_STREAM)
-    settings = {"console": {"port": port}}
-    with playing(show, folder, "--emulate", *arguments, settings=settings) as box:
+    whole = {"console": {"port": port}, **(settings or {})}
+    with playing(show, folder, "--emulate", *arguments, settings=whole) as box:
         page = Page(port, box.box_file)
         wait_until(page.is_open, lambda: box.words)
         wait_until(lambda: _is_linked(page), lambda: box.words)

@@ -16,6 +16,7 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.bvh import read_bvh
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import Run, read_journal
+from tests.bundles import FIGURE
 from tests.console.browser import await_true, press
 from tests.console.page import Page
 from tests.system.box import Box
@@ -47,6 +48,33 @@ def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page
     tab.locator("#show-dance").check()
     await_true(tab, f"Number(document.body.dataset.frames) > {count}")
     reader.close()
+
+
+def test_the_phrase_stands_beside_the_puppet_as_it_is_without_hands(
+    tab: Tab, venue: tuple[Box, Page]
+) -> None:
+    """In the phrase the left arm stays with the swaying chest; a hand holds the puppet's elsewhere."""
+    press(tab, '[data-page="dance"]')
+    await_true(tab, "Number(document.body.dataset.tick) > 0")
+    assert not tab.evaluate("document.body.dataset.ghost"), "only if wished"
+    tab.locator("#show-ghost").check()
+    await_true(tab, "Boolean(document.body.dataset.ghost)")
+    swayed = set()
+
+    def has_swayed() -> bool:
+        places = np.array(tab.evaluate("document.body.dataset.ghost").split(), float).reshape(-1, 3)
+        chest, shoulder, elbow = (places[FIGURE.index(name)] for name in ("Chest", "lShldr", "lForeArm"))
+        collar, arm = shoulder - chest, elbow - shoulder
+        cosine = collar @ arm / np.linalg.norm(collar) / np.linalg.norm(arm)
+        assert cosine == pytest.approx(2 / np.sqrt(5), abs=0.02), "as FIGURE and the phrase have it"
+        assert min(places[:, 1]) == pytest.approx(0.05, abs=0.01), "it stands on the floor"
+        swayed.add(round(float(np.arctan2(arm[1], np.hypot(arm[0], arm[2]))), 1))
+        return len(swayed) >= 4
+
+    wait_until(has_swayed, "the phrase does not move")
+    assert tab.evaluate("document.body.dataset.puppets") == "2"
+    tab.locator("#show-ghost").uncheck()
+    await_true(tab, "!document.body.dataset.ghost")
 
 
 def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> None:

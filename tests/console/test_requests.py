@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 import socket
+import time
 from importlib.metadata import version
 from pathlib import Path
 from urllib.parse import urlparse
@@ -84,6 +86,26 @@ def test_wrong_pins_are_slowed_down_and_then_even_the_right_one_waits(page: Page
         assert page.post("/api/pin", {"pin": "x" * 6, "name": ""}).status == 403
     late = page.post("/api/pin", {"pin": pin, "name": ""})
     assert late.status == 429 and 0 < int(late.headers["Retry-After"]) <= 60
+
+
+def test_pins_that_wait_for_their_bodies_are_counted_like_all_others(page: Page) -> None:
+    """Requests that are all begun before the first wrong PIN came: five of them are tried."""
+    body = b'{"pin": "xxxxxx", "name": ""}'
+    head = f"POST /api/pin HTTP/1.1\r\nHost: {HOST}:{page.port}\r\nOrigin: {page.origin}\r\n"
+    head += f"Content-Length: {len(body)}\r\nConnection: close\r\n\r\n"
+    with contextlib.ExitStack() as opened:
+        begun = [
+            opened.enter_context(socket.create_connection((HOST, page.port), 60))
+            for _ in range(4 * FREE_TRIES)
+        ]
+        for one in begun:
+            one.sendall(head.encode() + body[:1])
+        page.get("/status")
+        time.sleep(0.5)
+        for one in begun:
+            one.sendall(body[1:])
+        answers = [one.recv(12)[9:] for one in begun]
+    assert answers.count(b"403") == FREE_TRIES and answers.count(b"429") == 3 * FREE_TRIES
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ export class Box extends EventTarget {
     super();
     this.value = null;
     this.heardAt = 0;
-    this.framesWanted = false;
+    this.framesWanted = this.ghostWanted = false;
     this.open();
     setInterval(() => this.check(), 500);
     document.addEventListener("visibilitychange", () => this.wake());
@@ -56,14 +56,14 @@ export class Box extends EventTarget {
     this.open();
   }
 
-  showFrames(wanted) {
-    this.framesWanted = wanted;
+  showFrames(wanted, ghost) {
+    [this.framesWanted, this.ghostWanted] = [wanted, ghost];
     this.say();
   }
 
   say() {
     if (this.socket?.readyState !== WebSocket.OPEN) return;
-    this.socket.send(JSON.stringify({ frames: this.framesWanted && document.visibilityState === "visible" }));
+    this.socket.send(JSON.stringify({ frames: this.framesWanted && document.visibilityState === "visible", ghost: this.ghostWanted }));
   }
 }
 

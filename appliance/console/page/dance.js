@@ -1,9 +1,12 @@
 // The dance in 3D, drawn on a plain canvas: a body of capsules, its shadow, a floor. No library, no graphics card.
+import { multiplied } from "./rotation.js";
+
 const HEAD_BYTES = 16; // tick (float64), flags, joints (uint32): stage_view.py
 const GRID_M = 3;
 const NEAR_M = 4.5, BACK = 1.8; // the eye from one dancer; and for each metre that several are from their middle
+const GHOST = 2, GHOST_M = 1.0; // a flag of a frame: stage_view.py; how far the phrase stands beside the puppet
 const HELD = 0.01; // less is not seen
-const INK = { body: [238, 226, 206], hand: [255, 138, 92], floor: "#2a2f36", shadow: "#000000" };
+const INK = { body: [238, 226, 206], hand: [255, 138, 92], ghost: [98, 118, 142], floor: "#2a2f36", shadow: "#000000" };
 
 export class Dance {
   constructor(canvas, caption, box, words) {
@@ -41,13 +44,14 @@ export class Dance {
   take(buffer) {
     if (this.canvas.offsetParent === null) return; // on another page
     const head = new DataView(buffer), joints = head.getUint32(12, true);
-    const puppets = (buffer.byteLength - HEAD_BYTES) / (32 * joints);
+    const source = head.getUint32(8, true) & GHOST ? new Float32Array(buffer, buffer.byteLength - 16 * joints, 4 * joints) : null;
+    const puppets = (buffer.byteLength - HEAD_BYTES - (source?.byteLength ?? 0)) / (32 * joints);
     if (!Number.isInteger(puppets) || puppets < 1) return;
     const figures = Array.from({ length: puppets }, (_, puppet) => {
       const numbers = new Float32Array(buffer, HEAD_BYTES + 32 * joints * puppet, 8 * joints);
       return { world: numbers.subarray(0, 4 * joints), positions: numbers.subarray(4 * joints, 7 * joints), holds: numbers.subarray(7 * joints) };
     });
-    this.frame = { tick: head.getFloat64(0, true), figures, ...figures[0] }; // fingers and words are the first one's
+    this.frame = { tick: head.getFloat64(0, true), figures, source, ...figures[0] }; // fingers and words are the first one's
     this.takenAt = performance.now();
     document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
   }
@@ -105,6 +109,8 @@ export class Dance {
       return;
     }
     const root = pointOf(frame, 0), roots = frame.figures.map((figure) => pointOf(figure, 0));
+    const ghost = frame.source && show.offsets ? this.ghost(frame) : null;
+    if (ghost) roots.push(pointOf(ghost, 0));
     const middle = [0, 2].map((axis) => roots.reduce((sum, one) => sum + one[axis], 0) / roots.length);
     this.centre ??= middle;
     this.centre = this.centre.map((value, axis) => value + 0.05 * (middle[axis] - value));
@@ -113,7 +119,7 @@ export class Dance {
     this.away += 0.05 * (away - this.away);
     const eye = this.eye(wide, high);
     this.drawFloor(ink, eye, ratio);
-    const bones = frame.figures.flatMap((figure) => this.bones(figure));
+    const bones = [...frame.figures, ...ghost ? [ghost] : []].flatMap((figure) => this.bones(figure));
     ink.lineCap = "round";
     ink.strokeStyle = INK.shadow;
     ink.globalAlpha = 0.45;
@@ -121,10 +127,11 @@ export class Dance {
     ink.globalAlpha = 1;
     const seen = bones.map((bone) => ({ ...bone, a: eye(bone.from), b: eye(bone.to) }));
     seen.sort((one, other) => other.a.away + other.b.away - one.a.away - one.b.away);
-    for (const { a, b, radius, held } of seen) this.drawBone(ink, a, b, radius, held);
+    for (const { a, b, radius, held, body } of seen) this.drawBone(ink, a, b, radius, held, body);
     for (const figure of frame.figures) {
       for (const joint of this.heldJoints(figure)) this.drawRing(ink, eye(pointOf(figure, joint)), ratio, figure.holds[joint]);
     }
+    document.body.dataset.ghost = ghost ? Array.from(ghost.positions, (value) => value.toFixed(3)).join(" ") : "";
     document.body.dataset.puppets = frame.figures.length;
     document.body.dataset.held = this.heldJoints().map((joint) => `${show.joints[joint]} ${frame.holds[joint].toFixed(2)}`).join(", ");
     document.body.dataset.tick = frame.tick;
@@ -132,6 +139,23 @@ export class Dance {
     const isOld = performance.now() - this.takenAt > 1500;
     const names = this.heldJoints().map((joint) => show.joints[joint]);
     this.tell(isOld ? this.words("dance_stands") : names.length ? this.words("held", { names: names.join(", ") }) : this.words("free"));
+  }
+
+  // What the puppet starts from, as a figure on the floor beside it, to its right as the eye sees it.
+  ghost({ source, positions }) {
+    const { joints, parents, offsets } = this.show, world = [], places = [];
+    joints.forEach((_, joint) => {
+      const parent = parents[joint], turned = source.subarray(4 * joint, 4 * joint + 4);
+      world.push(parent < 0 ? [...turned] : multiplied(world[parent], turned));
+      places.push(parent < 0 ? [0, 0, 0] : rotated(world[parent], offsets[joint]).map((value, axis) => value + places[parent][axis]));
+    });
+    const ends = this.show.ends.map(([joint, offset]) => places[joint][1] + rotated(world[joint], offset)[1]);
+    const floor = Math.min(...places.map((place) => place[1]), ...ends);
+    const beside = [positions[0] + GHOST_M * Math.cos(this.yaw), -floor, positions[2] - GHOST_M * Math.sin(this.yaw)];
+    return {
+      world: new Float32Array(world.flat()), holds: new Float32Array(joints.length), body: INK.ghost,
+      positions: new Float32Array(places.flatMap((place) => place.map((value, axis) => value + beside[axis]))),
+    };
   }
 
   heldJoints(figure = this.frame) {
@@ -160,7 +184,7 @@ export class Dance {
       const name = show.joints[joint].toLowerCase(), length = Math.hypot(...from.map((v, axis) => to[axis] - v));
       const trunk = /hip|pelvis|root|spine|torso|chest|back/.test(name);
       const radius = /head/.test(name) ? 0.085 : Math.min(trunk ? 0.085 : 0.055, Math.max(0.022, 0.2 * length));
-      if (length > 0.005) bones.push({ from: [...from], to: [...to], radius, held: figure.holds[joint], joint });
+      if (length > 0.005) bones.push({ from: [...from], to: [...to], radius, held: figure.holds[joint], joint, body: figure.body ?? INK.body });
     };
     show.parents.forEach((parent, joint) => { if (parent >= 0) add(parent, point(parent), point(joint)); });
     for (const [joint, offset] of show.ends) {
@@ -170,9 +194,9 @@ export class Dance {
     return bones;
   }
 
-  drawBone(ink, a, b, radius, held) {
+  drawBone(ink, a, b, radius, held, body) {
     const light = Math.min(1, Math.max(0.45, 1.25 - 0.16 * ((a.away + b.away) / 2 - 3)));
-    const colour = INK.body.map((value, part) => value + held * (INK.hand[part] - value)); // as firmly as it is held
+    const colour = body.map((value, part) => value + held * (INK.hand[part] - value)); // as firmly as it is held
     const shade = (part) => `rgb(${colour.map((value) => Math.round(value * light * part)).join(" ")})`;
     ink.strokeStyle = "#0d0f11";
     this.stroke(ink, a, b, radius * 1.22);

@@ -3,7 +3,6 @@ import { Dance } from "./dance.js";
 import { clock, language, number, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
-const STRETCH_S = 10;
 const HEAD_BYTES = 16, JOINT_BYTES = 32; // of a frame: dance.js
 const SLOWEST_MS = 20, MANY = 5; // what fills the timeline's height
 const INK = { late: "#ff7a66", skipped: "#f0b840", failed: "#d36bff", slowest: "#59636f", mark: "#f3ece0", order: "#58c27d" };
@@ -13,6 +12,7 @@ let runs = [], run = null, second = 0, again = null, dance = null;
 
 export function initHappened() {
   byId("happened-run").addEventListener("change", () => choose(runs[Number(byId("happened-run").value)]));
+  byId("happened-seconds").addEventListener("change", () => point(second));
   byId("happened-read").addEventListener("click", readHappened);
   byId("happened-dance").addEventListener("click", danceAgain);
   const slider = byId("happened-second"), canvas = byId("timeline");
@@ -62,7 +62,7 @@ function choose(chosen) {
     item.append(button, ` ${words(`happened_${kind}`)}: ${said}`);
     return item;
   }));
-  point(run.seconds - STRETCH_S);
+  point(run.seconds - stretch());
 }
 
 function point(at) {
@@ -73,7 +73,8 @@ function point(at) {
   draw();
 }
 
-const part = () => new URLSearchParams({ run: run.number, from: second.toFixed(2), seconds: STRETCH_S });
+const part = () => new URLSearchParams({ run: run.number, from: second.toFixed(2), seconds: stretch() });
+const stretch = () => Number(byId("happened-seconds").value);
 
 function draw() {
   const canvas = byId("timeline"), ratio = Math.min(devicePixelRatio || 1, 2);

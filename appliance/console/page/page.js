@@ -9,6 +9,7 @@ import { initLogs } from "./logs.js";
 import { initPicture, showPicture } from "./picture.js";
 import { initProve, leaveProve, showProve } from "./prove.js";
 import { initRehearsal, leaveRehearsal, showRehearsal } from "./rehearsal.js";
+import { initRig, showRig } from "./rig.js";
 import { initSensorChanges, showSensorChanges } from "./sensor_changes.js";
 import { showSensors } from "./sensors.js";
 import { initVenue } from "./venue.js";
@@ -33,7 +34,7 @@ function show(page) {
   if (known === "prove") showProve();
   else leaveProve();
   if (known !== "rehearsal") leaveRehearsal();
-  box.showFrames(["dance", "rehearsal"].includes(known) && byId("show-dance").checked);
+  box.showFrames(["dance", "rehearsal"].includes(known) && byId("show-dance").checked, known === "dance" && byId("show-ghost").checked);
 }
 
 function verdict() {
@@ -133,12 +134,13 @@ initDevice(me, words);
 initPicture();
 initHappened();
 initProve();
+initRig();
 initSensorChanges();
 initLogs();
 initVenue();
 initRehearsal(me, box);
 for (const button of document.querySelectorAll("nav button")) button.addEventListener("click", () => show(button.dataset.page));
-byId("show-dance").addEventListener("change", () => show("dance"));
+for (const id of ["show-dance", "show-ghost"]) byId(id).addEventListener("change", () => show("dance"));
 addEventListener("hashchange", () => show(location.hash.slice(1)));
 byId("go").addEventListener("click", () => command("/go"));
 byId("stop").addEventListener("click", () => command("/stop"));
@@ -156,6 +158,7 @@ box.addEventListener("value", () => {
   showSensors(byId("cards"), box.value, words);
   showSensorChanges(box.value, dance.show);
   showPicture(box.value);
+  showRig(box.value);
   showClock(box.value);
   showRehearsal(box.value, dance.show);
   dance.follow(box.value);

@@ -20,8 +20,9 @@ export function initPicture() {
 }
 
 export function showPicture(value) {
-  const projects = value.processes.some((one) => one.who === "projector" && !one.late);
-  document.querySelector('[data-page="picture"]').hidden = !projects && value.looks.length === 0;
+  const runs = (name) => value.processes.some((one) => one.who === name && !one.late);
+  const projects = runs("projector");
+  document.querySelector('[data-page="picture"]').hidden = !projects && !runs("lights") && value.looks.length === 0;
   for (const id of ["brightness", "grid-on", "info-on", "corners-reset"]) byId(id).parentElement.hidden = !projects;
   byId("corners").hidden = !projects;
   for (const element of document.querySelectorAll('#picture > h2, #picture > .quiet')) element.hidden = !projects;

@@ -1,10 +1,11 @@
 // For choreographers: the figure with its hands, what is danced, how often a window is coded.
 import { showChoices } from "./choices.js";
 import { request } from "./box.js";
-import { command, withPin } from "./device.js";
+import { ask, command, withPin } from "./device.js";
 import { Figure } from "./figure.js";
 import { initMotion, showMotion } from "./motion.js";
 import { initSprings, showSprings } from "./springs.js";
+import { twice } from "./venue.js";
 import { hasWords, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
@@ -24,9 +25,15 @@ export function initRehearsal(me, box) {
   figure = new Figure(byId("figure"), byId("figure-said"), box, words);
   initMotion();
   initSprings();
+  const offerCopy = () => {
+    byId("cue-show").hidden = false;
+    byId("cue-dance").hidden = !me.installed;
+  };
+  if (me.cue_kept) offerCopy();
+  twice(byId("cue-dance"), danceCopy, "sure_now");
   byId("cue-form").addEventListener("submit", (event) => {
     event.preventDefault();
-    withPin(keepCue);
+    withPin(() => keepCue(offerCopy));
   });
 }
 
@@ -47,13 +54,21 @@ export function showRehearsal(value, show) {
 }
 
 // The settings of now become a cue in a copy of the show; what dances stays as it is.
-async function keepCue() {
+async function keepCue(offerCopy) {
   byId("cue-keep").disabled = true;
   byId("cue-said").textContent = words("change_runs");
   const answer = await request("/api/cue", { name: byId("cue-name").value }, KEEPING_MS);
   byId("cue-keep").disabled = false;
   byId("cue-said").textContent = answer.status === 200 ? answer.value.words : answer.words || words("no_page");
-  if (answer.status === 200) byId("cue-show").hidden = false;
+  if (answer.status === 200) offerCopy();
+}
+
+// On an installed box the copy becomes the show, as if it had come on a stick.
+async function danceCopy() {
+  byId("cue-said").textContent = words("file_checking");
+  const answer = await ask("/api/cue/dance", {}, KEEPING_MS);
+  const problems = answer.value?.problems?.map((one) => one.words).join(" ");
+  byId("cue-said").textContent = answer.status === 200 ? problems || answer.value.words : answer.words || words("no_page");
 }
 
 // Away from the page no joint is held.

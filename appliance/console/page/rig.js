@@ -1,0 +1,151 @@
+// The rig as it shines now, from the audience and from above; and a walk through it while the show stands.
+import { request } from "./box.js";
+import { command } from "./device.js";
+import { words } from "./words.js";
+
+const byId = (id) => document.getElementById(id);
+const LOOK_MS = 200, WIDE_PX = 640;
+const LONGEST_M = 12, MARGIN_M = 1.2, STAGE_M = 2;
+const VIEWS = [["rig_front", 1, 1], ["rig_above", 2, -1]]; // words; the axis upwards, and its sense
+const INK = { floor: "#3d434b", quiet: "#b3b7bd", lamp: "#f3ece0", dark: "#22262b" };
+let beams = [], isLit = false;
+
+export function initRig() {
+  byId("rig-walk").addEventListener("click", () => command("/lights/walk"));
+  byId("rig-end").addEventListener("click", () => command("/lights/walk/stop"));
+  setInterval(look, LOOK_MS);
+}
+
+// Only where lights run.
+export function showRig(value) {
+  isLit = value.processes.some((one) => one.who === "lights" && !one.late);
+  if (!isLit) byId("rig-part").hidden = true;
+}
+
+async function look() {
+  if (!isLit || document.hidden || byId("picture").hidden) return;
+  const answer = await request("/api/rig");
+  if (answer.status !== 200) return;
+  beams = answer.value.beams;
+  const walk = answer.value.walk;
+  byId("rig-part").hidden = beams.length === 0;
+  byId("rig-said").textContent = walk && words("rig_now", { words: walk });
+  byId("rig-walk").hidden = Boolean(walk);
+  byId("rig-end").hidden = !walk;
+  lamps();
+  draw();
+}
+
+// A button for each fixture, once, however many heads it has. They stay the same elements.
+function lamps() {
+  const levels = new Map(beams.map(([name, , , , level]) => [name, level])), parent = byId("lamps");
+  const names = JSON.stringify([...levels.keys()]);
+  if (parent.dataset.names !== names) {
+    parent.dataset.names = names;
+    parent.replaceChildren(...[...levels.keys()].map((name) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.addEventListener("click", () => command("/lights/walk", name));
+      return button;
+    }));
+  }
+  [...levels].forEach(([name, level], place) => { parent.children[place].textContent = words("rig_level", { name, level: Math.round(100 * level) }); });
+}
+
+function draw() {
+  const canvas = byId("rig"), ratio = Math.min(devicePixelRatio || 1, 2);
+  if (canvas.offsetParent === null) return;
+  const isWide = canvas.clientWidth > WIDE_PX, rows = isWide ? 1 : 2;
+  const views = VIEWS.map((view) => framed(...view));
+  const across = canvas.clientWidth / (isWide ? 2 : 1);
+  const heights = views.map((view) => 26 + across * (view.top - view.low) / (view.right - view.left));
+  const high = isWide ? Math.max(...heights) : heights[0] + heights[1];
+  [canvas.width, canvas.height] = [Math.round(canvas.clientWidth * ratio), Math.round(high * ratio)];
+  canvas.style.height = `${high}px`;
+  const ink = canvas.getContext("2d");
+  views.forEach((view, place) => {
+    const x = isWide ? place * across : 0, y = rows === 2 && place ? heights[0] : 0;
+    ink.save();
+    ink.beginPath();
+    ink.rect(x * ratio, y * ratio, across * ratio, heights[place] * ratio);
+    ink.clip();
+    drawView(ink, view, x * ratio, y * ratio, across * ratio, ratio);
+    ink.restore();
+  });
+}
+
+// What a view shows, in metres: all lamps, and the middle of the stage.
+function framed(title, axis, sense) {
+  const places = beams.map(([, place]) => [place[0], sense * place[axis]]);
+  const [xs, ys] = [0, 1].map((side) => places.map((place) => place[side]));
+  const floor = axis === 1 ? [0] : [-STAGE_M, STAGE_M];
+  return {
+    title, axis, sense,
+    left: Math.min(-STAGE_M, ...xs) - MARGIN_M, right: Math.max(STAGE_M, ...xs) + MARGIN_M,
+    low: Math.min(...floor, ...ys) - (axis === 1 ? 0.3 : 1) * MARGIN_M, top: Math.max(...floor, ...ys) + (axis === 1 ? 0.5 : 1) * MARGIN_M,
+  };
+}
+
+function drawView(ink, view, x, y, wide, ratio) {
+  const scale = wide / (view.right - view.left), top = y + 26 * ratio;
+  const at = (point) => [x + (point[0] - view.left) * scale, top + (view.top - view.sense * point[view.axis]) * scale];
+  ink.strokeStyle = INK.floor;
+  ink.lineWidth = ratio;
+  ink.beginPath();
+  if (view.axis === 1) line(ink, at([view.left, 0, 0]), at([view.right, 0, 0]));
+  else {
+    for (let step = -STAGE_M; step <= STAGE_M; step++) {
+      line(ink, at([step, 0, -STAGE_M]), at([step, 0, STAGE_M]));
+      line(ink, at([-STAGE_M, 0, step]), at([STAGE_M, 0, step]));
+    }
+  }
+  ink.stroke();
+  ink.globalCompositeOperation = "lighter";
+  for (const beam of beams) drawBeam(ink, beam, at, scale, view);
+  ink.globalCompositeOperation = "source-over";
+  for (const [, place, , colour, level] of beams) {
+    const [px, py] = at(place);
+    ink.fillStyle = level > 0.005 ? rgb(colour, 1) : INK.dark;
+    ink.strokeStyle = INK.lamp;
+    ink.lineWidth = 1.5 * ratio;
+    ink.beginPath();
+    ink.arc(px, py, 5 * ratio, 0, 7);
+    ink.fill();
+    ink.stroke();
+  }
+  ink.font = `600 ${13 * ratio}px system-ui, sans-serif`;
+  ink.fillStyle = INK.quiet;
+  ink.fillText(words(view.title), x + 10 * ratio, y + 18 * ratio);
+}
+
+// A cone to the floor, and from above the patch that it lights there; the brighter the denser.
+function drawBeam(ink, [, place, way, colour, level, degrees], at, scale, view) {
+  if (level < 0.005) return;
+  const reach = way[1] < -0.001 ? Math.min(LONGEST_M, place[1] / -way[1]) : LONGEST_M;
+  const end = place.map((value, axis) => value + reach * way[axis]), radius = reach * Math.tan(degrees * Math.PI / 360) * scale;
+  const [from, to] = [at(place), at(end)], long = Math.hypot(to[0] - from[0], to[1] - from[1]) || 1;
+  const isPlan = view.axis === 2, hitsFloor = way[1] < -0.001 && reach < LONGEST_M;
+  // To the side of the beam; on the floor, seen from the audience, along the floor.
+  const aside = !isPlan && hitsFloor ? [radius, 0] : [-(to[1] - from[1]) / long * radius, (to[0] - from[0]) / long * radius];
+  const cone = ink.createLinearGradient(...from, ...to);
+  cone.addColorStop(0, rgb(colour, 0.04 + 0.36 * level));
+  cone.addColorStop(1, rgb(colour, 0.01 + 0.09 * level));
+  ink.fillStyle = cone;
+  ink.beginPath();
+  ink.moveTo(...from);
+  ink.lineTo(to[0] + aside[0], to[1] + aside[1]);
+  ink.lineTo(to[0] - aside[0], to[1] - aside[1]);
+  ink.fill();
+  if (!isPlan || !hitsFloor) return;
+  ink.fillStyle = rgb(colour, 0.02 + 0.16 * level);
+  ink.beginPath();
+  ink.arc(...to, radius, 0, 7);
+  ink.fill();
+}
+
+function line(ink, from, to) {
+  ink.moveTo(...from);
+  ink.lineTo(...to);
+}
+
+const rgb = (colour, alpha) => `rgb(${colour.map((value) => Math.round(255 * value)).join(" ")} / ${alpha})`;

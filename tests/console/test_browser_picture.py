@@ -1,0 +1,136 @@
+"""Picture and light in a browser: corners that are dragged move on the wall, lamps shine and are walked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from playwright.sync_api import BrowserContext, expect
+from playwright.sync_api import Page as Tab
+
+from tests.bundles import write_show
+from tests.console.browser import declared, press, unlocked_tab
+from tests.console.page import Page, box_with_page
+from tests.system.box import Box
+from tests.system.lit import DIMMER, PAR, RIG, Node, artnet, node
+from tests.system.processes import wait_until
+from tests.system.test_projector import Projection
+
+pytestmark = pytest.mark.realtime
+
+RED = PAR + 1
+
+
+@pytest.fixture(scope="module")
+def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Box, Page, Node]]:
+    """A box with a rig, whose levels arrive at a node."""
+    folder = tmp_path_factory.mktemp("hall")
+    with (
+        node() as (lamps, port),
+        box_with_page(write_show(folder / "show", lights=RIG), folder, settings=artnet(port, 1, 2)) as (
+            box,
+            page,
+        ),
+    ):
+        yield box, page, lamps
+
+
+def test_a_corner_follows_the_finger_on_the_wall(
+    context: BrowserContext, hall: tuple[Box, Page, Node], tmp_path: Path
+) -> None:
+    box, page, _ = hall
+    with Projection(box.box_file, tmp_path) as projection:
+        projection.await_dance()
+        tab = unlocked_tab(context, page, "picture")
+        press(tab, "#grid-on")
+        projection.await_picture(lambda picture: bool(picture[:3, :3].any()))
+        pad, handle = (tab.locator(one).bounding_box() for one in ("#corners", "#corners button >> nth=0"))
+        assert pad is not None and handle is not None
+        way = 0.25 * pad["width"], 0.25 * pad["height"]
+        drag(tab, handle["x"] + 30, handle["y"] + 30, *way)
+        quarter = pytest.approx((0.25, 0.25), abs=0.01)
+        wait_until(lambda: _corner(box) == quarter, lambda: f"{_corner(box)} {tab.inner_text('#said')}")
+        projection.await_picture(lambda picture: not np.any(picture[:12, :20]))
+        corner = _corner(box)
+        tab.locator("#corners button").nth(0).press("ArrowRight")
+        wait_until(lambda: _corner(box)[0] > corner[0] + 0.001)
+        press(tab, "#corners-reset")
+        projection.await_picture(lambda picture: bool(picture[:3, :3].any()))
+        press(tab, "#grid-off")
+        projection.end()
+
+
+def drag(tab: Tab, x: float, y: float, dx: float, dy: float) -> None:
+    """By finger on a phone, by mouse on a laptop; slowly enough for a hand."""
+    steps = [(x + dx * part / 10, y + dy * part / 10) for part in range(11)]
+    if not tab.evaluate("matchMedia('(pointer: coarse)').matches"):
+        tab.mouse.move(x, y)
+        tab.mouse.down()
+        for at in steps:
+            tab.mouse.move(*at)
+            tab.wait_for_timeout(50)
+        tab.mouse.up()
+        return
+    touch = tab.context.new_cdp_session(tab)
+    for kind, at in [("touchStart", steps[0]), *(("touchMove", at) for at in steps)]:
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": at[0], "y": at[1]}]})
+        tab.wait_for_timeout(50)
+    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+
+def _corner(box: Box) -> tuple[float, float]:
+    """Where the projector keeps the first corner."""
+    kept = box.box_file.with_name("projector.alignment")
+    corners = (yaml.safe_load(kept.read_text()) if kept.is_file() else {}).get("corners", [[0, 0]])
+    x, y = corners[0]
+    return float(x), float(y)
+
+
+def test_the_rig_shines_on_the_page_and_is_walked_while_the_show_stands(
+    context: BrowserContext, hall: tuple[Box, Page, Node]
+) -> None:
+    box, page, lamps = hall
+    tab = unlocked_tab(context, page, "picture")
+    expect(tab.locator("#lamps button")).to_have_text(["head · 100 %", "par · 100 %", "second · 100 %"])
+    bright = tab.evaluate(LIT)
+    assert bright > 200
+    press(tab, "#rig-walk")
+    expect(tab.locator("#said")).to_contain_text("Stop it first")
+    press(tab, '[data-page="tonight"]')
+    press(tab, "#stop")
+    wait_until(lambda: not declared(box).going)
+    press(tab, '[data-page="picture"]')
+    expect(tab.locator("#lamps button").nth(0)).to_have_text("head · 0 %")
+
+    def begins() -> bool:
+        press(tab, "#lamps >> text=par")
+        return "par: " in tab.inner_text("#rig-said")
+
+    wait_until(begins, lambda: tab.inner_text("#said"))
+    lamps.await_levels(lambda levels: levels[PAR] == 255 and levels[DIMMER] == 0)
+    expect(tab.locator("#rig-said")).to_contain_text("Now par: red")
+    lamps.await_levels(lambda levels: levels[RED] == 255 and not any(levels[RED + 1 : RED + 4]))
+    press(tab, "#rig-end")
+    lamps.await_safe()
+    expect(tab.locator("#rig-said")).to_be_empty()
+    press(tab, "#lamps >> text=par")
+    lamps.await_levels(lambda levels: levels[PAR] > 200)
+    press(tab, "#panic")
+    lamps.await_safe()
+    press(tab, '[data-page="tonight"]')
+    press(tab, "#go")
+    lamps.await_dance()
+    press(tab, '[data-page="picture"]')
+    expect(tab.locator("#rig-walk")).to_be_visible()
+    assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+# The brightest pixel of the picture of the rig.
+LIT = """() => {
+  const canvas = document.querySelector('#rig');
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  return data.reduce((most, one, place) => place % 4 === 3 ? most : Math.max(most, one), 0);
+}"""
