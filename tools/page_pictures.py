@@ -20,7 +20,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, TimeoutError, sync_playwright
 
 CHROMIUM = "/usr/bin/chromium"
-PAGES = ("tonight", "dance", "sensors", "prove", "happened", "box")
+PAGES = ("tonight", "dance", "sensors", "rehearsal", "picture", "prove", "happened", "box", "device")
 _FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 _COLOURS = 64  # a third of the bytes, and nothing that is seen
 _WELL_WITHIN_MS = 20_000
@@ -41,7 +41,7 @@ def take_pictures(browser: Browser, address: str, folder: Path, pin: str = "") -
         _prove(tab, pin)
     for page in PAGES:
         tab.click(f'[data-page="{page}"]')
-        if page == "dance":
+        if page in ("dance", "rehearsal"):
             tab.wait_for_selector("body[data-tick]")
         if page == "happened":
             tab.wait_for_selector("#happened-all:not([hidden])", timeout=_WELL_WITHIN_MS)

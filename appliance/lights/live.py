@@ -20,7 +20,7 @@ _GOES = "The show goes on: a walk through the rig would be seen. Stop it first: 
 
 
 class LiveRig:
-    """Tells `beams` a few times a second. A folder that takes no file costs the picture of the rig alone."""
+    """Tells those who look how the rig shines. A folder that takes no file costs this alone."""
 
     def __init__(self, folder: Path) -> None:
         self._writer: LiveRigWriter | None = None
@@ -33,6 +33,8 @@ class LiveRig:
         if self._writer is None or now < self._due:
             return
         self._due = now + EVERY_S
+        if not self._writer.is_wanted(now):
+            return
         self._writer.write([_told(beam) for beam in beams_of(patch, values)], walk)
 
     def close(self) -> None:

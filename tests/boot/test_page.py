@@ -161,6 +161,19 @@ def _cues(device: Device) -> list[str]:
     return [one["name"] for one in value.get("cues", ())] if status == 200 else []
 
 
+def test_https_makes_its_certificate_in_the_page_s_sandbox(dancing: Box) -> None:
+    """The last test here: from then on the page answers to HTTPS alone."""
+    device, machine = Device(dancing), dancing.machine
+    text = device.ask("/api/box/file")[1]["text"]
+    change = {"text": text, "values": [[["console", "https"], True]], "now": True}
+    status, answer = device.ask("/api/box/file", change)
+    assert (status, answer.get("problems")) == (200, []), answer
+    served = "import ssl; print(ssl.get_server_certificate(('127.0.0.1', 8080)))"
+    python = "/opt/bunraku/current/bin/python"
+    machine.await_that(lambda: "BEGIN CERT" in machine.run(python, "-c", served, check=False), "no HTTPS")
+    assert "Certificate, SHA-256: " in machine.run(BUNRAKU, "console", "pin")
+
+
 def _rehearses(device: Device) -> bool | None:
     status, me = device.ask("/api/me")
     return me["rehearsal"] if status == 200 else None

@@ -132,7 +132,7 @@ def test_the_settings_of_now_become_a_cue(browser: Browser, studio: tuple[Box, P
     cue = load_show(kept).config.cues[-1]
     assert (cue.name, cue.phrase, cue.iterations) == ("ben", "vary", (6, 4))
     assert cue.motion is not None and cue.motion.vary is not None and cue.motion.vary.sigma == 1.25
-    assert cue.hands == ["lShldr"]
+    assert cue.hands == ["lShldr", "rForeArm"], "the page's hand waits for a finger"
 
 
 def test_knobs_of_springs_and_strings(browser: Browser, studio: tuple[Box, Page]) -> None:

@@ -8,7 +8,7 @@ const LOOK_MS = 200, WIDE_PX = 640;
 const LONGEST_M = 12, MARGIN_M = 1.2, STAGE_M = 2;
 const VIEWS = [["rig_front", 1, 1], ["rig_above", 2, -1]]; // words; the axis upwards, and its sense
 const INK = { floor: "#3d434b", quiet: "#b3b7bd", lamp: "#f3ece0", dark: "#22262b" };
-let beams = [], isLit = false;
+let beams = [], isLit = false, isAsking = false;
 
 export function initRig() {
   byId("rig-walk").addEventListener("click", () => command("/lights/walk"));
@@ -23,8 +23,10 @@ export function showRig(value) {
 }
 
 async function look() {
-  if (!isLit || document.hidden || byId("picture").hidden) return;
+  if (!isLit || isAsking || document.hidden || byId("picture").hidden) return;
+  isAsking = true;
   const answer = await request("/api/rig");
+  isAsking = false;
   if (answer.status !== 200) return;
   beams = answer.value.beams;
   const walk = answer.value.walk;
