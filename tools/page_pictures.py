@@ -35,8 +35,7 @@ def take_pictures(browser: Browser, address: str, folder: Path, pin: str = "") -
     tab = browser.new_page(viewport={"width": 390, "height": 844}, locale="en-GB")
     tab.goto(address)
     tab.wait_for_selector("body[data-heard]")
-    with contextlib.suppress(TimeoutError):
-        tab.wait_for_selector("body[data-level=well]", timeout=_WELL_WITHIN_MS)
+    _await_well(tab)
     if pin:
         _prove(tab, pin)
     for page in PAGES:
@@ -71,7 +70,14 @@ def _prove(tab: Page, pin: str) -> None:
     tab.wait_for_selector("body[data-proof]", timeout=_PROVEN_WITHIN_MS)
     tab.click('[data-page="tonight"]')
     tab.click("#go")
-    tab.wait_for_selector("body[data-level=well]", timeout=_WELL_WITHIN_MS)
+    _await_well(tab)
+    tab.wait_for_timeout(_FADED_MS)
+
+
+def _await_well(tab: Page) -> None:
+    """A busy machine may not be well at all; then the pictures say so."""
+    with contextlib.suppress(TimeoutError):
+        tab.wait_for_selector("body[data-level=well]", timeout=_WELL_WITHIN_MS)
 
 
 @contextlib.contextmanager

@@ -1,6 +1,6 @@
 // Box: which show dances and which would instead, release, addresses, clock.
 import { danceAgain, twice } from "./venue.js";
-import { language, words } from "./words.js";
+import { locale, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
 
@@ -32,7 +32,7 @@ function tell(box) {
 
 // The box's clock, which a Pi without a network has wrong.
 export function showClock(value) {
-  byId("box-clock").textContent = `${words("box_time")}: ${new Date(1000 * value.time).toLocaleString(language, { hourCycle: "h23" })}`;
+  byId("box-clock").textContent = `${words("box_time")}: ${new Date(1000 * value.time).toLocaleString(locale, { hourCycle: "h23" })}`;
 }
 
 // Each but the first can be danced again, where the box has kept it; what comes with the box is the last resort.

@@ -1,6 +1,6 @@
 // This device: the PIN, what is asked of the box with it, and the devices that it knows.
 import { request } from "./box.js";
-import { language } from "./words.js";
+import { language, locale } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
 let known = false, waiting = null, words = (key) => key, silence = 0;
@@ -104,7 +104,7 @@ async function tell(isKnown) {
 function listed(device) {
   const item = document.createElement("li"), since = document.createElement("small"), row = document.createElement("div");
   item.textContent = device.own ? `${device.name} (${words("this_device")})` : device.name;
-  since.textContent = new Date(1000 * device.since).toLocaleString(language);
+  since.textContent = new Date(1000 * device.since).toLocaleString(locale);
   const button = document.createElement("button");
   button.type = "button";
   button.textContent = words("revoke");

@@ -1,12 +1,12 @@
 // What happened: the journal as a timeline, and any stretch of it danced again.
 import { Dance } from "./dance.js";
-import { clock, language, number, words } from "./words.js";
+import { clock, locale, number, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
 const HEAD_BYTES = 16, JOINT_BYTES = 32; // of a frame: dance.js
 const SLOWEST_MS = 20, MANY = 5; // what fills the timeline's height
 const INK = { late: "#ff7a66", skipped: "#f0b840", failed: "#d36bff", slowest: "#59636f", mark: "#f3ece0", order: "#58c27d" };
-const exact = (seconds) => new Date(1000 * seconds).toLocaleTimeString(language, { hourCycle: "h23" });
+const exact = (seconds) => new Date(1000 * seconds).toLocaleTimeString(locale, { hourCycle: "h23" });
 
 let runs = [], run = null, second = 0, again = null, dance = null;
 
@@ -30,7 +30,7 @@ export async function readHappened() {
   if (answer === null) return;
   runs = await answer.json();
   byId("happened-run").replaceChildren(...runs.map((one, place) => {
-    const option = document.createElement("option"), date = new Date(1000 * one.begun).toLocaleDateString(language);
+    const option = document.createElement("option"), date = new Date(1000 * one.begun).toLocaleDateString(locale);
     option.value = place;
     option.textContent = `${date} ${clock(one.begun)} · ${one.show} · ${number(one.seconds / 60, 1)} min`;
     return option;

@@ -1,10 +1,11 @@
 // The table of words: /words/LANGUAGE.json; a word that a language lacks is English.
 let english = {}, own = {};
-export let language = "en";
+export let language = "en", locale = "en"; // dates and numbers are written as this device does
 
 export async function loadWords(languages) {
   const wished = [localStorage.getItem("language"), ...navigator.languages.map((one) => one.split("-")[0]), "en"];
   language = wished.find((one) => languages.includes(one)) ?? "en";
+  locale = navigator.languages.find((one) => one.split("-")[0] === language) ?? language;
   english = await table("en");
   own = language === "en" ? english : await table(language);
   document.documentElement.lang = language;
@@ -20,10 +21,10 @@ export function words(key, values = {}) {
 export const hasWords = (key) => key in own;
 
 export const clock = (seconds) =>
-  new Date(1000 * seconds).toLocaleTimeString(language, { hour: "2-digit", minute: "2-digit", hourCycle: "h23" });
+  new Date(1000 * seconds).toLocaleTimeString(locale, { hour: "2-digit", minute: "2-digit", hourCycle: "h23" });
 
 export const number = (value, digits = 0) =>
-  value.toLocaleString(language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  value.toLocaleString(locale, { minimumFractionDigits: digits, maximumFractionDigits: digits });
 
 async function table(name) {
   try {
