@@ -20,6 +20,7 @@ FASTEST_M_S = 30.0
 # How far a bone may be stretched beyond its rest vector's length when a tick begins. A bound on velocities
 # alone can feed a stretched spring: symplectic Euler keeps an energy with a term of position times velocity.
 STRETCHED_M = 3.0
+SHORTENED_M = 2.0  # how far it then is: at the bound itself, stiff light chains shook for ever
 # A substep is stable while the frequency of the stiffest mode is below 2 / SUBSTEP_S. By Gershgorin's theorem
 # a mass at the end of several bones is safe when the stiffness of each is below this share of mass / bones.
 _STABLE = 0.5
@@ -126,11 +127,12 @@ class MassSpring:
 
     def _bound_stretch(self, lengths: NDArray[np.float64]) -> None:
         """Shortens bones that are stretched by more than STRETCHED_M; what hangs on them comes along."""
-        lasting = lengths + STRETCHED_M
         squares = np.vecdot(self._bones, self._bones)[:, None]
-        if np.any((squares > lasting * lasting)[1:]):
-            shortened = np.minimum(1.0, lasting / np.sqrt(np.maximum(squares, _SHORTEST_M2)))
-            self._bones[1:] *= shortened[1:]
+        stretched = squares > (lengths + STRETCHED_M) ** 2
+        stretched[0] = False  # is no bone
+        if stretched.any():
+            shortened = (lengths + SHORTENED_M) / np.sqrt(np.maximum(squares, _SHORTEST_M2))
+            self._bones *= np.where(stretched, shortened, 1.0)
 
     def energy(self, gravity: Vectors | None = None) -> float:
         """Joules: of motion, of both kinds of springs, and in a field of gravity (3,), metres a second^2."""
