@@ -20,10 +20,12 @@ FASTEST_M_S = 30.0
 # How far a bone may be stretched beyond its rest vector's length when a tick begins. A bound on velocities
 # alone can feed a stretched spring: symplectic Euler keeps an energy with a term of position times velocity.
 STRETCHED_M = 3.0
+SHORTENED_M = 2.0  # how far it then is: at the bound itself, stiff light chains shook for ever
 # A substep is stable while the frequency of the stiffest mode is below 2 / SUBSTEP_S. By Gershgorin's theorem
-# a mass at the end of several bones is safe when the stiffness of each is below this share of mass / bones.
-_STABLE = 0.5
-_SHORTEST_M2 = 1e-12  # keeps two masses at one place from dividing by zero
+# a mass at the end of several bones is safe when the stiffness of each is below 1 / SUBSTEP_S^2 times mass /
+# bones. At this share of it swings through a bone's own start die away as well: at 0.2 some went on for ever.
+_STABLE = 0.1
+_SHORTEST_M = 1e-6  # keeps a bone without length from dividing by zero
 
 
 class MassSpring:
@@ -31,7 +33,9 @@ class MassSpring:
 
     Forces on a mass at the bone b (its position less its parent's): the spring along it,
     -stiffness (|b| - length) b/|b|, and the spring towards the rest vector r, -directional (b - r); the
-    parent gets their opposites, so that no momentum arises. Damping draws its velocity towards that of the
+    parent gets their opposites, so that no momentum arises. A bone shorter than half its length is pushed by
+    stiffness b: the force has no edge where both masses are at one place, which gave fast masses more energy
+    than damping took. Damping draws its velocity towards that of the
     flow around it. Semi-implicit (symplectic) Euler, the damping integrated exactly.
 
     carried (N,): newtons a metre that each bone's springs may have.
@@ -56,7 +60,7 @@ class MassSpring:
             self._carried_by[0] = 1e9
         self._pushes = np.empty((count, count))
         self._bones, self._force, self._push, self._drift, self._kept = np.empty((5, count, 3))
-        self._squares, self._pull = np.empty((2, count, 1))
+        self._pull = np.empty((count, 1))
         self.set_parameters(*(np.full(count, value) for value in (1.0, 1000.0, 100.0, 1.0)))
 
     def set_parameters(self, mass: Floats, stiffness: Floats, directional: Floats, damping: Floats) -> None:
@@ -89,6 +93,7 @@ class MassSpring:
         moves, bones, force, push, drift = self.velocities, self._bones, self._force, self._push, self._drift
         add, multiply, matmul, kept, pull = np.add, np.multiply, np.matmul, self._kept, self._pull
         lengths = np.sqrt(np.vecdot(self.rest, self.rest))[:, None]
+        halves = np.maximum(lengths / 2, _SHORTEST_M)
         tension, rest_pull = self.stiffness[:, None] * lengths, self.directional[:, None] * self.rest
         multiply(1.0 - kept, flow, out=drift)
         drift += SUBSTEP_S * acceleration
@@ -102,9 +107,9 @@ class MassSpring:
         moves *= SUBSTEP_S  # metres a substep: spares an operation in each
         drift *= SUBSTEP_S
         for _ in range(SUBSTEPS):
-            np.vecdot(bones, bones, out=self._squares[:, 0])
-            add(self._squares, _SHORTEST_M2, out=pull)
+            np.vecdot(bones, bones, out=pull[:, 0])
             np.sqrt(pull, out=pull)
+            np.maximum(pull, halves, out=pull)
             np.divide(tension, pull, out=pull)
             np.subtract(pull, self._both, out=pull)
             multiply(bones, pull, out=force)
@@ -126,17 +131,19 @@ class MassSpring:
 
     def _bound_stretch(self, lengths: NDArray[np.float64]) -> None:
         """Shortens bones that are stretched by more than STRETCHED_M; what hangs on them comes along."""
-        lasting = lengths + STRETCHED_M
         squares = np.vecdot(self._bones, self._bones)[:, None]
-        if np.any((squares > lasting * lasting)[1:]):
-            shortened = np.minimum(1.0, lasting / np.sqrt(np.maximum(squares, _SHORTEST_M2)))
-            self._bones[1:] *= shortened[1:]
+        stretched = squares > (lengths + STRETCHED_M) ** 2
+        stretched[0] = False  # is no bone
+        if stretched.any():
+            shortened = (lengths + SHORTENED_M) / np.sqrt(np.maximum(squares, _SHORTEST_M))
+            self._bones *= np.where(stretched, shortened, 1.0)
 
     def energy(self, gravity: Vectors | None = None) -> float:
         """Joules: of motion, of both kinds of springs, and in a field of gravity (3,), metres a second^2."""
         bones = self._to_bones @ self.positions
-        stretch = np.linalg.norm(bones, axis=1) - np.linalg.norm(self.rest, axis=1)
+        far, lengths = np.linalg.norm(bones, axis=1), np.linalg.norm(self.rest, axis=1)
+        squares = np.where(far < lengths / 2, lengths**2 / 2 - far**2, (far - lengths) ** 2)
         aside = np.sum((bones - self.rest) ** 2, axis=1)
         motion = self.mass @ np.sum(self.velocities**2, axis=1)
         height = 0.0 if gravity is None else float(self.mass @ (self.positions @ gravity))
-        return float(motion + self.stiffness @ stretch**2 + self.directional @ aside) / 2 - height
+        return float(motion + self.stiffness @ squares + self.directional @ aside) / 2 - height

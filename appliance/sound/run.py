@@ -16,7 +16,7 @@ from appliance.box.notify import Notifier
 from appliance.box.process_health import ProcessHealthWriter
 from appliance.box.realtime import share_the_interpreter
 from appliance.box.runtime_folder import Claim, runtime_folder
-from appliance.box.show_state import ShowStateReader, part_of_fade
+from appliance.box.show_state import ShowState, ShowStateReader, part_of_fade
 from appliance.box.stop_signals import stop_signals
 from appliance.outputs.frame_reader import FrameReader
 from appliance.show.box import BoxConfig, load_box
@@ -27,7 +27,7 @@ from appliance.sound.card import Card
 from appliance.sound.fallback import CARD_AWAY, DROPOUTS, NO_CARD, OF_THE_SOUND, STAGE_UNSEEN
 from appliance.sound.instrument import Instrument
 
-LOOK_S = 0.005  # how often frame and show state are read: panic is heard a block later
+LOOK_S = 0.005  # how often frame and show state are read
 LOST_S = 0.5  # without a frame: as the projector
 FADE_S = 0.5  # in which the strings then fade out
 CHANGE_S = 0.1  # for the strings of one show to fall silent before those of another sound
@@ -104,6 +104,16 @@ class Sound:
         loud = state.level(now) * state.strings_level(now) * entered
         self.instrument.level = loud * min(max(1.0 - (age_s - LOST_S) / FADE_S, 0.0), 1.0)
 
+    def render(self, frames: int, show_state: ShowState) -> NDArray[np.float32]:
+        """The next samples (frames, channels): for the card's thread, which is late for nothing else. It also
+        sees to panic and blackout, read with a reader of its own: `look` may wait for a processor."""
+        instrument = self.instrument
+        if instrument is None:
+            return np.zeros((frames, self._config.channels), np.float32)
+        if show_state.panic or show_state.blackout:
+            instrument.level = 0.0
+        return instrument.render(frames)
+
     def report(self, card: Card, now: float) -> None:
         """Once a second: what has changed about the card."""
         self._fallbacks.follow(DROPOUTS.name, card.dropouts, now)
@@ -158,16 +168,17 @@ def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
         opened.callback(speaker.close)
         folder = runtime_folder(box)
         opened.callback(Claim(folder, "sound").close)
-        notifier, stage, show_state = Notifier(), FrameReader(folder), ShowStateReader(folder)
+        notifier, stage = Notifier(), FrameReader(folder)
+        show_state, for_the_card = ShowStateReader(folder), ShowStateReader(folder)
         fallbacks = Fallbacks(OF_THE_SOUND)
         process_health = ProcessHealthWriter(folder, "sound", fallbacks)
-        for one in (notifier, stage, show_state, process_health):
+        for one in (notifier, stage, show_state, for_the_card, process_health):
             opened.callback(one.close)
         sound = Sound(config, stage, show_state, speaker.say, fallbacks)
         priority = (
             max(box.realtime.priority // 2, 1) if box.realtime.enabled else None
         )  # the dance goes first
-        card = Card(config, lambda frames: _rendered(sound, frames, config.channels), priority)
+        card = Card(config, lambda frames: sound.render(frames, for_the_card.read()), priority)
         opened.callback(card.close)
         share_the_interpreter()
         notifier.ready("The strings follow the stage.")
@@ -184,8 +195,3 @@ def run_sound(box_file: Path | None, by_hand: bool = True) -> None:
                 sound.report(card, now)
             time.sleep(LOOK_S)
         process_health.end(time.monotonic())
-
-
-def _rendered(sound: Sound, frames: int, channels: int) -> NDArray[np.float32]:
-    instrument = sound.instrument
-    return np.zeros((frames, channels), np.float32) if instrument is None else instrument.render(frames)

@@ -125,3 +125,16 @@ def test_nothing_bursts_at_the_bounds_of_its_parameters(anchored: bool, chance: 
             one.step(one.positions[0].copy(), flow, STILL)
         worst = 18 * 50 * 3 * FASTEST_M_S**2 / 2 + (one.stiffness + one.directional).sum() * 100
         assert one.energy() < worst
+
+
+def test_light_masses_on_the_stiffest_springs_come_to_rest() -> None:
+    """Some shook for ever: through a bone's own start, and from the bound of the stretch and back."""
+    rng = np.random.default_rng(5)
+    for parents, stretch_m, speed_m_s in [*[([-1, 0], 0.0, 20.0)] * 10, ([-1, 0, 1], 3.0, 400.0)]:
+        one = system(parents, len(parents) == 2, mass=0.05, stiffness=1e6, damping=0.5)
+        one.rest[1:] = [0.0, -0.05, 0.0]
+        one.begin(np.cumsum(one.rest, axis=0))
+        one.positions[1:, 0] += stretch_m
+        one.velocities[1:] = rng.normal(size=3) * speed_m_s
+        course(one, 20.0)
+        assert one.energy() < 0.01

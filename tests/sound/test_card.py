@@ -96,19 +96,20 @@ def test_a_card_that_is_away_and_back(
 def test_a_card_that_is_pulled_out_while_it_plays_is_opened_again(
     null_card: None, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """A card that takes a tenth of a second and is gone: writing to it fails, as when it is pulled out."""
+    """A card that takes a second of sound and is gone: writing to it fails, as when it is pulled out."""
     (tmp_path / "asound.conf").write_text(
         "pcm.!default { type plug slave.pcm short }\npcm.null { type null }\n"
-        'pcm.short { type file slave.pcm null format raw file "|exec head -c 40000 >/dev/null" }\n'
+        'pcm.short { type file slave.pcm null format raw file "|exec head -c 400000 >/dev/null" }\n'
     )
     asked = []
 
     def render(frames: int) -> np.ndarray:
         asked.append(frames)
+        time.sleep(0.003)
         return np.zeros((frames, 2), np.float32)
 
     card = Card(SoundConfig(), render)
-    for opened in range(3):
+    for opened in range(2):
         card.look(10.0 * opened)
         assert card.trouble == ""
         stream, before = card._stream, len(asked)

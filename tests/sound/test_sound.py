@@ -75,6 +75,20 @@ def test_without_a_stage_the_strings_rest(tmp_path: Path) -> None:
     assert said == ["A test: 7 strings."]
 
 
+@pytest.mark.parametrize("urgent", [{"panic": True}, {"blackout": True}])
+def test_the_cards_thread_sees_to_panic_by_itself(tmp_path: Path, urgent: dict[str, bool]) -> None:
+    """Two blocks after it is declared nothing is left, also where `look` waits for a processor."""
+    stage = StageDouble(write_show(tmp_path / "show", strings={}))
+    state = SimpleNamespace(read=ShowState)
+    sound = Sound(SoundConfig(), stage, state, print, Fallbacks(OF_THE_SOUND))  # type: ignore[arg-type]
+    for tick in range(20):
+        sound.look(10.0 + 0.02 * tick)
+        assert sound.render(960, ShowState()).shape == (960, 2)
+    assert sound.render(256, ShowState()).any()
+    fading, silent = (sound.render(256, ShowState(**urgent)) for _ in range(2))  # type: ignore[arg-type]
+    assert np.abs(fading[-1]).max() < 1e-6 and not silent.any()
+
+
 def test_another_show_comes_in_when_the_strings_of_the_one_before_are_silent(tmp_path: Path) -> None:
     stage = StageDouble(write_show(tmp_path / "show", strings={}))
     state = SimpleNamespace(read=ShowState)
