@@ -44,6 +44,7 @@ _REST_S = 0.2  # from one motion to the next, at least
 _AHEAD_S = 1.2  # until an improvisation is made that is wanted at once
 _FILES = 3  # of each puppet the newest, beside what is danced: the stage may still open the one before
 _EACH = ("seed", "number", "after", "from_s", "prompt")
+_M_MMAP_THRESHOLD, _ARRAY_BYTES = -3, 1 << 17  # of malloc.h; it grows by itself unless it is set
 _MOST_NUMBERS = 10_000_000  # exact in the track's float32
 _WRONG = (MotionNetworkError, GroundingError, PhraseError, BvhError, OSError, LookupError, ValueError)
 
@@ -90,7 +91,8 @@ class Generator:
             self._kept_names.write(names)
         self._fallbacks.set(NOT_KEPT.name, self.kept.complaint)
         state = state_reader.read()
-        return any(self._look_at(one, state, now) for one in self._ahead)  # one motion, then it looks again
+        waiting_first = sorted(self._ahead, key=lambda one: one.wish is not None)
+        return any(self._look_at(one, state, now) for one in waiting_first)  # one motion, then it looks again
 
     def obey(self, order: Order) -> tuple[bool, str]:
         """Carry out an order of show control's: keep."""
@@ -235,7 +237,13 @@ def _character(recipe: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in recipe.items() if name not in _EACH}
 
 
+def save_memory() -> None:
+    """Arrays go back to the system as soon as they are freed: 10 to 20 MB less while motion is made."""
+    with contextlib.suppress(OSError, AttributeError):  # not the GNU C library
+        ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _ARRAY_BYTES)
+
+
 def give_back_memory() -> None:
     """What numpy and onnxruntime have freed goes back to the system: 20 MB of 130."""
-    with contextlib.suppress(OSError, AttributeError):  # not the GNU C library
+    with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)

@@ -84,8 +84,11 @@ def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
     told = [{"base": "main", "made": "", "position_s": 0.0} for _ in puppets[1:]]
     one.health |= {"others": told, "looked_at": time.monotonic()}
     made = [MadeMotionReader(one.folder, puppet) for puppet in range(4)]
-    for _ in range(3):  # a motion a look
-        one.recipe()
+    one.recipe()
+    told[0]["made"] = made[1].read().recipe  # type: ignore[union-attr]
+    one.recipe()  # a motion a look: the path that is waited for comes before the next variation
+    assert made[3].read() is not None
+    told[0]["made"] = ""
     varied, path = (json.loads(made[puppet].read().recipe) for puppet in (1, 3))  # type: ignore[union-attr]
     assert (varied["source"], path["source"]) == ("vary", "path")
     assert made[0].read() is None and made[2].read() is None
