@@ -119,7 +119,7 @@ class HannMean:
 
     def poses(self) -> Poses:
         """(period, M, 4), once all windows have come; it is empty afterwards."""
-        made, self._total = self._total, np.zeros(0)
+        made, self._total = self._total, np.zeros((0, 0, 4))
         made /= self._sums[:, None, None]
         lengths = np.sqrt(np.einsum("pjk,pjk->pj", made, made))
         made /= np.maximum(lengths, 1e-9)[..., None]
