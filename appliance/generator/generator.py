@@ -31,6 +31,7 @@ from appliance.dancer.phrase import FPS, NUMBER, Phrase, PhraseError
 from appliance.dancer.phrase_cache import MEMORY, PhraseCache
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
 from appliance.generator.kept_motions import KeptMotions
+from appliance.generator.pointing import Pointing
 from appliance.generator.wish import AGAIN, Wish, Wishes
 from appliance.outputs.frame_reader import FrameReader
 from appliance.pose.bvh import BvhError
@@ -78,6 +79,13 @@ class Generator:
         self._maker = Maker(show.skeleton, show.motion_networks, self._loop_of, grounded)
         taken = tuple(name for name in config.motion.sources if name not in config.motion.kept)
         self.kept = KeptMotions(folder, box.state_folder, show.skeleton.names, taken)
+        hand = (
+            config.hands[0].joint
+            if config.motion.path and config.motion.path.by_hand and config.hands
+            else ""
+        )
+        self._pointing = Pointing(show.skeleton, hand) if hand else None
+        self._pointed: list[float] = []
         self._kept_names = KeptNamesWriter(folder)
         self._told_names: list[str] | None = None
         puppets = range(max(1, len(config.puppets)))
@@ -91,6 +99,7 @@ class Generator:
             self._kept_names.write(names)
         self._fallbacks.set(NOT_KEPT.name, self.kept.complaint)
         state = state_reader.read()
+        self._pointed = [] if self._pointing is None else self._pointing.point(self._stage.newest(now))
         waiting_first = sorted(self._ahead, key=lambda one: one.wish is not None)
         return any(self._look_at(one, state, now) for one in waiting_first)  # one motion, then it looks again
 
@@ -117,7 +126,7 @@ class Generator:
         """Make what is wanted next for a puppet, if anything is; whether it did."""
         told, danced = self._told(ahead.puppet), self._danced(ahead.puppet)
         base, wanted = str(told.get("base", MAIN)), str(told.get("wanted", ""))
-        wish = self._wishes.wish(state, base, self.kept.recipes, now, wanted, ahead.puppet)
+        wish = self._wishes.wish(state, base, self.kept.recipes, now, wanted, ahead.puppet, self._pointed)
         if wish is None:
             ahead.wish = None
             return False
