@@ -27,8 +27,8 @@ class Pointing:
     def point(self, frame: SeenFrame | None) -> list[float]:
         """x, y, each 0 to 1, as `/motion/path` takes them; [] while the hand does not hold.
 
-        By the joint's rotation alone, as the limb is seen from ahead of the parent joint: ahead is the middle;
-        left and right, up and down are the edges. Angles would leap where a limb hangs or points back.
+        By the joint's rotation alone, as the limb is seen from the front of the parent joint: ahead is the
+        middle; left and right, up and down are the edges. Angles would leap where a limb hangs.
         """
         if frame is None or frame.holds[self._joint] < HELD:
             self._point = []
