@@ -178,10 +178,9 @@ def aligned(q: Array, reference: Array) -> Array:
 def continuous(q: Array, axis: int = 0) -> Array:
     """The same rotations with no sign jump from one step to the next along an axis."""
     steps = np.moveaxis(np.asarray(q), axis, 0)
-    dots = np.einsum("...k,...k->...", steps[1:], steps[:-1])
-    turned = steps.copy()
-    turned[1:] *= np.cumprod(np.where(dots < 0, -1, 1), axis=0, dtype=np.int8)[..., None]
-    return np.moveaxis(turned, 0, axis)
+    dots = np.einsum("...k,...k->...", steps[1:], steps[:-1])[..., None]
+    flips = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0).astype(steps.dtype)
+    return np.moveaxis(np.concatenate([steps[:1], steps[1:] * flips], axis=0), 0, axis)
 
 
 def heading(q: Array) -> Array:

@@ -140,6 +140,7 @@ def danced_again(coder: Coder, poses: Array, moving: Sequence[int], cyclic: bool
     mean, again = total[:count], poses.copy()
     mean /= np.sqrt(np.einsum("njk,njk->nj", mean, mean))[..., None]
     again[:, list(moving)] = mean
+    del mean, total, reference, windows  # a minute of each is some MB
     return quaternion.continuous(again)
 
 
