@@ -28,6 +28,7 @@ SWINGING_M_S = 1.0  # a point at this speed counts half: it lands or lifts and d
 # hip shakes with 28 mm per tick^2 (99th percentile); 0.85 leaves 13 cm/s and 26 mm; 0.7 leaves 18 and 22.
 FOLLOW = 0.85
 LEAK_S = 6.0  # time constant of the root's return to its path
+_AT_ONCE = 512  # poses whose soles are looked for: all of a long phrase take tens of MB
 FAR_M = 1.0  # this far from its path the root returns twice as fast
 
 
@@ -200,13 +201,15 @@ def sole_positions(skeleton: Skeleton, poses: Array, roots: Array) -> Array:
             "No joint of this skeleton is named foot or ankle, so the figure cannot be set on the floor. "
             "Set grounded: false, or rename the joints."
         )
-    positions, world = skeleton.forward_kinematics(poses, roots)
-    columns = []
-    for point in points:
-        if point < len(skeleton):
-            columns.append(positions[..., point, :])
-        else:
-            joint, offset = skeleton.ends[point - len(skeleton)]
-            turned = quaternion.rotate(world[..., joint, :], np.asarray(offset, dtype=poses.dtype))
-            columns.append(positions[..., joint, :] + turned)
-    return np.stack(columns, axis=-2)
+    found = np.empty((len(poses), len(points), 3), dtype=poses.dtype)
+    for first in range(0, len(poses), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        positions, world = skeleton.forward_kinematics(poses[some], roots[some])
+        for column, point in enumerate(points):
+            if point < len(skeleton):
+                found[some, column] = positions[:, point]
+            else:
+                joint, offset = skeleton.ends[point - len(skeleton)]
+                turned = quaternion.rotate(world[:, joint], np.asarray(offset, dtype=poses.dtype))
+                found[some, column] = positions[:, joint] + turned
+    return found

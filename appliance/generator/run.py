@@ -18,7 +18,7 @@ from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.show_state import ShowStateReader
 from appliance.box.stop_signals import stop_signals
 from appliance.generator.fallback import OF_THE_GENERATOR
-from appliance.generator.generator import Generator
+from appliance.generator.generator import Generator, save_memory
 from appliance.outputs.frame_reader import FrameReader
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
@@ -36,6 +36,7 @@ def run_generator(directory: Path | None, box_file: Path | None) -> None:
     """
     box = load_box(box_file)
     give_way(_NICE)
+    save_memory()
     with stop_signals() as stopped, ExitStack() as opened:
         speaker = LogWriter()
         opened.callback(speaker.close)

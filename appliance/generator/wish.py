@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from appliance.box.show_state import MOTION, Part, ShowState
@@ -45,11 +45,12 @@ class Wishes:
         now: float,
         wanted: str = "",
         puppet: int = 0,
+        pointed: Sequence[float] = (),
     ) -> Wish | None:
         """What a puppet waits for; None: phrases or a live dancer. base: the phrase that it danced last.
 
         kept: recipes of kept motions by name. now: monotonic seconds. wanted: what the first puppet waits for
-        while nothing is declared, after a power cut.
+        while nothing is declared, after a power cut. pointed: x, y of the map at which a hand points.
         """
         dance: Mapping[str, Part] = state.dance if state.show == self._config.name else {}
         if puppet:
@@ -70,7 +71,7 @@ class Wishes:
             recipe |= {"from": getattr(section, "from_", None), "to": getattr(section, "to", None)}
         elif name != IMPROVISE:
             recipe["phrase"] = base
-        points = dance.get(f"{MOTION}{PATH} {POINTS}", (0, "", ()))[2]
+        points = pointed or dance.get(f"{MOTION}{PATH} {POINTS}", (0, "", ()))[2]
         if name == PATH and points:
             recipe["points"] = [round(value, 3) for value in points]
         return Wish(name, recipe)

@@ -178,7 +178,7 @@ def aligned(q: Array, reference: Array) -> Array:
 def continuous(q: Array, axis: int = 0) -> Array:
     """The same rotations with no sign jump from one step to the next along an axis."""
     steps = np.moveaxis(np.asarray(q), axis, 0)
-    dots = np.sum(steps[1:] * steps[:-1], axis=-1, keepdims=True)
+    dots = np.einsum("...k,...k->...", steps[1:], steps[:-1])[..., None]
     flips = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0).astype(steps.dtype)
     return np.moveaxis(np.concatenate([steps[:1], steps[1:] * flips], axis=0), 0, axis)
 

@@ -41,7 +41,7 @@ class Run:
 
     ticks: a structured array in order of time; `tick_numbers` (N,) their numbers in the log, in which events
     have numbers too: between two that follow on each other nothing is missing. keyframes: (entries of the log
-    before it, packed state).
+    before it, packed state). pieces: numbers that the parts of long events have.
     """
 
     header: dict[str, Any]
@@ -49,6 +49,7 @@ class Run:
     tick_numbers: np.ndarray[Any, np.dtype[np.uint64]]
     events: list[tuple[int, dict[str, Any]]]
     keyframes: list[tuple[int, bytes]]
+    pieces: tuple[int, ...] = ()
 
     @property
     def skeleton(self) -> Skeleton:
@@ -232,6 +233,7 @@ class _Part:
     events: dict[int, dict[str, Any]] = field(default_factory=dict)
     keyframes: dict[int, bytes] = field(default_factory=dict)
     pieces: log.Pieces = field(default_factory=log.Pieces)
+    piece_numbers: list[int] = field(default_factory=list)
 
     @property
     def has_ticks(self) -> bool:
@@ -247,6 +249,7 @@ class _Part:
             np.array(numbers, dtype=np.uint64),
             sorted(self.events.items(), key=lambda event: event[0]),
             sorted(self.keyframes.items()),
+            tuple(self.piece_numbers),
         )
 
 
@@ -274,6 +277,8 @@ def _add(parts: dict[str, _Part], data: bytes, room: _Room) -> None:
                     part.ticks[entry.number] = entry.data
                 elif entry.kind in (EVENT, PIECE):
                     room.take(_OF_JSON * len(entry.data))
+                    if entry.kind == PIECE:
+                        part.piece_numbers.append(entry.number)
                     event = entry.data if entry.kind == EVENT else part.pieces.whole(entry)
                     if event is not None:
                         part.events[entry.number] = _event(event)

@@ -58,6 +58,11 @@ class PathConfig(Section):
     """The phrase's path through the dancer's poses that wobbles, or a point or line by `/motion/path`."""
 
     network: BundleFile = _network("pose")
+    by_hand: bool = key(
+        "Whether the limb that the show's first hand holds points at the map while it holds: ahead is the "
+        "middle, its left and right, up and down are the edges.",
+        False,
+    )
     wobble: float = _parameter(PATH, "wobble")
     frequency: float = _parameter(PATH, "frequency")
     seed: int = _parameter(PATH, "seed")

@@ -74,7 +74,7 @@ class Replay:
         run, keyframes, rows = self._run, dict(self._run.keyframes), self._rows()
         events, danced, before = dict(run.events), 0, -1
         first = self._first(from_s)
-        for number in sorted({*rows, *events}):
+        for number in sorted({*rows, *events, *run.pieces}):
             if number <= first:
                 continue
             if number != before + 1:
@@ -87,7 +87,7 @@ class Replay:
                 self._dance_row(rows[number], comparison)
                 danced += 1
                 yield danced
-            elif events[number]["kind"] == ORDER:
+            elif number in events and events[number]["kind"] == ORDER:
                 self._obey(events[number], comparison)
 
     def _restore(self, keyframe: bytes) -> None:

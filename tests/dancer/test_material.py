@@ -112,7 +112,7 @@ def test_a_phrase_that_walks_and_turns_goes_on_doing_so(maker: Maker, tmp_path: 
     windows = cycle.windows(starts, 32, places)
     inside = np.degrees(quaternion.angle_between(windows[:, 1:], windows[:, :-1])).max()
     assert inside < 0.5
-    assert np.degrees(quaternion.angle_between(cycle.blended(windows, starts, places), poses)).max() < 0.1
+    assert np.degrees(quaternion.angle_between(cycle.blended([(windows, starts)], places), poses)).max() < 0.1
     loop = cycle.loop(poses, None, None, 1001)
     assert steps(loop).max() < 0.5
 

@@ -6,16 +6,23 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from appliance.box.made_motion import MadeMotionReader
+from appliance.box.show_state import ShowState
 from appliance.generator import wish as wishes
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
+from appliance.generator.pointing import Pointing
+from appliance.outputs.frame_reader import SeenFrame
 from appliance.pose import quaternion
 from appliance.pose.bvh import read_bvh
+from appliance.show.show import load_show
 from appliance.show_control.orders import Order
+from tests.bundles import FIGURE
 from tests.command import Command
 from tests.generator.conftest import Bench
 from tests.sources import write_motion_network, write_show_with_sources
@@ -84,8 +91,11 @@ def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
     told = [{"base": "main", "made": "", "position_s": 0.0} for _ in puppets[1:]]
     one.health |= {"others": told, "looked_at": time.monotonic()}
     made = [MadeMotionReader(one.folder, puppet) for puppet in range(4)]
-    for _ in range(3):  # a motion a look
-        one.recipe()
+    one.recipe()
+    told[0]["made"] = made[1].read().recipe  # type: ignore[union-attr]
+    one.recipe()  # a motion a look: the path that is waited for comes before the next variation
+    assert made[3].read() is not None
+    told[0]["made"] = ""
     varied, path = (json.loads(made[puppet].read().recipe) for puppet in (1, 3))  # type: ignore[union-attr]
     assert (varied["source"], path["source"]) == ("vary", "path")
     assert made[0].read() is None and made[2].read() is None
@@ -101,6 +111,33 @@ def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
     assert one.recipe() == own, "what it made for the others changes nothing of the first"
     for reader in made:
         reader.close()
+
+
+def test_a_limb_that_a_hand_holds_points_at_the_map(tmp_path: Path) -> None:
+    pointing, joint = Pointing(FIGURE, "lShldr"), FIGURE.index("lShldr")
+    limb = FIGURE.offsets[FIGURE.parents.index(joint)]
+    pose = np.tile(quaternion.IDENTITY, (len(FIGURE), 1))
+    holds = np.zeros(len(FIGURE), np.float32)
+
+    def pointed(*to: float) -> list[float]:
+        axis, angle = np.cross(limb, to), np.arccos(limb @ np.array(to) / np.linalg.norm(limb))
+        pose[joint] = quaternion.from_axis_angle(axis, angle)
+        return pointing.point(cast(SeenFrame, SimpleNamespace(pose=pose, holds=holds)))
+
+    assert pointed(0.0, 0.1, 1.0) == []
+    holds[joint] = 1.0
+    ahead, up = pointed(0.0, 0.0, 1.0), pointed(0.0, 0.6, 0.8)
+    assert ahead == [0.5, 0.5] and up[0] == 0.5 and up[1] == pytest.approx(0.8, abs=0.01)
+    assert pointed(0.03, 0.6, 0.8) == up, "a tremble moves nothing"
+    assert pointed(0.8, 0.0, 0.6)[0] == 0.9 and pointed(-0.8, 0.0, 0.6)[0] == 0.1
+    assert pointed(0.01, -1.0, 0.0) == [0.5, 0.0] == pointed(-0.01, -1.0, 0.0), "a hanging arm does not leap"
+    config = load_show(
+        write_show_with_sources(tmp_path, {"path": {"by_hand": True}, "source": "path"})
+    ).config
+    wishes_of = wishes.Wishes(config)
+    wish = wishes_of.wish(ShowState(show=config.name), "main", {}, 0.0, pointed=up)
+    assert wish is not None and wish.recipe["points"] == up
+    assert "points" not in wishes_of.wish(ShowState(show=config.name), "main", {}, 0.0).recipe  # type: ignore[union-attr]
 
 
 def test_what_the_stage_could_not_take_over_is_made_again(bench: Benches, tmp_path: Path) -> None:

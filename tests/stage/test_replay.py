@@ -210,6 +210,18 @@ def test_another_show_is_refused_in_words(run: Run, tmp_path: Path) -> None:
         replay_journal(tmp_path / "journal", None, 0.0, None)
 
 
+def test_after_an_order_that_takes_several_entries_it_dances_on(show: Path, tmp_path: Path) -> None:
+    night = Night(show, tmp_path / "run")
+    night.dance(20)
+    assert not night.order("phrase", text="nobody's " * 400)[0]
+    night.dance(20)
+    run = read_journal(night.kept(tmp_path / "kept")).runs[0]
+    assert len(run.pieces) > 2
+    replay = Replay(run, load_show(show))
+    comparison = Comparison(float(run.ticks["frame_time"][0]), 0.0)
+    assert [*replay.dance(comparison)][-1] == 40 and replay.skipped == 0 and comparison.first is None
+
+
 def test_an_order_that_nobody_heard_and_a_stop_dance_again_as_they_did(show: Path, tmp_path: Path) -> None:
     night = Night(show, tmp_path / "runtime")
     night.dance(130, reading(STILL))

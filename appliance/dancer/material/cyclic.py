@@ -6,6 +6,7 @@ What is decoded of such windows joins its own start by itself: nothing has to be
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,7 @@ class Cycle:
     def of(loop: Loop) -> Cycle:
         """Without the frames that only the first round has."""
         own = slice(loop.fade, loop.length)
-        poses = quaternion.continuous(loop.poses[own]).astype(np.float32)
+        poses = quaternion.continuous(loop.poses[own]).astype(np.float32, copy=False)
         return Cycle(poses, loop.track[loop.fade : loop.length + 1], loop.step, loop.start_s + loop.fade / 50)
 
     def windows(self, starts: Starts, length: int, places: list[int]) -> Poses:
@@ -46,23 +47,25 @@ class Cycle:
         at = starts[:, None] + np.arange(length)
         found = self.poses[at % len(self.poses)][:, :, places]
         found[:, :, 0] = quaternion.multiply(self._turns(at), found[:, :, 0])
-        return quaternion.continuous(found, axis=1).astype(np.float32)
+        return quaternion.continuous(found, axis=1).astype(np.float32, copy=False)
 
-    def blended(self, windows: Poses, starts: Starts, places: list[int]) -> Poses:
-        """Windows (W, T, M, 4) that stand at these starts, longer quaternions being more certain -> the
-        cycle's poses (P, J, 4); other joints stay.
+    def blended(self, parts: Iterable[tuple[Poses, Starts]], places: list[int]) -> Poses:
+        """Windows (W, T, M, 4) that stand at these starts, part after part, longer quaternions being more
+        certain -> the cycle's poses (P, J, 4); other joints stay.
         """
-        at = starts[:, None] + np.arange(windows.shape[1])
-        back = windows.copy()
-        back[:, :, 0] = quaternion.multiply(quaternion.inverse(self._turns(at)), windows[:, :, 0])
-        back = quaternion.continuous(back, axis=1)  # a network turns back where it cannot know a heading
-        middle = windows.shape[1] // 2
-        own = self.poses[at[:, middle] % len(self.poses)][:, places]
-        against = np.sum(back[:, middle] * own, axis=-1) < 0
-        back = np.where(against[:, None, :, None], -back, back)
-        made = self.poses.copy()
-        made[:, places] = hann_mean(back, starts, len(self.poses))
-        return quaternion.continuous(made).astype(np.float32)
+        mean = HannMean(len(self.poses), len(places))
+        for windows, starts in parts:
+            at = starts[:, None] + np.arange(windows.shape[1])
+            back = windows.copy()
+            back[:, :, 0] = quaternion.multiply(quaternion.inverse(self._turns(at)), windows[:, :, 0])
+            back = quaternion.continuous(back, axis=1)  # a network turns back where it cannot know a heading
+            middle = windows.shape[1] // 2
+            own = self.poses[at[:, middle] % len(self.poses)][:, places]
+            against = np.sum(back[:, middle] * own, axis=-1) < 0
+            mean.add(np.where(against[:, None, :, None], -back, back), starts)
+        moved, made = mean.poses(), self.poses.copy()
+        made[:, places] = moved
+        return quaternion.continuous(made).astype(np.float32, copy=False)
 
     def loop(self, poses: Poses, lifts: Array | None, rest_heights: Array | None, number: int) -> Loop:
         """A closed loop of other poses (P, J, 4) on the same way; lifts (P,), rest_heights (S,): floor."""
@@ -76,7 +79,7 @@ class Cycle:
         if lifts is not None and rest_heights is not None:
             track[:, LIFT] = np.append(lifts, lifts[0])
             track[:, STANDING:NUMBER] = rest_heights
-        whole = np.concatenate([poses, last]).astype(np.float32)
+        whole = np.concatenate([poses, last]).astype(np.float32, copy=False)
         return Loop.made(whole, track, self.step, self.start_s)
 
     def _turns(self, at: Starts) -> Array:
@@ -94,20 +97,36 @@ def hann_mean(windows: Poses, starts: Starts, period: int) -> Poses:
     """Windows (W, T, M, 4) at these starts of a cycle, their signs alike, weighted by their lengths -> its
     poses (period, M, 4).
     """
-    length, shape = windows.shape[1], windows.shape[2:]
-    weights = np.hanning(length + 2)[1:-1] if length > 1 else np.ones(1)
-    total, sums = np.zeros((period, *shape)), np.zeros(period)
-    for window, start in zip(windows, starts, strict=True):
-        at = (start + np.arange(length)) % period
-        np.add.at(total, at, weights[:, None, None] * window)
-        np.add.at(sums, at, weights)
-    total /= sums[:, None, None]
-    lengths = np.linalg.norm(total, axis=-1)
-    made = total / np.maximum(lengths, 1e-9)[..., None]
-    for joint in np.flatnonzero((lengths < UNCERTAIN).any(axis=0)):
-        made[:, joint] = bridged(made[:, joint], lengths[:, joint] < UNCERTAIN)
-    result: Poses = made.astype(np.float32)
-    return result
+    mean = HannMean(period, windows.shape[2])
+    mean.add(windows, starts)
+    return mean.poses()
+
+
+class HannMean:
+    """The poses of a cycle of so many frames and joints, as the mean of windows that come part after part."""
+
+    def __init__(self, period: int, joints: int) -> None:
+        self._total, self._sums = np.zeros((period, joints, 4)), np.zeros(period)
+
+    def add(self, windows: Poses, starts: Starts) -> None:
+        """Take in windows (W, T, M, 4) at these starts, their signs alike, weighted by their lengths."""
+        length, period = windows.shape[1], len(self._sums)
+        weights = np.hanning(length + 2)[1:-1] if length > 1 else np.ones(1)
+        for window, start in zip(windows, starts, strict=True):
+            at = (start + np.arange(length)) % period
+            np.add.at(self._total, at, weights[:, None, None] * window)
+            np.add.at(self._sums, at, weights)
+
+    def poses(self) -> Poses:
+        """(period, M, 4), once all windows have come; it is empty afterwards."""
+        made, self._total = self._total, np.zeros((0, 0, 4))
+        made /= self._sums[:, None, None]
+        lengths = np.sqrt(np.einsum("pjk,pjk->pj", made, made))
+        made /= np.maximum(lengths, 1e-9)[..., None]
+        for joint in np.flatnonzero((lengths < UNCERTAIN).any(axis=0)):
+            made[:, joint] = bridged(made[:, joint], lengths[:, joint] < UNCERTAIN)
+        result: Poses = made.astype(np.float32)
+        return result
 
 
 def bridged(rotations: Array, uncertain: Array) -> Array:

@@ -7,7 +7,7 @@ what was danced again.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -78,8 +78,7 @@ class Maker:
         starts, latents, facing = _encoded(network, cycle)
         noise = np.random.default_rng(recipe["seed"]).standard_normal(network.latent)
         moved = (latents + recipe["sigma"] * noise).astype(np.float32)
-        windows = _facing(network.decode(moved), facing)
-        return cycle, cycle.blended(windows, starts, network.places)
+        return cycle, cycle.blended(_decoded(network, moved, starts, facing), network.places)
 
     def _walked(self, network: MotionNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
         """A walk through the prior, or the path between two excerpts, that leads into its own start."""
@@ -92,13 +91,12 @@ class Maker:
             _, two, _ = _encoded(network, other)
             two = np.resize(two, one.shape)  # the shorter one goes round
             path = latent_paths.between(one, two, recipe["mix"], recipe["offset"], seed)
-            windows = _facing(network.decode(path), facing)
-            return cycle, cycle.blended(windows, starts, network.places)
+            return cycle, cycle.blended(_decoded(network, path, starts, facing), network.places)
         cycle = self._on_the_spot(GRANULAR_S)
         starts = even_starts(len(cycle.poses), network.window)
         waves = recipe["speed"] * GRANULAR_S
         path = latent_paths.walked(len(starts), network.latent, recipe["spread"], waves, seed)
-        return cycle, cycle.blended(network.decode(path), starts, network.places)
+        return cycle, cycle.blended(_decoded(network, path, starts), network.places)
 
     def _excerpt(self, name: str, start_s: float, seconds: float) -> Cycle:
         """The whole cycle of a phrase, or so many of its seconds from there on, as far as it has them."""
@@ -118,13 +116,12 @@ class Maker:
             starts, latents, facing = _encoded(network, cycle)
         else:
             cycle = self._on_the_spot(POINT_S)
-            starts, facing = np.arange(len(cycle.poses)), np.tile(quaternion.IDENTITY, (len(cycle.poses), 1))
+            starts, facing = np.arange(len(cycle.poses)), None
             latents = _on_the_map(network, np.array(points, float).reshape(-1, 2), len(starts))
         seconds = len(latents) / FPS
         rate = max(1, round(rate * seconds)) / seconds  # a whole number of waves leads into the start
         moved = wobbled(latents, recipe["wobble"], rate, recipe["seed"])
-        windows = _facing(network.decode(moved), facing)
-        return cycle, cycle.blended(windows, starts, network.places)
+        return cycle, cycle.blended(_decoded(network, moved, starts, facing), network.places)
 
     def _improvised(self, network: ImproviserNetwork, recipe: Recipe) -> tuple[Cycle, Poses]:
         """What the dancer goes on with after the recipe's prompt; its end leads into its start."""
@@ -170,14 +167,24 @@ class Maker:
 def _encoded(network: MotionNetwork, cycle: Cycle) -> tuple[Starts, latent_paths.Latents, Array]:
     """Where windows of a cycle begin, their latents and where they face."""
     starts = even_starts(len(cycle.poses), network.window)
-    return starts, *network.encode(cycle.windows(starts, network.window, network.places))
+    parts = [
+        network.encode(cycle.windows(starts[part], network.window, network.places))
+        for part in network.parts(len(starts))
+    ]
+    return starts, np.concatenate([latents for latents, _ in parts]), np.concatenate([at for _, at in parts])
 
 
-def _facing(windows: Poses, facing: Array) -> Poses:
-    """Windows (W, T, M, 4) turned to where they face (W, 4)."""
-    turned = windows.copy()
-    turned[:, :, 0] = quaternion.multiply(facing[:, None], windows[:, :, 0])
-    return turned
+def _decoded(
+    network: MotionNetwork, latents: latent_paths.Latents, starts: Starts, facing: Array | None = None
+) -> Iterator[tuple[Poses, Starts]]:
+    """Windows of latents, turned to where they face (W, 4), and their starts. In parts: the windows of a
+    phrase overlap, and all of them are several times as large as it is.
+    """
+    for part in network.parts(len(latents)):
+        windows = network.decode(latents[part])
+        if facing is not None:
+            windows[:, :, 0] = quaternion.multiply(facing[part, None], windows[:, :, 0])
+        yield windows, starts[part]
 
 
 def _on_the_map(network: MotionNetwork, points: Array, ticks: int) -> latent_paths.Latents:

@@ -16,7 +16,7 @@ from appliance.pose.quaternion import Array
 from appliance.show.bundle import LARGEST_FILE
 from appliance.show.network import moving_joints, rest_pose
 
-MOST_AT_ONCE = 64  # windows: bounds the memory of a run
+POSES_AT_ONCE = 512  # in the windows of a run: what else a run needs grows with them
 LONGEST_WINDOW = 512
 
 Poses = NDArray[np.float32]
@@ -49,6 +49,7 @@ class MotionNetwork:
         try:
             network = content(path, LARGEST_FILE)  # as bytes: it cannot have other files read as its weights
             self._session = onnxruntime.InferenceSession(network, options, ["CPUExecutionProvider"])
+            self._session._model_bytes = None  # it would keep the file's 1 to 8 MB for other providers
             facts: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
             self.joints = tuple(moving_joints(facts))
             self.rest = rest_pose(facts, len(self.joints)).astype(np.float32)
@@ -69,28 +70,29 @@ class MotionNetwork:
     def encode(self, windows: Array) -> tuple[Latents, Array]:
         """Windows (W, T, M, 4), without sign jumps -> latents (W, Z), and where each of them faces (W, 4)."""
         facing = quaternion.heading(windows[:, windows.shape[1] // 2, 0])
-        level = np.array(windows, dtype=np.float32)
-        level[:, :, 0] = quaternion.multiply(quaternion.inverse(facing)[:, None], windows[:, :, 0])
-        level = quaternion.aligned(level, self.rest)
-        parts = [
-            self._run(["coded"], windows=part)[0]
-            for part in np.array_split(level, -(-len(level) // MOST_AT_ONCE))
-        ]
-        return np.concatenate(parts), facing
+        latents = np.empty((len(windows), self.latent), np.float32)
+        for part in self.parts(len(windows)):
+            level = np.array(windows[part], dtype=np.float32)
+            level[:, :, 0] = quaternion.multiply(quaternion.inverse(facing[part])[:, None], level[:, :, 0])
+            latents[part] = self._run(["coded"], windows=quaternion.aligned(level, self.rest))[0]
+        return latents, facing
 
     def decode(self, latents: Latents) -> Poses:
         """Latents (W, Z) -> windows (W, T, M, 4) that face ahead; a short quaternion is an uncertain one.
 
         Raises MotionNetworkError where it gives no sound poses.
         """
-        parts = [
-            self._run(["decoded"], latents=part.astype(np.float32))[0]
-            for part in np.array_split(latents, -(-len(latents) // MOST_AT_ONCE))
-        ]
-        windows: Poses = np.concatenate(parts)
+        windows = np.empty((len(latents), self.window, len(self.joints), 4), np.float32)
+        for part in self.parts(len(latents)):
+            windows[part] = self._run(["decoded"], latents=latents[part].astype(np.float32))[0]
         if not np.isfinite(windows).all():
             raise MotionNetworkError("The network gives poses that are not numbers.")
         return windows
+
+    def parts(self, windows: int) -> list[slice]:
+        """So many windows in parts for one run each."""
+        most = max(1, POSES_AT_ONCE // self.window)
+        return [slice(first, first + most) for first in range(0, windows, most)]
 
     def _take_facts(self, facts: Mapping[str, str]) -> None:
         """What a file of this kind says besides. Raises ValueError, LookupError."""

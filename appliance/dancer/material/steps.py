@@ -20,6 +20,7 @@ WINDOW = 8  # poses of a window
 HOP = 4  # frames from one step to the next: 12.5 steps a second, half a window, so that two windows overlap
 MIDDLE = WINDOW // 2  # the frame of a window whose heading and place count as the window's own
 ROOT = 4  # numbers besides the latent: displacement x and z, turn, height
+AT_ONCE = 64  # windows: all of a minute at once take 50 MB
 FLOOR_FRAMES = 150  # the floor of a recording drifts by centimetres within seconds: its window
 FLOOR_PERCENTILE = 30.0
 
@@ -101,14 +102,16 @@ def motion_of(coder: Coder, steps: Steps, still_pose: Array, moving: Sequence[in
     still_pose (J, 4): how the joints stand that the autoencoder does not know.
     """
     heading = np.cumsum(steps.ways[:, 2].astype(np.float64))
-    turned = quaternion.normalize(coder.decode(steps.latents).astype(np.float64))
-    turned[:, :, 0] = quaternion.multiply(turns_about_y(heading)[:, None], turned[:, :, 0])
-    count = HOP * (len(steps) - 1)
-    earlier = turned[:-1, HOP:].reshape(count, len(moving), 4)
-    later = turned[1:, :HOP].reshape(count, len(moving), 4)
     share = np.sin(np.pi * (np.arange(HOP) + 0.5) / WINDOW) ** 2
-    poses = np.tile(np.asarray(still_pose, np.float64), (count, 1, 1))
-    poses[:, list(moving)] = quaternion.slerp(earlier, later, np.tile(share, len(steps) - 1)[:, None])
+    poses = np.tile(np.asarray(still_pose, np.float64), (HOP * (len(steps) - 1), 1, 1))
+    for first in range(0, len(steps) - 1, AT_ONCE):
+        some = slice(first, first + AT_ONCE + 1)
+        turned = quaternion.normalize(coder.decode(steps.latents[some]).astype(np.float64))
+        turned[:, :, 0] = quaternion.multiply(turns_about_y(heading[some])[:, None], turned[:, :, 0])
+        earlier = turned[:-1, HOP:].reshape(-1, len(moving), 4)
+        later = turned[1:, :HOP].reshape(-1, len(moving), 4)
+        between = quaternion.slerp(earlier, later, np.tile(share, len(turned) - 1)[:, None])
+        poses[HOP * first : HOP * first + len(between), list(moving)] = between
     return quaternion.continuous(poses), path_along(steps.ways, heading, HOP)
 
 
@@ -120,20 +123,24 @@ def danced_again(coder: Coder, poses: Array, moving: Sequence[int], cyclic: bool
     """
     count = len(poses)
     around = np.arange(count + WINDOW - 1 if cyclic else count) % count
-    reference = poses[around][:, list(moving)]
+    reference = poses[:, list(moving)][around]
     windows = np.lib.stride_tricks.sliding_window_view(reference, WINDOW, axis=0)
-    latents, facing = coder.encode(np.moveaxis(windows, -1, 1).astype(np.float32))
-    made = quaternion.normalize(coder.decode(latents).astype(np.float64))
-    made[:, :, 0] = quaternion.multiply(facing[:, None].astype(np.float64), made[:, :, 0])
     total = np.zeros_like(reference)
     hann = np.sin(np.pi * (np.arange(WINDOW) + 0.5) / WINDOW) ** 2
-    for place, weight in enumerate(hann):
-        rows = slice(place, place + len(made))
-        total[rows] += weight * quaternion.aligned(made[:, place], reference[rows])
+    for first in range(0, len(windows), AT_ONCE):
+        some = np.moveaxis(windows[first : first + AT_ONCE], -1, 1)
+        latents, facing = coder.encode(some.astype(np.float32))
+        made = quaternion.normalize(coder.decode(latents).astype(np.float64))
+        made[:, :, 0] = quaternion.multiply(facing[:, None].astype(np.float64), made[:, :, 0])
+        for place, weight in enumerate(hann, first):
+            rows = slice(place, place + len(made))
+            total[rows] += weight * quaternion.aligned(made[:, place - first], reference[rows])
     if cyclic:
         total[: WINDOW - 1] += quaternion.aligned(total[count:], reference[: WINDOW - 1])
-    again = poses.copy()
-    again[:, list(moving)] = quaternion.normalize(total[:count])
+    mean, again = total[:count], poses.copy()
+    mean /= np.sqrt(np.einsum("njk,njk->nj", mean, mean))[..., None]
+    again[:, list(moving)] = mean
+    del mean, total, reference, windows  # a minute of each is some MB
     return quaternion.continuous(again)
 
 
