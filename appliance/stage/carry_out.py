@@ -141,8 +141,8 @@ def _orientation(joint: str, parts: StageParts) -> quaternion.Array:
 def _spring(order: Order, parts: StageParts) -> None:
     """The first puppet's springs get a setting, a kick (m/s), a turned knob; the gate is of them all."""
     if order.name == "gate":
-        for springs in parts.springs:
-            springs.turn("gate", order.values[:1], *order.values[1:])
+        for each in parts.springs:
+            each.turn("gate", order.values[:1], *order.values[1:])
         return
     springs = parts.first.springs
     if springs is None:
