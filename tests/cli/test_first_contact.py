@@ -64,8 +64,9 @@ def test_a_default_receiver_is_nothing_to_warn_of_and_no_emulator_outlives_a_kil
 
 
 def test_the_first_seconds_show_a_hand_that_leads(tmp_path: Path) -> None:
-    with rehearsal(tmp_path, "--seconds", "4", "--journal", str(tmp_path / "journal")) as process:
-        said_until(process, "Danced")
+    kept = ("--journal", tmp_path / "journal", "--filmstrip", tmp_path / "dance.png")
+    with rehearsal(tmp_path, "--seconds", "4", *map(str, kept)) as process:
+        said_until(process, "held joints highlighted")
     dance = load_dance(tmp_path / "journal")
     assert dance.holds is not None
     led = np.flatnonzero(dance.holds.max(axis=1) > 0.5) / dance.recording.fps

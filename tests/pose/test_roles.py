@@ -44,6 +44,10 @@ def test_the_two_sides_are_told_apart(convention: str) -> None:
         ("spine_03", ("spine", 0, 2, 3)),
         ("T12", ("spine", 0, 3, 0)),
         ("lIndex2", ("index", 1, 0, 2)),
+        ("IndexProximal_L", ("index", 1, 0, 1)),
+        ("RightFinger5Medial", ("pinky", -1, 0, 2)),
+        ("lShldrBend", ("arm", 1, 2, 0)),
+        ("abdomenUpper", ("spine", 0, 1, 0)),
     ],
 )
 def test_prefixes_sides_and_numbers(name: str, place: tuple[str, int, int, int]) -> None:

@@ -41,3 +41,11 @@ def test_the_stretch_that_loops_is_the_phrase(tmp_path: Path) -> None:
 
 def test_short_recordings_have_no_phrase_that_loops(tmp_path: Path) -> None:
     assert choose_phrase(load_dataset(write_recordings(tmp_path / "dancer", count=2, seconds=5.0))) is None
+
+
+def test_what_lies_between_two_capture_errors_may_be_a_few_frames(tmp_path: Path) -> None:
+    dataset = load_dataset(write_recordings(tmp_path / "dancer", count=2, seconds=20.0))
+    for take in dataset.takes:
+        take.sound[[20, 24, 26]] = False
+    chosen = choose_phrase(dataset)
+    assert chosen is not None and chosen.from_s > 0.5

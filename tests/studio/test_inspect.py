@@ -39,6 +39,15 @@ def test_a_file_of_the_cmu_s_units_with_z_up_is_described(tmp_path: Path) -> Non
     assert "LHumerus" in text and "left upper arm" in text and "(--true-fps)" in text
 
 
+def test_fingers_and_the_whole_trunk_are_recognised_and_a_root_on_the_floor_is_none(tmp_path: Path) -> None:
+    file = tmp_path / "take.bvh"
+    write_bvh(file, as_the_system_writes(dance_of("Captury", seconds=2.0), "Captury"))
+    (found,) = facts(file, "--root", "Root")
+    taken = {joint["name"]: joint["taken_for"] for joint in found["joints"]}
+    expected = {"LeftHandIndex2": "left index", "Spine2": "spine", "Spine4": "chest", "Root": ""}
+    assert {name: taken[name] for name in expected} == expected
+
+
 def test_every_guess_can_be_overruled(tmp_path: Path) -> None:
     file = tmp_path / "take.bvh"
     write_bvh(file, as_the_system_writes(dance_of("Unreal", seconds=3.0), "Unreal"))

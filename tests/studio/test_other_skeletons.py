@@ -182,7 +182,7 @@ def test_errors_of_a_part_are_at_their_place_in_it(tmp_path: Path) -> None:
 
 def test_few_data_are_told_and_too_few_refused_with_the_figure(tmp_path: Path) -> None:
     found = load_dataset(write(tmp_path / "dancer", swaying(6.0), swaying(4.0, seed=1)))
-    assert "6 s are little to learn from" in told(found)
+    assert "Only 6 s of dance to learn from" in told(found)
     require_windows(found, 293)
     with pytest.raises(DatasetError, match=r"Only 293 windows .*about 5\.9 s.*At least 294 are needed"):
         require_windows(found, 294)

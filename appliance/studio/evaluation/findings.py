@@ -76,7 +76,7 @@ def few_data(dataset: Dataset) -> list[str]:
     if seconds >= FEW_S:
         return []
     return [
-        f"{seconds:.0f} s are little to learn from: expect a dancer that knows these few moves, and that "
+        f"Only {seconds:.0f} s of dance to learn from: expect a dancer that knows these few moves, and that "
         f"answers a hand far from all of them with the nearest one. {_ENOUGH}: the show that comes along "
         "learned from 11."
     ]

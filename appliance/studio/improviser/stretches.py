@@ -58,6 +58,8 @@ def best_stretches(
 def _stretches(
     number: int, dance: Recording, yardstick: Yardstick, seconds: float, stage_m: float, seam_s: float
 ) -> list[Stretch]:
+    if dance.seconds < SHORTEST * seconds + seam_s:
+        return []
     rate = dance.fps / EVERY
     shapes = figure_shapes(dance, yardstick.moving)[::EVERY]
     path = dance.roots[::EVERY, [0, 2]]
