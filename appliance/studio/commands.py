@@ -152,9 +152,10 @@ def train(
     """
     with clear_errors("train"):
         from appliance.studio import train_command
+        from appliance.studio.train_options import TrainOptions
 
         done = train_command.run(
-            train_command.TrainOptions(
+            TrainOptions(
                 out=out,
                 recordings=recordings,
                 model=model.value,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from appliance.show.show import load_show
 from appliance.studio.autoencoder.models import AnySettings
@@ -13,9 +12,7 @@ from appliance.studio.data.dataset import Dataset
 from appliance.studio.evaluation.coders import TorchCoder, load_puppet
 from appliance.studio.export.exported import read_exported
 from appliance.studio.studio_error import StudioError
-
-if TYPE_CHECKING:
-    from appliance.studio.train_command import TrainOptions
+from appliance.studio.train_options import TrainOptions
 
 LEARNING_RATE = 2e-4  # a fifth of a new network's: at that one it forgets in 200 steps what it knows
 _OF_THE_NETWORK = ("network", "window", "latent", "width", "depth")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,7 @@ from torch import nn
 
 from appliance.dancer.material.improvising import MOVE
 from appliance.pose.counted import counted
-from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
-from appliance.studio.autoencoder.models import MODELS, AnySettings, settings_for, settings_from
+from appliance.studio.autoencoder.models import AnySettings, settings_for, settings_from
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.autoencoder.training_run import LOSSES_PICTURE, TrainingRun, parameters
 from appliance.studio.data import sources
@@ -32,43 +31,12 @@ from appliance.studio.improviser import own_output
 from appliance.studio.improviser.improviser_training import ImproviserTraining
 from appliance.studio.improviser.learning import AnyTraining, train_until_done, training_for
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesTraining
+from appliance.studio.model_uses import USES
 from appliance.studio.processes import Processes, joined
 from appliance.studio.studio_error import StudioError
+from appliance.studio.train_options import TrainOptions
 from appliance.studio.trained_on import reading_progress
 from appliance.studio.variations.sweep import report
-
-
-@dataclass(frozen=True)
-class TrainOptions:
-    """The command line of bunraku train."""
-
-    out: Path
-    recordings: Path | None = None
-    model: str = "puppet"
-    network: str | None = None
-    window: int = 0
-    minutes: float | None = None
-    steps: int | None = None
-    seed: int = 1
-    latent: int = 0
-    width: int = 0
-    depth: int = 0
-    mixtures: int = 0
-    ahead: int = 0
-    learning_rate: float = 0.0
-    full_precision: bool = False
-    puppet: Path | None = None
-    start: Path | None = None
-    resume: bool = False
-    threads: int = 0
-    device: str = "auto"
-    catalogue: Path | None = None
-    held_out: tuple[str, ...] = ()
-    reading: ReadingOptions = AS_THE_FILES_SAY
-    keep: tuple[str, ...] = ()
-    phrase: Path | None = None
-    name: str | None = None
-    hand: str | None = None
 
 
 def run(options: TrainOptions) -> bool:
@@ -150,7 +118,7 @@ def _finish(
             console.print(f"{file}: a show that holds it dances from it live (docs/variations.md, On stage).")
         if isinstance(training, ImproviserTraining):
             _export_improviser(training, checkpoint, console)
-        console.print(f"{checkpoint} is ready. What it is for: {MODELS[settings.model].use}.")
+        console.print(f"{checkpoint} is ready. What it is for: {USES[settings.model]}.")
     elif training.settings.window != WINDOW:
         console.print(
             f"{checkpoint} dances by itself: bunraku granular {shlex.quote(str(checkpoint))} --out "

@@ -10,9 +10,9 @@ from appliance.studio.autoencoder.architectures import DEFAULT
 from appliance.studio.autoencoder.losses import LossWeights
 from appliance.studio.autoencoder.training import Settings
 from appliance.studio.data.dataset import WINDOW
-from appliance.studio.evaluation.coders import IMPROVISER
 from appliance.studio.improviser.improviser_training import ImproviserSettings
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesSettings
+from appliance.studio.model_uses import IMPROVISER
 from appliance.studio.studio_error import StudioError
 
 SQUARED_ALONE = LossWeights(
@@ -24,19 +24,18 @@ SQUARED_ALONE = LossWeights(
 class Model:
     """A kind of network: its window in poses, and settings by network, the default first.
 
-    use: what its checkpoint is good for, for people; shortest, longest: windows that may be asked for.
+    shortest, longest: windows that may be asked for.
     """
 
     window: int
     networks: dict[str, dict[str, Any]]
-    use: str
     shortest: int = 4
     longest: int = 128
 
 
 PUPPETS: tuple[str, ...] = (DEFAULT, "mlp", "conv", "lstm", "lstm-autoregressive", "lstm256")
 MODELS = {
-    "puppet": Model(WINDOW, {name: {} for name in PUPPETS}, "bunraku play"),
+    "puppet": Model(WINDOW, {name: {} for name in PUPPETS}),
     "pose": Model(
         1,
         {
@@ -57,7 +56,6 @@ MODELS = {
                 "minutes": 15.0,
             },
         },
-        "bunraku path, bunraku map",
         shortest=1,
         longest=1,
     ),
@@ -76,11 +74,10 @@ MODELS = {
             # Section 'Sequence VAE' of 'Beyond Imitation'
             "lstm384": {"weights": SQUARED_ALONE, "variational": True, "minutes": 45.0, "batch": 128},
         },
-        "bunraku vary",
         shortest=16,
     ),
     # Section 'LSTM' of 'Beyond Imitation' is lstm-mixtures; its look-back is the window
-    IMPROVISER: Model(32, {"moves": {}, "lstm-mixtures": {}}, "bunraku improvise --model", shortest=10),
+    IMPROVISER: Model(32, {"moves": {}, "lstm-mixtures": {}}, shortest=10),
 }
 AnySettings = Settings | ImproviserSettings | PoseMixturesSettings
 IMPROVISERS: dict[str, type[ImproviserSettings] | type[PoseMixturesSettings]] = {

@@ -15,13 +15,13 @@ from appliance.pose.foreign_file import opened
 from appliance.show.network import WINDOW
 from appliance.show.show import load_show
 from appliance.studio.autoencoder.held_joints import HeldJoints
+from appliance.studio.model_uses import IMPROVISER, USES
 from appliance.studio.studio_error import StudioError
 
 if TYPE_CHECKING:
     from appliance.studio.autoencoder.autoencoder import Autoencoder
 
 Poses = NDArray[np.float32]
-IMPROVISER = "improviser"  # the model of a checkpoint that is no autoencoder
 
 
 class MovedJoints(Protocol):
@@ -180,12 +180,10 @@ def _from_training(path: Path) -> Iterator[None]:
 
 def load_puppet(path: Path) -> tuple[TorchCoder, dict[str, Any]]:
     """The same for a network that the box can dance. Raises StudioError."""
-    from appliance.studio.autoencoder.models import MODELS
-
     coder, state = load_checkpoint(path)
     model = state["settings"].get("model", "puppet")
     if model != "puppet":
-        raise StudioError(f"{path} is a {model} model, for {MODELS[model].use}; a show needs a puppet.")
+        raise StudioError(f"{path} is a {model} model, for {USES[model]}; a show needs a puppet.")
     if coder.window != WINDOW:
         raise StudioError(
             f"{path} has windows of {coder.window} poses, and the box dances windows of {WINDOW}. It dances "

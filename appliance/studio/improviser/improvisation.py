@@ -18,7 +18,7 @@ from appliance.studio.autoencoder.autoencoder import Autoencoder
 from appliance.studio.dance_files import write_dance
 from appliance.studio.data.dataset import FPS, Dataset, window_starts
 from appliance.studio.disk_room import require_room
-from appliance.studio.evaluation.coders import IMPROVISER, MovedJoints, TorchCoder, load_puppet, load_state
+from appliance.studio.evaluation.coders import MovedJoints, TorchCoder, load_puppet, load_state
 from appliance.studio.improviser.improviser_training import (
     ImproviserSettings,
     ImproviserTraining,
@@ -35,6 +35,7 @@ from appliance.studio.improviser.naturalness_table import naturalness_table
 from appliance.studio.improviser.phrase import PhraseOptions, make_phrase, verdict
 from appliance.studio.improviser.pose_mixtures_training import PoseMixturesSettings, load_pose_improviser
 from appliance.studio.improviser.prompt import Follower, MovesFollower, continued
+from appliance.studio.model_uses import IMPROVISER
 from appliance.studio.standing_dance import excerpt_of
 from appliance.studio.studio_error import StudioError
 from appliance.studio.trained_on import trained_on
