@@ -141,8 +141,6 @@ class Easel:
 
     def show(self, poses: Sequence[Poses], holds: Sequence[Floats | None]) -> None:
         """What the figures of the next picture do, at least one."""
-        for video in self._videos.values():
-            video.stop_unseen()
         self._shown = len(poses)
         while len(self._figures) < self._shown:
             self._figures.append(_FigureTextures(self.ctx, self._mesh, len(self.skeleton)))

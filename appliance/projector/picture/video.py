@@ -50,11 +50,6 @@ class Video:
         """What it takes on the GPU."""
         return 3 * self._texture.width * self._texture.height
 
-    def stop_unseen(self) -> None:
-        """End the process where the look is not shown any more; called for each picture."""
-        if self._process is not None and time.monotonic() - self._seen_at > UNSEEN_S:
-            self._stop()
-
     def release(self) -> None:
         """End the process, and give the GPU's memory back."""
         self._stop()
@@ -79,6 +74,8 @@ class Video:
         assert process.stdout is not None
         while (picture := _ppm(process.stdout)) is not None:
             self._newest = picture
+            if time.monotonic() - self._seen_at > UNSEEN_S:
+                self._stop()
         if process is self._process:
             _say(
                 f"{self._path} is played no further. The audience sees the figure before its last picture. "
