@@ -1,4 +1,4 @@
-"""The trunk as a tube along the spine, and the arms beside it, on any skeleton with the usual names."""
+"""The trunk as a tube along spine and skull, and the arms beside it, on any skeleton with the usual names."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from appliance.dancer.two_bones import Vector, vector
+from appliance.pose import quaternion
 from appliance.pose.roles import UPPER_ARMS
 from appliance.pose.skeleton import Skeleton
 
 TRUNK_RADIUS = 0.5  # of the distance between the shoulders: 11 cm for the CMU dancers
+SKULL = 0.7  # of that radius: from the head's joint upwards, where the tube ends in a ball
 
 
 class Arm(NamedTuple):
@@ -24,11 +27,16 @@ class Arm(NamedTuple):
 
 @dataclass(frozen=True)
 class Trunk:
-    """spine: joints from the neck (or what carries the head) down to the root; radius_m: of the tube."""
+    """spine: joints from the neck (or what carries the head) down to the root; radius_m: of the tube.
+
+    skull: from the head's joint to the middle of the skull, metres in the joint's own frame.
+    """
 
     spine: tuple[int, ...]
     arms: tuple[Arm, ...]
     radius_m: float
+    head: int
+    skull: Vector
 
     @classmethod
     def of(cls, skeleton: Skeleton) -> Trunk | None:
@@ -36,7 +44,8 @@ class Trunk:
         named = skeleton.roles
         if "head" not in named or any(part not in named for part in UPPER_ARMS):
             return None
-        spine = skeleton.ancestors(named["head"])[1:]
+        head = named["head"]
+        spine = skeleton.ancestors(head)[1:]
         arms = []
         for part in UPPER_ARMS:
             shoulder = named[part]
@@ -45,9 +54,13 @@ class Trunk:
             if elbow is None or wrist is None or shoulder == 0:
                 return None
             arms.append(Arm(skeleton.parents[shoulder], shoulder, elbow, wrist))
-        positions, _ = skeleton.forward_kinematics(skeleton.standing, np.zeros(3))
+        if len(spine) < 2:
+            return None
+        positions, world = skeleton.forward_kinematics(skeleton.standing, np.zeros(3))
         apart = float(np.linalg.norm(positions[arms[0].shoulder] - positions[arms[1].shoulder]))
-        return cls(tuple(spine), tuple(arms), TRUNK_RADIUS * apart) if len(spine) > 1 else None
+        radius_m = TRUNK_RADIUS * apart
+        up = quaternion.rotate(quaternion.inverse(world[head]), np.array([0.0, SKULL * radius_m, 0.0]))
+        return cls(tuple(spine), tuple(arms), radius_m, head, vector(up.tolist()))
 
 
 def _longest(skeleton: Skeleton, joint: int) -> int | None:

@@ -82,6 +82,25 @@ def test_a_forearm_in_the_belly_is_bent_out() -> None:
     assert np.hypot(hand[0], hand[2]) > 0.12  # it was 0.05 from the spine's line
 
 
+def test_a_forearm_through_the_head_goes_around_it() -> None:
+    trunk = Trunk.of(FIGURE)
+    assert trunk is not None
+
+    def from_the_skull(poses: np.ndarray) -> float:
+        """Metres, of the forearm's middle and the wrist, whichever is nearer."""
+        positions, _ = FIGURE.forward_kinematics(poses[-1].astype(np.float64), np.zeros(3))
+        elbow, wrist = positions[ELBOW], positions[NAMES.index("lHand")]
+        skull = positions[trunk.head] + trunk.skull
+        return min(float(np.linalg.norm(place - skull)) for place in (0.5 * (elbow + wrist), wrist))
+
+    for raised, bent in ((np.pi / 2, np.pi / 2), (1.2, 1.6), (1.0, 2.0)):
+        poses = rest(100)
+        poses[:, LEFT] = quaternion.from_axis_angle([0.0, 0.0, 1.0], raised)
+        poses[:, ELBOW] = quaternion.from_axis_angle([0.0, 0.0, 1.0], bent)
+        assert from_the_skull(poses) < 0.12
+        assert from_the_skull(cleared(poses)) > 0.16
+
+
 def test_an_arm_that_is_led_through_the_body_and_back_never_jumps() -> None:
     """A slow swing from one side to the other and back: the correction has a limited speed."""
     shares = np.concatenate([np.linspace(0.4, 1.2, 200), np.linspace(1.2, 0.4, 200)])
