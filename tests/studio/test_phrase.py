@@ -208,7 +208,7 @@ def test_a_phrase_is_made_and_the_same_again_from_what_was_kept(
     assert phrase.fps == pytest.approx(50.0) and 3.5 <= phrase.seconds <= 4.5
     assert is_closed(phrase.poses.astype(np.float32), phrase.roots.astype(np.float32))
     beside = {file.name for file in tmp_path.iterdir()}
-    assert beside == {"phrase.bvh", "phrase.json", "phrase.png", "phrase.improviser.pt"}
+    assert beside == {f"phrase.{end}" for end in ("bvh", "json", "png", "improviser.pt", "improviser.png")}
     told = json.loads((tmp_path / "phrase.json").read_text())
     assert told["improviser"]["steps"] == 2
     assert told["naturalness"]["seconds"] == pytest.approx(phrase.seconds)

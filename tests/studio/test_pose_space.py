@@ -13,12 +13,13 @@ import pytest
 
 from appliance.dancer.material.pose_paths import even_path, wobbled
 from appliance.pose import quaternion
-from appliance.pose.bvh import read_bvh
+from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.studio.evaluation.coders import load_checkpoint
 from appliance.studio.pose_space.drawing import read_line
 from appliance.studio.pose_space.latent_poses import PoseMap, latents_of, poses_of
 from appliance.studio.pose_space.projections import projections
 from appliance.studio.studio_error import StudioError
+from tests.studio.bodies import body, moved
 from tests.studio.conftest import bunraku
 from tests.studio.tiny import moving, swaying
 
@@ -170,7 +171,34 @@ def test_the_page_of_the_map_needs_no_network(model: Path, recordings: Path, tmp
     assert not re.search(r"https?://|src=|@import", page)
     data = json.loads(re.search(r"const data = (\{.*\});\n", page)[1])
     assert data["dances"][0]["name"] == "sway_0" and len(data["dances"][0]["path"]) == 100
-    assert len(data["dances"][0]["figures"][0]) == 3 * 20
+    phrase = read_bvh(recordings / "sway_0.bvh")
+    figure = np.array(data["dances"][0]["figures"][7]).reshape(-1, 3)
+    assert figure.shape == (20 + 5, 3), "joints, then the ends of hands, feet and face"
+    own, _ = phrase.skeleton.forward_kinematics(phrase.poses[14], np.zeros(3))
+    np.testing.assert_allclose(figure[:20], own, atol=2e-3)
+    lengths = [np.linalg.norm(figure[joint] - figure[parent]) for joint, parent in data["bones"][-5:]]
+    np.testing.assert_allclose(
+        lengths, [np.linalg.norm(offset) for _, offset in phrase.skeleton.ends], atol=2e-3
+    )
+
+
+def test_two_numbers_hold_a_body_of_58_joints_and_are_its_whole_map(tmp_path: Path) -> None:
+    (tmp_path / "dancer").mkdir()
+    for seed in (1, 2):
+        write_bvh(tmp_path / "dancer" / f"take_{seed}.bvh", moved(body(fingers=9), seconds=6.0, seed=seed))
+    sizes = ["--latent", 2, "--width", 32, "--steps", 30, "--threads", 1]
+    options = ["--recordings", tmp_path / "dancer", "--out", tmp_path / "poses", *sizes]
+    result = bunraku("train", "--model", "pose", *options)
+    assert result.exit_code == 0, result.output
+    model, take = tmp_path / "poses" / "checkpoint.pt", tmp_path / "dancer" / "take_1.bvh"
+    result = bunraku("map", take, "--model", model, "--out", tmp_path / "map")
+    assert result.exit_code == 0, result.output
+    data = json.loads(re.search(r"const data = (\{.*\});\n", (tmp_path / "map" / "map.html").read_text())[1])
+    path = np.array(data["dances"][0]["path"])
+    assert path.shape == (150, 3) and not path[:, 2].any() and np.ptp(path[:, :2], axis=0).min() > 0
+    assert len(data["dances"][0]["figures"][0]) == 3 * 58 and len(data["known"]) > 100
+    autoencoder = load_checkpoint(model)[0].autoencoder
+    assert poses_of(autoencoder, np.zeros((3, 2), np.float32)).shape == (3, 58, 4)
 
 
 @pytest.mark.parametrize(

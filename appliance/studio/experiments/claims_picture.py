@@ -12,7 +12,7 @@ from appliance.studio.evaluation.pictures import FAINT, INK, PANEL, new_figure, 
 from appliance.studio.experiments.claims import Claim
 
 WIDTH, CLAIM_SHARE = 15.0, 0.34  # inches; of the width for the claim's words
-ROW, HEAD = 0.62, 0.5  # inches
+ROW, HEAD = 0.74, 0.5  # inches
 COLOURS = {True: "#2f5a3a", False: "#6e2a1f", None: PANEL}  # holds, does not, is not spoken of
 
 
@@ -44,13 +44,13 @@ def _table(axes: Any, name: str, claims: Sequence[Claim]) -> None:
     axes.set_ylim(len(claims) + HEAD / ROW, -HEAD / ROW)
     axes.set_title(f"{name}: green where the claim holds, red where not", color=INK, loc="left", fontsize=11)
     for column, excerpt in enumerate(names):
-        axes.text(CLAIM_SHARE + (column + 0.5) * width, -0.3, excerpt, color=FAINT, fontsize=9, ha="center")
+        axes.text(CLAIM_SHARE + (column + 0.5) * width, -0.3, excerpt, color=FAINT, fontsize=10, ha="center")
     for row, claim in enumerate(claims):
         measured = next(iter(claim.figures.values()))
-        words = fill(f"({claim.letter}) {claim.words}", 78)
-        axes.text(0, row + 0.06, words, color=INK, fontsize=7.5, va="top")
+        words = fill(f"({claim.letter}) {claim.words}", 70)
+        axes.text(0, row + 0.06, words, color=INK, fontsize=9.5, va="top")
         told = " / ".join(name.replace("_", " ") for name in measured)
-        axes.text(0, row + 0.92, told, color=FAINT, fontsize=6.5, va="bottom")
+        axes.text(0, row + 0.92, told, color=FAINT, fontsize=8.5, va="bottom")
         for column, excerpt in enumerate(names):
             figures = claim.figures.get(excerpt)
             if figures is None:
@@ -59,7 +59,7 @@ def _table(axes: Any, name: str, claims: Sequence[Claim]) -> None:
             colour = COLOURS[claim.holds.get(excerpt)]
             axes.add_patch(Rectangle((left + 0.003, row + 0.06), width - 0.006, 0.86, color=colour))
             said = " / ".join(map(_short, figures.values()))
-            axes.text(left + width / 2, row + 0.5, said, color=INK, fontsize=7, ha="center", va="center")
+            axes.text(left + width / 2, row + 0.5, said, color=INK, fontsize=9, ha="center", va="center")
 
 
 def _short(value: float) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from appliance.pose import quaternion
 from appliance.pose.quaternion import Array
 from appliance.pose.reading_options import AS_THE_FILES_SAY, ReadingOptions
 from appliance.pose.recording import Recording
@@ -113,7 +114,12 @@ def _write_page(
     every = max(PAGE_EVERY, sum(map(len, recordings.values())) // MOST_PAGE_POSES)
     for name, recording in recordings.items():
         poses = recording.poses[::every]
-        positions, _ = skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
+        positions, turns = skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
+        ends = [
+            positions[:, joint] + quaternion.rotate(turns[:, joint], np.broadcast_to(offset, (len(poses), 3)))
+            for joint, offset in skeleton.ends
+        ]
+        positions = np.concatenate([positions, *(end[:, None] for end in ends)], axis=1)
         dances.append(
             {
                 "name": name,
@@ -123,6 +129,7 @@ def _write_page(
         )
     known = _in_three(ground.known[:: max(1, len(ground.known) // MOST_KNOWN)])
     bones = [[joint, parent] for joint, parent in enumerate(skeleton.parents) if parent >= 0]
+    bones += [[len(skeleton) + number, joint] for number, (joint, _) in enumerate(skeleton.ends)]
     facts = {"bones": bones, "fps": FPS / every, "known": known, "dances": dances}
     data = json.dumps(facts).replace("</", "<\\/")
     template = resources.files("appliance.studio.pose_space").joinpath("map.html").read_text("utf-8")
