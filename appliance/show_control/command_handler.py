@@ -34,8 +34,10 @@ if TYPE_CHECKING:
     from appliance.sensor.keys import SensorKey
 
 # What a box sends is never answered: two boxes would go on answering each other for ever.
-_ANSWERS = frozenset((REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END))
-_LISTED = ("/cues/", "/phrases/", "/looks/", "/cards/", "/hands/", "/fallbacks/", "/motion/is")
+_ANSWERS = frozenset(
+    (REPLY, SENSORS_REPLY, PONG, END, STATUS, SENSOR, ROSTER_END, "/motion/is", "/motion/parameter")
+)
+_LISTED = ("/cues/", "/phrases/", "/looks/", "/cards/", "/hands/", "/fallbacks/")
 _ONCE_A_BUNDLE = frozenset((*QUESTIONS, "/sensors/list", "/sensors/reload"))  # the same answer each time
 _NO_STAGE = "No stage dances on this box, so nothing is known of its sensors. Start it: bunraku play."
 

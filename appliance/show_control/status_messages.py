@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
-from appliance.box.show_state import ShowState
+from appliance.box.show_state import MOTION, ShowState
 from appliance.pose.foreign_file import plain_json
-from appliance.show.sources import NO_CARD
+from appliance.show.sources import NO_CARD, PARAMETERS
 from appliance.show_control.packet import Message
 
 if TYPE_CHECKING:
@@ -91,6 +91,8 @@ def told(
         cards = (NO_CARD, *observer.facts.cards) if observer.facts else ()
         shown = show_state.card or NO_CARD
         answers = [("/cards/card", name, int(name == shown)) for name in cards]
+    elif question == "/motion":
+        answers = [*_made(now_status, observer), *_declared(show_state, observer)]
     else:
         answers = list(_LISTS[question](now_status, observer, now))
     yield from answers
@@ -127,7 +129,7 @@ def _fallbacks(status: Status, observer: StageObserver, now: float) -> Iterator[
         yield "/fallbacks/fallback", one.name, who, one.times, int(one.active), one.words[:_LONGEST_WORDS]
 
 
-def _motion(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
+def _made(status: Status, observer: StageObserver) -> Iterator[Message]:
     """What was made ahead and is danced, number by number; nothing while a phrase or a live dancer is."""
     recipe = plain_json(str(observer.health().get("made") or "{}"))
     recipe = recipe.get("of", recipe)
@@ -136,13 +138,22 @@ def _motion(status: Status, observer: StageObserver, now: float) -> Iterator[Mes
             yield "/motion/is", name, *(value if isinstance(value, list) else (value,))
 
 
+def _declared(show_state: ShowState, observer: StageObserver) -> Iterator[Message]:
+    """Each parameter of the show's sources that are made ahead, with the value that it has or fades to."""
+    facts = observer.facts
+    dance = show_state.dance if facts is not None and show_state.show == facts.show_name else {}
+    for source, section in facts.motion.items() if facts is not None else ():
+        for name in PARAMETERS[source]:
+            value, *_ = dance.get(f"{MOTION}{source} {name}", (0, "", (section[name],)))[2]
+            yield "/motion/parameter", source, name, float(value)
+
+
 _LISTS = {
     "/cues": _cues,
     "/phrases": _phrases,
     "/looks": _looks,
     "/hands": _hands,
     "/fallbacks": _fallbacks,
-    "/motion": _motion,
 }
 
 

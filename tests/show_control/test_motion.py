@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -14,6 +16,7 @@ from appliance.show.sources import MOST_POINTS, PARAMETERS
 from appliance.show_control.command import command
 from appliance.show_control.show_state_commands import DECLARATIONS
 from appliance.show_control.stage_observer import StageObserver
+from appliance.show_control.status_messages import Status, told
 from tests.show_control.doubles import facts
 
 SOURCES = ("main", "quiet", "vary", "granular", "path", "improvise")
@@ -80,3 +83,17 @@ def test_kept_motions_are_known_by_name(tmp_path: Path) -> None:
         assert observer.kept() == ()
         writer.write(["anna", "bert"])
         assert observer.kept() == ("anna", "bert")
+
+
+def test_the_status_tells_what_is_danced_and_every_parameter() -> None:
+    state, _ = declared("/motion/vary/sigma", 2.0, 8.0)
+    shown = facts(motion={"vary": {"sigma": 0.7, "seed": 3}})
+    recipe = {"source": "vary", "sigma": 0.9, "seed": 4, "number": 1001, "prompt": "long"}
+    for made, danced in (("", []), (json.dumps(recipe), [("source", "vary"), ("sigma", 0.9), ("seed", 4)])):
+        observer = cast(StageObserver, SimpleNamespace(facts=shown, health=lambda made=made: {"made": made}))
+        status = cast(Status, SimpleNamespace(phrase="vary"))
+        *answers, end = told("/motion", state, observer, status, NOW)
+        assert [answer[1:] for answer in answers if answer[0] == "/motion/is"] == danced
+        parameters = [answer[1:] for answer in answers if answer[0] == "/motion/parameter"]
+        assert parameters == [("vary", "sigma", 2.0), ("vary", "seed", 3.0)]
+        assert end == ("/end", "/motion", len(answers))
