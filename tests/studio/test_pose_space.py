@@ -141,7 +141,7 @@ def test_umap_stands_beside_the_others_where_it_is_installed(
     class Umap:
         """A stand-in with the interface of umap-learn: the first two numbers of what it was fitted to."""
 
-        def __init__(self, random_state: int) -> None: ...
+        def __init__(self, random_state: int, n_jobs: int) -> None: ...
 
         def fit(self, shapes: np.ndarray) -> Umap:
             self.middle = shapes.mean(axis=0)

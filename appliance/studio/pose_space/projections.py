@@ -75,5 +75,5 @@ def _umap(shapes: Sequence[Array]) -> tuple[Array, ...] | None:
     except ImportError:
         return None
     whole = np.concatenate(shapes)
-    fitted = UMAP(random_state=1).fit(whole[:: max(1, len(whole) // MOST_NEIGHBOURS_OF)])
+    fitted = UMAP(random_state=1, n_jobs=1).fit(whole[:: max(1, len(whole) // MOST_NEIGHBOURS_OF)])
     return tuple(np.asarray(fitted.transform(one)) for one in shapes)
