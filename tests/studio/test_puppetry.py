@@ -86,7 +86,9 @@ def test_figures_are_in_the_agreed_json(pair: Pair, poses: np.ndarray) -> None:
     keys = {"answer", "fit", "fit_own", "fit_bare", "plausibility", "energy", "roughness", "held"}
     for joint in joints:
         assert {"2_1", "10_9", "turning", "onset_ticks"} <= set(found[joint])
-        assert keys | {"arm_in_trunk", "foot_skate", "snap"} <= set(found[joint]["10_9"])
+        assert keys | {"arm_in_trunk", "arms_touch", "strained", "foot_skate", "snap"} <= set(
+            found[joint]["10_9"]
+        )
         assert found[joint]["onset_ticks"] is None and found[joint]["step_answer"] == pytest.approx(
             0, abs=0.01
         )
@@ -152,6 +154,29 @@ def test_an_arm_in_the_trunk_is_seen_and_a_hanging_one_is_not() -> None:
     poses[4:, place] = quaternion.from_axis_angle([0.0, 0.0, 1.0], np.radians(-130))  # through the ribs
     assert body.arm_in_trunk(poses) == pytest.approx(0.6)
     assert 3.0 < body.arm_depth_cm(poses) < 30.0
+
+
+def test_arms_that_cross_touch_and_arms_apart_do_not() -> None:
+    phrase = swaying(2.0)
+    body = BodyFigures(phrase)
+    poses = np.tile(np.array([1.0, 0, 0, 0]), (10, len(phrase.skeleton), 1))
+    assert body.arms_touch(poses) == 0.0
+    for name, side in (("lShldr", 1), ("rShldr", -1)):  # both to the front and across
+        poses[7:, phrase.skeleton.index(name)] = quaternion.from_axis_angle(
+            [0.0, 1, 0], side * np.radians(-120)
+        )
+    assert body.arms_touch(poses) == pytest.approx(0.3)
+
+
+def test_a_joint_is_strained_beyond_all_that_it_ever_did(poses: np.ndarray) -> None:
+    reference, danced = Reference(poses), poses[:10].copy()
+    assert reference.strained(danced) == 0.0
+    head = NAMES.index("head")
+    danced[6:, head] = quaternion.from_axis_angle([1.0, 0, 0], 2.5)
+    assert reference.strained(danced) == pytest.approx(0.4)
+    assert reference.strained(danced, [place for place in range(len(NAMES)) if place != head]) == 0.0
+    danced[:, 0] = quaternion.multiply(quaternion.from_axis_angle([1.0, 0, 0], 2.5), danced[:, 0])
+    assert reference.strained(danced, [0]) == 0.0  # a root may be anywhere
 
 
 def test_feet_that_stand_do_not_skate_and_feet_that_swing_do() -> None:

@@ -1,4 +1,4 @@
-"""Figures of a dance: energy, roughness and steps of its motion; arms in the trunk, sliding feet."""
+"""Figures of a dance: energy, roughness and steps of its motion; arms in trunk and arm, sliding feet."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from appliance.pose.recording import Recording
 from appliance.studio.standing import measure_standing
 
 ROUGHNESS_PERCENTILE = DEPTH_PERCENTILE = 99.0
+ALONG_BONE = np.linspace(0.0, 1.0, 9)
 DEEP = 0.3  # of that radius below the surface: 3.5 cm
+TOUCHING_M = 0.03  # between the axes of two arms
 ALONG_ARM = (0.5, 0.75, 1.0)  # of the upper arm: its inner half begins in the trunk
 
 
@@ -74,6 +76,26 @@ class BodyFigures:
         if self._trunk is None or depths is None:
             return float("nan")
         return 100 * self._trunk.radius_m * float(np.percentile(depths, DEPTH_PERCENTILE))
+
+    def arms_touch(self, poses: Array) -> float:
+        """Share of poses (T, J, 4) in which upper arm or forearm are nearer than 3 cm to the other arm's."""
+        if self._trunk is None:
+            return float("nan")
+        positions, _ = self._skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
+        left, right = (
+            [
+                (positions[:, arm.shoulder], positions[:, arm.elbow]),
+                (positions[:, arm.elbow], positions[:, arm.wrist]),
+            ]
+            for arm in self._trunk.arms
+        )
+        nearest: Array = np.full(len(poses), np.inf)
+        for one, other in ((one, other) for one in left for other in right):
+            for bone, points in ((one, other), (other, one)):
+                for share in ALONG_BONE:
+                    point = (1 - share) * points[0] + share * points[1]
+                    nearest = np.minimum(nearest, _distance(point, *bone))
+        return float((nearest < TOUCHING_M).mean())
 
     def foot_skate(self, poses: Array, roots: Array) -> float:
         """Sliding speed of the supporting foot, m/s, in grounded poses (T, J, 4) with roots (T, 3)."""

@@ -49,7 +49,8 @@ class Figures:
     answer, fit, fit_own, fit_bare, held, plausibility_degrees, largest_step: degrees. plausibility, energy,
     roughness: ratios to the phrase's own. snap: the largest step against the largest one of the recordings.
     found: share of ticks whose hand orientation occurs in the recordings; fit is over those. arm_in_trunk:
-    share of ticks. arm_depth_cm: 99th percentile. foot_skate: metres a second.
+    share of ticks. arm_depth_cm: 99th percentile. arms_touch, strained (of the others): share of ticks.
+    foot_skate: metres a second.
     """
 
     answer: float
@@ -66,6 +67,8 @@ class Figures:
     found: float
     arm_in_trunk: float
     arm_depth_cm: float
+    arms_touch: float
+    strained: float
     foot_skate: float
 
 
@@ -114,6 +117,7 @@ class Measurement:
             held=float(np.degrees(quaternion.angle_between(danced[:, held], hand_turns)).mean()),
             plausibility_degrees=float(far.mean()),
             found=float(np.isfinite(fit).mean()),
+            strained=self.reference.strained(danced[rows], others),
             **self._of_body(shown, joint),
         )
 
@@ -134,6 +138,7 @@ class Measurement:
             "roughness": _ratio(figures.roughness(danced), figures.roughness(self.phrase)),
             "deviation": float(figures.degrees_apart(danced, self.phrase).mean()),
             "plausibility_degrees": float(far.mean()),
+            "strained": self.reference.strained(danced[::STEP]),
             **self._of_body(shown),
         }
 
@@ -143,6 +148,7 @@ class Measurement:
         _, roots = self.body.grounded(whole, locked=False)
         return {
             "plausibility_degrees": float(self.phrase_far.mean()),
+            "strained": self.reference.strained(self.phrase[::STEP]),
             "energy_degrees_a_tick": figures.energy(self.phrase),
             "roughness_degrees_a_tick2": figures.roughness(self.phrase),
             **self._figures_of_body(self.rehearsal.phrase, whole, roots),
@@ -160,6 +166,7 @@ class Measurement:
             "snap": _ratio(step, self.reference.largest_step),
             "arm_in_trunk": self.body.arm_in_trunk(poses),
             "arm_depth_cm": self.body.arm_depth_cm(poses),
+            "arms_touch": self.body.arms_touch(poses),
             "foot_skate": self.body.foot_skate(poses, roots),
         }
 

@@ -12,6 +12,7 @@ from appliance.pose.quaternion import Array
 from appliance.studio.data.dataset import Take
 from appliance.studio.studio_error import StudioError
 
+STRAINED_DEGREES = 10.0  # from every orientation that the joint ever had: no longer how this dancer moves
 HOLDS_DEGREES = 15.0  # a recorded joint this close to the hand's orientation counts as held by it
 CANDIDATES = 128
 ROWS = 128  # ticks searched at once: their scores against 35,000 poses are 18 MB
@@ -57,6 +58,22 @@ class Reference:
             allowed = None if held is None or hand is None else self._holding(held, hand[rows])
             parts.append(self._nearest(level[rows], compared, allowed))
         return np.concatenate(parts) if parts else np.zeros(0, dtype=np.float32)
+
+    def strained(self, poses: Array, joints: Sequence[int] | None = None) -> float:
+        """Share of poses (T, M, 4) in which a joint is beyond what it ever did, by STRAINED_DEGREES.
+
+        A limit of swing and twist that is learned joint by joint. joints: those looked at, all if not given;
+        a root may have any orientation.
+        """
+        level = without_heading(poses).astype(np.float32)
+        near = np.ones(len(level), dtype=np.bool_)
+        cosine = np.cos(np.radians(STRAINED_DEGREES / 2))
+        for joint in range(level.shape[1]) if joints is None else joints:
+            known = self.poses[:, joint].T
+            for first in range(0, len(level) if joint else 0, ROWS):
+                rows = slice(first, first + ROWS)
+                near[rows] &= np.abs(level[rows, joint] @ known).max(axis=1) >= cosine
+        return float(1.0 - near.mean())
 
     def _holding(self, held: int, hand: Array) -> NDArray[np.bool_]:
         """(T, N): whether a pose of the reference holds the joint as the hand does at each tick."""

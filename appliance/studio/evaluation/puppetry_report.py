@@ -112,6 +112,12 @@ def asides(found: dict[str, Any]) -> list[str]:
             f"{depth or 0:.1f} cm); in the phrase in {100 * phrase['arm_in_trunk']:.1f} % "
             f"({phrase['arm_depth_cm'] or 0:.1f} cm)."
         )
+    strained, touch = (_mean_of(found, name) for name in ("strained", "arms_touch"))
+    if strained is not None:
+        lines.append(
+            f"A joint that nobody holds is beyond what it ever did in {100 * strained:.1f} % of the ticks; "
+            f"in the phrase in {100 * phrase['strained']:.1f} %. Arms touch in {100 * (touch or 0):.1f} %."
+        )
     if skate is not None and phrase["foot_skate"] is not None:
         lines.append(f"Feet slide at {skate:.2f} m/s; in the phrase at {phrase['foot_skate']:.2f}.")
     return lines
