@@ -62,15 +62,9 @@ class Settings:
     @staticmethod
     def from_state(saved: Mapping[str, Any]) -> Settings:
         """The settings of a checkpoint."""
-        answers = saved["answers"]
-        nearness = Nearness(**answers["nearness"])
-        return Settings(
-            **{
-                **saved,
-                "weights": losses.LossWeights(**saved["weights"]),
-                "answers": AnswerSettings(**{**answers, "nearness": nearness}),
-            }
-        )
+        answers = {**saved["answers"], "nearness": Nearness(**saved["answers"]["nearness"])}
+        parts = {"weights": losses.LossWeights(**saved["weights"]), "answers": AnswerSettings(**answers)}
+        return Settings(**{**saved, **parts})
 
 
 @dataclass
