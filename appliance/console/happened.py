@@ -12,11 +12,14 @@ from pathlib import Path
 from aiohttp import web
 
 from appliance.console.child import answer_of
+from appliance.console.guard import Guard
 
 LONGEST_S = 60.0  # of the dance at once; 2 MB of frames
 _PATIENCE_S = 60.0  # for reading half an hour
 _FRESH_S = 5.0
-_ENDINGS = {"bvh": "text/plain", "glb": "model/gltf-binary"}
+_LARGEST = 64 << 20  # bytes of a download; a minute of the show that comes with the box has 2 MB
+_JOURNAL = "bunraku"  # the journal itself, as `bunraku replay` reads it
+_ENDINGS = {"bvh": "text/plain", "glb": "model/gltf-binary", _JOURNAL: "application/x-tar"}
 
 
 class Happened:
@@ -25,8 +28,8 @@ class Happened:
     journal: its folder; None: this box keeps none.
     """
 
-    def __init__(self, journal: str | None) -> None:
-        self._journal = journal
+    def __init__(self, guard: Guard, journal: str | None) -> None:
+        self._guard, self._journal = guard, journal
         self._reading = asyncio.Lock()
         self._timeline, self._read_at = b"", -_FRESH_S
 
@@ -46,15 +49,19 @@ class Happened:
         return web.Response(body=body, content_type="application/octet-stream")
 
     async def download(self, request: web.Request) -> web.Response:
-        """A stretch of the dance as a recording: BVH or glTF."""
+        """A stretch of the dance as a recording, BVH or glTF; or the journal's own, which needs the PIN."""
         part, ending = self._part(request), request.match_info["ending"]
         if ending not in _ENDINGS:
             raise web.HTTPNotFound(text="There is nothing at this address.")
+        if ending == _JOURNAL:
+            self._guard.require_device(request)
         async with self._turn():
             with tempfile.TemporaryDirectory(prefix="bunraku-") as folder:
                 out = Path(folder) / f"dance.{ending}"
                 await self._read("stretch", *part, "--out", str(out))
-                body = await asyncio.to_thread(out.read_bytes)
+                if out.stat().st_size > _LARGEST:
+                    raise web.HTTPServiceUnavailable(text="That is too much at once. Take fewer seconds.")
+                body = out.open("rb")  # sent piece by piece, and closed then
         name = f"bunraku-{time.strftime('%Y%m%d-%H%M%S')}.{ending}"
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
         return web.Response(body=body, content_type=_ENDINGS[ending], headers=headers)

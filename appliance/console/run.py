@@ -60,7 +60,7 @@ async def _serve(settings: Settings) -> int:
     guard, desk = Guard(settings.viewers, settings.names, devices), Desk(settings.control)
     box = BoxView(desk, stage, ProcessHealth(folder), ShowStateReader(folder))
     health, notifier = ProcessHealthWriter(folder, "console", Fallbacks(())), Notifier()
-    happened, about = Happened(settings.journal), About(settings.about)
+    happened, about = Happened(guard, settings.journal), About(settings.about)
     prove = Prove(guard, folder, Path(settings.kept).parent, settings.about, settings.is_installed)
     logs = Logs(guard, folder, settings.is_installed)
     rehearsed = Path(settings.kept).parent / FOLDER

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
+from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
@@ -20,7 +21,7 @@ from tests.bundles import FIGURE
 from tests.console.browser import await_true, press
 from tests.console.page import Page
 from tests.system.box import Box
-from tests.system.processes import wait_until
+from tests.system.processes import run_bunraku, wait_until
 
 pytestmark = pytest.mark.realtime
 
@@ -102,6 +103,27 @@ def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> Non
     assert dance.seconds > 1.0
     press(tab, '[data-page="tonight"]')
     expect(tab.locator("#again")).to_be_hidden()
+
+
+def test_the_journal_itself_is_saved_by_who_gave_the_pin_and_danced_again(
+    tab: Tab, venue: tuple[Box, Page], tmp_path: Path
+) -> None:
+    wait_until(lambda: len(recorded(venue[0]).ticks) > 100, "nothing was recorded")
+    path = "/api/happened/dance.bunraku?run=1&from=0"
+    assert venue[1].get(path, Cookie="none").status == 401
+    press(tab, '[data-page="happened"]')
+    tab.locator("#happened-second").fill("0")
+    press(tab, "#happened-bunraku")
+    tab.fill("#pin-input", venue[1].pin)
+    with tab.expect_download() as download:
+        press(tab, "#pin-send")
+    assert download.value.suggested_filename.endswith(".bunraku")
+    saved = tmp_path / download.value.suggested_filename
+    download.value.save_as(saved)
+    ticks = read_journal(saved).runs[0].ticks
+    assert ticks.tobytes() == recorded(venue[0]).ticks[: len(ticks)].tobytes(), "as it was recorded"
+    again = run_bunraku("replay", saved)
+    assert again.returncode == 0 and "All are the same" in again.stdout, again.stdout + again.stderr
 
 
 def recorded(box: Box) -> Run:

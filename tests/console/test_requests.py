@@ -204,6 +204,7 @@ def test_a_box_without_a_journal_says_so(page: Page) -> None:
 def test_no_more_of_the_dance_is_read_than_a_stretch(page: Page, query: str) -> None:
     assert page.get(f"/api/happened/stretch?{query}").status == 400
     assert page.get("/api/happened/dance.exe?run=1&from=0").status in (400, 404)
+    assert page.get(f"/api/happened/dance.bunraku?{query}").status == 400
 
 
 def test_a_venue_may_hide_the_rehearsal(tmp_path: Path) -> None:

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from appliance.recorder.export import export_stretch
 from appliance.recorder.journal_error import JournalError
-from appliance.recorder.reading import Run, read_journal
+from appliance.recorder.reading import Run, read_journal, segments_of
+from appliance.recorder.segments import SEGMENT_TICKS
 from appliance.recorder.timeline import EVERY, MOST_BINS, stretch, timeline
 from tests.bundles import write_show
 from tests.command import Command
@@ -79,3 +81,26 @@ def test_the_command_shows_it_by_minutes(bunraku: Command, tmp_path: Path) -> No
     assert "1 s" in said and "0.0 min  slowest tick" in said
     (run,) = json.loads(bunraku("journal", "timeline", "--json", "--journal", journal).out)
     assert run["late"] == [0, 0]
+
+
+def test_a_stretch_of_the_journal_has_the_segments_it_lies_in(bunraku: Command, tmp_path: Path) -> None:
+    """Two starts of the stage, the first in two segments; a stretch of its end is the second of them."""
+    show, journal = write_show(tmp_path / "show"), tmp_path / "journal"
+    night = Night(show, tmp_path / "first")
+    night.dance(SEGMENT_TICKS + 200)
+    night.kept(journal)
+    later = Night(show, tmp_path / "second", begins_at=5000.0)
+    later.dance(60)
+    later.kept(journal)
+    first = read_journal(journal).runs[0]
+    lasts_s = 0.02 * len(first.ticks)
+    for start_s, has in ((0.0, 1), (lasts_s - 1.0, 1), (lasts_s - 10.0, 2)):
+        out = tmp_path / f"{start_s:.0f}.bunraku"
+        options = ("--run", 1, "--start", start_s, "--seconds", 60 if start_s else 1, "--out", out)
+        bunraku("journal", "stretch", "--journal", journal, *options)
+        (part,) = read_journal(out).runs
+        assert len(list(segments_of(out))) == has
+        assert part.header["run"] == first.header["run"] and part.keyframes, "it can be danced again"
+        assert set(part.tick_numbers) < set(first.tick_numbers) or has == 2
+    with pytest.raises(JournalError, match="Nothing was danced at second 1000"):
+        export_stretch(journal, tmp_path / "none.bunraku", first, 1000.0, 5.0)

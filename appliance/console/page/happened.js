@@ -1,5 +1,6 @@
 // What happened: the journal as a timeline, and any stretch of it danced again.
 import { Dance } from "./dance.js";
+import { withPin } from "./device.js";
 import { clock, locale, number, words } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
@@ -15,6 +16,11 @@ export function initHappened() {
   byId("happened-seconds").addEventListener("change", () => point(second));
   byId("happened-read").addEventListener("click", readHappened);
   byId("happened-dance").addEventListener("click", danceAgain);
+  byId("happened-bunraku").addEventListener("click", (event) => {
+    if (document.body.dataset.known === "yes") return;
+    event.preventDefault();
+    withPin(() => byId("happened-bunraku").click());
+  });
   const slider = byId("happened-second"), canvas = byId("timeline");
   slider.addEventListener("input", () => point(Number(slider.value)));
   canvas.addEventListener("click", (event) => {
@@ -69,7 +75,7 @@ function point(at) {
   second = Math.min(Math.max(0, at), Number(byId("happened-second").max));
   byId("happened-second").value = second;
   byId("happened-at").textContent = exact(run.begun + second);
-  for (const ending of ["bvh", "glb"]) byId(`happened-${ending}`).href = `/api/happened/dance.${ending}?${part()}`;
+  for (const ending of ["bvh", "glb", "bunraku"]) byId(`happened-${ending}`).href = `/api/happened/dance.${ending}?${part()}`;
   draw();
 }
 
