@@ -110,7 +110,8 @@ def box_with_page(
 ) -> Iterator[tuple[Box, Page]]:
     """A box that dances with its emulated sensors, and its page; `settings`: more of the box file."""
     (port,) = free_ports(1, socket.SOCK_STREAM)
-    whole = {"console": {"port": port}, **(settings or {})}
+    given = settings or {}
+    whole = {**given, "console": {"port": port, **given.get("console", {})}}
     with playing(show, folder, "--emulate", *arguments, settings=whole) as box:
         page = Page(port, box.box_file)
         wait_until(page.is_open, lambda: box.words)
