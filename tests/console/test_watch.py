@@ -29,9 +29,8 @@ from tests.system.processes import PATIENCE_S, children_running, wait_until
 
 pytestmark = pytest.mark.realtime
 
-LOST_AT_MOST = (
-    0.02  # of the ticks, on a machine that others use too; a stage that waits for browsers loses all
-)
+# Of the ticks, on a machine that other programs hold up too; a stage that waits for browsers loses all.
+LOST_AT_MOST = 0.04
 FLOOD, PIPELINED = 10_000, 200  # requests in all, and over one connection
 BACKLOG_BYTES = 300_000  # what may wait for a reader that takes nothing: the kernel's buffers on both sides
 
