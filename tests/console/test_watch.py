@@ -214,10 +214,8 @@ def test_twenty_browsers_five_of_them_stuck_and_a_flood_cost_the_dance_nothing(
     assert sum(answered) >= FLOOD and set(answered) == {PIPELINED}
     ticks = [frame[0] for frame in frames]
     missing = ticks[-1] - ticks[0] + 1 - len(ticks)
-    late = sum(bool(frame[3]) for frame in frames)
-    print(
-        f"{sum(answered)} requests, {sum(answered) / (time.monotonic() - began):.0f} a second, all answered."
-    )
+    late, rate = sum(bool(frame[3]) for frame in frames), sum(answered) / (time.monotonic() - began)
+    print(f"{sum(answered)} requests, {rate:.0f} a second, all answered.")
     print(f"Of {len(ticks)} ticks {missing} were missing and {late} late.")
     assert missing <= LOST_AT_MOST * len(ticks), f"{missing} ticks of {len(ticks)} are missing"
     assert page.get("/status").value["frames"] == "fresh"
