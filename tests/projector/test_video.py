@@ -21,8 +21,10 @@ from appliance.show.look import LookConfig, looks_by_name
 from tests.projector.golden_looks import AT_S, SIZE, renderer
 
 WITHIN_S = 60.0
-DOUBLE = """#!{python}
-import pathlib, sys, time
+WRAPPER = """#!/bin/sh
+exec "{python}" "$0.py" "$@"
+"""  # a first line with an interpreter may have no space in its path
+DOUBLE = """import pathlib, sys, time
 arguments = " ".join(sys.argv[1:])
 pathlib.Path(__file__).with_name("asked").write_text(arguments)
 assert "-stream_loop -1 -re -i" in arguments and "vflip -f image2pipe -c:v ppm -" in arguments
@@ -39,7 +41,8 @@ def ffmpeg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], P
 
     def made(pictures: int) -> Path:
         program = tmp_path / "ffmpeg"
-        program.write_text(DOUBLE.format(python=sys.executable, pictures=pictures))
+        program.write_text(WRAPPER.format(python=sys.executable))
+        program.with_name("ffmpeg.py").write_text(DOUBLE.format(pictures=pictures))
         program.chmod(0o755)
         monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
         return tmp_path / "asked"

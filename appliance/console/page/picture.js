@@ -37,16 +37,31 @@ function handle(x, y, number) {
     button.style.top = `calc(${100 * (0.18 + 0.64 * y + dy)}% - 32px)`;
   };
   put(0, 0);
-  let from = null, sent = [0, 0], at = [0, 0], timer = 0;
-  const send = () => {
+  // at: where the finger is, sent: how far the wall has followed, both in shares of the picture. What the
+  // projector was too busy to do is asked for again, at the end of a drag three times.
+  let from = null, sent = [0, 0], at = [0, 0], timer = 0, isSending = false, misses = 0;
+  const rest = () => {
+    clearInterval(timer);
+    sent = at = [0, 0];
+  };
+  const send = async () => {
+    if (isSending) return;
     const [dx, dy] = [at[0] - sent[0], at[1] - sent[1]];
-    if (Math.hypot(dx, dy) > 0.0005) command("/projector/nudge", number, dx, dy);
-    sent = at;
+    if (Math.hypot(dx, dy) <= 0.0005) {
+      if (!from) rest();
+      return;
+    }
+    isSending = true;
+    const done = await command("/projector/nudge", number, dx, dy);
+    isSending = false;
+    if (done) sent = [sent[0] + dx, sent[1] + dy];
+    else if (!from && ++misses === 3) rest();
   };
   button.addEventListener("pointerdown", (event) => {
     button.setPointerCapture(event.pointerId);
     from = [event.clientX, event.clientY];
-    sent = at = [0, 0];
+    [sent, at, misses] = [[sent[0] - at[0], sent[1] - at[1]], [0, 0], 0];
+    clearInterval(timer);
     timer = setInterval(send, 1000 * STEP_S);
   });
   button.addEventListener("pointermove", (event) => {
@@ -57,10 +72,9 @@ function handle(x, y, number) {
   });
   const end = () => {
     if (!from) return;
-    clearInterval(timer);
-    send();
     from = null;
     put(0, 0);
+    send();
   };
   button.addEventListener("pointerup", end);
   button.addEventListener("pointercancel", end);
