@@ -25,10 +25,10 @@ def print_figures(journal: Path, show: Path) -> None:
     def row(name: str, dance: Recording) -> None:
         body = BodyFigures(dance)
         slide = measure_standing(dance.skeleton, dance.poses, dance.roots, floor).slide_cm_s / 100
-        deep, depth_cm = 100 * body.arm_in_trunk(dance.poses), body.arm_depth_cm(dance.poses)
+        arms = body.arms(dance.poses)
         print(
-            f"{name}: {len(dance)} poses, an upper arm deep in the trunk in {deep:.2f} %, 99 % at most "
-            f"{depth_cm:.1f} cm; feet slide at {slide:.3f} m/s"
+            f"{name}: {len(dance)} poses, an upper arm deep in the trunk in {100 * arms.arm_in_trunk:.2f} %, "
+            f"99 % at most {arms.arm_depth_cm:.1f} cm; feet slide at {slide:.3f} m/s"
         )
 
     row("phrase", phrase)

@@ -18,9 +18,8 @@ from appliance.show.show import Show
 from appliance.stage.stage_error import StageError
 
 _LAST_WORDS_S = 2.0
-_STAND_STILL_S = (
-    0.8  # a double tap, half a second of stillness: the neutral pose is taken; then the hand leads
-)
+# A double tap, half a second of stillness: the neutral pose is taken; then the hand leads.
+_STAND_STILL_S = 0.8
 _CALLING_WITHIN_S = 15.0
 _WORDS = "emulator.txt"
 

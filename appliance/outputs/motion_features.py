@@ -35,7 +35,7 @@ class Derivatives:
         self.found[:] = 0.0
 
     def take(self, vectors: Floats, passed_s: float) -> None:
-        """The next vectors (J, 3), so long after the last ones."""
+        """The next vectors (J, 3), passed_s after the last ones."""
         for order, found in enumerate(self.found):
             if self._frames > order:
                 np.divide(vectors - self._before[order], np.float32(passed_s), out=found)

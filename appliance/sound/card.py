@@ -15,7 +15,7 @@ from appliance.show.sound import SoundConfig
 
 RETRY_S = 1.0
 LIBRARY_RETRY_S = 10.0  # to look for it costs a tenth of a second
-STALLED_S = 1.0  # a card that asks for no block for so long is gone, whatever its driver says
+STALLED_S = 1.0  # without a request for a block: the card is gone, whatever its driver says
 _ALSA = "libasound.so.2"
 
 
@@ -35,7 +35,7 @@ class Card:
         self._library: Any = None
         self._stream: Any = None
         self._tries_at = 0.0
-        self._blocks, self._seen = 0, (0, 0.0)  # seen: so many blocks, at that time
+        self._blocks, self._seen = 0, (0, 0.0)  # seen: the count of blocks, and when
         self.trouble, self.dropouts, self.is_missing, self.refused = "", 0, False, ""
 
     def look(self, now: float) -> None:

@@ -43,7 +43,7 @@ def cleared(poses: np.ndarray) -> np.ndarray:
 def deep(poses: np.ndarray) -> float:
     """Share of the ticks with an upper arm deep in the trunk."""
     phrase = Recording(FIGURE, rest(2), np.zeros((2, 3)), 50.0)
-    return BodyFigures(phrase).arm_in_trunk(poses.astype(np.float64))
+    return BodyFigures(phrase).arms(poses.astype(np.float64)).arm_in_trunk
 
 
 def test_the_trunk_is_found_by_the_joints_names() -> None:

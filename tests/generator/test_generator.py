@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from appliance.box.made_motion import MadeMotionReader
+from appliance.box.made_motion import MadeMotion, MadeMotionReader
 from appliance.box.show_state import ShowState
 from appliance.generator import wish as wishes
 from appliance.generator.fallback import NOT_KEPT, NOT_MADE
@@ -36,16 +36,23 @@ def active(bench: Bench, name: str) -> bool:
     return any(one.name == name and one.active for one in bench.fallbacks.happened(time.monotonic()))
 
 
+def newest(made: MadeMotionReader) -> MadeMotion:
+    """What was made last."""
+    found = made.read()
+    assert found is not None
+    return found
+
+
 def test_one_variation_ahead_and_no_more(bench: Benches, tmp_path: Path) -> None:
     one = bench(write_show_with_sources(tmp_path / "show"))
     assert one.recipe() == {}, "nothing is made while a phrase is danced"
     one.declare(phrase=("vary", (0.5,)))
     first = one.recipe()
     assert (first["source"], first["phrase"], first["sigma"], first["seed"]) == ("vary", "main", 1.0, 1)
-    assert one.made.read() is not None and one.made.read().at_once  # type: ignore[union-attr]
+    assert newest(one.made).at_once
     assert one.recipe() == first, "what was made is not danced yet"
     second = one.dance()
-    assert second["seed"] == 2 and not one.made.read().at_once  # type: ignore[union-attr]
+    assert second["seed"] == 2 and not newest(one.made).at_once
     assert one.recipe() == second
     assert one.dance()["seed"] == 3
     one.health["base"] = "other"
@@ -63,7 +70,7 @@ def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: 
     one.declare(phrase=("improvise", NO_FADE))
     first = one.recipe()
     assert first["source"] == "improvise" and first["after"] == 0
-    assert 0.5 < first["from_s"] < 3.0 and one.made.read().from_s == first["from_s"]  # type: ignore[union-attr]
+    assert 0.5 < first["from_s"] < 3.0 and newest(one.made).from_s == first["from_s"]
     second = one.dance()
     made = one.made.read()
     assert made is not None and not made.at_once
@@ -73,7 +80,7 @@ def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: 
     one.declare(motion_improvise_temperature=("", (0.25,)))
     third = one.recipe()
     assert third["temperature"] == 0.25 and third["after"] == first["number"]
-    assert one.made.read().at_once and third["from_s"] > 1.0  # type: ignore[union-attr]
+    assert newest(one.made).at_once and third["from_s"] > 1.0
     one.dance()
     health = one.health
     one.close()  # killed
@@ -82,7 +89,7 @@ def test_an_improvisation_goes_on_from_what_is_danced(bench: Benches, tmp_path: 
     other.declare(phrase=("improvise", NO_FADE), motion_improvise_temperature=("", (0.25,)))
     fourth = other.recipe()
     assert fourth["after"] == third["number"] and fourth["seed"] == third["seed"] + 1
-    assert not other.made.read().at_once  # type: ignore[union-attr]
+    assert not newest(other.made).at_once
 
 
 def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
@@ -92,22 +99,22 @@ def test_each_puppet_has_its_own_source(bench: Benches, tmp_path: Path) -> None:
     one.health |= {"others": told, "looked_at": time.monotonic()}
     made = [MadeMotionReader(one.folder, puppet) for puppet in range(4)]
     one.recipe()
-    told[0]["made"] = made[1].read().recipe  # type: ignore[union-attr]
+    told[0]["made"] = newest(made[1]).recipe
     one.recipe()  # a motion a look: the path that is waited for comes before the next variation
     assert made[3].read() is not None
     told[0]["made"] = ""
-    varied, path = (json.loads(made[puppet].read().recipe) for puppet in (1, 3))  # type: ignore[union-attr]
+    varied, path = (json.loads(newest(made[puppet]).recipe) for puppet in (1, 3))
     assert (varied["source"], path["source"]) == ("vary", "path")
     assert made[0].read() is None and made[2].read() is None
     one.declare(phrase=("vary", NO_FADE), motion_vary_sigma=("", (2.0,)))
     own = one.recipe()
     assert own["sigma"] == 2.0 and own["seed"] != varied["seed"], "no two dance the same variation"
     one.recipe()
-    again = json.loads(made[1].read().recipe)  # type: ignore[union-attr]
+    again = json.loads(newest(made[1]).recipe)
     assert (again["sigma"], again["seed"]) == (2.0, varied["seed"]), "values are those of all puppets"
-    told[0]["made"] = made[1].read().recipe  # type: ignore[union-attr]
+    told[0]["made"] = newest(made[1]).recipe
     one.recipe()
-    assert json.loads(made[1].read().recipe)["seed"] == varied["seed"] + 1  # type: ignore[union-attr]
+    assert json.loads(newest(made[1]).recipe)["seed"] == varied["seed"] + 1
     assert one.recipe() == own, "what it made for the others changes nothing of the first"
     for reader in made:
         reader.close()
@@ -157,13 +164,13 @@ def test_a_generator_that_was_killed_goes_on_where_it_was(bench: Benches, tmp_pa
     one.declare(phrase=("vary", NO_FADE))
     one.recipe()
     danced = one.dance()
-    health = one.health | {"made": one.made.read().recipe}  # type: ignore[union-attr]
+    health = one.health | {"made": newest(one.made).recipe}
     one.close()
     other = bench(show)
     other.health = health
     other.declare(phrase=("vary", NO_FADE))
     assert other.recipe()["seed"] == danced["seed"] + 1
-    assert not other.made.read().at_once  # type: ignore[union-attr]
+    assert not newest(other.made).at_once
 
 
 def test_parameters_reach_their_value_in_steps(

@@ -148,24 +148,24 @@ def test_an_arm_in_the_trunk_is_seen_and_a_hanging_one_is_not() -> None:
     phrase = swaying(2.0)
     body, place = BodyFigures(phrase), phrase.skeleton.index("lShldr")
     poses = np.tile(np.array([1.0, 0, 0, 0]), (10, len(phrase.skeleton), 1))
-    assert body.arm_in_trunk(poses) == 0.0
+    assert body.arms(poses).arm_in_trunk == 0.0
     poses[:, place] = quaternion.from_axis_angle([0.0, 0.0, 1.0], np.radians(-80))  # it hangs
-    assert body.arm_in_trunk(poses) == 0.0
+    assert body.arms(poses).arm_in_trunk == 0.0
     poses[4:, place] = quaternion.from_axis_angle([0.0, 0.0, 1.0], np.radians(-130))  # through the ribs
-    assert body.arm_in_trunk(poses) == pytest.approx(0.6)
-    assert 3.0 < body.arm_depth_cm(poses) < 30.0
+    assert body.arms(poses).arm_in_trunk == pytest.approx(0.6)
+    assert 3.0 < body.arms(poses).arm_depth_cm < 30.0
 
 
 def test_arms_that_cross_touch_and_arms_apart_do_not() -> None:
     phrase = swaying(2.0)
     body = BodyFigures(phrase)
     poses = np.tile(np.array([1.0, 0, 0, 0]), (10, len(phrase.skeleton), 1))
-    assert body.arms_touch(poses) == 0.0
+    assert body.arms(poses).arms_touch == 0.0
     for name, side in (("lShldr", 1), ("rShldr", -1)):  # both to the front and across
         poses[7:, phrase.skeleton.index(name)] = quaternion.from_axis_angle(
             [0.0, 1, 0], side * np.radians(-120)
         )
-    assert body.arms_touch(poses) == pytest.approx(0.3)
+    assert body.arms(poses).arms_touch == pytest.approx(0.3)
 
 
 def test_a_joint_is_strained_beyond_all_that_it_ever_did(poses: np.ndarray) -> None:

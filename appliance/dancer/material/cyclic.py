@@ -103,7 +103,7 @@ def hann_mean(windows: Poses, starts: Starts, period: int) -> Poses:
 
 
 class HannMean:
-    """The poses of a cycle of so many frames and joints, as the mean of windows that come part after part."""
+    """The poses of a cycle (period, joints, 4): the mean of windows that are added in parts."""
 
     def __init__(self, period: int, joints: int) -> None:
         self._total, self._sums = np.zeros((period, joints, 4)), np.zeros(period)

@@ -99,7 +99,7 @@ class Maker:
         return cycle, cycle.blended(_decoded(network, path, starts), network.places)
 
     def _excerpt(self, name: str, start_s: float, seconds: float) -> Cycle:
-        """The whole cycle of a phrase, or so many of its seconds from there on, as far as it has them."""
+        """Seconds of a phrase from start_s on, all within it, as a cycle; 0: the whole phrase."""
         loop = self._loop_of(name)
         if not seconds:
             return Cycle.of(loop)

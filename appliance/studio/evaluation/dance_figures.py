@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise, product
+from typing import NamedTuple
+
 import numpy as np
 
 from appliance.dancer.grounding import Floor, Grounding, GroundingError, survey
@@ -46,6 +49,17 @@ def roughness(poses: Array) -> float:
     return float(np.percentile(accelerations, ROUGHNESS_PERCENTILE))
 
 
+class ArmFigures(NamedTuple):
+    """arm_in_trunk: share of poses in which an upper arm is deep in the trunk. arm_depth_cm: how far its axis
+    is below the surface in the deepest of a hundred poses. arms_touch: share of poses in which upper arm or
+    forearm are nearer than 3 cm to the other arm's.
+    """
+
+    arm_in_trunk: float = float("nan")
+    arm_depth_cm: float = float("nan")
+    arms_touch: float = float("nan")
+
+
 class BodyFigures:
     """The figures of dances on one phrase and its floor; NaN if joint names do not identify the body parts.
 
@@ -65,37 +79,17 @@ class BodyFigures:
         except GroundingError:
             self._floor = None
 
-    def arm_in_trunk(self, poses: Array) -> float:
-        """Share of poses (T, J, 4) in which an upper arm is deep in the trunk."""
-        depths = self._arm_depths(poses)
-        return float("nan") if depths is None else float((depths > DEEP).mean())
-
-    def arm_depth_cm(self, poses: Array) -> float:
-        """How far an upper arm's axis is below the trunk's surface in the deepest of a hundred poses, cm."""
-        depths = self._arm_depths(poses)
-        if self._trunk is None or depths is None:
-            return float("nan")
-        return 100 * self._trunk.radius_m * float(np.percentile(depths, DEPTH_PERCENTILE))
-
-    def arms_touch(self, poses: Array) -> float:
-        """Share of poses (T, J, 4) in which upper arm or forearm are nearer than 3 cm to the other arm's."""
+    def arms(self, poses: Array) -> ArmFigures:
+        """Where the arms are in poses (T, J, 4)."""
         if self._trunk is None:
-            return float("nan")
+            return ArmFigures()
         positions, _ = self._skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
-        left, right = (
-            [
-                (positions[:, arm.shoulder], positions[:, arm.elbow]),
-                (positions[:, arm.elbow], positions[:, arm.wrist]),
-            ]
-            for arm in self._trunk.arms
+        depths = _depths(positions, self._trunk)
+        return ArmFigures(
+            float((depths > DEEP).mean()),
+            100 * self._trunk.radius_m * float(np.percentile(depths, DEPTH_PERCENTILE)),
+            float((_between_arms(positions, self._trunk) < TOUCHING_M).mean()),
         )
-        nearest: Array = np.full(len(poses), np.inf)
-        for one, other in ((one, other) for one in left for other in right):
-            for bone, points in ((one, other), (other, one)):
-                for share in ALONG_BONE:
-                    point = (1 - share) * points[0] + share * points[1]
-                    nearest = np.minimum(nearest, _distance(point, *bone))
-        return float((nearest < TOUCHING_M).mean())
 
     def foot_skate(self, poses: Array, roots: Array) -> float:
         """Sliding speed of the supporting foot, m/s, in grounded poses (T, J, 4) with roots (T, 3)."""
@@ -121,20 +115,29 @@ class BodyFigures:
             standing[tick], roots[tick] = grounding.pose, grounding.root
         return standing, roots
 
-    def _arm_depths(self, poses: Array) -> Array | None:
-        """(T,): how far the deepest upper arm is below the trunk's surface, in its radii; 0 outside."""
-        if self._trunk is None:
-            return None
-        spine = self._trunk.spine
-        positions, _ = self._skeleton.forward_kinematics(poses, np.zeros((len(poses), 3)))
-        nearest: Array = np.full(len(poses), np.inf)
-        for arm in self._trunk.arms:
-            for share in ALONG_ARM:
-                point = (1 - share) * positions[:, arm.shoulder] + share * positions[:, arm.elbow]
-                for low, high in zip(spine[1:], spine[:-1], strict=True):
-                    nearest = np.minimum(nearest, _distance(point, positions[:, low], positions[:, high]))
-        depths: Array = np.maximum(1.0 - nearest / self._trunk.radius_m, 0.0)
-        return depths
+
+def _depths(positions: Array, trunk: Trunk) -> Array:
+    """(T,): how far the deepest upper arm is below the trunk's surface, in its radii; 0 outside."""
+    nearest: Array = np.full(len(positions), np.inf)
+    for arm in trunk.arms:
+        for share in ALONG_ARM:
+            point = (1 - share) * positions[:, arm.shoulder] + share * positions[:, arm.elbow]
+            for low, high in pairwise(trunk.spine[::-1]):
+                nearest = np.minimum(nearest, _distance(point, positions[:, low], positions[:, high]))
+    depths: Array = np.maximum(1.0 - nearest / trunk.radius_m, 0.0)
+    return depths
+
+
+def _between_arms(positions: Array, trunk: Trunk) -> Array:
+    """(T,): metres between the axes of upper arm and forearm of one side and those of the other."""
+    left, right = (pairwise((arm.shoulder, arm.elbow, arm.wrist)) for arm in trunk.arms)
+    nearest: Array = np.full(len(positions), np.inf)
+    for bones in product(left, right):
+        for (start, end), (first, last) in (bones, bones[::-1]):
+            for share in ALONG_BONE:
+                point = (1 - share) * positions[:, first] + share * positions[:, last]
+                nearest = np.minimum(nearest, _distance(point, positions[:, start], positions[:, end]))
+    return nearest
 
 
 def _distance(points: Array, starts: Array, ends: Array) -> Array:

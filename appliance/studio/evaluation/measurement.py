@@ -164,9 +164,7 @@ class Measurement:
         return {
             "largest_step": step,
             "snap": _ratio(step, self.reference.largest_step),
-            "arm_in_trunk": self.body.arm_in_trunk(poses),
-            "arm_depth_cm": self.body.arm_depth_cm(poses),
-            "arms_touch": self.body.arms_touch(poses),
+            **self.body.arms(poses)._asdict(),
             "foot_skate": self.body.foot_skate(poses, roots),
         }
 

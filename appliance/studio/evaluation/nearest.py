@@ -68,9 +68,10 @@ class Reference:
         level = without_heading(poses).astype(np.float32)
         near = np.ones(len(level), dtype=np.bool_)
         cosine = np.cos(np.radians(STRAINED_DEGREES / 2))
-        for joint in range(level.shape[1]) if joints is None else joints:
+        looked_at = range(level.shape[1]) if joints is None else joints
+        for joint in (joint for joint in looked_at if joint):
             known = self.poses[:, joint].T
-            for first in range(0, len(level) if joint else 0, ROWS):
+            for first in range(0, len(level), ROWS):
                 rows = slice(first, first + ROWS)
                 near[rows] &= np.abs(level[rows, joint] @ known).max(axis=1) >= cosine
         return float(1.0 - near.mean())
