@@ -13,7 +13,7 @@ from appliance.box.fallback import Fallback, Fallbacks, Fallen, fallen
 from appliance.box.record import Record
 from appliance.pose.foreign_file import kept_json, plain_json
 
-WHO = ("lights", "projector", "keeper", "console", "generator", "sound")
+PROCESSES = ("lights", "projector", "keeper", "console", "generator", "sound")
 BEAT_S, LATE_S = 1.0, 5.0
 _LARGEST = 8192
 _CHOSEN = "chosen.json"
@@ -73,11 +73,11 @@ OF_THE_COMPANY = (*DIED.values(), STAGE_HUNG, COMMANDS_DROPPED, SHOW_REFUSED, SH
 class ProcessHealthWriter:
     """A process publishes its health once a second; without room for the block it works on without."""
 
-    def __init__(self, folder: Path, who: str, fallbacks: Fallbacks) -> None:
+    def __init__(self, folder: Path, process: str, fallbacks: Fallbacks) -> None:
         self._fallbacks = fallbacks
         self._due = 0.0
         self._block: BlockWriter | None = None
-        record = _record(who)
+        record = _record(process)
         with contextlib.closing(record.reader(folder)) as block:
             before = _parsed(block.read())
         self._starts = 1 if before is None or before.get("ended") else int(before.get("starts", 0)) + 1
@@ -115,7 +115,7 @@ class ProcessHealthWriter:
 class Member(NamedTuple):
     """A process beside the stage. late: it published nothing for LATE_S, and did not end."""
 
-    who: str
+    process: str
     starts: int
     late: bool
     fallbacks: tuple[Fallen, ...]
@@ -125,30 +125,30 @@ class ProcessHealth:
     """What all of them published; never waits, never raises."""
 
     def __init__(self, folder: Path) -> None:
-        self._blocks = {who: _record(who).reader(folder) for who in WHO}
+        self._blocks = {process: _record(process).reader(folder) for process in PROCESSES}
         self._chosen, self._chosen_at = folder / _CHOSEN, -1
         self._of_choice: tuple[Fallen, ...] = ()
 
     def members(self, now: float) -> list[Member]:
         """Processes that have run since power-on."""
         found = []
-        for who, block in self._blocks.items():
+        for process, block in self._blocks.items():
             values = _parsed(block.read())
             if values is not None:
                 late = not values.get("ended") and now - float(values.get("beat", now)) > LATE_S
                 starts, fallbacks = int(values.get("starts", 1)), fallen(values.get("fallbacks"))
-                found.append(Member(who, starts, late, fallbacks))
+                found.append(Member(process, starts, late, fallbacks))
         return found
 
     def fallbacks(self, now: float) -> list[tuple[str, Fallen]]:
         """Process and fallback: what each published, whether it died, and shows that do not dance."""
         found = []
         for member in self.members(now):
-            died = DIED[member.who]
+            died = DIED[member.process]
             deaths = member.starts - 1 + member.late
             if deaths:
-                found.append((member.who, Fallen(died.name, deaths, member.late, died.words)))
-            found += [(member.who, one) for one in member.fallbacks]
+                found.append((member.process, Fallen(died.name, deaths, member.late, died.words)))
+            found += [(member.process, one) for one in member.fallbacks]
         return found + [("preflight", one) for one in self._choice()]
 
     def close(self) -> None:
@@ -175,8 +175,8 @@ def _of_choice(refused: list[str], aside: list[list[str]]) -> list[Fallen]:
     return [Fallen(one.name, len(words), True, " ".join(words)) for one, words in both if words]
 
 
-def _record(who: str) -> Record:
-    return Record(f"{who}.health", "company", _LARGEST)
+def _record(process: str) -> Record:
+    return Record(f"{process}.health", "company", _LARGEST)
 
 
 def _parsed(payload: bytes | None) -> dict[str, Any] | None:

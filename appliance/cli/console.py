@@ -162,28 +162,23 @@ def show_or_change_box_file(
     print(json.dumps(box_file.change(box, chosen, wanted)))
 
 
-@console.command("adopt-show", hidden=True)
-def adopt_show(
-    folder: Annotated[Path, typer.Argument(help="Where `bunraku console cue` keeps it.")],
+@console.command("choose-show", hidden=True)
+def choose_show(
+    show: Annotated[
+        str,
+        typer.Argument(help="Id, as `bunraku console about` tells it, or folder of `bunraku console cue`."),
+    ],
     chosen: ChosenFile = None,
 ) -> None:
-    """Let the copy of a rehearsal dance from now on."""
-    from appliance.cli.box_file import adopt_show
+    """Let a show that the box has kept dance from now on, or the copy of a rehearsal."""
+    from appliance.cli import box_file
     from appliance.release.choice import CHOSEN, RUN
 
-    print(json.dumps(adopt_show(chosen or RUN / CHOSEN, folder)))
-
-
-@console.command("dance-again", hidden=True)
-def dance_again(
-    show: Annotated[str, typer.Argument(help="Its id, as `bunraku console about` tells it.")],
-    chosen: ChosenFile = None,
-) -> None:
-    """Let a show that the box has kept dance from now on."""
-    from appliance.cli.box_file import dance_again
-    from appliance.release.choice import CHOSEN, RUN
-
-    print(json.dumps(dance_again(chosen or RUN / CHOSEN, show)))
+    place = chosen or RUN / CHOSEN
+    is_copy = Path(show).is_dir() or "+" not in show  # an id has one
+    print(
+        json.dumps(box_file.adopt_show(place, Path(show)) if is_copy else box_file.dance_again(place, show))
+    )
 
 
 def card_lines(box: BoxConfig) -> tuple[str, ...]:

@@ -12,9 +12,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {  # in the order of the README's table
     "control": ("bunraku control --box box.yaml",),
     "console": ("bunraku console --box box.yaml",),
     "console about": ("bunraku console about --box box.yaml",),
-    "console adopt-show": ("bunraku console adopt-show rehearsed",),
     "console box-file": ("bunraku console box-file --box box.yaml",),
-    "console dance-again": ("bunraku console dance-again 4be1f0+c3d2",),
+    "console choose-show": (
+        "bunraku console choose-show 4be1f0+c3d2",
+        "bunraku console choose-show rehearsed",
+    ),
     "console prove": ("bunraku console prove --box box.yaml",),
     "console map": ("bunraku console map --show my_show",),
     "console cue": ("""bunraku console cue --show my_show --into rehearsed --cue '{"name": "calm"}'""",),

@@ -55,7 +55,7 @@ class BoxView:
         sensors = [self._sensor(line) for line in _roster(answers)]
         fallbacks = [_fallback(values) for address, values in answers if address == "/fallbacks/fallback"]
         if trouble:
-            fallbacks = [_told(who, one) for who, one in self._processes.fallbacks(now)]
+            fallbacks = [_told(process, one) for process, one in self._processes.fallbacks(now)]
         frames = self._stage.state(now)
         lists: dict[str, list[dict[str, Any]]] = {name: [] for name in _LISTS.values()}
         for address, values in answers:
@@ -74,8 +74,10 @@ class BoxView:
             "since": self._since,
             "sensors": sensors,
             "fallbacks": fallbacks,
-            "processes": [{"who": one.who, "late": one.late} for one in self._processes.members(now)],
-            "hands": [{"joint": joint, "who": who, "holds": bool(holds)} for joint, who, holds in hands],
+            "processes": [{"process": one.process, "late": one.late} for one in self._processes.members(now)],
+            "hands": [
+                {"joint": joint, "source": source, "holds": bool(holds)} for joint, source, holds in hands
+            ],
             "generation": self._stage.generation,
             **self._declared(),
             **lists,
@@ -127,9 +129,15 @@ def _roster(answers: Sequence[Answer]) -> list[RosterLine]:
 
 
 def _fallback(values: Sequence[Any]) -> dict[str, Any]:
-    name, who, times, active, words = values
-    return {"name": name, "who": who, "times": times, "active": bool(active), "words": words}
+    name, process, times, active, words = values
+    return {"name": name, "process": process, "times": times, "active": bool(active), "words": words}
 
 
-def _told(who: str, one: Fallen) -> dict[str, Any]:
-    return {"name": one.name, "who": who, "times": one.times, "active": one.active, "words": one.words}
+def _told(process: str, one: Fallen) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "process": process,
+        "times": one.times,
+        "active": one.active,
+        "words": one.words,
+    }

@@ -24,7 +24,7 @@ _JOURNALCTL = (
 
 
 class Logs:
-    """Requests for lines: `time` (Unix seconds), `who`, `words`; the newest last."""
+    """Requests for lines: `time` (Unix seconds), `unit`, `words`; the newest last."""
 
     def __init__(self, guard: Guard, runtime: Path, is_installed: bool) -> None:
         self._guard, self._said, self._is_installed = guard, runtime / SAID, is_installed
@@ -77,8 +77,8 @@ def _of_journal(line: bytes) -> dict[str, Any] | None:
     return _line(at, unit.removesuffix(".service"), words) if isinstance(words, str) else None
 
 
-def _line(at: float, who: str, words: str) -> dict[str, Any]:
-    return {"time": at, "who": who, "words": words[:_LONGEST]}
+def _line(at: float, unit: str, words: str) -> dict[str, Any]:
+    return {"time": at, "unit": unit, "words": words[:_LONGEST]}
 
 
 def _is_number(text: str) -> bool:

@@ -51,7 +51,7 @@ def _lines(value: dict[str, Any]) -> Iterator[str]:
         known = [(_label("sensor", one["name"]), one[field]) for one in sensors if one[field] is not None]
         yield from _metric(name, "gauge", meaning, known)
     happened = [
-        (_label("name", one["name"], "process", one["who"]), one["times"])
+        (_label("name", one["name"], "process", one["process"]), one["times"])
         for one in value.get("fallbacks", ())
     ]
     yield from _metric("fallbacks_total", "counter", "How often each fallback happened.", happened)

@@ -62,14 +62,14 @@ class Venue:
         show = (await said(request)).get("id")
         if not self._is_installed or not isinstance(show, str) or _SHOW.fullmatch(show) is None:
             raise web.HTTPBadRequest(text="There is no such show.")
-        return await self._done("dance-again", "--", show)
+        return await self._done("choose-show", "--", show)
 
     async def _dance_rehearsed(self, request: web.Request) -> web.Response:
         self._guard.require_device(request)
         await said(request)
         if not self._is_installed:
             raise web.HTTPBadRequest(text="This box keeps no shows: give bunraku play the copy, with --show.")
-        return await self._done("adopt-show", "--", str(self._rehearsed))
+        return await self._done("choose-show", "--", str(self._rehearsed))
 
     async def _done(self, *words: str, said: bytes | None = None) -> web.Response:
         if self._busy.locked():

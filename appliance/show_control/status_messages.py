@@ -119,14 +119,14 @@ def _hands(status: Status, observer: StageObserver, now: float) -> Iterator[Mess
     if facts is None:
         return
     let_go = observer.health().get("let_go", ())
-    for joint, who in zip(facts.held, facts.hands, strict=True):
+    for joint, source in zip(facts.held, facts.hands, strict=True):
         name = facts.skeleton.names[joint]
-        yield "/hands/hand", name, who, int(name not in let_go)
+        yield "/hands/hand", name, source, int(name not in let_go)
 
 
 def _fallbacks(status: Status, observer: StageObserver, now: float) -> Iterator[Message]:
-    for who, one in observer.fallbacks(now):
-        yield "/fallbacks/fallback", one.name, who, one.times, int(one.active), one.words[:_LONGEST_WORDS]
+    for process, one in observer.fallbacks(now):
+        yield "/fallbacks/fallback", one.name, process, one.times, int(one.active), one.words[:_LONGEST_WORDS]
 
 
 def _made(status: Status, observer: StageObserver) -> Iterator[Message]:

@@ -78,7 +78,7 @@ def test_it_reads_logs_journal_and_box_in_its_own_sandbox(dancing: Box) -> None:
     device = Device(dancing)
     status, lines = device.ask("/api/logs")
     assert status == 200, lines
-    assert {"bunraku-stage", "bunraku-console"} <= {line["who"] for line in lines}
+    assert {"bunraku-stage", "bunraku-console"} <= {line["unit"] for line in lines}
     status, box = device.ask("/api/box")
     assert status == 200 and box["release"] and box["shows"], box
     status, runs = device.ask("/api/happened")

@@ -42,7 +42,7 @@ def test_it_takes_little_memory_tells_its_health_and_ends_when_asked(tmp_path: P
         assert resident_mb < MOST_MB
         health = ProcessHealth(tmp_path / "runtime")
         (member,) = wait_until(lambda: health.members(time.monotonic()))
-        assert (member.who, member.late) == ("console", False)
+        assert (member.process, member.late) == ("console", False)
         assert process.end(signal.SIGTERM) == 0
         assert not health.fallbacks(time.monotonic()), "it ended as it should"
 

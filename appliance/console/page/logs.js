@@ -15,9 +15,9 @@ async function readLogs() {
   if (answer.status !== 200) return;
   byId("logs").replaceChildren(...answer.value.reverse().map((line) => {
     const item = document.createElement("li"), small = document.createElement("small");
-    const unit = words(`unit_${line.who}`);
+    const name = words(`unit_${line.unit}`);
     item.textContent = line.words;
-    small.textContent = `${clock(line.time)} · ${unit.startsWith("unit_") ? line.who : unit}`;
+    small.textContent = `${clock(line.time)} · ${name.startsWith("unit_") ? line.unit : name}`;
     item.append(small);
     return item;
   }));

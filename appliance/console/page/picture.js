@@ -20,7 +20,7 @@ export function initPicture() {
 }
 
 export function showPicture(value) {
-  const runs = (name) => value.processes.some((one) => one.who === name && !one.late);
+  const runs = (name) => value.processes.some((one) => one.process === name && !one.late);
   const projects = runs("projector");
   document.querySelector('[data-page="picture"]').hidden = !projects && !runs("lights") && value.looks.length === 0;
   for (const id of ["brightness", "grid-on", "info-on", "corners-reset"]) byId(id).parentElement.hidden = !projects;

@@ -42,7 +42,7 @@ export function showRehearsal(value, show) {
   byId("figure-how").hidden = figure.joints.length === 0;
   const phrases = value.phrases.map((one) => ({ ...one, label: hasWords(`source_${one.name}`) ? words(`source_${one.name}`) : one.name }));
   showChoices(byId("phrases"), byId("phrases-part"), phrases, (name) => command("/phrase", name, PHRASE_FADE_S));
-  const hands = value.hands.map((one) => ({ name: one.joint, label: `${one.joint} · ${one.who === "osc" ? words("hand_here") : one.who}`, now: one.holds }));
+  const hands = value.hands.map((one) => ({ name: one.joint, label: `${one.joint} · ${one.source === "osc" ? words("hand_here") : one.source}`, now: one.holds }));
   showChoices(byId("hands"), byId("hands-part"), hands, (joint, holds) => command("/hold", joint, holds ? 0 : 1));
   for (const id of ["coding", "interaction"]) {
     if (show) byId(id).max = show.most_iterations;

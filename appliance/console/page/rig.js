@@ -18,7 +18,7 @@ export function initRig() {
 
 // Only where lights run.
 export function showRig(value) {
-  isLit = value.processes.some((one) => one.who === "lights" && !one.late);
+  isLit = value.processes.some((one) => one.process === "lights" && !one.late);
   if (!isLit) byId("rig-part").hidden = true;
 }
 
