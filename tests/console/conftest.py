@@ -24,9 +24,9 @@ def page(tmp_path: Path) -> Iterator[Page]:
 PUPPETS = [{"name": "left", "x": -0.8}, {"name": "right", "x": 0.8, "turned": 30}]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def venue(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Box, Page]]:
-    """A box on which two puppets dance, with a sensor and two cues."""
+    """A box on which two puppets dance, with a sensor and two cues; until the last test of this folder."""
     folder = tmp_path_factory.mktemp("venue")
     show = write_show(folder / "show", cues=CUES, puppets=PUPPETS)
     with box_with_page(show, folder, "--journal", str(folder / "night")) as (box, page):
