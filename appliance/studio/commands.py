@@ -115,6 +115,9 @@ def train(
     learning_rate: Annotated[
         float, typer.Option(min=0.0, max=0.1, help="Adam's, at its largest. 0: as the network has it.")
     ] = 0.0,
+    batch: Annotated[
+        int, typer.Option(min=0, max=65536, help="Windows in a training step. 0: as the network has it.")
+    ] = 0,
     full_precision: Annotated[
         bool, typer.Option("--full-precision", help="On a GPU: networks in fp32 too, not in bfloat16.")
     ] = False,
@@ -170,6 +173,7 @@ def train(
                 mixtures=mixtures,
                 ahead=ahead,
                 learning_rate=learning_rate,
+                batch=batch,
                 full_precision=full_precision,
                 puppet=puppet,
                 start=start,

@@ -178,6 +178,7 @@ def _settings_and_source(
         mixtures=options.mixtures,
         ahead=options.ahead,
         learning_rate=options.learning_rate,
+        batch=options.batch,
         seed=options.seed,
     )
     if options.recordings is None:

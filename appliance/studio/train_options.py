@@ -26,6 +26,7 @@ class TrainOptions:
     mixtures: int = 0
     ahead: int = 0
     learning_rate: float = 0.0
+    batch: int = 0
     full_precision: bool = False
     puppet: Path | None = None
     start: Path | None = None

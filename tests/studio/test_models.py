@@ -50,6 +50,7 @@ def test_the_published_forms_have_the_published_sizes() -> None:
     assert sequence.window == 128 and sequence.variational and sequence.weights.divergence == 1e-4
     for settings in (pose, sequence):
         assert settings.weights.squared == 1.0 and settings.weights.rotation == settings.weights.prior == 0.0
+    assert settings_for("pose", "dense64", batch=16).batch == 16
 
 
 def test_a_variational_model_is_drawn_to_the_prior_by_the_weight_of_its_divergence(dancer: Dataset) -> None:
