@@ -63,7 +63,17 @@ def own_network() -> tuple[str, ...]:
     return ()
 
 
-BLOCKS = {page: blocks_of(page) for page in PAGES}
+def different_blocks() -> dict[str, list[Block]]:
+    """The blocks of each page, without those that stand on an earlier page word for word."""
+    seen: set[str] = set()
+    found = {}
+    for page in PAGES:
+        found[page] = [block for block in blocks_of(page) if block.text not in seen]
+        seen |= {block.text for block in found[page]}
+    return found
+
+
+BLOCKS = different_blocks()
 
 
 @pytest.fixture(scope="module")
