@@ -9,12 +9,14 @@ import pytest
 import torch
 from typer.testing import CliRunner, Result
 
+from appliance.pictures import figure
 from appliance.studio import dance_files, standing_dance
 from appliance.studio.autoencoder.training import Settings, Training
 from appliance.studio.commands import app
 from appliance.studio.data.dataset import load_dataset
 from appliance.studio.evaluation import answer_picture, own_answer, pictures
 from appliance.studio.experiments import strips
+from appliance.studio.granular import walk
 from appliance.studio.improviser import own_output
 from appliance.studio.improviser.footing import plant_feet
 from appliance.studio.pose_space import path
@@ -35,12 +37,17 @@ def _seeded_torch() -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def _small_answers() -> Iterator[None]:
-    """What training ends with is measured on little, and strips have two figures."""
+    """What training ends with is measured on little, strips have two figures of whole pixels, and feet are
+    planted in few steps.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(answer_picture, "COLUMNS", 2)
         patch.setattr(own_answer, "MOST_TICKS", 150)
         for module in (pictures, sweep, vary, path, own_output, strips):
             patch.setattr(module, "COLUMNS", 2)
+        patch.setattr(figure, "SUPERSAMPLE", 1)
+        for module in (standing_dance, walk):
+            patch.setattr(module, "plant_feet", lambda dance: plant_feet(dance, 20))
         patch.setattr(sweep, "WINDOWS", 3)
         patch.setattr(own_output, "SECONDS", 2.0)
         patch.setattr(own_output, "DANCES", 1)

@@ -23,9 +23,9 @@ WINDOW = 32
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> Path:
-    """A sequence model after 150 steps; what the command said lies beside it."""
+    """A sequence model after 80 steps; what the command said lies beside it."""
     out = tmp_path_factory.mktemp("sequence")
-    options = ["--window", WINDOW, "--steps", 150, "--width", 64, "--latent", 12, "--threads", 1]
+    options = ["--window", WINDOW, "--steps", 80, "--width", 64, "--latent", 12, "--threads", 1]
     result = bunraku("train", "--model", "sequence", "--recordings", recordings, "--out", out, *options)
     assert result.exit_code == 0, result.output
     (out / "said.txt").write_text(result.output)
