@@ -17,7 +17,7 @@ from appliance.outputs.frame_reader import FrameReader
 from appliance.pose import quaternion
 from hw_sim.peers import HOST
 from tests.bundles import FIGURE, write_show
-from tests.show_control.doubles import Asker
+from tests.show_control.doubles import PATIENCE_S, Asker
 from tests.system.box import Box, playing
 from tests.system.processes import wait_until
 
@@ -92,6 +92,27 @@ def test_a_live_dancer_comes_falls_silent_comes_back_and_goes(show: Path, tmp_pa
     assert "Traceback" not in box.words
 
 
+def lost_at(port: int) -> int:
+    """How many datagrams the kernel threw away at a port, whose buffer is full where no processor is free."""
+    lines = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    return sum(int(fields[-1]) for fields in lines if fields[1].endswith(f":{port:04X}"))
+
+
+def answer_to_ping(desk: Asker, port: int) -> str:
+    """What a ping is answered with; asked again only after the kernel itself threw datagrams away."""
+    ends_at = time.monotonic() + PATIENCE_S
+    while True:
+        lost = lost_at(port)
+        desk.tell("/ping")
+        heard = desk.hear(1.0)
+        if heard is None and lost_at(port) == lost:
+            heard = desk.hear()
+        if heard is not None:
+            return str(heard[0])
+        assert lost_at(port) > lost, "a ping that arrived was not answered"
+        assert time.monotonic() < ends_at, "no ping was answered"
+
+
 def test_a_flood_of_poses_costs_no_frame(show: Path, tmp_path: Path) -> None:
     """Two thousand a second: the newest one counts, nothing queues up."""
     with playing(show, tmp_path) as box, closing(Asker(box.control)) as desk:
@@ -100,7 +121,7 @@ def test_a_flood_of_poses_costs_no_frame(show: Path, tmp_path: Path) -> None:
         with streaming(box.control, 0.5, rate=2000.0):
             frames = box.frames(100)
             begun = time.monotonic()
-            assert desk.ask("/ping")[0].endswith("pong")
+            assert answer_to_ping(desk, box.control).endswith("pong")
         assert time.monotonic() - begun < 10.0
         numbers = [frame[0] for frame in frames]
         assert numbers == sorted(set(numbers))
