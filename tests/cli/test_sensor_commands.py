@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -381,6 +381,23 @@ def test_watching_goes_on_until_it_is_interrupted(box: RunningBox) -> None:
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=60)
         assert process.returncode == 0, err
+
+
+def test_an_interruption_that_python_swallows_ends_watching_too(
+    box: RunningBox, monkeypatch: pytest.MonkeyPatch, bunraku: Command
+) -> None:
+    asked = []
+
+    def swallow(*_: object) -> Roll:
+        asked.append(True)
+        assert len(asked) == 1, "it goes on"
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        return Roll(roster_lines([LEFT], lambda _: ""), 0.0, None)
+
+    monkeypatch.setattr(ControlClient, "roll", swallow)
+    monkeypatch.setattr(time, "sleep", lambda _: None)
+    bunraku("sensors", "--watch", "--box", box.box_file)
 
 
 def test_a_missing_folder_and_a_full_disk_are_reported(

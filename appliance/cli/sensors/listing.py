@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import signal
 import time
+from collections.abc import Callable, Iterator
 
 from rich.console import Group
 from rich.live import Live
@@ -35,16 +37,33 @@ def list_sensors(box_keys: BoxKeys, watch: bool, as_json: bool) -> None:
     if not watch:
         console.print(_picture(box_keys))
         return
-    with contextlib.suppress(KeyboardInterrupt):
+    with _interruptible() as is_interrupted:
         if console.is_terminal:
             with Live(_picture(box_keys), console=console, auto_refresh=False, screen=False) as live:
-                while True:
+                while not is_interrupted():
                     time.sleep(1.0)
                     live.update(_picture(box_keys), refresh=True)
-        while True:  # in a pipe, each table at once: its reader may stop at any time
+        while not is_interrupted():  # in a pipe, each table at once: its reader may stop at any time
             console.print(_picture(box_keys), "")
             console.file.flush()
             time.sleep(1.0)
+
+
+@contextlib.contextmanager
+def _interruptible() -> Iterator[Callable[[], bool]]:
+    """Ctrl-C ends what is inside, and is noted, too: Python swallows it in a generator's or object's end."""
+    caught: list[int] = []
+
+    def interrupt(number: int, _: object) -> None:
+        caught.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            yield lambda: bool(caught)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _picture(box_keys: BoxKeys) -> Group:
