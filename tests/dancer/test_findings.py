@@ -276,5 +276,5 @@ def test_the_puppeteered_figure_stands_on_the_floor_and_hardly_slides(dancer: Da
     after = measure_standing(skeleton, dance.poses, dance.grounded_roots, floor, dance.lifts)
     assert after.float_cm + after.penetration_cm < 0.3
     assert max(after.worst_float_cm, after.worst_penetration_cm) < 2.5
-    assert after.slide_cm_s < 0.35 * before.slide_cm_s
+    assert after.slide_cm_s < 0.4 * before.slide_cm_s
     assert after.slide_cm_s < 20.0

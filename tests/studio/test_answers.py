@@ -86,7 +86,7 @@ def lessons(recorded: Tensor, **changed: float) -> Answers:
     """Lessons in which one joint is held: the arm."""
     torch.manual_seed(2)
     chances = torch.tensor([1e-6, 1.0, 1e-6, 1e-6])
-    return Answers(recorded, chances, replace(SETTINGS, **changed))
+    return Answers(recorded, recorded, chances, replace(SETTINGS, **changed))
 
 
 def with_hands(answers: Answers, progress: float = FULL) -> Lesson:
@@ -108,6 +108,16 @@ def test_a_window_without_a_hand_should_come_out_as_it_went_in(recorded: Tensor)
     lesson = without_hands(lessons(recorded, disturbed=0.0))
     assert lesson.hands is None and lesson.passes == 1
     torch.testing.assert_close(lesson.answer, lesson.windows, atol=1e-3, rtol=0)
+
+
+def test_mirror_images_are_copied_and_are_no_answers(recorded: Tensor) -> None:
+    danced = recorded[recorded[:, 0, ARM, 3] > 0]  # the others bend the arm to the other side
+    chances = torch.tensor([1e-6, 1.0, 1e-6, 1e-6])
+    answers = Answers(recorded, danced, chances, replace(SETTINGS, wild=0.0, disturbed=0.0))
+    assert without_hands(answers).answer[:, :, ARM, 3].min() < -0.3
+    lesson = with_hands(answers)
+    for windows in (lesson.windows, lesson.answer, hands_of(lesson).goal):
+        assert windows[:, :, ARM, 3].min() > -0.01
 
 
 def test_a_disturbed_window_is_led_back(recorded: Tensor) -> None:

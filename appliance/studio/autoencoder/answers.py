@@ -6,6 +6,8 @@ through all passes: the loss is on what the audience sees in the end, and partly
 come in pairs, one a few poses after the other, so that the network learns how an answer changes from tick to
 tick.
 
+An answer is something that the dancer did: mirror images, which the network learns to copy, are none.
+
 Windows without a hand should come out unchanged; some are disturbed and led back. Others wander: they are
 coded again and again, and are pulled the more towards what the dancer usually does the longer they wander.
 """
@@ -55,11 +57,14 @@ class AnswerSettings:
 class Answers:
     """Lessons for a conditional network."""
 
-    def __init__(self, windows: Tensor, chances: Tensor, settings: AnswerSettings) -> None:
-        """windows (N, T, M, 4), heading-free; chances (M,): how often each joint is held."""
+    def __init__(self, windows: Tensor, danced: Tensor, chances: Tensor, settings: AnswerSettings) -> None:
+        """windows (N, T, M, 4) to copy, heading-free; danced (D, T, M, 4): those without mirror images, among
+        which answers are found; chances (M,): how often each joint is held.
+        """
         self._settings = settings
-        self._recorded, self._chances = windows, chances
-        self._repertoire = Repertoire(windows, settings.nearness)
+        self._recorded, self._danced, self._chances = windows, danced, chances
+        self._usually = Repertoire(windows, settings.nearness)
+        self._repertoire = Repertoire(danced, settings.nearness)
         self._start = windows.new_zeros(settings.reserve, *windows.shape[1:])
         self._answer, self._goal = self._start.clone(), self._start.clone()
         self._held = windows.new_zeros(settings.reserve, windows.shape[2])
@@ -137,7 +142,7 @@ class Answers:
         ended = (self._age > wander + 1).nonzero()[:, 0]
         self._wandering[ended] = self._moments(len(ended))
         self._age[ended] = 0
-        self._usual.copy_(self._repertoire.usual(self._wandering))
+        self._usual.copy_(self._usually.usual(self._wandering))
 
     def _refill(self) -> None:
         """New dances, pair by pair, and the answers to their hands."""
@@ -164,9 +169,9 @@ class Answers:
 
     def _pairs_of_moments(self, later: Tensor) -> Tensor:
         """(2 * pairs, T, M, 4): recorded windows, each followed by that `later` (pairs,) poses on."""
-        first = torch.randint(len(self._recorded), later.shape, device=later.device)
-        second = (first + later).clamp(max=len(self._recorded) - 1)
-        return self._recorded[torch.stack([first, second], dim=1).flatten()]
+        first = torch.randint(len(self._danced), later.shape, device=later.device)
+        second = (first + later).clamp(max=len(self._danced) - 1)
+        return self._danced[torch.stack([first, second], dim=1).flatten()]
 
     def _disturbed(self, windows: Tensor) -> Tensor:
         """The windows; in some, a few joints are moved towards those of another window."""

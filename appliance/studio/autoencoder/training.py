@@ -116,10 +116,7 @@ class Training(TrainingLoop[Report]):
         self.body = rotation.MovingSkeleton(dataset.skeleton, dataset.moving, torch.tensor(still)).to(
             self.device
         )
-        mirror = settings.mirror and dataset.mirrors
-        self.train_windows = self._heading_free(
-            windows(dataset.training, dataset.moving, mirror, settings.window, settings.hop)
-        )
+        self.train_windows = self._training_windows(settings.mirror and dataset.mirrors)
         self.held_windows = torch.tensor(
             windows(dataset.held_out, dataset.moving, window=settings.window, hop=settings.hop)
         ).to(self.device)
@@ -131,7 +128,9 @@ class Training(TrainingLoop[Report]):
         )
         conditional = isinstance(network, Conditional)
         self.lessons: Lessons = (
-            Answers(self.train_windows, self.holding_chances(), settings.answers)
+            Answers(
+                self.train_windows, self._training_windows(False), self.holding_chances(), settings.answers
+            )
             if conditional
             else Copies(self.train_windows, settings.input_noise_degrees, processes)
         )
@@ -262,7 +261,10 @@ class Training(TrainingLoop[Report]):
         if isinstance(self.lessons, Answers) and not self.processes.leads:
             torch.manual_seed(1_000_003 * (self.step + 1) + 1009 * self.settings.seed + self.processes.rank)
 
-    def _heading_free(self, poses: np.ndarray[Any, np.dtype[np.float32]]) -> Tensor:
+    def _training_windows(self, mirror: bool) -> Tensor:
+        """(N, T, M, 4): heading-free windows to learn from, of each take its mirror image too if wanted."""
+        settings, dataset = self.settings, self.dataset
+        poses = windows(dataset.training, dataset.moving, mirror, settings.window, settings.hop)
         return torch.cat(
             [
                 self.autoencoder.without_heading(part, self.autoencoder.facing(part))
