@@ -13,12 +13,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from appliance.box.parent_death import PARENT
+from appliance.box.stop_signals import stop_signals
 from appliance.console.proofs import Proofs
 from appliance.console.proving import SHOW_GOES, Proving, Wanted
 from appliance.outputs.frame_reader import FrameReader
@@ -94,7 +95,7 @@ def _run(
     proving: Proving, words: tuple[str, ...], tell: Callable[[], None] = lambda: None, at_rest: bool = False
 ) -> str:
     """What a command of ours says; ended when it is no longer wanted. at_rest: or when the show goes on."""
-    with tempfile.TemporaryFile() as out, _ended_here() as is_ended:
+    with tempfile.TemporaryFile() as out, stop_signals() as is_ended:
         child = subprocess.Popen(
             (sys.executable, "-m", "appliance.cli", *words),
             stdin=subprocess.DEVNULL,
@@ -146,21 +147,6 @@ def _end(child: subprocess.Popen[bytes]) -> None:
         except subprocess.TimeoutExpired:
             child.kill()
             child.wait()
-
-
-@contextlib.contextmanager
-def _ended_here() -> Iterator[Callable[[], bool]]:
-    """Whether a signal asks this process to end."""
-    asked: list[int] = []
-    before = {
-        number: signal.signal(number, lambda number, _: asked.append(number))
-        for number in (signal.SIGTERM, signal.SIGINT)
-    }
-    try:
-        yield lambda: bool(asked)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def machine() -> dict[str, Any]:

@@ -7,7 +7,6 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from appliance.box.fallback import Fallen
 from appliance.box.process_health import ProcessHealth
 from appliance.box.show_state import MOTION, ShowStateReader
 from appliance.console.desk import Answer, Desk, NoAnswerError
@@ -55,7 +54,10 @@ class BoxView:
         sensors = [self._sensor(line) for line in _roster(answers)]
         fallbacks = [_fallback(values) for address, values in answers if address == "/fallbacks/fallback"]
         if trouble:
-            fallbacks = [_told(process, one) for process, one in self._processes.fallbacks(now)]
+            fallbacks = [
+                _fallback((one.name, process, one.times, one.active, one.words))
+                for process, one in self._processes.fallbacks(now)
+            ]
         frames = self._stage.state(now)
         lists: dict[str, list[dict[str, Any]]] = {name: [] for name in _LISTS.values()}
         for address, values in answers:
@@ -131,13 +133,3 @@ def _roster(answers: Sequence[Answer]) -> list[RosterLine]:
 def _fallback(values: Sequence[Any]) -> dict[str, Any]:
     name, process, times, active, words = values
     return {"name": name, "process": process, "times": times, "active": bool(active), "words": words}
-
-
-def _told(process: str, one: Fallen) -> dict[str, Any]:
-    return {
-        "name": one.name,
-        "process": process,
-        "times": one.times,
-        "active": one.active,
-        "words": one.words,
-    }

@@ -268,13 +268,15 @@ def test_a_turning_joint_changes_the_pace_of_a_dancing_one(dancer: Dancer, joint
     assert pace(fast) > 1.05 * pace(slow)
 
 
-@pytest.mark.parametrize("joint", ["lShldr", "rForeArm"])
-def test_the_puppeteered_figure_stands_on_the_floor_and_hardly_slides(dancer: Dancer, joint: str) -> None:
+@pytest.mark.parametrize(("joint", "left"), [("lShldr", 0.35), ("rForeArm", 0.4)])
+def test_the_puppeteered_figure_stands_on_the_floor_and_hardly_slides(
+    dancer: Dancer, joint: str, left: float
+) -> None:
     dance = dancer.hold(10, 9, joint)
     skeleton, floor = dancer.recording.skeleton, dancer.floor
     before = measure_standing(skeleton, dance.poses, dance.roots, floor, dance.lifts)
     after = measure_standing(skeleton, dance.poses, dance.grounded_roots, floor, dance.lifts)
     assert after.float_cm + after.penetration_cm < 0.3
     assert max(after.worst_float_cm, after.worst_penetration_cm) < 2.5
-    assert after.slide_cm_s < 0.4 * before.slide_cm_s
+    assert after.slide_cm_s < left * before.slide_cm_s
     assert after.slide_cm_s < 20.0

@@ -82,11 +82,11 @@ SETTINGS = AnswerSettings(reserve=400, wandering=40, nearness=NEAR)
 FULL = 1.0  # of the training
 
 
-def lessons(recorded: Tensor, **changed: float) -> Answers:
-    """Lessons in which one joint is held: the arm."""
+def lessons(recorded: Tensor, danced: Tensor | None = None, **changed: float) -> Answers:
+    """Lessons in which one joint is held: the arm. danced: without mirror images; None: there are none."""
     torch.manual_seed(2)
     chances = torch.tensor([1e-6, 1.0, 1e-6, 1e-6])
-    return Answers(recorded, recorded, chances, replace(SETTINGS, **changed))
+    return Answers(recorded, recorded if danced is None else danced, chances, replace(SETTINGS, **changed))
 
 
 def with_hands(answers: Answers, progress: float = FULL) -> Lesson:
@@ -112,8 +112,7 @@ def test_a_window_without_a_hand_should_come_out_as_it_went_in(recorded: Tensor)
 
 def test_mirror_images_are_copied_and_are_no_answers(recorded: Tensor) -> None:
     danced = recorded[recorded[:, 0, ARM, 3] > 0]  # the others bend the arm to the other side
-    chances = torch.tensor([1e-6, 1.0, 1e-6, 1e-6])
-    answers = Answers(recorded, danced, chances, replace(SETTINGS, wild=0.0, disturbed=0.0))
+    answers = lessons(recorded, danced, wild=0.0, disturbed=0.0)
     assert without_hands(answers).answer[:, :, ARM, 3].min() < -0.3
     lesson = with_hands(answers)
     for windows in (lesson.windows, lesson.answer, hands_of(lesson).goal):

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import signal
 import time
-from collections.abc import Callable, Iterator
 
 from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
+from appliance.box.stop_signals import stop_signals
 from appliance.cli.sensors.box_keys import (
     THAT_BOX,
     WHICH_KEYS,
@@ -37,33 +35,16 @@ def list_sensors(box_keys: BoxKeys, watch: bool, as_json: bool) -> None:
     if not watch:
         console.print(_picture(box_keys))
         return
-    with _interruptible() as is_interrupted:
+    with stop_signals() as is_stopped:
         if console.is_terminal:
             with Live(_picture(box_keys), console=console, auto_refresh=False, screen=False) as live:
-                while not is_interrupted():
+                while not is_stopped():
                     time.sleep(1.0)
                     live.update(_picture(box_keys), refresh=True)
-        while not is_interrupted():  # in a pipe, each table at once: its reader may stop at any time
+        while not is_stopped():  # in a pipe, each table at once: its reader may stop at any time
             console.print(_picture(box_keys), "")
             console.file.flush()
             time.sleep(1.0)
-
-
-@contextlib.contextmanager
-def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Ctrl-C ends what is inside, and is noted, too: Python swallows it in a generator's or object's end."""
-    caught: list[int] = []
-
-    def interrupt(number: int, _: object) -> None:
-        caught.append(number)
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGINT, interrupt)
-    try:
-        with contextlib.suppress(KeyboardInterrupt):
-            yield lambda: bool(caught)
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _picture(box_keys: BoxKeys) -> Group:

@@ -63,8 +63,8 @@ class Answers:
         """
         self._settings = settings
         self._recorded, self._danced, self._chances = windows, danced, chances
-        self._usually = Repertoire(windows, settings.nearness)
         self._repertoire = Repertoire(danced, settings.nearness)
+        self._usually = self._repertoire if danced is windows else Repertoire(windows, settings.nearness)
         self._start = windows.new_zeros(settings.reserve, *windows.shape[1:])
         self._answer, self._goal = self._start.clone(), self._start.clone()
         self._held = windows.new_zeros(settings.reserve, windows.shape[2])

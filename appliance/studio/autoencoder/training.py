@@ -116,7 +116,8 @@ class Training(TrainingLoop[Report]):
         self.body = rotation.MovingSkeleton(dataset.skeleton, dataset.moving, torch.tensor(still)).to(
             self.device
         )
-        self.train_windows = self._training_windows(settings.mirror and dataset.mirrors)
+        mirror = settings.mirror and dataset.mirrors
+        self.train_windows = self._training_windows(mirror)
         self.held_windows = torch.tensor(
             windows(dataset.held_out, dataset.moving, window=settings.window, hop=settings.hop)
         ).to(self.device)
@@ -129,7 +130,10 @@ class Training(TrainingLoop[Report]):
         conditional = isinstance(network, Conditional)
         self.lessons: Lessons = (
             Answers(
-                self.train_windows, self._training_windows(False), self.holding_chances(), settings.answers
+                self.train_windows,
+                self._training_windows(False) if mirror else self.train_windows,
+                self.holding_chances(),
+                settings.answers,
             )
             if conditional
             else Copies(self.train_windows, settings.input_noise_degrees, processes)
