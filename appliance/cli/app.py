@@ -57,7 +57,7 @@ _MODULES = {  # in each a function or a group of the command's name
 
 
 def command_line(name: str | None = None) -> typer.Typer:
-    """The parser of one command, which loads no other, or of all of them."""
+    """The parser of one command, which loads no other (none where it is a plug-in's), or of all of them."""
     app = typer.Typer(
         help="The box that lets a dancer puppeteer an AI dancer on stage.",
         no_args_is_help=True,
@@ -146,17 +146,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv[1:] if arguments is None else arguments)
     if "--version" in given:
         given = ["version"]
-    own = given[0] if given and given[0] in _MODULES else None
-    app = command_line(own)
-    if own is None:
-        plug_in(app, entry_points(group=PLUG_INS), lambda words: print(words, file=sys.stderr))
-    command: Any = typer.main.get_command(app)
+    word = given[0] if given else ""
+    plugged = [] if word in _MODULES else plug_ins(entry_points(group=PLUG_INS))
+    command = parser(word, plugged)
+    if word not in command.commands:  # help and mistakes need all
+        command = parser(None, plugged)
     give_help(command, order=ORDER)
     _require_known(given, list(command.commands))
     try:
         command(given, prog_name="bunraku")
     except Exception as error:
         refuse(error)
+
+
+def parser(name: str | None, plugged: Iterable[typer.Typer] = ()) -> Any:
+    """The parsed `command_line` with the commands of plug-ins beside its own."""
+    app = command_line(name)
+    for each in plugged:
+        app.add_typer(each)
+    return typer.main.get_command(app)
 
 
 def _require_known(given: Sequence[str], commands: Sequence[str]) -> None:
@@ -185,13 +193,16 @@ def refuse(error: Exception) -> NoReturn:
     sys.exit(status)
 
 
-def plug_in(onto: typer.Typer, found: Iterable[EntryPoint], say: Callable[[str], None]) -> None:
-    """Add the commands of every plug-in; one that does not load costs its own commands alone."""
+def plug_ins(found: Iterable[EntryPoint]) -> list[typer.Typer]:
+    """The commands of every plug-in; one that does not load costs its own commands alone."""
+    loaded = []
     for point in found:
         try:
-            onto.add_typer(point.load())
+            loaded.append(point.load())
         except Exception as error:
-            say(f"bunraku: the commands of '{point.name}' are not available here ({error}).")
+            words = f"bunraku: the commands of '{point.name}' are not available here ({error})."
+            print(words, file=sys.stderr)
+    return loaded
 
 
 def _is_correctable(error: Exception) -> bool:

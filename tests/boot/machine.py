@@ -21,6 +21,7 @@ from tests.system.processes import children
 
 NSPAWN = Path(__file__).parent / "nspawn.sh"
 PATIENCE_S = 60.0  # for a machine that is busy with other things; nothing here waits without a reason
+_PAUSE = 2.0  # between two looks, of the time that a look takes: each starts processes in the box
 _PDEATHSIG = 1
 _ENDS_WITHIN_S = 60.0
 _ENVIRONMENT = {"PATH": "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/root"}
@@ -137,9 +138,12 @@ class Machine:
     ) -> Found:
         """The first true thing that `find` gives."""
         until = time.monotonic() + patience_s
+        asked_at = time.monotonic()
         while not (found := find()):
-            assert time.monotonic() < until, f"{else_say}\n{self.log()}"
-            time.sleep(0.02)
+            now = time.monotonic()
+            assert now < until, f"{else_say}\n{self.log()}"
+            time.sleep(max(0.02, _PAUSE * (now - asked_at)))
+            asked_at = time.monotonic()
         return found
 
     def cut_power(self) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import typer
 
-from appliance.cli.app import plug_in
+from appliance.cli.app import parser, plug_ins
 from appliance.pose.bvh import write_bvh
 from appliance.recorder.export import export
 from appliance.sensor.keys import create_keys
@@ -208,19 +208,12 @@ def test_a_filmstrip_of_nothing_is_refused(tmp_path: Path, bunraku: Command) -> 
     assert "nothing was danced" in bunraku("filmstrip", show / "phrase.bvh", "--start", "99", status=2).err
 
 
-def test_a_broken_plug_in_costs_only_its_own_commands() -> None:
-    app, said = typer.Typer(), []
+def test_a_broken_plug_in_costs_only_its_own_commands(capsys: pytest.CaptureFixture[str]) -> None:
     broken = EntryPoint("studio", "tests.stage.no_such_module:app", "bunraku.commands")
-    plug_in(app, [broken], said.append)
-    [words] = said
+    mine = EntryPoint("mine", "tests.cli.test_cli:plugged", "bunraku.commands")
+    assert "emote" in parser("emote", plug_ins([broken, mine])).commands
+    [words] = capsys.readouterr().err.splitlines()
     assert words.startswith("bunraku: the commands of 'studio' are not available here (No module named")
-
-
-def test_a_plug_in_adds_its_commands_beside_the_others() -> None:
-    app = typer.Typer()
-    plug_in(app, [EntryPoint("mine", "tests.cli.test_cli:plugged", "bunraku.commands")], print)
-    command = typer.main.get_command(app)
-    assert "emote" in command.commands
 
 
 plugged = typer.Typer()
@@ -246,6 +239,19 @@ def test_the_box_starts_without_torch_and_without_the_plug_ins() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_a_plug_in_s_command_loads_none_of_the_box_s_own() -> None:
+    code = (
+        "import sys; from appliance.cli.app import main\n"
+        "try: main(['emulate', '--help'])\n"
+        "except SystemExit: pass\n"
+        "print(sorted(m for m in sys.modules if m.startswith('appliance.cli.')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "Usage: bunraku emulate" in done.stdout
+    loaded = done.stdout.splitlines()[-1]
+    assert "appliance.cli.app" in loaded and "appliance.cli.project" not in loaded
 
 
 def test_pack_vouches_for_a_changed_show(tiny_show: Path, tmp_path: Path, bunraku: Command) -> None:

@@ -9,9 +9,8 @@ from importlib.metadata import entry_points
 from typing import Any
 
 import pytest
-import typer
 
-from appliance.cli.app import PLUG_INS, command_line, plug_in
+from appliance.cli.app import PLUG_INS, parser, plug_ins
 from appliance.cli.examples import EXAMPLES, ORDER, OTHER_WORDS
 from appliance.cli.help_page import MACHINERY
 from tests.command import Command
@@ -21,9 +20,7 @@ READING = {"metres_per_unit", "up", "facing", "true_fps", "root", "all_frames"}
 
 def whole() -> Any:
     """The parser of all commands."""
-    app = command_line()
-    plug_in(app, entry_points(group=PLUG_INS), print)
-    return typer.main.get_command(app)
+    return parser(None, plug_ins(entry_points(group=PLUG_INS)))
 
 
 def paths(command: Any, words: tuple[str, ...] = ()) -> Iterator[str]:

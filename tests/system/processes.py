@@ -22,13 +22,19 @@ Found = TypeVar("Found")
 def wait_until(
     find: Callable[[], Found],
     missing: str | Callable[[], object] = "it never came",
-    pause: Callable[[], object] = lambda: time.sleep(POLL_S),
+    pause: Callable[[], object] | None = None,
 ) -> Found:
-    """The first true value that `find` returns; fails after PATIENCE_S with what is missing."""
+    """The first true value that `find` returns; fails after PATIENCE_S with what is missing.
+
+    Without `pause` it waits at least as long as `find` took: what starts a process would else fill a core.
+    """
     give_up = time.monotonic() + PATIENCE_S
+    asked_at = time.monotonic()
     while not (found := find()):
-        assert time.monotonic() < give_up, missing() if callable(missing) else missing
-        pause()
+        now = time.monotonic()
+        assert now < give_up, missing() if callable(missing) else missing
+        pause() if pause else time.sleep(max(POLL_S, now - asked_at))
+        asked_at = time.monotonic()
     return found
 
 
