@@ -55,7 +55,7 @@ def render(cones: Cones, colours: Array, frame: Frame) -> Array:
     right, up = part.rays(SUPERSAMPLE)
     depth = np.full((len(up), len(right)), -np.inf)
     normals = np.zeros((*depth.shape, 3))
-    paint = np.zeros((*depth.shape, 3))
+    cone = np.zeros(depth.shape, np.int16)
     for number in range(len(cones.joint)):
         a, b = cones.start[number], cones.end[number]
         ra, rb = float(cones.start_radius[number]), float(cones.end_radius[number])
@@ -68,14 +68,15 @@ def render(cones: Cones, colours: Array, frame: Frame) -> Array:
         for met, reached, normal in _meet(right[None, columns], up[rows, None], a, b, ra, rb, near):
             near[met] = reached
             normals[rows, columns][met] = normal
-            paint[rows, columns][met] = colours[number]
+            cone[rows, columns][met] = number
     if not (hit := np.isfinite(depth)).any():
         return picture
     lit = np.zeros((*depth.shape, 4))
-    lit[hit, :3] = _shade(normals[hit], paint[hit]) * _openness(depth, part)[hit, None]
+    lit[hit, :3] = _shade(normals[hit], colours[cone[hit]]) * _openness(depth, part)[hit, None]
     lit[hit, 3] = 1.0
-    shape = (part.height, SUPERSAMPLE, part.width, SUPERSAMPLE, 4)
-    picture[place] = lit.reshape(shape).mean(axis=(1, 3))
+    finer = range(SUPERSAMPLE)
+    parts = [lit[row::SUPERSAMPLE, column::SUPERSAMPLE] for row in finer for column in finer]
+    picture[place] = sum(parts) / len(parts)
     return picture
 
 
@@ -97,20 +98,28 @@ def floor_shadow(cones: Cones, floor: float, lift: float, frame: Frame) -> Array
     The rows of the frame run over the floor: a metre of depth is `lift` metres of the picture.
     """
     right, up = frame.rays(1)
-    x, z = np.meshgrid(right, -up / lift)
-    darkness = np.zeros(x.shape)
+    deep = -up / lift
+    darkness = np.zeros((len(deep), len(right)))
     for number in range(len(cones.joint)):
         ends = np.stack([cones.start[number], cones.end[number]])
         above = ends[:, 1] - floor
-        (ax, az), (bx, bz) = ends[:, [0, 2]] + above[:, None] * np.array([0.30, -0.20])
+        (ax, az), (bx, bz) = thrown = ends[:, [0, 2]] + above[:, None] * np.array([0.30, -0.20])
+        ra, rb = cones.start_radius[number], cones.end_radius[number]
+        reach = max(ra, rb) + 0.03 + 0.22 * max(above.max(), 0)
+        columns, rows = (
+            slice(*np.searchsorted(along, [ends.min() - reach, ends.max() + reach]))
+            for along, ends in zip((right, deep), thrown.T, strict=True)
+        )
+        x, z = right[None, columns], deep[rows, None]
         length = (bx - ax) ** 2 + (bz - az) ** 2 + 1e-12
         along = np.clip(((x - ax) * (bx - ax) + (z - az) * (bz - az)) / length, 0, 1)
         distance = np.hypot(x - ax - along * (bx - ax), z - az - along * (bz - az))
-        radius = cones.start_radius[number] * (1 - along) + cones.end_radius[number] * along
+        radius = ra * (1 - along) + rb * along
         softness = 0.03 + 0.22 * np.maximum(above[0] * (1 - along) + above[1] * along, 0)
         edge = np.clip((radius + softness - distance) / (2 * softness), 0, 1)
         strength = radius / (radius + 0.5 * softness)
-        darkness = np.maximum(darkness, strength * edge * edge * (3 - 2 * edge))
+        part = darkness[rows, columns]
+        np.maximum(part, strength * edge * edge * (3 - 2 * edge), out=part)
     return darkness
 
 
