@@ -125,9 +125,7 @@ def test_varied_kept_killed_and_danced_again(show: Path, tmp_path: Path) -> None
         assert desk.order("/motion/improvise/temperature", 0.25, 3.0)[2] == 1
         place = tmp_path / "state" / PLACE
         wait_until(
-            lambda: (
-                (kept := read_checkpoint(place)) is not None and any(0.25 in values for _, values in kept.motion)
-            ),
+            lambda: (kept := read_checkpoint(place)) and any(0.25 in values for _, values in kept.motion),
             lambda: f"no values are kept: {read_checkpoint(place)}",
         )
         cut_power(box, place)
