@@ -77,6 +77,8 @@ def test_a_training_goes_on_from_a_show(
     before, after = (json.loads((each / "training.json").read_text()) for each in (show, tmp_path / "next"))
     assert after["settings"]["width"] == 48 and after["settings"]["learning_rate"] == 2e-4
     assert after["settings"]["answers"]["full_progress"] == 0
+    shares = [told["settings"]["weights"]["energy_share"] for told in (before, after)]
+    assert shares[1] < shares[0], "it moves already"
     errors = [told["history"][-1]["held_out_degrees"] for told in (before, after)]
     assert errors[1] < 1.1 * errors[0], "it began anew"
     for words, options in (

@@ -50,7 +50,7 @@ class AnswerSettings:
     disturbed: float = 0.25  # of the windows without hands: some joints are those of another window
     wandering: int = 512  # windows that are coded over and over: half of those without hands
     wander: int = 100  # passes at most
-    pull: float = 0.15
+    pull: float = 0.2
     nearness: Nearness = field(default_factory=Nearness)
 
 

@@ -11,13 +11,16 @@ from torch.nn import functional
 from appliance.studio.autoencoder import rotation
 from appliance.studio.autoencoder.autoencoder import PriorCritic
 
-ENERGY = 1.12  # of the dance's own: blending the overlapping windows takes about a tenth of it away again
 POSITION_POSES = 2  # of a window's 8, redrawn each step: as good a gradient at a quarter of the cost
 
 
 @dataclass(frozen=True)
 class LossWeights:
-    """Weights of the losses. Unit norm and positions as in the papers; the prior's as measured."""
+    """Weights of the losses. Unit norm and positions as in the papers; the prior's as measured.
+
+    energy_share: of the dance's own energy that is asked for. Blending the overlapping windows takes about a
+    tenth of it away again; a network that has learned long moves more by itself.
+    """
 
     rotation: float = 1.0
     pace: float = 1.0
@@ -29,6 +32,7 @@ class LossWeights:
     divergence: float = 0.001  # of a variational network's latents from the prior
     advance: float = 1.0
     energy: float = 8.0
+    energy_share: float = 1.12
     first: float = 0.5  # of rotations after the first pass of several
     hands: float = 0.8  # of all losses of dances with hands
 
@@ -61,18 +65,19 @@ def reconstruction_losses(
     return parts
 
 
-def advance_losses(raw: Tensor, windows: Tensor) -> dict[str, Tensor]:
+def advance_losses(raw: Tensor, windows: Tensor, share: float = 1.0) -> dict[str, Tensor]:
     """What changes from the first half of a batch to its second, the same dances a few poses later.
 
     Overlapping windows are blended: the dance moves as fast as its windows change from tick to tick, however
     fast each of them moves by itself. In radians, as `pace`: advance, the change as a vector; energy,
-    how much each joint changes on average over the batch. A network answers what it cannot
-    predict with the mean, which hardly moves. Therefore energy rewards how much joints move, beside where
-    they move to, and as an average over the batch: per window, it would shrink as the direction does.
+    how much each joint changes on average over the batch, against a share of what is wanted. A network
+    answers what it cannot predict with the mean, which hardly moves. Therefore energy rewards how much joints
+    move, beside where they move to, and as an average over the batch: per window, it would shrink as the
+    direction does.
     """
     (made, later), (given, given_later) = rotation.normalize(raw).chunk(2), windows.chunk(2)
     change, wanted = later - made, given_later - given
-    return {"advance": 2 * _length(change - wanted), "energy": _mean_size_loss(change, wanted, ENERGY)}
+    return {"advance": 2 * _length(change - wanted), "energy": _mean_size_loss(change, wanted, share)}
 
 
 def divergence(mean: Tensor, log_variance: Tensor) -> Tensor:

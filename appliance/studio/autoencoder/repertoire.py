@@ -37,7 +37,7 @@ class Nearness:
     change: float = 1.5
     hand: float = 120.0
     hand_change: float = 2.0
-    own: float = 0.85  # of what distinguishes the window from the usual, kept in the free joints
+    own: float = 0.78  # of what distinguishes the window from the usual, kept in the free joints
 
 
 class Repertoire:

@@ -170,8 +170,7 @@ class Training(TrainingLoop[Report]):
         self._average_weights(self.averaged, self.autoencoder)
         self.step += 1
         with torch.no_grad():
-            spread = {"latent_mean": coded.mean(0).abs().mean(), "latent_std": coded.std(0).mean()}
-        reported |= spread
+            reported |= {"latent_mean": coded.mean(0).abs().mean(), "latent_std": coded.std(0).mean()}
         return {name: part.detach() for name, part in reported.items()}
 
     def _code(self, lesson: Lesson) -> tuple[Tensor, Tensor, dict[str, Tensor]]:
@@ -204,7 +203,7 @@ class Training(TrainingLoop[Report]):
             raw = self.autoencoder.decode_raw(seen).float()
         parts.update(losses.reconstruction_losses(raw, lesson.answer, self.body, self.settings.weights))
         if hands is not None:
-            parts.update(losses.advance_losses(raw, lesson.answer))
+            parts.update(losses.advance_losses(raw, lesson.answer, self.settings.weights.energy_share))
         return raw, coded, parts
 
     def _train_critic(self, latents: Tensor) -> Tensor:
