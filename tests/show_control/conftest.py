@@ -1,15 +1,17 @@
-"""A runtime folder with a stage, show control, and somebody who asks."""
+"""A runtime folder with a stage, show control, and somebody who asks; the two ends of an order."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from appliance.sensor.keys import create_keys
 from appliance.show_control import order_dispatch
-from tests.show_control.doubles import Asker, ControlInThread, StageDouble
+from appliance.show_control.orders import OrderInbox, OrderSender
+from tests.show_control.doubles import Asker, Clock, ControlInThread, StageDouble
 
 
 @pytest.fixture
@@ -33,7 +35,7 @@ def stage(folder: Path) -> Iterator[StageDouble]:
 
 @pytest.fixture
 def control(folder: Path, key_file: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ControlInThread]:
-    """Its orders live for as long as a busy machine may hold up a double; test_orders has the real time."""
+    """Its orders live while a busy machine may hold up a double; test_order_dispatch has the real time."""
     monkeypatch.setattr(order_dispatch, "PATIENCE_S", 15.0)
     control = ControlInThread(folder, key_file)
     yield control
@@ -45,3 +47,20 @@ def asker(control: ControlInThread) -> Iterator[Asker]:
     asker = Asker(control.port)
     yield asker
     asker.close()
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def sender(folder: Path) -> Iterator[OrderSender]:
+    with closing(OrderSender(folder)) as sender:
+        yield sender
+
+
+@pytest.fixture
+def inbox(folder: Path, clock: Clock) -> Iterator[OrderInbox]:
+    with closing(OrderInbox(folder, "stage", clock)) as inbox:
+        yield inbox

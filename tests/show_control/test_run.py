@@ -19,20 +19,9 @@ from tests.show_control.doubles import HOST, Asker, Clock, facts
 
 
 @pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
-@pytest.fixture
 def stage(folder: Path) -> Iterator[FrameWriter]:
     with closing(FrameWriter(folder, facts())) as writer:
         yield writer
-
-
-@pytest.fixture
-def inbox(folder: Path, clock: Clock) -> Iterator[OrderInbox]:
-    with closing(OrderInbox(folder, "stage", clock)) as inbox:
-        yield inbox
 
 
 @pytest.fixture
