@@ -16,7 +16,7 @@ from appliance.release.choice import CHOSEN
 from appliance.release.trial import MirroredProof, pair_to_dance
 from tests.bundles import FIGURE
 from tests.show_control.doubles import facts
-from tests.system.test_preflight import Machine, late
+from tests.system.box_folders import Machine, late
 
 STARTS = 4  # at the fourth one a new show that never danced is put aside
 SECONDS_AFTER_POWER_ON, MID_SHOW = 20.0, 3600.0

@@ -19,8 +19,8 @@ from appliance.release.choice import CHOSEN, Choice, Pair
 from appliance.release.trial import ANEW, TRIES, MirroredProof, ended_well, pair_to_dance
 from tests.bundles import FIGURE, write_show
 from tests.show_control.doubles import facts
+from tests.system.box_folders import choice_in
 from tests.system.processes import run, wait_until
-from tests.system.test_preflight import choice_in
 
 NEW, BEFORE = "new+", "before+"
 
