@@ -1,0 +1,77 @@
+"""The doctor's checks of what the venue brings: radios, network, cables, adapters, displays, ports."""
+
+from __future__ import annotations
+
+import os
+import socket
+from pathlib import Path
+
+from appliance.cli.doctor import venue
+from appliance.cli.doctor.host_view import HostView
+from appliance.show.box import BoxConfig
+from tests.system.machine_of_files import lay, only, verdicts
+
+
+def test_radios(tmp_path: Path) -> None:
+    lay(tmp_path, "/sys/class/rfkill/rfkill0/type", "bluetooth\n")
+    lay(tmp_path, "/sys/class/rfkill/rfkill0/name", "hci0\n")
+    lay(tmp_path, "/sys/class/rfkill/rfkill0/soft", "0\n")
+    lay(tmp_path, "/sys/class/net/wlan0/phy80211/name", "phy0\n")
+    lay(tmp_path, "/sys/drivers/brcmfmac/name")
+    (tmp_path / "sys/class/net/wlan0/device").mkdir()
+    (tmp_path / "sys/class/net/wlan0/device/driver").symlink_to(tmp_path / "sys/drivers/brcmfmac")
+    lay(tmp_path, "/data/network/sensors.nmconnection")
+    assert verdicts(venue.radios(HostView(tmp_path))) == [("bluetooth", "better"), ("wi-fi", "better")]
+
+
+def test_a_network_without_a_cable(tmp_path: Path) -> None:
+    lay(tmp_path, "/sys/class/net/eth0/carrier", "0\n")
+    (tmp_path / "sys/class/net/eth0/device").mkdir()
+    assert only(venue.network(HostView(tmp_path))).verdict == "better"
+    lay(tmp_path, "/sys/class/net/eth0/carrier", "1\n")
+    assert only(venue.network(HostView(tmp_path))).verdict == "ok"
+
+
+def test_cables_and_adapters(tmp_path: Path) -> None:
+    wires = [
+        {"universe": 1, "wire": "udmx"},
+        {"universe": 2, "wire": "usb-pro", "device": str(tmp_path / "tty")},
+    ]
+    box = BoxConfig.model_validate(
+        {"sensors": {"serial": [{"device": "/dev/ttyACM0"}]}, "outputs": {"dmx": wires}},
+        context={"directory": tmp_path},
+    )
+    assert only(venue.cables(HostView(tmp_path, box))).verdict == "wrong"
+    lay(tmp_path, "/dev/ttyACM0")
+    assert only(venue.cables(HostView(tmp_path, box))).verdict == "ok"
+    lay(tmp_path, "/sys/bus/usb/devices/1-1/idVendor", "16c0\n")
+    lay(tmp_path, "/sys/bus/usb/devices/1-1/idProduct", "05dc\n")
+    assert [one.verdict for one in venue.adapters(HostView(tmp_path, box))] == ["ok", "ok"]
+    lay(tmp_path, "/sys/bus/usb/devices/1-1/idProduct", "0001\n")
+    assert next(iter(venue.adapters(HostView(tmp_path, box)))).verdict == "wrong"
+    here = [one.verdict for one in venue.adapters(HostView(Path("/"), box))]
+    assert here[1] == "wrong"  # the path that the box file names is not there
+    (tmp_path / "tty").touch()
+    assert [one.verdict for one in venue.adapters(HostView(Path("/"), box))][1] == "ok"
+
+
+def test_displays(tmp_path: Path) -> None:
+    assert verdicts(venue.display(HostView(tmp_path))) == [("display", "better"), ("graphics", "better")]
+    lay(tmp_path, "/sys/class/drm/card1-HDMI-A-1/status", "connected\n")
+    lay(tmp_path, "/sys/class/drm/card1-HDMI-A-2/status", "disconnected\n")
+    lay(tmp_path, "/dev/dri/renderD128")
+    found = only(venue.display(HostView(tmp_path)))
+    assert found.verdict == "ok"
+    assert "HDMI-A-1" in found.words
+    assert "HDMI-A-2" not in found.words
+
+
+def test_a_port_that_another_process_holds_is_wrong_and_it_is_named(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        box = BoxConfig.model_validate({"sensors": {"udp": {"port": port}}, "control": None})
+        found = next(iter(venue.ports(HostView(box=box))))
+        name = Path(f"/proc/{os.getpid()}/comm").read_text().strip()
+        assert (found.verdict, f"{name} (process {os.getpid()})" in found.words) == ("wrong", True)
+    assert next(iter(venue.ports(HostView(box=box)))).verdict == "ok"
