@@ -145,7 +145,6 @@ class Measurement:
         while len({one.ticks[-1] for one in heard.values() if one.ticks}) > 1 and time.monotonic() < until:
             self.receive(0.2)
             heard["oscdump"] = _dumped(self._venue.dump)
-        positions = Heard(self._frames)
         receivers = {
             name: {
                 "frames": len(one.ticks),
@@ -153,7 +152,7 @@ class Measurement:
                 "late": one.late,
                 "lost": self._venue.lost(name),
             }
-            for name, one in {**heard, "PosiStageNet": positions}.items()
+            for name, one in {**heard, "PosiStageNet": Heard(self._frames)}.items()
         }
         malformed = sum(one.malformed for one in (*self._venue.osc.values(), self._venue.positions))
         return {
@@ -266,8 +265,7 @@ def _dumped(file: Path) -> Heard:
     """The real oscdump's output: address, type tags, tick, second, sequence, late, its rest."""
     heard = Heard()
     for line in file.read_text().splitlines():
-        found = re.search(r"/bunraku/frame \S+ (\d+) \d+ -?\d+ (\d) [\d.]+$", line.strip())
-        if found:
+        if found := re.search(r"/bunraku/frame \S+ (\d+) \d+ -?\d+ (\d) [\d.]+$", line.strip()):
             heard.ticks.append(int(found[1]))
             heard.late += int(found[2])
     return heard
@@ -291,9 +289,8 @@ def main() -> int:
     print("\n".join([*table(figures), *([f"FAIL  {words}" for words in wrong] or ["ok"])]))
     if options.report is not None:
         options.report.mkdir(parents=True, exist_ok=True)
-        (options.report / "outputs.json").write_text(
-            json.dumps({**figures, "faults": wrong}, indent=2) + "\n"
-        )
+        report = json.dumps({**figures, "faults": wrong}, indent=2)
+        (options.report / "outputs.json").write_text(report + "\n")
     return 1 if wrong else 0
 
 
