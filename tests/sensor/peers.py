@@ -17,6 +17,8 @@ KEYS = {
 }
 IMU_ID = bytes(range(0x40, 0x50))
 A, B = ("192.168.4.7", 2390), ("192.168.4.8", 2390)
+STRANGER = ("192.168.4.66", 6666)
+BELIEVED = ("accepted", "hello", "profile")
 
 
 class Wearable:
@@ -154,3 +156,22 @@ class Box:
 
     def counted(self) -> dict[str, int]:
         return {reason: count for reason, count in self.link.counts.items() if count}
+
+
+def believed(box: Box) -> dict[str, int]:
+    return {reason: count for reason, count in box.counted().items() if reason in BELIEVED}
+
+
+def linked_box() -> tuple[Box, Wearable]:
+    """A sensor dances; the box owes it nothing at this moment."""
+    box = Box()
+    sensor = box.pair()
+    for _ in range(60):
+        box.now += 0.02
+        assert len(box.hear(sensor.reading())) == 1
+        box.answers()
+    return box, sensor
+
+
+def way(box: Box) -> str:
+    return box.link.states(box.now)[0].way

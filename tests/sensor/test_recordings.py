@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.sensor.peers import KEYS, A, B, Box, Wearable
-from tests.sensor.test_security import STRANGER, linked_box
+from tests.sensor.peers import KEYS, STRANGER, A, B, Box, Wearable, linked_box
 
 
 def test_hundreds_of_recorded_power_ons_at_ten_thousand_a_second_do_not_either() -> None:
