@@ -18,7 +18,7 @@ from appliance.sensor.transports import udp
 from appliance.sensor.transports.udp import UdpIntake
 from tests.sensor.flood import flood
 from tests.sensor.peers import KEYS, Wearable
-from tests.sensor.test_udp import Radio
+from tests.sensor.radio import Radio
 
 TICK_S = 0.02
 GROUP = "sensors, one tick: drain and answer"
