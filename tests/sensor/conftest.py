@@ -1,4 +1,4 @@
-"""Links over a real socket and over a pseudo-terminal, and what reaches them."""
+"""Links over a real socket and a pseudo-terminal, what reaches them, and a console that settles at once."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from appliance.sensor.link import SensorLink, open_link
+from appliance.sensor.provisioning import wearable_console
 from appliance.sensor.transports.serial import SerialIntake
 from tests.sensor.cable import Cable, await_that
 from tests.sensor.peers import KEYS
@@ -44,3 +45,9 @@ def opened(cable: Cable) -> Iterator[tuple[SensorLink, SerialIntake]]:
     yield link, intake
     link.close()
     cable.pull_out()
+
+
+@pytest.fixture
+def short_settling(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The wearable of these tests answers at once, and each question was asked once."""
+    monkeypatch.setattr(wearable_console, "_QUIET_S", 0.02)
