@@ -8,13 +8,14 @@ from math import cos, radians, sin
 
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
-from appliance.sensor.link import SensorLink, SensorReading
+from appliance.sensor.link import SensorLink, SensorReading, SensorState
 from appliance.sensor.transports.transport import Origin
 
 KEYS = {
     "left-wrist": SensorKey("left-wrist", 0x11, bytes(range(16))),
     "head": SensorKey("head", 0x22, bytes(range(16, 32))),
 }
+EIGHT = {f"hand-{n}": SensorKey(f"hand-{n}", 0x100 + n, bytes([n]) * 16) for n in range(8)}
 IMU_ID = bytes(range(0x40, 0x50))
 A, B = ("192.168.4.7", 2390), ("192.168.4.8", 2390)
 STRANGER = ("192.168.4.66", 6666)
@@ -173,5 +174,22 @@ def linked_box() -> tuple[Box, Wearable]:
     return box, sensor
 
 
+def state(box: Box, name: str = "left-wrist") -> SensorState:
+    return next(one for one in box.link.states(box.now) if one.name == name)
+
+
 def way(box: Box) -> str:
-    return box.link.states(box.now)[0].way
+    return state(box).way
+
+
+def dance(box: Box, sensor: Wearable, seconds: float, origin: tuple[str, int] = A) -> list[wire.Packet]:
+    """Readings at 50 Hz; what the box sent meanwhile."""
+    heard = []
+    for _ in range(round(50 * seconds)):
+        box.now += 0.02
+        assert len(box.hear(sensor.reading(), origin=origin)) == 1
+        for data, to in box.answers():
+            if data[4] == sensor.key.device_id:
+                assert to == origin
+                heard.append(sensor.hear(data))
+    return heard
