@@ -8,10 +8,12 @@ from itertools import count
 
 from appliance.sensor import wire
 from appliance.sensor.keys import SensorKey
+from hw_sim import motions
 from hw_sim.device import Lane
 from hw_sim.emulated_sensor import EmulatedSensor
 from hw_sim.emulator import Emulator, Sender, Sent
 from hw_sim.network import VenueNetwork
+from hw_sim.wearer import Wearer
 
 KEY = SensorKey("left-wrist", 0x11, bytes(range(16)))
 HEARTBEAT_S = 1.0
@@ -160,3 +162,16 @@ class Pair:
         while self.clock.now < end:
             due = min(self.emulator.step(self.clock.now), end, self.clock.now + 0.05)
             self.clock.sleep(max(due - self.clock.now, 0.0))
+
+
+def paired(motion: motions.Motion | None = None, box: TinyBox | None = None, **options: object) -> Pair:
+    sensor = EmulatedSensor(KEY, Wearer(motion or motions.still()), **options)  # type: ignore[arg-type]
+    return Pair(sensor, box)
+
+
+def hello_times(pair: Pair) -> list[float]:
+    return [at for at, _ in pair.box.of(wire.Hello)]
+
+
+def readings(pair: Pair) -> list[wire.Reading]:
+    return [packet for _, packet in pair.box.of(wire.Reading) if isinstance(packet, wire.Reading)]
