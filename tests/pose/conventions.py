@@ -215,8 +215,7 @@ def skeleton_of(convention: str) -> Skeleton:
     tips = _ENDS | (_FINGERTIPS if system.finger else {"hand": (0.17, 0.0, 0.0)})
     ends = []
     for joint, role in enumerate(order):
-        tip = tips.get(role.removeprefix("left ").removeprefix("right "))
-        if tip is not None:
+        if tip := tips.get(role.removeprefix("left ").removeprefix("right ")):
             sign = -1.0 if role.startswith("right") else 1.0
             ends.append((joint, (sign * tip[0], tip[1], tip[2])))
     if system.floor_root:
@@ -246,9 +245,7 @@ def dance_of(convention: str, seconds: float = 12.0, fps: float = 50.0, seed: in
         turn = quaternion.from_axis_angle(axis, swing(0.05 if part in ("hips", "foot") else 0.25))
         if role.endswith("upper arm"):
             hanging = np.radians(-75.0 if role.startswith("left") else 75.0)
-            turn = quaternion.multiply(
-                quaternion.from_axis_angle([0.0, 0.0, 1.0], np.full(len(time), hanging)), turn
-            )
+            turn = quaternion.multiply(quaternion.from_axis_angle([0.0, 0.0, 1.0], hanging), turn)
         if part in ("thigh", "shin"):
             turn = quaternion.from_axis_angle([1.0, 0.0, 0.0], swing(0.12))
         poses[:, joint] = turn
@@ -288,10 +285,8 @@ def _zero_world(skeleton: Skeleton, convention: str) -> Array:
             zero[joint] = zero[skeleton.parents[joint]]
         if kind == "x":
             children = [c for c, parent in enumerate(skeleton.parents) if parent == joint]
-            tips = [np.array(end) for j, end in skeleton.ends if j == joint]
-            bone = (
-                skeleton.offsets[children[0]] if len(children) == 1 else tips[0] if tips else [0.0, 1.0, 0.0]
-            )
+            tips = [end for j, end in skeleton.ends if j == joint] or [(0.0, 1.0, 0.0)]
+            bone = skeleton.offsets[children[0]] if len(children) == 1 else tips[0]
             zero[joint] = _turn_to_x(np.asarray(bone, float))
     return zero
 
