@@ -259,15 +259,13 @@ def test_a_restarted_stage_goes_on_in_what_was_made(
     dance.run(3.0)
     assert [one.source for one in dance.parts.puppets] == ["improvise", "vary"]
     (runtime := tmp_path / "place").mkdir()
-    noted = Resumption("A test", runtime, None, "always")
-    noted.write_checkpoint(dance.reconciler, 7)
-    noted.close()
+    with closing(Resumption("A test", runtime, None, "always")) as noted:
+        noted.write_checkpoint(dance.reconciler, 7)
     windows = [one.motion.window().copy() for one in dance.parts.puppets]
     roots = [one.motion.roots().copy() for one in dance.parts.puppets]
     again = dance_of(puppets=puppets)
-    resumed = Resumption("A test", runtime, None, "always")
-    assert "After a restart" in resumed.go_on(again.reconciler, again.now)
-    resumed.close()
+    with closing(Resumption("A test", runtime, None, "always")) as resumed:
+        assert "After a restart" in resumed.go_on(again.reconciler, again.now)
     for one, window, root in zip(again.parts.puppets, windows, roots, strict=True):
         assert np.abs(np.sum(one.motion.window() * window, axis=-1)).min() > 0.9999, "the very poses"
         assert one.motion.roots() == pytest.approx(root, abs=1e-3)
@@ -276,9 +274,8 @@ def test_a_restarted_stage_goes_on_in_what_was_made(
     assert [one.motion.going_on[2] for one in again.parts.puppets] == [1001, 1002]
     (tmp_path / FOLDER / "1001.material").unlink()
     third = dance_of(puppets=puppets)
-    resumed = Resumption("A test", runtime, None, "always")
-    resumed.go_on(third.reconciler, third.now)
-    resumed.close()
+    with closing(Resumption("A test", runtime, None, "always")) as resumed:
+        resumed.go_on(third.reconciler, third.now)
     assert [one.motion.going_on[2] for one in third.parts.puppets] == [0, 1002], "the phrase, if it is gone"
 
 
@@ -290,14 +287,12 @@ def test_after_a_power_cut_it_goes_on_with_its_source(
     dance.make(writer, True, number=1001)
     dance.run(1.5)
     (runtime := tmp_path / "place").mkdir()
-    noted = Resumption("A test", runtime, None, "always")
-    noted.write_checkpoint(dance.reconciler, 7)
-    noted.close()
+    with closing(Resumption("A test", runtime, None, "always")) as noted:
+        noted.write_checkpoint(dance.reconciler, 7)
     monkeypatch.setattr("appliance.stage.resume.boot_id", lambda: "another")
     (tmp_path / "show_state").unlink()
     again = dance_of()
-    resumed = Resumption("A test", runtime, None, "always")
-    assert "After a power cut" in resumed.go_on(again.reconciler, again.now)
-    again.run(0.5)
-    assert again.reconciler.wanted == "vary" and again.parts.first.source == "vary"
-    resumed.close()
+    with closing(Resumption("A test", runtime, None, "always")) as resumed:
+        assert "After a power cut" in resumed.go_on(again.reconciler, again.now)
+        again.run(0.5)
+        assert again.reconciler.wanted == "vary" and again.parts.first.source == "vary"
