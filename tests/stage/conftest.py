@@ -1,4 +1,4 @@
-"""An evening on which sensors are put on, and what the box remembers of them."""
+"""A show and the dance that follows what is declared of it; an evening on which sensors are put on."""
 
 from __future__ import annotations
 
@@ -7,12 +7,67 @@ from pathlib import Path
 
 import pytest
 
-from appliance.show.box import BoxConfig, OutputsConfig, SensorsConfig
-from appliance.show.show import load_show
+from appliance.show.show import Show, load_show
+from appliance.show_control.command import Command
+from appliance.show_control.show_state_commands import DECLARATIONS
+from appliance.stage.iterations import Iterations
+from appliance.stage.reconcile import Reconciler
 from appliance.stage.sensor_memory import SensorMemory
+from appliance.stage.sharing import facts_of
 from appliance.stage.stage_parts import StageParts, assemble
-from tests.bundles import write_show
+from tests.bundles import swaying_phrase, write_show
+from tests.stage.declared import Commanded, Declared, follow
+from tests.stage.shows import BOX, NOW, write_show_with_phrase
 from tests.stage.worn import HAND, Evening, Stage
+
+CUES = [
+    {"name": "start", "phrase": "main", "iterations": [4, 3], "hands": ["lShldr", "Chest"]},
+    {"name": "storm", "phrase": "slow", "iterations": [12, 11], "hands": ["Chest"], "fade_s": 0.2},
+    {"name": "alone", "hands": []},
+    {"name": "lights only", "master": 0.5},
+]
+
+
+@pytest.fixture
+def show(tmp_path: Path) -> Show:
+    phrase = swaying_phrase(5.0).resampled(60.0)  # brought to 50 at the start
+    return load_show(write_show_with_phrase(tmp_path / "show", "slow", phrase, CUES))
+
+
+@pytest.fixture
+def parts(show: Show) -> Iterator[StageParts]:
+    parts = assemble(show, BOX)
+    yield parts
+    parts.close()
+
+
+@pytest.fixture
+def iterations() -> Iterations:
+    return Iterations(3, 2, most=8)
+
+
+@pytest.fixture
+def declared() -> Declared:
+    return Declared()
+
+
+@pytest.fixture
+def reconciler(parts: StageParts, iterations: Iterations, declared: Declared) -> Reconciler:
+    return Reconciler("A test", parts, iterations, declared)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def command(show: Show, iterations: Iterations, declared: Declared, reconciler: Reconciler) -> Commanded:
+    """Lets show control declare what a command says, and the dance follow; gives what it says about it."""
+    facts = facts_of(show, None, iterations, NOW)
+
+    def command(address: str, *values: float, text: str = "") -> str:
+        declared.now, _ = DECLARATIONS[address](declared.now, Command(address, values, text), facts, NOW)
+        words = follow(reconciler)
+        assert not reconciler.pending(NOW)
+        return words
+
+    return command
 
 
 @pytest.fixture
@@ -27,9 +82,7 @@ def evening(tmp_path: Path, memory: SensorMemory) -> Iterator[Evening]:
     def begun(hands: list[dict[str, object]] | None = None) -> Stage:
         """The box is switched on; what it remembers of before stays."""
         show = load_show(write_show(tmp_path / f"show{len(all_parts)}", hands or [HAND]))
-        all_parts.append(
-            assemble(show, BoxConfig(sensors=SensorsConfig(udp=None), outputs=OutputsConfig(osc=[])))
-        )
+        all_parts.append(assemble(show, BOX))
         return Stage(all_parts[-1], memory)
 
     yield begun
