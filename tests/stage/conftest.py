@@ -1,12 +1,14 @@
-"""A show and the dance that follows what is declared of it; an evening on which sensors are put on."""
+"""Shows, the dance that follows what is declared or resumes; an evening on which sensors are put on."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from appliance.box.show_state import ShowStateReader
+from appliance.show.box import BoxConfig, RealtimeConfig
 from appliance.show.show import Show, load_show
 from appliance.show_control.command import Command
 from appliance.show_control.show_state_commands import DECLARATIONS
@@ -17,7 +19,7 @@ from appliance.stage.sharing import facts_of
 from appliance.stage.stage_parts import StageParts, assemble
 from tests.bundles import swaying_phrase, write_show
 from tests.stage.declared import Commanded, Declared, follow
-from tests.stage.shows import BOX, NOW, write_show_with_phrase
+from tests.stage.shows import BOX, NOW, walking, write_show_with_phrase
 from tests.stage.worn import HAND, Evening, Stage
 
 CUES = [
@@ -68,6 +70,38 @@ def command(show: Show, iterations: Iterations, declared: Declared, reconciler: 
         return words
 
     return command
+
+
+@pytest.fixture
+def walking_show(tmp_path: Path) -> Show:
+    storm = {"name": "storm", "phrase": "walk", "iterations": [6, 5], "hands": ["Chest"], "fade_s": 0.2}
+    return load_show(write_show_with_phrase(tmp_path / "show", "walk", walking(), [storm]))
+
+
+@pytest.fixture
+def runtime(tmp_path: Path) -> Path:
+    (tmp_path / "runtime").mkdir(mode=0o700)
+    return tmp_path / "runtime"
+
+
+@pytest.fixture
+def dance_of(walking_show: Show, runtime: Path) -> Iterator[Callable[[], Reconciler]]:
+    """A dance from its beginning, as a stage of this folder makes it before it resumes."""
+    made: list[Reconciler] = []
+
+    def dance() -> Reconciler:
+        reader = ShowStateReader(runtime)
+        made.append(Reconciler("A test", assemble(walking_show, BOX), Iterations(3, 2, 20), reader))
+        return made[-1]
+
+    yield dance
+    for one in made:
+        one.parts.close()
+
+
+@pytest.fixture
+def box(runtime: Path) -> BoxConfig:
+    return BOX.model_copy(update={"runtime": runtime, "realtime": RealtimeConfig(enabled=False)})
 
 
 @pytest.fixture

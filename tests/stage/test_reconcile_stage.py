@@ -5,24 +5,14 @@ from __future__ import annotations
 import gc
 import time
 from contextlib import closing
-from pathlib import Path
-
-import pytest
 
 from appliance.box.checkpoint import CheckpointReader
 from appliance.box.show_state import ShowState, ShowStateWriter
 from appliance.outputs.frame_reader import FrameReader
-from appliance.show.box import BoxConfig, RealtimeConfig
+from appliance.show.box import BoxConfig
 from appliance.show.show import Show
 from appliance.stage.run import Stage
-from tests.stage.shows import BOX, NOW
-
-
-@pytest.fixture
-def box(tmp_path: Path) -> BoxConfig:
-    runtime = tmp_path / "runtime"
-    runtime.mkdir(mode=0o700)
-    return BOX.model_copy(update={"runtime": runtime, "realtime": RealtimeConfig(enabled=False)})
+from tests.stage.shows import NOW
 
 
 def test_the_stage_begins_with_the_show_state_of_its_folder(show: Show, box: BoxConfig) -> None:
