@@ -29,7 +29,7 @@ from appliance.show.show import load_show
 from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import HOST
 from hw_sim.posistagenet import PsnReceiver
-from tests.outputs.test_shared_frame import facts_of
+from tests.outputs.small_stage import facts_of
 from tests.studio.tiny import skeleton, swaying
 
 FIGURE_GROUP = "forward kinematics of one pose"

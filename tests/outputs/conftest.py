@@ -1,12 +1,18 @@
-"""A dancer to send: a small skeleton with Daz names, in poses that no symmetry hides a fault in."""
+"""A dancer to send, small and in poses that no symmetry hides a fault in; a stage that shares its frames."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from appliance.outputs.frame_reader import FrameReader
 from appliance.outputs.joint_frame import JointFrame
+from appliance.outputs.shared_frame import FrameWriter
 from appliance.pose.skeleton import Skeleton
+from tests.outputs.small_stage import facts_of
 
 # (joint, parent, offset in metres); lButtock, rButtock and tail have no Unity name.
 JOINTS = [
@@ -58,3 +64,23 @@ def fill(frame: JointFrame, skeleton: Skeleton, seed: int) -> JointFrame:
 @pytest.fixture
 def frame(skeleton: Skeleton) -> JointFrame:
     return fill(JointFrame(len(skeleton)), skeleton, seed=1)
+
+
+@pytest.fixture
+def reader(tmp_path: Path) -> Iterator[FrameReader]:
+    reader = FrameReader(tmp_path)
+    yield reader
+    reader.close()
+
+
+@pytest.fixture
+def writer(tmp_path: Path, skeleton: Skeleton) -> Iterator[FrameWriter]:
+    writer = FrameWriter(tmp_path, facts_of(skeleton))
+    yield writer
+    writer.close()
+
+
+def write(writer: FrameWriter, skeleton: Skeleton, *ticks: int) -> None:
+    frame = JointFrame(len(skeleton))
+    for tick in ticks:
+        writer.write(fill(frame, skeleton, tick))

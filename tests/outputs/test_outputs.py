@@ -18,7 +18,7 @@ from hw_sim.osc_receiver import OscReceiver
 from hw_sim.peers import free_ports
 from hw_sim.posistagenet import PsnReceiver
 from tests.outputs.conftest import fill
-from tests.outputs.test_shared_frame import facts_of
+from tests.outputs.small_stage import facts_of
 
 LOOPBACK = "127.0.0.1"
 
