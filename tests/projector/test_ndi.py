@@ -12,7 +12,7 @@ import pytest
 
 from appliance.projector.stream.feed import Feed
 from appliance.show.stream import StreamConfig
-from tests.outputs.test_receivers import free_port
+from tests.outputs.osc_peers import free_port
 from tests.projector.test_stream import connected
 
 WITHIN_S = 60.0

@@ -27,7 +27,7 @@ from appliance.projector.stream.keying import keyed
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.show.stream import StreamConfig
-from tests.outputs.test_receivers import free_port
+from tests.outputs.osc_peers import free_port
 from tests.projector.golden_looks import AT_S, SIZE
 from tests.system.processes import BUNRAKU
 
