@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
-import json
 import os
-import resource
 import tarfile
 import zlib
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,15 +20,22 @@ from appliance.recorder.export import export
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import POSITION
 from appliance.recorder.reading import last_kept, read_journal
-from appliance.recorder.record import EVENT, TICK, layout_of
+from appliance.recorder.record import EVENT, TICK
 from appliance.recorder.segments import segment_paths
 from appliance.show.show import load_show
 from appliance.stage.comparison import Comparison
 from appliance.stage.replay import Replay
 from tests.bundles import write_show
 from tests.recorder.night import Night
-
-PATIENCE_S = 300.0
+from tests.recorder.odd_journals import (
+    PATIENCE_S,
+    changed_order,
+    header,
+    listed_in_bounds,
+    many_ticks,
+    odd_headers,
+    with_header,
+)
 
 
 @pytest.fixture(scope="module")
@@ -51,28 +53,6 @@ def whole(show: Path, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     night.dance(5)
     (segment,) = segment_paths(night.kept(folder / "journal"))
     return segment.read_bytes()
-
-
-def header(whole: bytes) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(next(chunks.chunks(whole)).data)
-    return found
-
-
-def with_header(whole: bytes, facts: Any) -> bytes:
-    _, *others = chunks.chunks(whole)
-    parts = [chunks.chunk(one.kind, one.data, one.ticks) for one in others]
-    return b"".join([chunks.chunk(chunks.HEADER, json.dumps(facts).encode()), *parts])
-
-
-def odd_headers(whole: bytes) -> Iterator[Any]:
-    facts = header(whole)
-    yield from ([], {}, "run", None, 7)
-    for name in facts:
-        yield {other: value for other, value in facts.items() if other != name}
-        yield from (facts | {name: odd} for odd in (None, [], {}, "", -1, 1e300, [[]], ["a"], {"a": 1}))
-    yield facts | {"record": [*facts["record"][:-1], ["reading_numbers", "|O", [1, 8]]]}
-    yield facts | {"record": [[name, form, [10**6, 10**6]] for name, form, _ in facts["record"]]}
-    yield facts | {"hands": [{"joint": "nobody's", "kind": "", "sensor": None}]}
 
 
 def all_that_reads(path: Path, folder: Path) -> None:
@@ -156,39 +136,6 @@ def test_names_in_an_archive_lead_nowhere(whole: bytes, tmp_path: Path) -> None:
         ]
 
 
-PEAK = 1000 << 20  # bytes on top of the test's own: what may be held, and once more while it grows
-
-
-def listed_in_bounds(path: Path) -> str:
-    """What `journal list` says of a journal, in bounded memory and time."""
-
-    def listed() -> bytes:
-        before = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-        with contextlib.redirect_stderr(io.StringIO()) as refused, pytest.raises(SystemExit):
-            main(("journal", "list", "--journal", str(path), "--events"))
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
-        return json.dumps([refused.getvalue() or "listed", peak - before]).encode()
-
-    words, peak = json.loads(run_with_timeout(PATIENCE_S, listed))
-    assert peak < PEAK, f"{peak >> 20} MB"
-    return str(words)
-
-
-def many_ticks(whole: bytes, count: int) -> bytes:
-    """So many ticks of zeros: a hundredth of their bytes."""
-    facts, *_ = chunks.chunks(whole)
-    tick_bytes = layout_of(json.loads(facts.data)).itemsize
-    rows = np.zeros(
-        20_000, [("number", "<u8"), ("kind", "<u4"), ("bytes", "<u4"), ("tick", f"V{tick_bytes}")]
-    )
-    rows["kind"], rows["bytes"] = TICK, tick_bytes
-    parts = [chunks.chunk(chunks.HEADER, facts.data)]
-    for first in range(1, count, len(rows)):
-        rows["number"] = np.arange(first, first + len(rows))
-        parts.append(chunks.chunk(chunks.LOG, rows.tobytes(), len(rows)))
-    return b"".join(parts)
-
-
 def test_a_small_file_of_very_many_ticks_is_refused(whole: bytes, tmp_path: Path) -> None:
     path = tmp_path / "odd.segment"
     path.write_bytes(many_ticks(whole, 2_000_000))
@@ -231,22 +178,6 @@ def test_headers_that_stand_for_gigabytes_are_refused(whole: bytes, tmp_path: Pa
     assert "unpacks to more than" in listed_in_bounds(path)
 
 
-def test_an_archive_of_very_many_parts_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "odd.bunraku"
-    path.write_bytes(b"".join(tarfile.TarInfo(f"{n}.segment").tobuf() for n in range(25_000)) + bytes(1024))
-    assert "larger than any journal" in listed_in_bounds(path)
-
-
-def test_an_archive_whose_names_are_enormous_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "odd.bunraku"
-    name = tarfile.TarInfo("././@LongLink")
-    name.type, name.size = tarfile.GNUTYPE_LONGNAME, 1 << 36
-    path.write_bytes(name.tobuf(tarfile.GNU_FORMAT))
-    with path.open("r+b") as file:
-        file.truncate(1 << 37)
-    assert "larger than any journal" in listed_in_bounds(path)
-
-
 @pytest.mark.parametrize("place", ["odd.segment", "folder/00000001.segment"])
 def test_a_fifo_or_a_device_holds_nothing_up(whole: bytes, tmp_path: Path, place: str) -> None:
     path = tmp_path / place
@@ -270,17 +201,6 @@ def test_a_keeper_passes_by_what_is_no_segment(show: Path, tmp_path: Path) -> No
         return str(len(read_journal(night.kept(folder)).ticks)).encode()
 
     assert run_with_timeout(PATIENCE_S, kept) == b"20"
-
-
-def test_a_part_that_claims_to_be_enormous_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "odd.bunraku"
-    member = tarfile.TarInfo("1.segment")
-    member.size = 1 << 40
-    path.write_bytes(member.tobuf() + bytes(10240))
-    with path.open("r+b") as file:
-        file.truncate((1 << 40) + 10240)  # as long as it claims, and no room taken
-    with pytest.raises(JournalError, match="larger than any journal"):
-        read_journal(path)
 
 
 def test_a_segment_that_goes_while_it_is_exported_is_no_fault(
@@ -320,23 +240,6 @@ def test_a_keyframe_of_another_release_is_refused_in_words(
     (run,) = read_journal(path).runs
     with pytest.raises(JournalError, match="another release"):
         list(Replay(run, load_show(show)).dance(Comparison(0.0, 0.0)))
-
-
-def changed_order(whole: bytes, change: Callable[[dict[str, Any]], None]) -> bytes:
-    def entries(data: bytes) -> Iterator[log.Entry]:
-        for one in log.unpacked(data):
-            if one.kind == EVENT:
-                event = json.loads(one.data)
-                change(event)
-                one = log.Entry(one.number, EVENT, json.dumps(event).encode())
-            yield one
-
-    return b"".join(
-        chunks.chunk(one.kind, log.packed(list(entries(one.data))), one.ticks)
-        if one.kind == chunks.LOG
-        else chunks.chunk(one.kind, one.data, one.ticks)
-        for one in chunks.chunks(whole)
-    )
 
 
 def test_an_order_of_another_release_is_refused_in_words(whole: bytes, show: Path, tmp_path: Path) -> None:
