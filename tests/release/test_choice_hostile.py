@@ -14,14 +14,9 @@ from appliance.release.adoption import adopt, read_choice
 from appliance.release.arrivals import look
 from appliance.release.choice import CHOSEN, Aside, Choice, Pair
 from appliance.release.shelf import Shelf, UnreadableError
-from tests.release.test_choice import BROKEN, Venue, dancing
+from tests.release.venue import BROKEN, Venue, dancing
 
 NO_TEXT = os.fsdecode(b"\xff\xfe.bvh")
-
-
-@pytest.fixture
-def venue(tmp_path: Path) -> Venue:
-    return Venue(tmp_path)
 
 
 def _power_on(venue: Venue) -> str:
