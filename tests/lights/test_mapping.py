@@ -7,16 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from appliance.box.show_state import ShowState
 from appliance.lights.curve import bent, eased, share
 from appliance.lights.dance import lean, turn
+from appliance.lights.patch import Patch
 from appliance.lights.rig import Rig
 from appliance.pose import quaternion
 from appliance.show.light_rules import RuleConfig
-from tests.lights.rigs import PERIOD_S, frame, lights, rig
+from appliance.show.lights import LightsConfig
+from tests.lights.rigs import PERIOD_S, SKELETON, frame, lights, rig
 
 PAR = {"name": "par", "profile": "led-par", "address": 1}
 OTHER = {"name": "other", "profile": "led-par", "address": 11}
@@ -261,12 +264,6 @@ def test_points_to_aim_at_slide_across_the_stage() -> None:
 
 
 def test_gobos_jump_in_the_middle_of_a_fade(tmp_path: Any) -> None:
-    import yaml
-
-    from appliance.lights.patch import Patch
-    from appliance.show.lights import LightsConfig
-    from tests.lights.rigs import SKELETON
-
     profile = {
         "name": "G",
         "modes": [{"name": "m", "channels": ["gobo"]}],
