@@ -8,9 +8,9 @@ ARGS ?= --seconds 30
 TEST_ARGS ?=
 # Empty, or --long: every count of the tests at its full length.
 LENGTH ?=
-# Test files run beside each other: they own their ports, folders and boxes. Two more than there are cores, for many
+# Test files run beside each other: they own their ports, folders and boxes. One more than there are cores, for many
 # wait; four at most, for each may start a box.
-WORKERS = $(shell cores=$$(nproc); echo $$((cores < 2 ? cores + 2 : 4)))
+WORKERS = $(shell cores=$$(nproc); echo $$((cores < 3 ? cores + 1 : 4)))
 BESIDE = --numprocesses=$(WORKERS) --dist=loadfile --no-loadscope-reorder
 
 # Debian 13's clang is 19, Debian 12's is 14.
