@@ -107,8 +107,8 @@ def floor_shadow(cones: Cones, floor: float, lift: float, frame: Frame) -> Array
         ra, rb = cones.start_radius[number], cones.end_radius[number]
         reach = max(ra, rb) + 0.03 + 0.22 * max(above.max(), 0)
         columns, rows = (
-            slice(*np.searchsorted(along, [ends.min() - reach, ends.max() + reach]))
-            for along, ends in zip((right, deep), thrown.T, strict=True)
+            slice(*np.searchsorted(axis, [both.min() - reach, both.max() + reach]))
+            for axis, both in zip((right, deep), thrown.T, strict=True)
         )
         x, z = right[None, columns], deep[rows, None]
         length = (bx - ax) ** 2 + (bz - az) ** 2 + 1e-12
