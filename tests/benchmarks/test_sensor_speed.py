@@ -15,10 +15,9 @@ import pytest
 from appliance.sensor.keys import SensorKey
 from appliance.sensor.link import SensorLink, open_link
 from appliance.sensor.transports import udp
-from appliance.sensor.transports.udp import UdpIntake
 from tests.sensor.flood import flood
 from tests.sensor.peers import KEYS, Wearable
-from tests.sensor.radio import Radio
+from tests.sensor.radio import Radio, intake_of
 
 TICK_S = 0.02
 GROUP = "sensors, one tick: drain and answer"
@@ -34,9 +33,7 @@ def link() -> Iterator[SensorLink]:
 
 @pytest.fixture
 def address(link: SensorLink) -> tuple[str, int]:
-    intake = link.intakes[0]
-    assert isinstance(intake, UdpIntake)
-    return intake.address
+    return intake_of(link).address
 
 
 class Hall:

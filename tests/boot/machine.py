@@ -17,11 +17,10 @@ from typing import TypeVar
 from tests.boot.disk import DataDisk
 from tests.deploy.cut import cut_off
 from tests.system.namespace import Namespace
-from tests.system.processes import children
+from tests.system.processes import children, wait_until
 
 NSPAWN = Path(__file__).parent / "nspawn.sh"
 PATIENCE_S = 60.0  # for a machine that is busy with other things; nothing here waits without a reason
-_PAUSE = 2.0  # between two looks, of the time that a look takes: each starts processes in the box
 _PDEATHSIG = 1
 _ENDS_WITHIN_S = 60.0
 _ENVIRONMENT = {"PATH": "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/root"}
@@ -137,14 +136,7 @@ class Machine:
         self, find: Callable[[], Found | None], else_say: str, patience_s: float = PATIENCE_S
     ) -> Found:
         """The first true thing that `find` gives."""
-        until = time.monotonic() + patience_s
-        asked_at = time.monotonic()
-        while not (found := find()):
-            now = time.monotonic()
-            assert now < until, f"{else_say}\n{self.log()}"
-            time.sleep(max(0.02, _PAUSE * (now - asked_at)))
-            asked_at = time.monotonic()
-        return found
+        return wait_until(find, lambda: f"{else_say}\n{self.log()}", patience_s=patience_s)
 
     def cut_power(self) -> None:
         """Everything is gone between two instructions; what the data disk had not written stays unwritten."""

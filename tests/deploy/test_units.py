@@ -11,9 +11,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-import typer
 
-from appliance.cli.app import command_line
+from appliance.cli.app import parser
 from appliance.cli.preflight import parsed
 from appliance.keeper.keeper import END_S
 from appliance.show.box import RealtimeConfig
@@ -176,7 +175,7 @@ def test_what_a_service_starts_is_a_command_with_these_options(name: str) -> Non
         if words[1] == "preflight":
             assert parsed(words[2:])
             continue
-        command = typer.main.get_command(command_line(words[1])).commands[words[1]]
+        command = parser(words[1]).commands[words[1]]
         known = {option for parameter in command.params for option in parameter.opts}
         assert {word for word in words if word.startswith("--")} <= known
 

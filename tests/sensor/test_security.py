@@ -1,4 +1,4 @@
-"""Whoever has no key changes nothing: forged, damaged, thrown back, made up. On invented times."""
+"""Packets without the key change nothing: forged, damaged, thrown back, made up. On invented times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A runtime folder with a stage, show control, and somebody who asks; the two ends of an order."""
+"""A runtime folder with a stage, show control, and a client that asks; the two ends of an order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Show control over its real port: what each command does, and what comes back to whoever sent it."""
+"""Show control over its real port: what each command does, and what its sender is answered."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def test_a_flood_of_orders_leaves_the_stage_at_four_a_tick(
 def test_a_stage_that_hangs_holds_up_no_answer(
     control: ControlInThread, stage: StageDouble, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Many ask a stage that is silent; whoever asks show control itself hears at once."""
+    """Many clients ask a silent stage; one that asks show control itself is answered at once."""
     monkeypatch.setattr(order_dispatch, "PATIENCE_S", 0.5)
     stage.obeys = False
     askers = [Asker(control.port) for _ in range(5)]

@@ -29,7 +29,7 @@ def tick(parts: StageParts, iterations: Iterations) -> Tick:
 
 
 def danced(tick: Tick, ticks: int, begin: int = 0) -> np.ndarray:
-    """Poses (ticks, J, 4) of so many frames."""
+    """Poses (ticks, J, 4) of the frames from number `begin` on."""
     poses = []
     for number in range(begin, begin + ticks):
         slot = Slot(number, 10 + 0.02 * number, 10 + 0.02 * number, 0)

@@ -20,15 +20,16 @@ Found = TypeVar("Found")
 
 
 def wait_until(
-    find: Callable[[], Found],
+    find: Callable[[], Found | None],
     missing: str | Callable[[], object] = "it never came",
     pause: Callable[[], object] | None = None,
+    patience_s: float = PATIENCE_S,
 ) -> Found:
-    """The first true value that `find` returns; fails after PATIENCE_S with what is missing.
+    """The first true value that `find` returns; fails after `patience_s` with what is missing.
 
     Without `pause` it waits at least as long as `find` took: what starts a process would else fill a core.
     """
-    give_up = time.monotonic() + PATIENCE_S
+    give_up = time.monotonic() + patience_s
     asked_at = time.monotonic()
     while not (found := find()):
         now = time.monotonic()

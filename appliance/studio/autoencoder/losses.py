@@ -65,7 +65,7 @@ def reconstruction_losses(
     return parts
 
 
-def advance_losses(raw: Tensor, windows: Tensor, share: float = 1.0) -> dict[str, Tensor]:
+def advance_losses(raw: Tensor, windows: Tensor, share: float) -> dict[str, Tensor]:
     """What changes from the first half of a batch to its second, the same dances a few poses later.
 
     Overlapping windows are blended: the dance moves as fast as its windows change from tick to tick, however
