@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import os
 import random
@@ -37,6 +38,7 @@ def pytest_configure(config: pytest.Config) -> None:
     report = figures_report.FiguresReport(ROOT / "build" / "boot")
     config.pluginmanager.register(report, figures_report.NAME)
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process compiles all modules
+    gc.disable()  # until all tests are collected: what is loaded by then stays
     worker = os.environ.get("PYTEST_XDIST_WORKER")
     if worker:
         # Files already run in parallel: what they start would only wait for its own threads.
@@ -70,6 +72,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             len(LONGEST_FIRST),
         )
     )
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ from appliance.show.config_error import ConfigError
 from appliance.show.show import Show
 from appliance.stage.stage_error import StageError
 
-_ONE_RUN_S = 20.0
+ONE_RUN_S = 20.0
 _FOR_PEOPLE = (BvhError, ConfigError, PuppetError, RuntimeFolderError, StageError)
 
 
@@ -78,4 +78,4 @@ def prove_network(show: Show) -> str:
                 "Export the show again, or copy the bundle again."
             ) from None
 
-    return proved(show.network, run, _ONE_RUN_S).strip()
+    return proved(show.network, run, ONE_RUN_S).strip()

@@ -8,11 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from appliance.pose import quaternion
 from appliance.show.bundle import require_file
 from appliance.show.config_error import did_you_mean
 
@@ -22,7 +20,8 @@ UNIT_TOLERANCE = 0.05  # how far from length 1 a hand-written quaternion may be 
 class Section(BaseModel):
     """A part of show.yaml or box.yaml. Frozen; a word is never taken for a number, nor 'yes' for a text."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    # A validator is built on first use: a process that reads the box file alone builds none for shows.
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 def key(
@@ -75,6 +74,10 @@ def _in_degrees(value: Any) -> Any:
     """`euler: {x: 90}` or `axis: [0, 1, 0]` with `angle: 90` as a quaternion; anything else as it is."""
     if not isinstance(value, dict):
         return value
+    import numpy as np  # here: most processes read a file without degrees, and nothing else of them needs it
+
+    from appliance.pose import quaternion
+
     cure = "Write {euler: {x: 90}}, or {axis: [0, 1, 0], angle: 90}, in degrees; or [w, x, y, z]."
     euler = value.get("euler")
     if len(value) == 1 and isinstance(euler, dict) and set(euler) <= {"x", "y", "z"}:

@@ -254,6 +254,18 @@ def test_a_plug_in_s_command_loads_none_of_the_box_s_own() -> None:
     assert "appliance.cli.app" in loaded and "appliance.cli.project" not in loaded
 
 
+@pytest.mark.parametrize("command", ["console", "firewall", "preflight"])
+def test_what_needs_the_box_file_alone_loads_no_numbers(command: str, tmp_path: Path) -> None:
+    (tmp_path / "box.yaml").write_text("control: null\n")
+    code = (
+        "import sys; from pathlib import Path; from appliance.show.box import load_box\n"
+        f"import appliance.cli.{command}\n"
+        "assert load_box(Path(sys.argv[1])).control is None\n"
+        "assert 'numpy' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code, tmp_path / "box.yaml"], check=True)
+
+
 def test_pack_vouches_for_a_changed_show(tiny_show: Path, tmp_path: Path, bunraku: Command) -> None:
     show = tmp_path / "mine"
     shutil.copytree(tiny_show, show)

@@ -1,18 +1,10 @@
-"""What tests of OSC receivers need on this machine: a port that nobody has, and messages as they come."""
+"""What tests of OSC receivers need on this machine: messages as they come."""
 
 from __future__ import annotations
-
-import socket
 
 from hw_sim.osc_receiver import OscReceiver, Received
 
 LOOPBACK = "127.0.0.1"
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind((LOOPBACK, 0))
-        return int(taken.getsockname()[1])
 
 
 def take(peer: OscReceiver, count: int) -> list[Received]:

@@ -16,8 +16,9 @@ from appliance.outputs.receivers import OscOutputs
 from appliance.pose.skeleton import Skeleton
 from appliance.show.osc import OscConfig
 from hw_sim.osc_receiver import OscReceiver, Received
+from hw_sim.peers import free_ports
 from tests.outputs.conftest import fill
-from tests.outputs.osc_peers import LOOPBACK, free_port
+from tests.outputs.osc_peers import LOOPBACK
 
 PATIENCE_S = 30.0
 
@@ -27,7 +28,7 @@ def oscdump() -> Iterator[tuple[int, subprocess.Popen[str]]]:
     program = shutil.which("oscdump")
     if not program:
         pytest.fail("the program 'oscdump' is missing: install the Debian package liblo-tools")
-    port = free_port()
+    port = free_ports(1)[0]
     process = subprocess.Popen([program, "-L", str(port)], stdout=subprocess.PIPE, text=True)
     gives_up = threading.Timer(PATIENCE_S, process.kill)  # so that no reading of its lines lasts for ever
     gives_up.start()

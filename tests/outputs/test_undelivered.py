@@ -16,8 +16,9 @@ from appliance.outputs.receivers import OscOutputs
 from appliance.pose.skeleton import Skeleton
 from appliance.show.osc import OscConfig
 from hw_sim.osc_receiver import OscReceiver
+from hw_sim.peers import free_ports
 from tests.outputs.conftest import fill
-from tests.outputs.osc_peers import LOOPBACK, free_port, take
+from tests.outputs.osc_peers import LOOPBACK, take
 
 FRAME_RATE_HZ = 50
 IN_A_NETWORK_OF_ITS_OWN = """
@@ -80,7 +81,7 @@ def peer() -> Iterator[OscReceiver]:
 def test_a_receiver_that_is_not_there_is_counted_and_disturbs_nobody(
     skeleton: Skeleton, frame: JointFrame, peer: OscReceiver
 ) -> None:
-    outputs = OscOutputs([OscConfig(port=free_port()), OscConfig(port=peer.port)], skeleton)
+    outputs = OscOutputs([OscConfig(port=free_ports(1)[0]), OscConfig(port=peer.port)], skeleton)
     for seed in range(20):
         outputs.send_frame(fill(frame, skeleton, seed))
     absent, present = outputs.receivers
@@ -92,7 +93,7 @@ def test_a_receiver_that_is_not_there_is_counted_and_disturbs_nobody(
 
 
 def test_a_receiver_that_comes_back_is_served_within_a_second(skeleton: Skeleton, frame: JointFrame) -> None:
-    port = free_port()
+    port = free_ports(1)[0]
     outputs = OscOutputs([OscConfig(port=port)], skeleton)
     for seed in range(500):  # long enough for the longest pause
         outputs.send_frame(fill(frame, skeleton, seed))
@@ -104,7 +105,7 @@ def test_a_receiver_that_comes_back_is_served_within_a_second(skeleton: Skeleton
 
 
 def test_tries_become_rarer_up_to_once_a_second(skeleton: Skeleton, frame: JointFrame) -> None:
-    outputs = OscOutputs([OscConfig(port=free_port())], skeleton)
+    outputs = OscOutputs([OscConfig(port=free_ports(1)[0])], skeleton)
     tries = []
     for number in range(400):
         sent = outputs.receivers[0].sent

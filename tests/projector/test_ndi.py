@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import time
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ import pytest
 
 from appliance.projector.stream.feed import Feed
 from appliance.show.stream import StreamConfig
-from tests.outputs.osc_peers import free_port
+from hw_sim.peers import free_ports
 from tests.projector.test_stream import connected
 
 WITHIN_S = 60.0
@@ -60,7 +61,10 @@ def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     [(False, "RGBX 25/1 1 1 ff000007000064"), (True, "RGBA 25/1 1 1 ff0000ff0000ff64")],
 )
 def test_receivers_get_the_upright_picture(told: Path, has_alpha: bool, pixels: str) -> None:
-    feed = Feed(StreamConfig(port=free_port(), ndi="Bunraku", ndi_alpha=has_alpha), pytest.fail)
+    feed = Feed(
+        StreamConfig(port=free_ports(1, socket.SOCK_STREAM)[0], ndi="Bunraku", ndi_alpha=has_alpha),
+        pytest.fail,
+    )
     until = time.monotonic() + WITHIN_S
     lines: list[str] = []
     while len(lines) < 3:
@@ -75,7 +79,7 @@ def test_receivers_get_the_upright_picture(told: Path, has_alpha: bool, pixels: 
 
 @pytest.mark.skipif(find_library("ndi") is not None, reason="NDI's library is installed here")
 def test_without_the_library_it_is_told_and_http_goes_on(capfd: pytest.CaptureFixture[str]) -> None:
-    port = free_port()
+    port = free_ports(1, socket.SOCK_STREAM)[0]
     feed = Feed(StreamConfig(port=port, ndi="Bunraku"), pytest.fail)
     feed.offer(time.monotonic(), (1, 1), lambda: bytes(4))
     connected(port, "/").close()  # it listens

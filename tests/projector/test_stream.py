@@ -27,7 +27,7 @@ from appliance.projector.stream.keying import keyed
 from appliance.show.box import load_box
 from appliance.show.config_error import ConfigError
 from appliance.show.stream import StreamConfig
-from tests.outputs.osc_peers import free_port
+from hw_sim.peers import free_ports
 from tests.projector.golden_looks import AT_S, SIZE
 from tests.system.processes import BUNRAKU
 
@@ -72,7 +72,7 @@ class Shown:
 
 @pytest.fixture
 def shown() -> Iterator[tuple[Shown, int]]:
-    port = free_port()
+    port = free_ports(1, socket.SOCK_STREAM)[0]
     shown = Shown(port)
     shown.offer()
     yield shown, port
@@ -172,7 +172,7 @@ def test_a_client_that_takes_nothing_for_long_makes_room(monkeypatch: pytest.Mon
         newest = server.Newest(StreamConfig(), BytesIO())
         runner = web.AppRunner(server._app(StreamConfig(), newest))
         await runner.setup()
-        await web.TCPSite(runner, HOST, port := free_port()).start()
+        await web.TCPSite(runner, HOST, port := free_ports(1, socket.SOCK_STREAM)[0]).start()
         _, writer = await asyncio.open_connection(HOST, port, limit=64)
         writer.write(b"GET /picture.mjpg HTTP/1.1\r\nHost: box\r\n\r\n")
         async with asyncio.timeout(WITHIN_S):
@@ -188,7 +188,7 @@ def test_a_client_that_takes_nothing_for_long_makes_room(monkeypatch: pytest.Mon
 
 
 def test_a_projector_serves_what_its_display_shows_and_takes_the_process_along(tmp_path: Path) -> None:
-    port = free_port()
+    port = free_ports(1, socket.SOCK_STREAM)[0]
     box = tmp_path / "box.yaml"
     box.write_text(f"runtime: run\nprojector:\n  stream: {{port: {port}}}\n")
     command = [*BUNRAKU, "project", "--box", box, "--offscreen", "64x36"]
