@@ -43,8 +43,9 @@ MINUTES ?= 60
 SIGNING = $(if $(KEY),--key '$(KEY)') $(if $(NEXT_KEY),--next-key '$(NEXT_KEY)')
 
 .DEFAULT_GOAL := help
-.PHONY: help run release studio firmware test test-long firmware-test fuzz-corpus lint bench lock clean soak boot-figures \
-    boot-root image test-vm debian-for-image debian-for-vm debian-for-firmware debian-for-tests debian-for-boot debian-for-soak
+.PHONY: help run release studio firmware test test-long pytest firmware-test fuzz-corpus lint lint-beside bench \
+    lock clean soak boot-figures image test-vm debian-for-image debian-for-vm debian-for-firmware \
+    debian-for-tests debian-for-boot debian-for-soak
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -61,15 +62,17 @@ firmware: debian-for-firmware ## build the wearable's firmware for this machine:
 	@$(call build,firmware,wearable)
 	@echo "Built build/firmware/libwearable.so"
 
-test: $(VENV)/.ready-to-test debian-for-tests debian-for-boot ## style, types, contracts, all tests
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target firmware-test lint boot-root
+test: $(VENV)/.ready-to-test debian-for-boot firmware-test ## style, types, contracts, all tests
+	@$(MAKE) --no-print-directory --jobs=2 pytest lint-beside
+
+pytest: $(VENV)/.ready-to-test
 	@$(BIN)/pytest $(BESIDE) $(LENGTH) $(TEST_ARGS)
+
+lint-beside:  # while tests wait: with what they leave of the processors
+	@chrt --idle 0 $(MAKE) --no-print-directory lint
 
 test-long: ## the same with every count at its full length: power cuts, fuzzing, random files, property tests
 	@$(MAKE) --no-print-directory test LENGTH=--long
-
-boot-root: $(VENV)/.ready-to-test debian-for-boot
-	@$(BIN)/python -m tests.boot.root
 
 firmware-test: debian-for-tests firmware ## the wearable: host tests, analysis, size and stack, emulated board, fuzzing
 	@echo "Wearable: host tests with sanitizers"
