@@ -22,13 +22,22 @@ export class Dance {
     this.show = null;
     this.frame = null;
     this.generation = -1;
+    this.drawn = null;
+    this.isAwaited = false;
     box.addEventListener("frame", (event) => this.take(event.detail));
+    box.addEventListener("beat", () => this.redraw());
+    new ResizeObserver(() => this.redraw()).observe(canvas);
     this.turnBy(canvas);
-    const next = () => {
-      if (!document.hidden && canvas.offsetParent !== null) this.draw();
-      requestAnimationFrame(next);
-    };
-    requestAnimationFrame(next);
+  }
+
+  // With the next picture of the display: where nothing new came, a phone draws nothing.
+  redraw() {
+    if (this.isAwaited || this.canvas.offsetParent === null) return;
+    this.isAwaited = true;
+    requestAnimationFrame(() => {
+      this.isAwaited = false;
+      if (this.canvas.offsetParent !== null) this.draw();
+    });
   }
 
   // A new stage may dance another skeleton.
@@ -54,6 +63,7 @@ export class Dance {
     this.frame = { tick: head.getFloat64(0, true), figures, source, ...figures[0] }; // fingers and words are the first one's
     this.takenAt = performance.now();
     document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
+    this.redraw();
   }
 
   turnBy(canvas) {
@@ -94,9 +104,13 @@ export class Dance {
   turn(yaw, pitch) {
     this.yaw += yaw;
     this.pitch = Math.min(1.4, Math.max(-0.2, this.pitch + pitch));
+    this.redraw();
   }
 
-  magnify(by) { this.zoom = Math.min(4, Math.max(0.4, this.zoom * by)); }
+  magnify(by) {
+    this.zoom = Math.min(4, Math.max(0.4, this.zoom * by));
+    this.redraw();
+  }
 
   draw() {
     const { canvas, frame, show } = this, ratio = Math.min(devicePixelRatio || 1, 2);
@@ -112,11 +126,13 @@ export class Dance {
     const ghost = frame.source && show.offsets ? this.ghost(frame) : null;
     if (ghost) roots.push(pointOf(ghost, 0));
     const middle = [0, 2].map((axis) => roots.reduce((sum, one) => sum + one[axis], 0) / roots.length);
+    const share = frame === this.drawn ? 0 : 0.05; // the eye follows the dance, frame by frame
+    this.drawn = frame;
     this.centre ??= middle;
-    this.centre = this.centre.map((value, axis) => value + 0.05 * (middle[axis] - value));
+    this.centre = this.centre.map((value, axis) => value + share * (middle[axis] - value));
     const apart = Math.max(...roots.map((one) => Math.hypot(one[0] - middle[0], one[2] - middle[1])));
     const away = NEAR_M + BACK * apart;
-    this.away += 0.05 * (away - this.away);
+    this.away += share * (away - this.away);
     const eye = this.eye(wide, high);
     this.drawFloor(ink, eye, ratio);
     const bones = [...frame.figures, ...ghost ? [ghost] : []].flatMap((figure) => this.bones(figure));

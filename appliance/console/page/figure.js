@@ -41,7 +41,9 @@ export class Figure extends Dance {
     });
     canvas.addEventListener("pointermove", (event) => {
       const hold = this.taken.get(event.pointerId);
-      if (hold) hold.at = this.pixel(event);
+      if (!hold) return;
+      hold.at = this.pixel(event);
+      this.redraw();
     });
     for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) {
       canvas.addEventListener(kind, (event) => this.release(event.pointerId));
