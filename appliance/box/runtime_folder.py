@@ -7,8 +7,10 @@ import os
 import stat
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from appliance.show.box import BoxConfig
+if TYPE_CHECKING:
+    from appliance.show.box import BoxConfig
 
 _OTHERS = 0o077
 _CURE = "Give another folder as `runtime:` in the box file."

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -27,10 +27,11 @@ from appliance.cli.options import (
 from appliance.cli.page_address import address, address_of, open_console_port
 from appliance.console.devices import Devices
 from appliance.console.settings import Settings
-from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import NotAskedForError, Problem
-from appliance.show.console import ConsoleConfig
 from appliance.stage.stage_error import StageError
+
+if TYPE_CHECKING:
+    from appliance.show.box import BoxConfig
 
 _KEPT, _WHERE = "console.json", "console.path"
 
@@ -46,6 +47,7 @@ def serve(context: typer.Context, box: BoxFile = None, chosen: ChosenFile = None
     if is_for_subcommand(context, box, chosen):
         return
     from appliance.release.choice import box_of
+    from appliance.show.box import load_box
 
     config = load_box(box_of(box, chosen))
     if config.console is None:
@@ -111,6 +113,7 @@ def prove_wanted(box: BoxFile = None, chosen: ChosenFile = None) -> None:
     from appliance.cli.proof import prove
     from appliance.console.proofs import FOLDER, Proofs
     from appliance.release.choice import box_of
+    from appliance.show.box import load_box
 
     path = box_of(box, chosen)
     config = load_box(path)
@@ -204,6 +207,8 @@ def console_command(
 
     Raises StageError.
     """
+    from appliance.show.console import ConsoleConfig
+
     console, own = box.console or ConsoleConfig(), box.control
     if control is None and own is not None and own.port:
         control = own.host, own.port
@@ -266,6 +271,7 @@ def _named(box: BoxConfig, chosen: Path | None) -> tuple[str, ...]:
 
 def _devices(box: Path | None) -> Devices:
     from appliance.release.installed_box import box_here
+    from appliance.show.box import load_box
 
     path = _kept_here(load_box(box_here(box)))
     try:

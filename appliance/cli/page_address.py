@@ -7,9 +7,12 @@ import errno
 import ipaddress
 import os
 import socket
+from typing import TYPE_CHECKING
 
-from appliance.show.console import ConsoleConfig
 from appliance.stage.stage_error import StageError
+
+if TYPE_CHECKING:
+    from appliance.show.console import ConsoleConfig
 
 _ELSEWHERE = "192.0.2.1", 9  # an address of no machine (RFC 5737): which of ours would a packet leave by?
 
