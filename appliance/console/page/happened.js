@@ -32,9 +32,9 @@ export function initHappened() {
 
 export async function readHappened() {
   const answer = await ask("/api/happened");
+  if (answer !== null) runs = await answer.json();
   byId("happened-all").hidden = answer === null;
   if (answer === null) return;
-  runs = await answer.json();
   byId("happened-run").replaceChildren(...runs.map((one, place) => {
     const option = document.createElement("option"), date = new Date(1000 * one.begun).toLocaleDateString(locale);
     option.value = place;
