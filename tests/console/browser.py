@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from playwright.sync_api import BrowserContext, expect
 from playwright.sync_api import Page as Tab
 
@@ -16,6 +17,9 @@ PATIENCE_MS = 1000 * PATIENCE_S
 CHROMIUM = "/usr/bin/chromium"
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}}
+ON_A_LAPTOP = pytest.mark.parametrize("context", [LAPTOP], ids=["laptop"], indirect=True)
+# For what finger and mouse do differently, and for the layout of a page.
+ON_BOTH = pytest.mark.parametrize("context", [PHONE, LAPTOP], ids=["phone", "laptop"], indirect=True)
 
 
 def press(tab: Tab, where: str) -> None:

@@ -10,15 +10,29 @@ from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright
 from playwright.sync_api import Page as Tab
 
 from tests.bundles import write_show
-from tests.console.browser import CHROMIUM, LAPTOP, PATIENCE_MS, PHONE
+from tests.console.browser import CHROMIUM, PATIENCE_MS, PHONE
 from tests.console.page import CUES, Page, box_with_page, page_alone
 from tests.system.box import Box
 
 
 @pytest.fixture
-def page(tmp_path: Path) -> Iterator[Page]:
+def own_page(tmp_path: Path) -> Iterator[Page]:
+    """A page whose PIN, devices or files a test spoils."""
     with page_alone(tmp_path) as (page, _):
         yield page
+
+
+@pytest.fixture(scope="module")
+def open_page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    with page_alone(tmp_path_factory.mktemp("page")) as (page, _):
+        yield page
+
+
+@pytest.fixture
+def page(open_page: Page) -> Page:
+    """The page of this module, on a device that has not given the PIN. No test gives it a wrong one."""
+    open_page.cookie = ""
+    return open_page
 
 
 PUPPETS = [{"name": "left", "x": -0.8}, {"name": "right", "x": 0.8, "turned": 30}]
@@ -42,9 +56,10 @@ def browser() -> Iterator[Browser]:
         chromium.close()
 
 
-@pytest.fixture(params=[PHONE, LAPTOP], ids=["phone", "laptop"])
+@pytest.fixture
 def context(request: pytest.FixtureRequest, browser: Browser) -> Iterator[BrowserContext]:
-    made = browser.new_context(**request.param, locale="en-GB")
+    """A phone; or what a test is marked with: ON_A_LAPTOP, ON_BOTH."""
+    made = browser.new_context(**getattr(request, "param", PHONE), locale="en-GB")
     made.set_default_timeout(PATIENCE_MS)
     yield made
     made.close()

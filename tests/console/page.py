@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import http.client
 import json
 import socket
@@ -44,9 +45,9 @@ class Page:
     def origin(self) -> str:
         return f"http://{HOST}:{self.port}"
 
-    @property
+    @functools.cached_property
     def pin(self) -> str:
-        """As `bunraku console pin` prints it."""
+        """As `bunraku console pin` printed it when it was asked first."""
         done = run_bunraku("console", "pin", "--box", self.box_file)
         assert done.returncode == 0, done.stderr
         return done.stdout.strip()
@@ -106,16 +107,23 @@ def page_alone(folder: Path, **console: Any) -> Iterator[tuple[Page, Process]]:
 
 @contextlib.contextmanager
 def box_with_page(
-    show: Path, folder: Path, *arguments: str, settings: dict[str, Any] | None = None
+    show: Path,
+    folder: Path,
+    *arguments: str,
+    settings: dict[str, Any] | None = None,
+    has_sensors: bool = True,
 ) -> Iterator[tuple[Box, Page]]:
     """A box that dances with its emulated sensors, and its page; `settings`: more of the box file."""
     (port,) = free_ports(1, socket.SOCK_STREAM)
     given = settings or {}
     whole = {**given, "console": {"port": port, **given.get("console", {})}}
-    with playing(show, folder, "--emulate", *arguments, settings=whole) as box:
+    emulated = ("--emulate",) if has_sensors else ()
+    with playing(show, folder, *emulated, *arguments, settings=whole) as box:
         page = Page(port, box.box_file)
         wait_until(page.is_open, lambda: box.words)
-        wait_until(lambda: _is_linked(page), lambda: box.words)
+        wait_until(
+            lambda: _is_linked(page) if has_sensors else page.status().get("status"), lambda: box.words
+        )
         try:
             yield box, page
         finally:

@@ -11,7 +11,7 @@ from playwright.sync_api import Page as Tab
 from playwright.sync_api import expect
 
 from appliance.show.box import UdpConfig, load_box
-from tests.console.browser import press, unlock
+from tests.console.browser import ON_A_LAPTOP, ON_BOTH, press, unlock
 from tests.console.page import Page
 from tests.system.box import Box
 
@@ -51,6 +51,7 @@ def test_the_box_tells_which_shows_it_has(tab: Tab) -> None:
     expect(tab.locator("#box-network")).to_contain_text("192.0.2.7")
 
 
+@ON_A_LAPTOP
 def test_a_venue_changes_its_ports_and_a_mistake_has_its_line(tab: Tab, venue: tuple[Box, Page]) -> None:
     """The whole file is checked as `bunraku check` does; what was written before is kept beside it."""
     box, page = venue
@@ -85,6 +86,7 @@ def test_a_venue_changes_its_ports_and_a_mistake_has_its_line(tab: Tab, venue: t
     assert path.read_text() == before
 
 
+@ON_BOTH
 def test_the_last_lines_are_for_a_device_that_gave_the_pin(tab: Tab, venue: tuple[Box, Page]) -> None:
     _, page = venue
     assert page.get("/api/logs", Cookie="none").status == 401

@@ -18,7 +18,7 @@ from appliance.pose.bvh import read_bvh
 from appliance.recorder.journal_error import JournalError
 from appliance.recorder.reading import Run, read_journal
 from tests.bundles import FIGURE
-from tests.console.browser import await_true, press
+from tests.console.browser import ON_A_LAPTOP, await_true, press
 from tests.console.page import Page
 from tests.system.box import Box
 from tests.system.processes import run_bunraku, wait_until
@@ -26,6 +26,7 @@ from tests.system.processes import run_bunraku, wait_until
 pytestmark = pytest.mark.realtime
 
 
+@ON_A_LAPTOP
 def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page]) -> None:
     box, _ = venue
     reader = FrameReader(box.runtime)
@@ -44,11 +45,24 @@ def test_the_dance_is_seen_as_it_leaves_the_box(tab: Tab, venue: tuple[Box, Page
     expect(tab.locator("#held")).not_to_contain_text("No frame")
     tab.wait_for_timeout(700)  # what was on its way has come
     count = tab.evaluate("document.body.dataset.frames")
+    tab.evaluate(PICTURES_COUNTED)
     tab.wait_for_timeout(1000)
     assert tab.evaluate("document.body.dataset.frames") == count, "switched off, it costs nothing"
+    assert tab.evaluate("pictures / (performance.now() - picturesFrom)") < 0.01, "it draws what it has drawn"
     tab.locator("#show-dance").check()
     await_true(tab, f"Number(document.body.dataset.frames) > {count}")
     reader.close()
+
+
+# Of the display, which the page asks for from now on.
+PICTURES_COUNTED = """() => {
+  const ask = requestAnimationFrame;
+  [window.pictures, window.picturesFrom] = [0, performance.now()];
+  window.requestAnimationFrame = (draw) => {
+    window.pictures++;
+    return ask(draw);
+  };
+}"""
 
 
 def test_the_phrase_stands_beside_the_puppet_as_it_is_without_hands(
@@ -105,6 +119,7 @@ def test_what_happened_is_danced_again(tab: Tab, venue: tuple[Box, Page]) -> Non
     expect(tab.locator("#again")).to_be_hidden()
 
 
+@ON_A_LAPTOP
 def test_the_journal_itself_is_saved_by_who_gave_the_pin_and_danced_again(
     tab: Tab, venue: tuple[Box, Page], tmp_path: Path
 ) -> None:

@@ -15,7 +15,7 @@ from playwright.sync_api import Page as Tab
 
 from appliance.outputs.frame_reader import FrameReader
 from tests.bundles import WORN, write_show
-from tests.console.browser import LAPTOP, PHONE, await_true, unlocked_tab
+from tests.console.browser import LAPTOP, ON_BOTH, PHONE, await_true, unlocked_tab
 from tests.console.page import Page, box_with_page
 from tests.system.box import Box
 from tests.system.processes import children_running, wait_until
@@ -32,7 +32,7 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
     """A box whose show has a hand for the page."""
     folder = tmp_path_factory.mktemp("studio")
     show = write_show(folder / "show", hands=[WORN, {"osc": True, "joint": HELD}])
-    with box_with_page(show, folder) as (box, page):
+    with box_with_page(show, folder, has_sensors=False) as (box, page):
         reader = FrameReader(box.runtime)
         yield box, page, reader
         reader.close()
@@ -95,6 +95,7 @@ def _touch(kind: str, *at: tuple[float, float]) -> dict[str, Any]:
     return {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in at]}
 
 
+@ON_BOTH
 def test_a_ring_that_is_dragged_is_a_hand(context: BrowserContext, studio: Studio) -> None:
     tab = opened(context, studio)
     finger, (x, y) = Finger(tab), ring(tab)

@@ -28,7 +28,7 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Box, Page
     """A box that dances the show that comes with it."""
     folder = tmp_path_factory.mktemp("studio")
     shutil.copytree(default_show_path(), folder / "show")
-    with box_with_page(folder / "show", folder) as (box, page):
+    with box_with_page(folder / "show", folder, has_sensors=False) as (box, page):
         yield box, page
 
 

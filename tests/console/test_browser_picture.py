@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from playwright.sync_api import BrowserContext, expect
 from playwright.sync_api import Page as Tab
 
 from tests.bundles import write_show
-from tests.console.browser import declared, press, unlocked_tab
+from tests.console.browser import ON_BOTH, declared, press, unlocked_tab
 from tests.console.page import Page, box_with_page
 from tests.system.box import Box
 from tests.system.lit import DIMMER, PAR, RIG, Node, artnet, node
@@ -28,68 +27,21 @@ RED = PAR + 1
 def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Box, Page, Node]]:
     """A box with a rig, whose levels arrive at a node."""
     folder = tmp_path_factory.mktemp("hall")
+    show = write_show(folder / "show", lights=RIG)
     with (
         node() as (lamps, port),
-        box_with_page(write_show(folder / "show", lights=RIG), folder, settings=artnet(port, 1, 2)) as (
-            box,
-            page,
-        ),
+        box_with_page(show, folder, settings=artnet(port, 1, 2), has_sensors=False) as (box, page),
     ):
         yield box, page, lamps
 
 
-def test_a_corner_follows_the_finger_on_the_wall(
-    context: BrowserContext, hall: tuple[Box, Page, Node], tmp_path: Path
-) -> None:
-    box, page, _ = hall
-    with Projection(box.box_file, tmp_path) as projection:
+@pytest.fixture(scope="module")
+def wall(hall: tuple[Box, Page, Node], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Projection]:
+    """The projector beside that box."""
+    with Projection(hall[0].box_file, tmp_path_factory.mktemp("wall")) as projection:
         projection.await_dance()
-        tab = unlocked_tab(context, page, "picture")
-        press(tab, "#grid-on")
-        projection.await_picture(lambda picture: bool(picture[:3, :3].any()))
-        pad, handle = (tab.locator(one).bounding_box() for one in ("#corners", "#corners button >> nth=0"))
-        assert pad is not None and handle is not None
-        way = 0.25 * pad["width"], 0.25 * pad["height"]
-        drag(tab, handle["x"] + 30, handle["y"] + 30, *way)
-        quarter = pytest.approx((0.25, 0.25), abs=0.01)
-        wait_until(lambda: _corner(box) == quarter, lambda: f"{_corner(box)} {tab.inner_text('#said')}")
-        projection.await_picture(lambda picture: not np.any(picture[:12, :20]))
-        corner = _corner(box)
-        tab.locator("#corners button").nth(0).press("ArrowRight")
-        wait_until(lambda: _corner(box)[0] > corner[0] + 0.001)
-        wait_until(  # a projector that is busy refuses, and the page says so: a person presses again
-            lambda: press(tab, "#corners-reset") or _corner(box) == pytest.approx((0, 0), abs=0.001),
-            lambda: f"{_corner(box)} {tab.inner_text('#said')}",
-        )
-        projection.await_picture(lambda picture: bool(picture[:3, :3].any()))
-        press(tab, "#grid-off")
+        yield projection
         projection.end()
-
-
-def drag(tab: Tab, x: float, y: float, dx: float, dy: float) -> None:
-    """By finger on a phone, by mouse on a laptop; slowly enough for a hand."""
-    steps = [(x + dx * part / 10, y + dy * part / 10) for part in range(11)]
-    if not tab.evaluate("matchMedia('(pointer: coarse)').matches"):
-        tab.mouse.move(x, y)
-        tab.mouse.down()
-        for at in steps:
-            tab.mouse.move(*at)
-            tab.wait_for_timeout(50)
-        tab.mouse.up()
-        return
-    touch = tab.context.new_cdp_session(tab)
-    for kind, at in [("touchStart", steps[0]), *(("touchMove", at) for at in steps)]:
-        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": at[0], "y": at[1]}]})
-        tab.wait_for_timeout(50)
-    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-
-
-def _corner(box: Box) -> tuple[float, float]:
-    """Where the projector keeps the first corner."""
-    kept = box.box_file.with_name("projector.alignment")
-    corners = (yaml.safe_load(kept.read_text()) if kept.is_file() else {}).get("corners", [[0, 0]])
-    x, y = corners[0]
-    return float(x), float(y)
 
 
 def test_the_rig_shines_on_the_page_and_is_walked_while_the_show_stands(
@@ -137,3 +89,57 @@ LIT = """() => {
   const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
   return data.reduce((most, one, place) => place % 4 === 3 ? most : Math.max(most, one), 0);
 }"""
+
+
+@ON_BOTH
+def test_a_corner_follows_the_finger_on_the_wall(
+    context: BrowserContext, hall: tuple[Box, Page, Node], wall: Projection
+) -> None:
+    box, page, _ = hall
+    tab = unlocked_tab(context, page, "picture")
+    press(tab, "#grid-on")
+    wall.await_picture(lambda picture: bool(picture[:3, :3].any()))
+    pad, handle = (tab.locator(one).bounding_box() for one in ("#corners", "#corners button >> nth=0"))
+    assert pad is not None and handle is not None
+    way = 0.25 * pad["width"], 0.25 * pad["height"]
+    drag(tab, handle["x"] + 30, handle["y"] + 30, *way)
+    quarter = pytest.approx((0.25, 0.25), abs=0.01)
+    wait_until(lambda: _corner(box) == quarter, lambda: f"{_corner(box)} {tab.inner_text('#said')}")
+    wall.await_picture(lambda picture: not np.any(picture[:12, :20]))
+    corner = _corner(box)
+    tab.locator("#corners button").nth(0).press("ArrowRight")
+    wait_until(lambda: _corner(box)[0] > corner[0] + 0.001)
+    wait_until(  # a projector that is busy refuses, and the page says so: a person presses again
+        lambda: press(tab, "#corners-reset") or _corner(box) == pytest.approx((0, 0), abs=0.001),
+        lambda: f"{_corner(box)} {tab.inner_text('#said')}",
+    )
+    wall.await_picture(lambda picture: bool(picture[:3, :3].any()))
+    press(tab, "#grid-off")
+    expect(tab.locator("#rig")).to_be_visible()
+    assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def drag(tab: Tab, x: float, y: float, dx: float, dy: float) -> None:
+    """By finger on a phone, by mouse on a laptop; slowly enough for a hand."""
+    steps = [(x + dx * part / 10, y + dy * part / 10) for part in range(11)]
+    if not tab.evaluate("matchMedia('(pointer: coarse)').matches"):
+        tab.mouse.move(x, y)
+        tab.mouse.down()
+        for at in steps:
+            tab.mouse.move(*at)
+            tab.wait_for_timeout(50)
+        tab.mouse.up()
+        return
+    touch = tab.context.new_cdp_session(tab)
+    for kind, at in [("touchStart", steps[0]), *(("touchMove", at) for at in steps)]:
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": at[0], "y": at[1]}]})
+        tab.wait_for_timeout(50)
+    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+
+def _corner(box: Box) -> tuple[float, float]:
+    """Where the projector keeps the first corner."""
+    kept = box.box_file.with_name("projector.alignment")
+    corners = (yaml.safe_load(kept.read_text()) if kept.is_file() else {}).get("corners", [[0, 0]])
+    x, y = corners[0]
+    return float(x), float(y)

@@ -11,7 +11,7 @@ from PIL import Image
 from playwright.sync_api import Browser, expect
 from playwright.sync_api import Page as Tab
 
-from tests.console.browser import LAPTOP, PATIENCE_MS, PHONE, await_true, declared, press, unlock
+from tests.console.browser import ON_A_LAPTOP, PATIENCE_MS, PHONE, await_true, declared, press, unlock
 from tests.console.page import Page
 from tests.system.box import Box
 from tests.system.processes import children, has_argument, wait_until
@@ -101,7 +101,7 @@ def ours(pid: int, word: str) -> bool:
     return any(has_argument(child, word) or ours(child, word) for child in children(pid))
 
 
-@pytest.mark.parametrize("context", [LAPTOP], ids=["laptop"], indirect=True)
+@ON_A_LAPTOP
 def test_a_measurement_ends_when_the_show_goes_on(tab: Tab, venue: tuple[Box, Page]) -> None:
     """It must not take the time of a dance that people see; neither a box nor a sensor of it stays."""
     box, page = venue

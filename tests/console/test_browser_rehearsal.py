@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Page as Tab
 from playwright.sync_api import expect
 
-from tests.console.browser import press, unlock
+from tests.console.browser import ON_A_LAPTOP, press, unlock
 from tests.console.page import Page
 from tests.system.box import Box
 from tests.system.processes import wait_until
@@ -27,6 +27,7 @@ def test_sensors_have_cards_and_take_their_neutral_pose(tab: Tab, venue: tuple[B
     expect(tab.locator("#said")).to_contain_text("neutral", ignore_case=True)
 
 
+@ON_A_LAPTOP
 def test_a_rehearsal_changes_iterations_and_hands(tab: Tab, venue: tuple[Box, Page]) -> None:
     _, page = venue
     unlock(tab, page)

@@ -47,19 +47,19 @@ def test_looking_needs_no_pin_and_every_file_is_the_box_s_own(page: Page) -> Non
     assert page.get("/status").value["verdict"]["key"] == "stage_absent"
 
 
-def test_acting_needs_the_pin_and_a_remembered_device_needs_it_once(page: Page) -> None:
-    refused = page.command("/panic")
+def test_acting_needs_the_pin_and_a_remembered_device_needs_it_once(own_page: Page) -> None:
+    refused = own_page.command("/panic")
     assert refused.status == 401 and "PIN" in refused.text
-    assert page.get("/api/devices").status == 401
-    wrong = page.post("/api/pin", {"pin": f"{(int(page.pin) + 1) % 1_000_000:06}", "name": "x"})
+    assert own_page.get("/api/devices").status == 401
+    wrong = own_page.post("/api/pin", {"pin": f"{(int(own_page.pin) + 1) % 1_000_000:06}", "name": "x"})
     assert wrong.status == 403 and "Set-Cookie" not in wrong.headers
-    page.unlock()
-    assert page.get("/api/me").value["known"] is True
-    assert page.command("/panic").status == 503, "no show control answers here, and it says so"
-    (own,) = page.get("/api/devices").value
+    own_page.unlock()
+    assert own_page.get("/api/me").value["known"] is True
+    assert own_page.command("/panic").status == 503, "no show control answers here, and it says so"
+    (own,) = own_page.get("/api/devices").value
     assert own["own"] and own["name"] == "a test"
-    assert page.post("/api/revoke", {"id": own["id"]}).status == 200
-    assert page.command("/panic").status == 401
+    assert own_page.post("/api/revoke", {"id": own["id"]}).status == 200
+    assert own_page.command("/panic").status == 401
 
 
 def test_the_cookie_is_for_the_page_alone(page: Page) -> None:
@@ -67,40 +67,41 @@ def test_the_cookie_is_for_the_page_alone(page: Page) -> None:
     assert "HttpOnly" in answer.headers["Set-Cookie"] and "SameSite=Strict" in answer.headers["Set-Cookie"]
 
 
-def test_devices_are_listed_and_revoked_at_the_prompt(page: Page) -> None:
-    page.unlock()
-    listed = run_bunraku("console", "devices", "--box", page.box_file).stdout
+def test_devices_are_listed_and_revoked_at_the_prompt(own_page: Page) -> None:
+    own_page.unlock()
+    listed = run_bunraku("console", "devices", "--box", own_page.box_file).stdout
     assert "a test" in listed
-    assert run_bunraku("console", "revoke", listed.split()[0], "--box", page.box_file).returncode == 0
-    assert page.command("/panic").status == 401
-    missing = run_bunraku("console", "revoke", "nobody", "--box", page.box_file)
+    assert run_bunraku("console", "revoke", listed.split()[0], "--box", own_page.box_file).returncode == 0
+    assert own_page.command("/panic").status == 401
+    missing = run_bunraku("console", "revoke", "nobody", "--box", own_page.box_file)
     assert missing.returncode == 2 and "no device nobody" in missing.stderr
-    before = page.pin
-    assert run_bunraku("console", "pin", "--new", "--box", page.box_file).stdout.strip() == page.pin != before
-    assert page.post("/api/pin", {"pin": before, "name": ""}).status == 403
+    before = own_page.pin
+    chosen = run_bunraku("console", "pin", "--new", "--box", own_page.box_file).stdout.strip()
+    assert chosen == Page(own_page.port, own_page.box_file).pin != before
+    assert own_page.post("/api/pin", {"pin": before, "name": ""}).status == 403
 
 
-def test_wrong_pins_are_slowed_down_and_then_even_the_right_one_waits(page: Page) -> None:
-    pin = page.pin
+def test_wrong_pins_are_slowed_down_and_then_even_the_right_one_waits(own_page: Page) -> None:
+    pin = own_page.pin
     for _ in range(FREE_TRIES):
-        assert page.post("/api/pin", {"pin": "x" * 6, "name": ""}).status == 403
-    late = page.post("/api/pin", {"pin": pin, "name": ""})
+        assert own_page.post("/api/pin", {"pin": "x" * 6, "name": ""}).status == 403
+    late = own_page.post("/api/pin", {"pin": pin, "name": ""})
     assert late.status == 429 and 0 < int(late.headers["Retry-After"]) <= 60
 
 
-def test_pins_that_wait_for_their_bodies_are_counted_like_all_others(page: Page) -> None:
+def test_pins_that_wait_for_their_bodies_are_counted_like_all_others(own_page: Page) -> None:
     """Requests that are all begun before the first wrong PIN came: five of them are tried."""
     body = b'{"pin": "xxxxxx", "name": ""}'
-    head = f"POST /api/pin HTTP/1.1\r\nHost: {HOST}:{page.port}\r\nOrigin: {page.origin}\r\n"
+    head = f"POST /api/pin HTTP/1.1\r\nHost: {HOST}:{own_page.port}\r\nOrigin: {own_page.origin}\r\n"
     head += f"Content-Length: {len(body)}\r\nConnection: close\r\n\r\n"
     with contextlib.ExitStack() as opened:
         begun = [
-            opened.enter_context(socket.create_connection((HOST, page.port), 60))
+            opened.enter_context(socket.create_connection((HOST, own_page.port), 60))
             for _ in range(4 * FREE_TRIES)
         ]
         for one in begun:
             one.sendall(head.encode() + body[:1])
-        page.get("/status")
+        own_page.get("/status")
         time.sleep(0.5)
         for one in begun:
             one.sendall(body[1:])
@@ -173,10 +174,10 @@ def test_the_box_tells_what_it_is(page: Page) -> None:
     assert told["shows"] == [], "nothing was chosen at power-on here"
 
 
-def test_a_box_file_that_is_gone_is_no_fault_of_the_page(page: Page) -> None:
-    page.box_file.unlink()
-    assert page.get("/api/box").status == 200
-    assert page.get("/status").status == 200
+def test_a_box_file_that_is_gone_is_no_fault_of_the_page(own_page: Page) -> None:
+    own_page.box_file.unlink()
+    assert own_page.get("/api/box").status == 200
+    assert own_page.get("/status").status == 200
 
 
 def test_a_box_without_a_journal_says_so(page: Page) -> None:

@@ -11,7 +11,6 @@ import struct
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,8 +21,7 @@ from appliance.console.watchers import LONGEST_MESSAGE, MOST
 from appliance.outputs.frame_layout import BROWSER_HEAD
 from appliance.outputs.frame_reader import FrameReader
 from hw_sim.peers import HOST
-from tests.bundles import write_show
-from tests.console.page import Page, box_with_page
+from tests.console.page import Page
 from tests.system.box import Box
 from tests.system.processes import PATIENCE_S, children_running, wait_until
 
@@ -251,20 +249,28 @@ def test_metrics_are_for_prometheus(venue: tuple[Box, Page]) -> None:
     assert {name.partition("{")[0] for name in values} == typed
 
 
-def test_the_page_dies_and_comes_back_and_the_dance_does_not_notice(tmp_path: Path) -> None:
-    with box_with_page(write_show(tmp_path / "show"), tmp_path) as (box, page):
-        assert f"The page: {page.origin}, PIN {page.pin}." in box.words
-        page.unlock()
-        first = box.frames(1)[0][0]
-        (process,) = children_running(box.process.pid, "appliance.console")
-        for number in (signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT):
-            with contextlib.suppress(ProcessLookupError):
-                signal.pidfd_send_signal(pidfd(process), number)
-        wait_until(lambda: children_running(box.process.pid, "appliance.console") not in ([process], []))
-        wait_until(page.is_open)
-        assert page.get("/api/me").value["known"], "the device is remembered"
-        assert box.frames(1)[0][0] > first and box.process.poll() is None
-        wait_until(lambda: "console-died" in [one["name"] for one in page.status().get("fallbacks", ())])
+def test_the_page_dies_and_comes_back_and_the_dance_does_not_notice(venue: tuple[Box, Page]) -> None:
+    box, page = venue
+
+    def deaths() -> int:
+        told = page.status().get("fallbacks", ())
+        return sum(one["times"] for one in told if one["name"] == "console-died")
+
+    assert f"The page: {page.origin}, PIN {page.pin}." in box.words
+    page.unlock()
+    before = deaths()
+    box.pause()
+    first = box.frames(1)[0][0]
+    (process,) = children_running(box.process.pid, "appliance.console")
+    for number in (signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT):
+        with contextlib.suppress(ProcessLookupError):
+            signal.pidfd_send_signal(pidfd(process), number)
+    wait_until(lambda: children_running(box.process.pid, "appliance.console") not in ([process], []))
+    wait_until(page.is_open)
+    assert page.get("/api/me").value["known"], "the device is remembered"
+    box.pause()
+    assert box.frames(1)[0][0] > first and box.process.poll() is None
+    wait_until(lambda: deaths() > before)
 
 
 def pidfd(process: int) -> int:
