@@ -79,7 +79,8 @@ def write_bvh(path: Path | str, recording: Recording, metres_per_unit: float = 0
             columns.append(recording.translations[:, joint] / metres_per_unit)
         columns.append(angles[:, joint])
     table = np.concatenate(columns, axis=1)
-    text += [" ".join(f"{v:.{digits}f}" for v in row) for row in table]
+    line = " ".join([f"%.{digits}f"] * table.shape[1])
+    text += [line % tuple(row) for row in table.tolist()]
     Path(path).write_text("\n".join(text) + "\n", encoding="utf-8")
 
 
