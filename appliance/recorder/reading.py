@@ -20,6 +20,7 @@ from appliance.recorder.journal_error import JournalError
 from appliance.recorder.keyframe import POSITION
 from appliance.recorder.record import DAMAGED, EVENT, PIECE, TICK, layout_of, require_sound, skeleton_of
 from appliance.recorder.segments import SUFFIX, segment_paths
+from appliance.recorder.uncollected import uncollected
 
 EXPORTED = ".bunraku"
 _OLD_MAGIC = b"bunraku journal 1\n"
@@ -90,13 +91,14 @@ def read_journal(path: Path) -> JournalRecording:
     """Read a journal, finished or torn off by a kill or a power cut. Raises JournalError with the reason."""
     parts: dict[str, _Part] = {}
     room = _Room(path)
-    for name, data in segments_of(path):
-        try:
-            _add(parts, data, room)
-        except DAMAGED as error:
-            raise JournalError(
-                f"{path}: {name} is damaged ({error}). Remove it, and read the rest."
-            ) from error
+    with uncollected():
+        for name, data in segments_of(path):
+            try:
+                _add(parts, data, room)
+            except DAMAGED as error:
+                raise JournalError(
+                    f"{path}: {name} is damaged ({error}). Remove it, and read the rest."
+                ) from error
     try:
         runs = tuple(part.run() for part in parts.values() if part.has_ticks)
     except DAMAGED as error:
