@@ -47,7 +47,9 @@ def test_the_picture_marks_the_joint(tmp_path: Path) -> None:
 def test_training_draws_what_it_masked_and_remembers_what_it_must_keep(tmp_path: Path) -> None:
     folder, out = upside_down(tmp_path / "dancer"), tmp_path / "show"
     options = ["--steps", 2, "--width", 32, "--latent", 8, "--threads", 1, "--device", "cpu"]
-    result = bunraku("train", "--recordings", folder, "--out", out, "--keep", "sway_0", *options)
+    result = bunraku(
+        "train", "--model", "pose", "--recordings", folder, "--out", out, "--keep", "sway_0", *options
+    )
     assert result.exit_code == 0, said(result)
     assert "in 1 recording: sway_1" in said(result)
     assert (out / "pictures" / "masked.png").read_bytes().startswith(b"\x89PNG")
