@@ -1,8 +1,13 @@
-"""A folder of small recordings, and a show trained on them by the command itself."""
+"""A folder of small recordings, and what the command itself trained on them: once for all workers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -66,10 +71,35 @@ def bunraku(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=False)
 
 
+@dataclass(frozen=True)
+class Said:
+    """How a command ended that another worker may have run."""
+
+    exit_code: int
+    output: str
+    stderr: str
+
+
+def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
+    """A folder for reading that one of the workers of a run makes for all of them."""
+    base = factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        base = base.parent
+    folder, whole = base / name, base / f"{name}.whole"
+    with (base / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not whole.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+            make(folder)
+            whole.touch()
+    return folder
+
+
 @pytest.fixture(scope="session")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three takes of four seconds."""
-    return write_recordings(tmp_path_factory.mktemp("recordings") / "dancer")
+    return made_once(tmp_path_factory, "three-takes", lambda out: write_recordings(out / "dancer")) / "dancer"
 
 
 @pytest.fixture(scope="session")
@@ -83,16 +113,24 @@ def puppet_checkpoint(tmp_path_factory: pytest.TempPathFactory, recordings: Path
 @pytest.fixture(scope="session")
 def pose_checkpoint(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> Path:
     """checkpoint.pt of a pose model after 300 steps."""
-    out = tmp_path_factory.mktemp("pose")
     options = ["--steps", 300, "--width", 48, "--latent", 6, "--threads", 1]
-    result = bunraku("train", "--model", "pose", "--recordings", recordings, "--out", out, *options)
-    assert result.exit_code == 0, result.output
-    return out / "checkpoint.pt"
+
+    def train(out: Path) -> None:
+        result = bunraku("train", "--model", "pose", "--recordings", recordings, "--out", out, *options)
+        assert result.exit_code == 0, result.output
+
+    return made_once(tmp_path_factory, "pose", train) / "checkpoint.pt"
 
 
 @pytest.fixture(scope="session")
-def trained(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> tuple[Path, Result]:
-    """A show after 60 steps of a tiny mlp, and what the command said."""
-    show = tmp_path_factory.mktemp("trained") / "evening"
+def trained(tmp_path_factory: pytest.TempPathFactory, recordings: Path) -> tuple[Path, Said]:
+    """A show after 60 steps of a tiny network, and what the command said."""
     options = ["--steps", 60, "--width", 48, "--latent", 16, "--threads", 1, "--device", "cpu"]
-    return show, bunraku("train", "--recordings", recordings, "--out", show, *options)
+
+    def train(folder: Path) -> None:
+        result = bunraku("train", "--recordings", recordings, "--out", folder / "evening", *options)
+        words = {"exit_code": result.exit_code, "output": result.output, "stderr": result.stderr}
+        (folder / "said.json").write_text(json.dumps(words))
+
+    folder = made_once(tmp_path_factory, "trained", train)
+    return folder / "evening", Said(**json.loads((folder / "said.json").read_text()))

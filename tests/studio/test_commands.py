@@ -15,14 +15,14 @@ from appliance.pose.bvh import read_bvh, write_bvh
 from appliance.show.check import verify_bundle
 from appliance.show.show import load_show
 from appliance.studio.export import gate
-from tests.studio.conftest import bunraku
+from tests.studio.conftest import Said, bunraku
 from tests.studio.tiny import swaying
 
-Trained = tuple[Path, Result]
+Trained = tuple[Path, Said]
 HANDS = ["evaluate", "{show}", "{rec}/sway_0.bvh", "--reference", "{rec}", "--hands"]
 
 
-def said(result: Result) -> str:
+def said(result: Result | Said) -> str:
     """What was said, its line breaks undone."""
     return " ".join(result.stderr.split())
 
@@ -162,15 +162,18 @@ def test_a_stop_in_the_middle_says_how_to_go_on(tmp_path: Path, recordings: Path
     options = ["--width", "32", "--latent", "12", "--threads", "1", "--device", "cpu"]
     asked = ["train", "--recordings", str(recordings), "--out", str(out), "--steps", "100000", *options]
     process = subprocess.Popen(
-        [sys.executable, "-m", "appliance.cli", *asked], stderr=subprocess.PIPE, text=True
+        [sys.executable, "-X", "importtime", "-m", "appliance.cli", *asked],
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert process.stderr is not None
+    words = ""
     for line in process.stderr:
+        words += line
         if "Ctrl-C stops" in line:
             process.send_signal(signal.SIGTERM)
-            break
-    words = process.stderr.read()
     assert process.wait() == 130
+    assert "torch" in words and "torch._dynamo" not in words, "PyTorch's compiler takes a second to load"
     assert "nothing is lost" in words and f"bunraku train --resume --out {out}" in words
     assert (out / "checkpoint.pt").exists() and not (out / "puppet.onnx").exists()
 

@@ -10,7 +10,6 @@ import onnx
 import pytest
 import torch
 from onnx import numpy_helper
-from typer.testing import Result
 
 from appliance.pose import quaternion
 from appliance.show.bundle import default_show_path
@@ -20,7 +19,7 @@ from appliance.studio.evaluation.coders import OnnxCoder
 from appliance.studio.export.export import export
 from appliance.studio.export.exported import read_exported
 from appliance.studio.studio_error import StudioError
-from tests.studio.conftest import bunraku
+from tests.studio.conftest import Said, bunraku
 from tests.studio.test_export import NAMES
 from tests.studio.tiny import untrained
 
@@ -67,7 +66,7 @@ def test_files_that_give_no_network_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_training_goes_on_from_a_show(
-    trained: tuple[Path, Result], recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    trained: tuple[Path, Said], recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(train_command, "release", lambda *_: {})  # as after any training, and slow
     show, _ = trained
