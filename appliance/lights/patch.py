@@ -13,7 +13,8 @@ from appliance.lights.head import Heads, heads_of
 from appliance.lights.slot import Slot
 from appliance.show.fixture_profile import DIMMER, FINE, PAN, TILT, AttributeConfig, ModeConfig, load_profile
 from appliance.show.light_rules import COLOUR
-from appliance.show.lights import UNIVERSE_CHANNELS, FixtureConfig
+from appliance.show.lights import FixtureConfig
+from appliance.show.venue_lights import UNIVERSE_CHANNELS
 
 Values = NDArray[np.float64]
 Places = NDArray[np.intp]

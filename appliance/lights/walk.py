@@ -12,7 +12,7 @@ from appliance.lights.patch import Patch, Values
 from appliance.lights.slot import Slot
 from appliance.show.fixture_profile import DIMMER, PAN, TILT
 from appliance.show.light_rules import AIM
-from appliance.show.lights import UNIVERSE_CHANNELS
+from appliance.show.venue_lights import UNIVERSE_CHANNELS
 
 LONGEST_STEP_S = 0.04  # of a pass; a late one continues where it was, so that no peak is skipped
 _ROOM = 2.2  # sweeps from end to end that a head gets time for; it makes two

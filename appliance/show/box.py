@@ -12,13 +12,13 @@ from appliance.show.config_error import Problem
 from appliance.show.console import ConsoleConfig
 from appliance.show.control import ControlConfig
 from appliance.show.dmx import DmxWires
-from appliance.show.lights import VenueLightsConfig
 from appliance.show.osc import OscConfig, osc_misfits
 from appliance.show.posistagenet import PosiStageNetConfig, misfits
 from appliance.show.projector import ProjectorConfig
 from appliance.show.section import Ipv4, LocalFile, Section, key, part, refusal, refuse_repeats
 from appliance.show.sound import SoundConfig
 from appliance.show.validation import validated
+from appliance.show.venue_lights import VenueLightsConfig
 from appliance.show.yaml_file import YamlFile, read_yaml
 
 Resume = Literal["always", "after_crash", "never"]

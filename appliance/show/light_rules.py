@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field, field_validator, model_validator
 
 from appliance.show.section import Axis, Joint, Section, key, refusal
+from appliance.show.venue_lights import Metres
 
-Metres = Annotated[tuple[float, float, float], Field(strict=False)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Colour = Annotated[tuple[Share, Share, Share], Field(strict=False)]

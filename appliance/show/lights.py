@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import ValidationInfo, field_validator
 
 from appliance.show.config_error import did_you_mean
 from appliance.show.fixture_profile import (
@@ -19,14 +19,9 @@ from appliance.show.fixture_profile import (
     load_profile,
     profile_refusal,
 )
-from appliance.show.light_rules import AIM, COLOUR, Colour, MappingConfig, Metres, Pair, RuleConfig
+from appliance.show.light_rules import AIM, COLOUR, Colour, MappingConfig, Pair, RuleConfig
 from appliance.show.section import Section, key, part, refusal, refuse_repeats
-
-MAX_FIXTURES = 2048
-UNIVERSE_CHANNELS = 512
-Universe = Annotated[int, Field(ge=0, le=63999)]
-Address = Annotated[int, Field(ge=1, le=UNIVERSE_CHANNELS)]
-Pose = Literal["hanging", "standing"]
+from appliance.show.venue_lights import MAX_FIXTURES, UNIVERSE_CHANNELS, Address, Metres, Pose, Universe
 
 
 class FixtureConfig(Section):
@@ -148,26 +143,6 @@ class LightsConfig(Section):
             if names and name not in names:
                 raise refusal(f"There is no fixture '{name}'.", did_you_mean(name, names), at="fixtures")
         return safe
-
-
-class VenuePlaceConfig(Section):
-    """What is different about one fixture in this venue; what is left out stays as in the show."""
-
-    fixture: str = key("Its name in the show.", length=(1, None))
-    universe: Universe | None = key("Its universe here.", None)
-    address: Address | None = key("Its first channel here.", None)
-    place: Metres | None = key("Where it is here, metres (x, y, z).", None)
-    pose: Pose | None = key("Hanging or standing here.", None)
-    turn: Metres | None = key("How it is turned here: yaw, pitch, roll in degrees.", None)
-
-
-class VenueLightsConfig(Section):
-    """The rig as it hangs in this venue."""
-
-    rate_hz: float = key(
-        "How often lights are computed; a full universe takes 22.7 ms.", 40.0, within=(1, 44)
-    )
-    places: list[VenuePlaceConfig] = key("Fixtures that differ from the show.", [], length=(0, MAX_FIXTURES))
 
 
 def overlaps(fixtures: Sequence[FixtureConfig], directory: Path | None) -> Sequence[tuple[int, str, str]]:

@@ -10,8 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from appliance.show.config_error import Problem
 from appliance.show.posistagenet import unknown_joints
-from appliance.show.puppets import MOST_PUPPETS
-from appliance.show.section import Axes, Ipv4, Section, key, refusal, refuse_repeats
+from appliance.show.section import MOST_PUPPETS, Axes, Ipv4, Section, key, refusal, refuse_repeats
 from appliance.show.yaml_file import YamlFile
 
 Dialect = Literal["ai-toolbox", "joint", "vmc", "features"]

@@ -15,7 +15,6 @@ from appliance.show.light_rules import MappingConfig
 from appliance.show.section import Section, key, refuse_repeats
 from appliance.show.yaml_file import YamlFile
 
-MOST_PUPPETS = 4
 MAX_HANDS = 8
 LED_BY_THE_SHOW = ("phrase", "start_s", "hands", "iterations")  # of the first puppet: not its to say
 _Times = Annotated[int, Field(ge=0, le=MOST_ITERATIONS)]

@@ -14,13 +14,14 @@ from pydantic_core import PydanticCustomError
 from appliance.show.bundle import require_file
 from appliance.show.config_error import did_you_mean
 
+MOST_PUPPETS = 4  # on one stage
 UNIT_TOLERANCE = 0.05  # how far from length 1 a hand-written quaternion may be before it is a typing error
 
 
 class Section(BaseModel):
     """A part of show.yaml or box.yaml. Frozen; a word is never taken for a number, nor 'yes' for a text."""
 
-    # A validator is built on first use: a process that reads the box file alone builds none for shows.
+    # defer_build: a validator is built when something is read with it, and most processes read few kinds.
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 

@@ -20,14 +20,8 @@ from appliance.show.dance import DancerConfig, MotionConfig
 from appliance.show.hand import HandConfig
 from appliance.show.lights import LightsConfig
 from appliance.show.look import LookConfig, looks_by_name
-from appliance.show.puppets import (
-    MAX_HANDS,
-    MOST_PUPPETS,
-    PuppetConfig,
-    puppet_problems,
-    require_each_joint_once,
-)
-from appliance.show.section import Section, key, part, refusal, refuse_repeats
+from appliance.show.puppets import MAX_HANDS, PuppetConfig, puppet_problems, require_each_joint_once
+from appliance.show.section import MOST_PUPPETS, Section, key, part, refusal, refuse_repeats
 from appliance.show.sound import StringsConfig
 from appliance.show.springs import SpringsConfig, springs_by_name
 from appliance.show.validation import validated

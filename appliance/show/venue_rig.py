@@ -6,15 +6,9 @@ from collections.abc import Sequence
 
 from appliance.show.box import BoxConfig
 from appliance.show.config_error import Problem, did_you_mean
-from appliance.show.lights import (
-    UNIVERSE_CHANNELS,
-    FixtureConfig,
-    LightsConfig,
-    VenueLightsConfig,
-    channel_count,
-    overlaps,
-)
+from appliance.show.lights import FixtureConfig, LightsConfig, channel_count, overlaps
 from appliance.show.show import Show
+from appliance.show.venue_lights import UNIVERSE_CHANNELS, VenueLightsConfig
 
 
 def unwired(show: Show, box: BoxConfig) -> list[str]:

@@ -28,7 +28,7 @@ from appliance.projector.picture.vertices import layout, packed
 from appliance.projector.picture.video import Video
 from appliance.projector.picture.wall import Wall
 from appliance.show.look import LookConfig
-from appliance.show.puppets import MOST_PUPPETS
+from appliance.show.section import MOST_PUPPETS
 
 BODY_AREA = 0.16  # of a figure height squared that the figure covers, about
 Box = tuple[float, float, float, float]
