@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
+import gc
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,15 +33,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         from appliance.cli.preflight import main as preflight
 
         sys.exit(preflight(given[1:]))
+    spare_the_collector()
     wishes = wishes_to_play(given)
     if wishes is None:
         from appliance.cli.app import main as any_command
 
-        any_command(given)
+        any_command(given, gc.enable)
         return
     end_with_parent()
     prepare_environment()
-    spare_the_collector()
     try:
         sys.exit(_play(wishes))
     except Exception as error:

@@ -1,6 +1,11 @@
 """`python -m appliance.cli`: the command `bunraku`."""
 
-from appliance.cli.app import main
+import gc
+
+from appliance.box.realtime import spare_the_collector
 
 if __name__ == "__main__":
-    main()
+    spare_the_collector()
+    from appliance.cli.app import main
+
+    main(loaded=gc.enable)

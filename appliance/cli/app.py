@@ -24,7 +24,7 @@ from appliance.cli.examples import ORDER, OTHER_WORDS  # noqa: E402
 from appliance.cli.help_page import give_help  # noqa: E402
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder  # noqa: E402
 from appliance.pose.file_trouble import sentence  # noqa: E402
-from appliance.show.config_error import nearest  # noqa: E402
+from appliance.show.config_error import ConfigError, nearest  # noqa: E402
 
 PLUG_INS = "bunraku.commands"
 REFUSED = 2
@@ -140,8 +140,11 @@ def version() -> None:
     print(f"bunraku {distribution_version('bunraku')}")
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run one command; an error that the user can correct ends it with one clear line and exit status 2."""
+def main(arguments: Sequence[str] | None = None, loaded: Callable[[], None] = lambda: None) -> None:
+    """Run one command; an error that the user can correct ends it with one clear line and exit status 2.
+
+    loaded: called once, when the command has been loaded and before it runs.
+    """
     end_with_parent()
     given = list(sys.argv[1:] if arguments is None else arguments)
     if "--version" in given:
@@ -153,6 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         command = parser(None, plugged)
     give_help(command, order=ORDER)
     _require_known(given, list(command.commands))
+    loaded()
     try:
         command(given, prog_name="bunraku")
     except Exception as error:
@@ -206,16 +210,15 @@ def plug_ins(found: Iterable[EntryPoint]) -> list[typer.Typer]:
 
 
 def _is_correctable(error: Exception) -> bool:
+    if isinstance(error, ConfigError):  # what a power-on ends with where nothing is asked for: at once
+        return True
     from appliance.box.runtime_folder import RuntimeFolderError
     from appliance.exchange.exchange_error import ExchangeError
     from appliance.pose.bvh import BvhError
     from appliance.recorder.journal_error import JournalError
-    from appliance.show.config_error import ConfigError
     from appliance.stage.stage_error import StageError
 
-    return isinstance(
-        error, BvhError | ConfigError | ExchangeError | JournalError | RuntimeFolderError | StageError
-    )
+    return isinstance(error, BvhError | ExchangeError | JournalError | RuntimeFolderError | StageError)
 
 
 if __name__ == "__main__":

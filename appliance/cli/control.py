@@ -7,7 +7,7 @@ import os
 import socket
 import sys
 import time
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,11 +17,13 @@ from appliance.release.choice import box_of
 from appliance.show.box import BoxConfig, load_box
 from appliance.show.config_error import NotAskedForError, Problem, did_you_mean
 from appliance.show.control import ControlConfig
-from appliance.show.show import Show
 from appliance.show_control.packet import datagram
 from appliance.show_control.port import open_port
 from appliance.show_control.settings import Settings
 from appliance.stage.stage_error import StageError
+
+if TYPE_CHECKING:
+    from appliance.show.show import Show
 
 _FIRST_OF_SYSTEMD = 3  # sd_listen_fds(3)
 _FREED_WITHIN_S, _LOOK_S = 2.0, 0.05

@@ -9,6 +9,7 @@ import typer
 
 from appliance.cli.options import BoxFile, ChosenFile, ShowFolder, command_group, is_for_subcommand
 from appliance.release.choice import box_of
+from appliance.show.asked_for import require_wires
 
 lights = command_group("Light the rig by the dance; walk through it, look at it, convert fixture profiles.")
 
@@ -25,9 +26,11 @@ def light(
     """Light the rig by the dance that `bunraku play` dances, until Ctrl-C; `play` starts this by itself."""
     if is_for_subcommand(context, show, box, chosen):
         return
+    box = box_of(box, chosen)
+    require_wires(box)
     from appliance.lights.run import run_lights
 
-    run_lights(show, box_of(box, chosen))
+    run_lights(show, box)
 
 
 @lights.command("test")

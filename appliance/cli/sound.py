@@ -9,10 +9,7 @@ import typer
 
 from appliance.cli.options import BoxFile, ChosenFile
 from appliance.release.choice import box_of
-from appliance.show.box import load_box
-from appliance.show.bundle import default_show_path
-from appliance.show.show import load_show
-from appliance.show.sound import SoundConfig, StringsConfig
+from appliance.show.asked_for import require_sound
 from appliance.stage.stage_error import StageError
 
 
@@ -27,13 +24,19 @@ def sound(
 ) -> None:
     """Play the strings of the show that the stage dances, through the sound card."""
     if file is None and recording is None:
+        box = box_of(box, chosen)
+        require_sound(box)
         from appliance.sound.run import run_sound
 
-        run_sound(box_of(box, chosen), chosen is None)
+        run_sound(box, chosen is None)
         return
     if file is None or recording is None:
         raise StageError("A file needs both: bunraku sound dance.journal --file out.wav")
     from appliance.cli.pictures import load_dance
+    from appliance.show.box import load_box
+    from appliance.show.bundle import default_show_path
+    from appliance.show.show import load_show
+    from appliance.show.sound import SoundConfig, StringsConfig
     from appliance.sound.render_file import render_file
 
     strings = load_show(show or default_show_path()).config.strings or StringsConfig()

@@ -25,8 +25,9 @@ from appliance.outputs.dmx.open_wire import open_universes
 from appliance.outputs.dmx.pace import Universe
 from appliance.outputs.frame_reader import FrameReader, SeenFrame
 from appliance.pose.counted import counted
+from appliance.show.asked_for import no_wires
 from appliance.show.box import BoxConfig, load_box
-from appliance.show.config_error import ConfigError, NotAskedForError, Problem
+from appliance.show.config_error import ConfigError, Problem
 from appliance.show.lights import LightsConfig
 from appliance.show.show import Show, load_show
 from appliance.show.venue_rig import at_venue, misplaced, unwired
@@ -168,9 +169,7 @@ def rig_here(show: Show, box: BoxConfig) -> LightsConfig:
 def require_wires(box: BoxConfig) -> None:
     """Raise NotAskedForError for a box file without any wire to lights."""
     if not box.outputs.dmx:
-        cure = "Add one under outputs: dmx:, for instance {universe: 1, wire: artnet, host: 192.168.0.30}."
-        file = box.path or Path("box.yaml")
-        raise NotAskedForError([Problem(file, 0, "No wire leads to the lights.", cure)])
+        raise no_wires(box.path)
 
 
 def wired(patch: Patch, box: BoxConfig) -> tuple[Universe, ...]:

@@ -29,7 +29,6 @@ from appliance.projector.fallback import (
 )
 from appliance.projector.info import Figures, Meter
 from appliance.projector.keys import press
-from appliance.projector.loop import Projector
 from appliance.projector.pacing import USUAL_RATE, Pacing
 from appliance.projector.png import write_png
 from appliance.projector.projector_error import GPU_LOST, NO_DISPLAY, NO_PLACE, ProjectorError
@@ -82,6 +81,8 @@ class Run:
             opened.callback(self._window.close)
             self.context = GlContext(self._window)
             opened.callback(self.context.close)
+            from appliance.projector.loop import Projector  # without a display nothing draws
+
             self._raw = None if options.raw is None else RawStream(options.raw, is_keyed=options.is_keyed)
             if self._raw is not None:
                 opened.callback(self._raw.close)

@@ -6,14 +6,16 @@ import os
 import platform
 import struct
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from appliance.box.clock import TICK_S
 from appliance.pose.skeleton import Skeleton, stance_facts, stance_of
 from appliance.show.bundle import default_show_path
-from appliance.show.show import Show
+
+if TYPE_CHECKING:
+    from appliance.show.show import Show
 
 LATE, NOT_FINITE, JUMPED, RESENT = 1, 2, 4, 8  # flags of a tick; RESENT: it sent the last pose once more
 SECTIONS = ("drain", "motion", "puppeteers", "puppet", "blend", "figure", "send")

@@ -19,8 +19,9 @@ from appliance.box.runtime_folder import Claim, runtime_folder
 from appliance.box.show_state import ShowState, ShowStateReader, part_of_fade
 from appliance.box.stop_signals import stop_signals
 from appliance.outputs.frame_reader import FrameReader
+from appliance.show.asked_for import no_sound
 from appliance.show.box import BoxConfig, load_box
-from appliance.show.config_error import ConfigError, NotAskedForError, Problem
+from appliance.show.config_error import ConfigError
 from appliance.show.show import load_show
 from appliance.show.sound import SoundConfig, StringsConfig
 from appliance.sound.card import Card
@@ -148,9 +149,7 @@ class Sound:
 def require_sound(box: BoxConfig) -> SoundConfig:
     """The box's sound. Raises NotAskedForError where the box file wants none."""
     if box.sound is None:
-        file = box.path or Path("box.yaml")
-        cure = "Write `sound: {}` for the system's own sound card."
-        raise NotAskedForError([Problem(file, 0, "This box file asks for no sound.", cure)])
+        raise no_sound(box.path)
     return box.sound
 
 

@@ -1,0 +1,40 @@
+"""Whether a box file asks for sound or lights at all: a look that loads next to nothing.
+
+At each power-on a process is started for either; on a small machine all that it loads takes seconds.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from appliance.show.config_error import NotAskedForError, Problem
+from appliance.show.yaml_file import read_yaml
+
+
+def require_sound(box: Path | None) -> None:
+    """Raises NotAskedForError where a box file is given and has no sound; ConfigError: it is no YAML."""
+    if box is not None and read_yaml(box).values.get("sound") is None:
+        raise no_sound(box)
+
+
+def require_wires(box: Path | None) -> None:
+    """Raises NotAskedForError where a box file is given and has no wires; ConfigError: it is no YAML."""
+    outputs = {} if box is None else read_yaml(box).values.get("outputs", {})
+    if box is not None and isinstance(outputs, dict) and outputs.get("dmx", []) == []:
+        raise no_wires(box)
+
+
+def no_sound(box: Path | None) -> NotAskedForError:
+    """What to say of this box file."""
+    cure = "Write `sound: {}` for the system's own sound card."
+    return _not_asked_for(box, "This box file asks for no sound.", cure)
+
+
+def no_wires(box: Path | None) -> NotAskedForError:
+    """What to say of this box file."""
+    cure = "Add one under outputs: dmx:, for instance {universe: 1, wire: artnet, host: 192.168.0.30}."
+    return _not_asked_for(box, "No wire leads to the lights.", cure)
+
+
+def _not_asked_for(box: Path | None, words: str, cure: str) -> NotAskedForError:
+    return NotAskedForError([Problem(box or Path("box.yaml"), 0, words, cure)])
