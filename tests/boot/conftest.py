@@ -9,10 +9,25 @@ import pytest
 
 from tests.boot import figures_report, rights
 from tests.boot.box import KEYS, Box, standing
+from tests.boot.device import Device
 from tests.boot.disk import DataDisk
 from tests.boot.figures import Figures
 from tests.boot.hall import Hall, hall
 from tests.boot.root import root_image
+
+# Who has the dancing box before whom: a look at what was just switched on, then harm, then another box file.
+TURNS = ("test_power_on", "test_ports", "test_page", "test_companions", "test_restarts", "test_page_changes")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The tests of the dancing box run last, in their turns: it stays on until the last of them has ended."""
+    places = [place for place, item in enumerate(items) if item.path.parent == Path(__file__).parent]
+    for place, item in zip(places, sorted((items[place] for place in places), key=_turn), strict=True):
+        items[place] = item
+
+
+def _turn(item: pytest.Item) -> int:
+    return TURNS.index(item.path.stem) if "dancing" in getattr(item, "fixturenames", ()) else -1
 
 
 @pytest.fixture(scope="session")
@@ -63,11 +78,11 @@ def box(image: Path, around: Hall, proven: DataDisk, tmp_path: Path) -> Iterator
         yield made
 
 
-@pytest.fixture(scope="module")
-def dancing(
+@pytest.fixture(scope="package")
+def shared(
     image: Path, around: Hall, proven: DataDisk, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Box]:
-    """A box that dances with a sensor, shared by the tests of a module; each finds it dancing."""
+    """The box of `dancing`, from the first test that has it to the last."""
     with standing(image, around, proven, tmp_path_factory.mktemp("box")) as made:
         made.power_on()
         made.await_frames()
@@ -75,3 +90,17 @@ def dancing(
         made.await_sensor()
         yield made
         around.switch_sensor_off()
+
+
+@pytest.fixture
+def dancing(shared: Box) -> Box:
+    """A box that dances with a sensor, one for all tests that leave it dancing; each finds it so."""
+    shared.hall.audience.forget()
+    shared.await_frames()
+    return shared
+
+
+@pytest.fixture(scope="package")
+def device(shared: Box) -> Device:
+    """One for all tests of the dancing box: it gives the PIN once."""
+    return Device(shared)

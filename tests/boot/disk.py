@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +51,15 @@ class DataDisk:
         with self.image.open("r+b") as image:
             image.truncate(megabytes << 20)
         _run("resize2fs", "-f", str(self.image))
+
+    def changed(self, words: str) -> None:
+        """By a line of shell in its root, while it is in use nowhere."""
+        self.repaired()
+        with tempfile.TemporaryDirectory() as root:
+            mounted = f'mount -o loop "$1" "$2" && cd "$2" && {words} && cd / && umount "$2"'
+            private = ("unshare", "--mount", "--propagation", "private")
+            _run(*private, "sh", "-ec", mounted, "sh", str(self.image), root)
+        self.await_release()
 
     def repaired(self) -> str:
         """Checked as before each boot; what was said. Raises AssertionError where that is not enough."""

@@ -1,4 +1,7 @@
-"""The data partition is full, read-only or not there: the audience notices nothing."""
+"""The data partition is full or read-only: the audience notices nothing.
+
+test_installed_for_good.py has a box whose data partition is not there.
+"""
 
 from __future__ import annotations
 
@@ -68,10 +71,3 @@ def test_a_read_only_data_partition(box: Box, figures: Figures) -> None:
     box.await_sensor()
     box.hall.switch_sensor_off()
     _dances_again_after_a_kill(box, figures, "data partition read-only")
-
-
-def test_no_data_partition_at_all(box: Box, figures: Figures) -> None:
-    box.power_on(disk=None)
-    first = box.await_frames()[0]
-    figures.note("power-on to first frame, no data partition", first.at - box.machine.powered_at)
-    _dances_again_after_a_kill(box, figures, "no data partition")

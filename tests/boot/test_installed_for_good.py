@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -72,6 +71,7 @@ def test_it_dances_after_a_power_cut_and_goes_back_for_good(installed: Box, figu
     assert not box.machine.path(f"{KEPT}/tries").exists()
     assert box.machine.run("systemctl", "--failed", "--plain", "--no-legend") == ""
     assert box.machine.show(STAGE, "NRestarts") == "0"
+    _the_services_cannot_touch_it(box)
     said = _bash(box, "bunraku-install --rollback; bunraku-install --list", 60.0)
     assert said.splitlines()[-1] == "  9.9.4", said
     box.machine.cut_power()
@@ -101,31 +101,31 @@ def test_one_whose_stage_does_not_start_any_more_gives_way(installed: Box, figur
 
 def test_a_damaged_one_never_dances(installed: Box) -> None:
     box = installed
+    box.disk.changed("truncate --size=-1 bunraku-releases/9.9.4/lib/python3*/site-packages/" + _STAGE)
     box.power_on()
-    box.await_frames()
-    _bash(box, f"truncate --size=-1 {KEPT}/9.9.4/lib/python3*/site-packages/appliance/stage/run.py; sync")
-    box.machine.cut_power()
-    began = time.time()
-    box.power_on()
-    box.await_frames(50, began)
+    box.await_frames(50)
     assert "9.9.4" not in box.machine.run("readlink", "/opt/bunraku/current")
     assert "9.9.4  put aside: files of it are missing or damaged" in _bash(box, "bunraku-install --list")
 
 
-def test_without_a_data_partition_what_came_with_the_box_dances(installed: Box, on_the_stick: Path) -> None:
+def test_without_a_data_partition_what_came_with_the_box_dances(
+    installed: Box, on_the_stick: Path, figures: Figures
+) -> None:
     box = installed
     box.power_on(disk=None, binds=((box.boot, "/boot/bunraku"), (on_the_stick, "/media/release")))
-    box.await_frames(50)
+    first = box.await_frames()[0]
+    figures.note("power-on to first frame, no data partition", first.at - box.machine.powered_at)
+    killed = box.machine.kill(STAGE)
+    _, after = box.pause_from(killed)
+    figures.note("SIGKILL to next frame, no data partition", after.at - killed, limit=1.0)
+    box.await_frames(50, after.at)
     assert "9.9.4" not in box.machine.run("readlink", "/opt/bunraku/current")
     said = _bash(box, "bunraku-install /media/release 2>&1; echo status $?")
     assert "status 1" in said and "where releases are kept, is not there" in said, said
 
 
-def test_the_services_cannot_touch_it(installed: Box) -> None:
+def _the_services_cannot_touch_it(box: Box) -> None:
     """Even as root a service would find it read only; and none is root."""
-    box = installed
-    box.power_on()
-    box.await_frames(50)
     for unit in ("stage", "keeper", "control", "lights", "projector", "console"):
         box.await_unit(f"bunraku-{unit}")  # before that its mounts may not be made
         pid = box.machine.show(f"bunraku-{unit}", "MainPID")

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.boot import rights
-from tests.boot.box import STAGE, Box
+from tests.boot.box import STAGE, Box, standing
+from tests.boot.disk import DataDisk
 from tests.boot.figures import Figures
+from tests.boot.hall import Hall
 from tests.boot.pauses import longest_pause_s
 
 LIMIT_BYTES = 900 << 20
@@ -18,18 +21,29 @@ _HOG = "taken = []\nwhile True: taken.append(bytearray(b'x') * (4 << 20))"
 pytestmark = pytest.mark.boot
 
 
-@pytest.fixture
-def short_of_memory(box: Box) -> Box:
+@pytest.fixture(scope="module")
+def limited(
+    image: Path, around: Hall, proven: DataDisk, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Box]:
+    """A box that may use LIMIT_BYTES."""
     why_not = rights.no_memory_limits()
     if why_not is not None:
         pytest.skip(why_not)
-    box.power_on(memory=LIMIT_BYTES)
-    box.await_frames(100)
-    return box
+    with standing(image, around, proven, tmp_path_factory.mktemp("limited")) as box:
+        box.power_on(memory=LIMIT_BYTES)
+        yield box
+
+
+@pytest.fixture
+def short_of_memory(limited: Box) -> Box:
+    """It has danced for a while."""
+    limited.await_frames(100, time.time())
+    return limited
 
 
 def _take_all_memory(box: Box) -> float:
     """A program of the box that takes more and more, until it is killed; when it began."""
+    box.machine.run("systemctl", "reset-failed", "hog", check=False)
     began = time.time()
     box.machine.run("systemd-run", "--unit=hog", "--property=Restart=no", "/usr/bin/python3", "-c", _HOG)
     box.machine.await_that(

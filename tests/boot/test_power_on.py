@@ -10,13 +10,16 @@ from tests.boot.box import STAGE, Box
 from tests.boot.figures import Figures
 
 POWER_ON_LIMIT_S = 3.0
+EVENINGS, MOST_EVENINGS = 2, 3  # MOST_EVENINGS with --long
 UNITS = ("stage", "keeper", "control", "lights", "projector", "console")
 
 pytestmark = pytest.mark.boot
 
 
-def test_after_an_evening_that_ended_it_begins_at_the_beginning(box: Box, figures: Figures) -> None:
-    for _ in range(3):
+def test_after_an_evening_that_ended_it_begins_at_the_beginning(
+    box: Box, figures: Figures, long_run: bool
+) -> None:
+    for _ in range(MOST_EVENINGS if long_run else EVENINGS):
         box.power_on()
         first = box.await_frames()[0]
         figures.note("power-on to first frame", first.at - box.machine.powered_at, limit=POWER_ON_LIMIT_S)
@@ -31,13 +34,11 @@ def test_after_an_evening_that_ended_it_begins_at_the_beginning(box: Box, figure
         box.machine.power_off()
 
 
-def test_all_that_belongs_to_the_box_runs_and_nothing_has_failed(box: Box) -> None:
-    box.power_on()
-    box.await_frames()
-    machine = box.machine
+def test_all_that_belongs_to_the_box_runs_and_nothing_has_failed(dancing: Box) -> None:
+    machine = dancing.machine
     for unit in UNITS:
-        box.await_unit(f"bunraku-{unit}")
-    machine.await_that(lambda: _settled(box), "the box is still starting")
+        dancing.await_unit(f"bunraku-{unit}")
+    machine.await_that(lambda: _settled(dancing), "the box is still starting")
     failed = machine.run("systemctl", "--failed", "--plain", "--no-legend")
     assert not failed, f"{failed}\n{machine.log()}"
     # Five processes start at once: on a busy machine one may be late for its watchdog, and is restarted.
@@ -45,21 +46,14 @@ def test_all_that_belongs_to_the_box_runs_and_nothing_has_failed(box: Box) -> No
     assert not fell and machine.show(STAGE, "NRestarts") == "0", machine.log()
 
 
-def test_only_the_stages_main_thread_has_real_time_priority(box: Box) -> None:
-    box.power_on()
-    box.await_frames(20)
-    stage = box.machine.main_pid(STAGE)
-    policies = box.machine.run(
-        "ps", "-L", "-o", "lwp=,cls=,rtprio=", "-p", str(_inside(box, stage))
-    ).splitlines()
+def test_only_the_stages_main_thread_has_real_time_priority(dancing: Box) -> None:
+    dancing.await_frames(20)
+    stage = dancing.machine.show(STAGE, "MainPID")
+    assert stage != "0"
+    policies = dancing.machine.run("ps", "-L", "-o", "lwp=,cls=,rtprio=", "-p", stage).splitlines()
     realtime = [line.split() for line in policies if "FF" in line.split()]
-    assert [(lwp, priority) for lwp, _, priority in realtime] == [(str(_inside(box, stage)), "70")], policies
+    assert [(lwp, priority) for lwp, _, priority in realtime] == [(stage, "70")], policies
 
 
 def _settled(box: Box) -> bool:
     return box.machine.run("systemctl", "is-system-running", check=False).strip() in ("running", "degraded")
-
-
-def _inside(box: Box, pid: int) -> int:
-    assert pid
-    return int(box.machine.show(STAGE, "MainPID"))

@@ -24,7 +24,9 @@ def _name_of_the_show(box: Box) -> str:
     )
 
 
-def test_a_new_show_on_the_stick_is_danced_and_kept(box: Box, tmp_path: Path, figures: Figures) -> None:
+def test_a_new_show_is_danced_and_kept_and_a_broken_one_refused_with_file_and_line(
+    box: Box, tmp_path: Path, figures: Figures
+) -> None:
     show_on(tmp_path / "content", "From the stick")
     stick = Stick.made(tmp_path / "stick.img", tmp_path / "content")
     box.power_on(stick=stick.image)
@@ -33,23 +35,16 @@ def test_a_new_show_on_the_stick_is_danced_and_kept(box: Box, tmp_path: Path, fi
     assert _name_of_the_show(box) == "From the stick", box.machine.log("bunraku-preflight", "bunraku-stage")
     box.machine.await_that(box.is_proven, "the show is not kept as one that dances")
     box.machine.cut_power()
-    box.power_on()
-    box.await_frames()
-    assert _name_of_the_show(box) == "From the stick", "it is gone with the stick"
-
-
-def test_a_broken_show_on_the_stick_is_refused_with_file_and_line(box: Box, tmp_path: Path) -> None:
-    show = show_on(tmp_path / "content", "Broken") / "show.yaml"
+    show = show_on(tmp_path / "broken", "Broken") / "show.yaml"
     show.write_text(show.read_text().replace("coding_iterations: 10", "coding_iteration: 10"))
     line = next(
         number
         for number, words in enumerate(show.read_text().splitlines(), 1)
         if "coding_iteration:" in words
     )
-    stick = Stick.made(tmp_path / "stick.img", tmp_path / "content")
-    box.power_on(stick=stick.image)
+    box.power_on(stick=Stick.made(tmp_path / "broken.img", tmp_path / "broken").image)
     box.await_frames()
-    assert _name_of_the_show(box) == "One hand"
+    assert _name_of_the_show(box) == "From the stick", "it is gone with its stick"
     said = box.machine.log("bunraku-preflight")
     assert f"/media/bunraku/bunraku/show/show.yaml:{line}" in said, said
     assert "coding_iterations" in said, "the nearest name is not told"

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.boot.box import STAGE, Box
+from tests.boot.box import STAGE, Box, standing
+from tests.boot.disk import DataDisk
 from tests.boot.figures import Figures
+from tests.boot.hall import Hall
 from tests.boot.pauses import lives, longest_pause_s
 from tests.boot.root import release
 from tests.boot.trial import changed_release
@@ -21,25 +25,37 @@ _CANNOT_START = (
 pytestmark = pytest.mark.boot
 
 
-def _install(box: Box, image: Path, tmp_path: Path, version: str, last_lines: str) -> str:
-    """Switch the box on with this release on a stick, and install it while it dances; what is said."""
-    made = changed_release(
-        release(image), tmp_path / "release", version, "appliance/stage/run.py", last_lines
-    )
-    box.power_on(binds=((box.boot, "/boot/bunraku"), (made, "/media/bunraku/bunraku/release")))
+@pytest.fixture(scope="module")
+def stick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder `bunraku` of a stick that stays plugged in; what lies on it changes from test to test."""
+    return tmp_path_factory.mktemp("stick")
+
+
+@pytest.fixture(scope="module")
+def touring(
+    image: Path, around: Hall, proven: DataDisk, stick: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Box]:
+    """A box that dances while one release after the other is installed on it."""
+    with standing(image, around, proven, tmp_path_factory.mktemp("touring")) as box:
+        box.power_on(binds=((box.boot, "/boot/bunraku"), (stick, "/media/bunraku/bunraku")))
+        box.await_frames(50)
+        yield box
+
+
+def _install(box: Box, image: Path, stick: Path, version: str, last_lines: str) -> str:
+    """Lay this release on the stick, and install it while the box dances; what is said."""
+    shutil.rmtree(stick / "release", ignore_errors=True)
+    changed_release(release(image), stick / "release", version, "appliance/stage/run.py", last_lines)
+    box.hall.audience.forget()
     box.await_frames(50)
     return box.machine.run(
-        *(
-            "sh",
-            "-c",
-            "bunraku-install --until-power-off 2>&1; echo status $?",
-        ),
-        patience_s=240.0,
+        "sh", "-c", "bunraku-install --until-power-off 2>&1; echo status $?", patience_s=240.0
     )
 
 
-def test_a_release_that_fails_its_preflight_never_dances(image: Path, box: Box, tmp_path: Path) -> None:
-    said = _install(box, image, tmp_path, "9.9.1", _CANNOT_DANCE)
+def test_a_release_that_fails_its_preflight_never_dances(image: Path, touring: Box, stick: Path) -> None:
+    box = touring
+    said = _install(box, image, stick, "9.9.1", _CANNOT_DANCE)
     assert "status 1" in said and "this release cannot dance" in said, said
     seen = box.await_frames(50, time.time())
     assert lives(box.hall.audience.frames) == 1 and lives(seen) == 1, "the dance was interrupted"
@@ -48,9 +64,10 @@ def test_a_release_that_fails_its_preflight_never_dances(image: Path, box: Box, 
 
 
 def test_a_release_that_does_not_start_gives_way_to_the_old_one(
-    image: Path, box: Box, tmp_path: Path, figures: Figures
+    image: Path, touring: Box, stick: Path, figures: Figures
 ) -> None:
-    said = _install(box, image, tmp_path, "9.9.2", _CANNOT_START)
+    box = touring
+    said = _install(box, image, stick, "9.9.2", _CANNOT_START)
     assert "status 1" in said and "which dances" in said, said
     assert box.await_frames(50, time.time())
     figures.note("update that does not start: time without frames", longest_pause_s(box.hall.audience.frames))
@@ -59,12 +76,13 @@ def test_a_release_that_does_not_start_gives_way_to_the_old_one(
 
 
 def test_a_sound_release_takes_over_while_it_dances(
-    image: Path, box: Box, tmp_path: Path, figures: Figures
+    image: Path, touring: Box, stick: Path, figures: Figures
 ) -> None:
+    box = touring
     began = time.time()
-    said = _install(box, image, tmp_path, "9.9.3", "")
+    said = _install(box, image, stick, "9.9.3", "")
     assert "status 0" in said, said
-    figures.note("installing a release while it dances (with its power-on)", time.time() - began, limit=60.0)
+    figures.note("installing a release while it dances", time.time() - began, limit=60.0)
     assert box.await_frames(50, time.time())
     figures.note("update: time without frames", longest_pause_s(box.hall.audience.frames))
     assert "9.9.3" in box.machine.run("readlink", "/opt/bunraku/current"), said
