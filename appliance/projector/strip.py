@@ -78,4 +78,4 @@ def _save(out: Path, picture: Image) -> None:
             f"Pictures need Pillow ({error}). Install it: pip install 'bunraku[pictures]'.", NO_DISPLAY
         ) from error
     out.parent.mkdir(parents=True, exist_ok=True)
-    Files.fromarray(picture).save(out, optimize=True)
+    Files.fromarray(picture).save(out)
