@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -130,10 +131,9 @@ def draw_rows(
     figure = matplotlib_figure(figsize=(width / 100, height / 100), dpi=100)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set_axis_off()
-    place = {"interpolation": "none", "aspect": "auto", "extent": (0, width, height, 0)}
-    axes.imshow(np.clip(stage.floor, 0, 1), **place, zorder=0)
+    axes.add_artist(_layers()(stage.floor, zorder=0))
     _draw_trails(axes, stage.trails)
-    axes.imshow(np.clip(straight(stage.figures), 0, 1), **place, zorder=2)
+    axes.add_artist(_layers()(straight(stage.figures), zorder=2))
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with every_script():
@@ -163,6 +163,28 @@ def _matplotlib() -> tuple[Any, Any]:
     except ImportError as error:
         raise MissingPicturesError from error
     return Figure, FigureCanvasAgg
+
+
+@cache
+def _layers() -> Any:
+    """The class of a layer: a picture that lies pixel upon pixel in a figure of its size."""
+    from matplotlib.artist import Artist
+
+    class Layer(Artist):
+        """Colours (height, width, 3 or 4), 0..1; imshow would resample them first, for ten times as long."""
+
+        def __init__(self, colours: Array, zorder: float) -> None:
+            super().__init__()
+            self.set_zorder(zorder)
+            self._pixels = np.full((*colours.shape[:2], 4), 255, np.uint8)
+            self._pixels[::-1, :, : colours.shape[2]] = np.clip(colours, 0, 1) * 255
+
+        def draw(self, renderer: Any) -> None:
+            context = renderer.new_gc()
+            renderer.draw_image(context, 0, 0, self._pixels)
+            context.restore()
+
+    return Layer
 
 
 def _rows(
