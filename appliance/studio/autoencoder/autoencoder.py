@@ -56,13 +56,14 @@ class Autoencoder(nn.Module):
         network SLERP overwrites the window's joints.
         """
         if isinstance(self.network, Conditional):
-            return self.network.encode_held(windows, start, goal, held)
+            condition = self.network.encoder.condition(start, goal, held)
+            return self.network.encode_held(windows, held, condition)
         return self.encode(slerp_towards(windows, goal, held[:, None, :, None]))
 
     def decode_raw(self, latents: Tensor, start: Tensor | None = None, held: Tensor | None = None) -> Tensor:
         """Latents -> heading-free windows before normalisation; start and held as given to encode_held."""
         if start is not None and held is not None and isinstance(self.network, Conditional):
-            raw = self.network.decode_held(latents, start, held)
+            raw = self.network.decode_held(latents, self.network.decoder.condition(start, held))
         else:
             raw = self.network.decode(latents)
         return raw.view(-1, self.shape.window, self.shape.joints, 4)
@@ -90,10 +91,17 @@ class Autoencoder(nn.Module):
         if hold is not None:
             held = (hold.mask.float() * hold.weights).expand(len(x), -1)
             goal = self.without_heading(hold.targets.expand_as(x), facing)
+        led = min(interaction_iterations, coding_iterations)
+        if isinstance(self.network, Conditional) and led:  # its conditions are the same in every pass
+            told = self.network.encoder.condition(start, goal, held)
+            meant = self.network.decoder.condition(start, held)
         for k in range(coding_iterations):
-            if k < interaction_iterations:
+            if k < led and isinstance(self.network, Conditional):
+                latents = self.network.encode_held(x, held, told)
+                x = rotation.normalize(self.network.decode_held(latents, meant).view_as(x))
+            elif k < led:
                 latents = self.encode_held(x, start, goal, held)
-                x = rotation.normalize(self.decode_raw(latents, start, held))
+                x = self.decode(latents)
             else:
                 latents = self.encode(x)
                 x = self.decode(latents)

@@ -68,12 +68,15 @@ class ConditionalDecoder(MlpDecoder):
         self.phrase = nn.Linear(shape.curves * shape.pose, shape.curves * shape.pose, bias=False)
         nn.init.zeros_(self.phrase.weight)
 
-    def forward(self, latent: Tensor, start: Tensor | None = None, held: Tensor | None = None) -> Tensor:
+    def condition(self, start: Tensor, held: Tensor) -> Tensor:
+        """Bias (B, C * P) of the last layer from the first window, held by (B, M)."""
+        strongest = held.amax(dim=1, keepdim=True)
+        condition: Tensor = strongest * self.phrase(self.time.project(start.flatten(1)))
+        return condition
+
+    def forward(self, latent: Tensor, condition: Tensor | None = None) -> Tensor:
         amounts: Tensor = self.stack(latent)
-        if start is not None and held is not None:
-            strongest = held.amax(dim=1, keepdim=True)
-            amounts = amounts + strongest * self.phrase(self.time.project(start.flatten(1)))
-        return self.time.unfold(amounts)
+        return self.time.unfold(amounts if condition is None else amounts + condition)
 
 
 class Conditional(Mlp):
@@ -86,13 +89,13 @@ class Conditional(Mlp):
         super().__init__(shape)
         self.encoder, self.decoder = ConditionalEncoder(shape), ConditionalDecoder(shape)
 
-    def encode_held(self, window: Tensor, start: Tensor, targets: Tensor, held: Tensor) -> Tensor:
-        """Latents (B, Z) of windows whose joints targets (B, T, M, 4) replace by weights held (B, M)."""
+    def encode_held(self, window: Tensor, held: Tensor, condition: Tensor) -> Tensor:
+        """Latents (B, Z) of windows without the joints that are held by (B, M); condition: the encoder's."""
         left = (window * (1 - held)[:, None, :, None]).flatten(1)
-        latent: Tensor = self.encoder(left, self.encoder.condition(start, targets, held))
+        latent: Tensor = self.encoder(left, condition)
         return latent
 
-    def decode_held(self, latent: Tensor, start: Tensor, held: Tensor) -> Tensor:
-        """Latents (B, Z) of encode_held -> flat windows."""
-        window: Tensor = self.decoder(latent, start, held)
+    def decode_held(self, latent: Tensor, condition: Tensor) -> Tensor:
+        """Latents (B, Z) of encode_held -> flat windows; condition: the decoder's."""
+        window: Tensor = self.decoder(latent, condition)
         return window

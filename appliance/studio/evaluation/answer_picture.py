@@ -26,15 +26,17 @@ def draw_answer(path: Path, measurement: Measurement, joint: str, iterations: It
     free, pair = rehearsal.free(iterations[0]), measurement.pair
     skeleton = rehearsal.recording.skeleton
 
-    def strip(poses: Poses, label: str, behind: Poses | None = None) -> Strip:
+    def strip(poses: Poses, label: str, behind: Strip | None = None) -> Strip:
         whole, roots = body.grounded(rehearsal.whole(poses), joint)
         holds = None if behind is None else held_throughout(whole, [skeleton.index(joint)])
-        return Strip(whole, roots, label, None if behind is None else strip(behind, ""), holds)
+        return Strip(whole, roots, label, behind, holds)
 
+    phrase = strip(rehearsal.phrase, f"The phrase: {pair.phrase_name}")
+    answer_words = "The dancer's answer; behind it, in grey, the same dance without a hand"
     strips = (
-        strip(rehearsal.phrase, f"The phrase: {pair.phrase_name}"),
-        strip(pasted, f"Pasted on: {joint} as in {pair.hand_name}; all else is the phrase", rehearsal.phrase),
-        strip(danced, "The dancer's answer; behind it, in grey, the same dance without a hand", free),
+        phrase,
+        strip(pasted, f"Pasted on: {joint} as in {pair.hand_name}; all else is the phrase", phrase),
+        strip(danced, answer_words, strip(free, "")),
     )
     answer = measurement.answer(joint, danced, free)
     title = (

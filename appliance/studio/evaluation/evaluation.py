@@ -22,13 +22,14 @@ from appliance.studio.data.dataset import (
     window_starts,
 )
 from appliance.studio.data.remembered import NOTHING, Remembered
-from appliance.studio.evaluation.coders import Coder, MovedJoints, Poses
+from appliance.studio.evaluation.coders import Coder, MovedJoints
 from appliance.studio.studio_error import StudioError
 
 ITERATIONS = (1, 2, 5, 10)
 POSITION_ITERATIONS = (1, 10)
 PATIENCE_S = 40.0
 HOPS = (1, 2, 4, 8)
+PART = 64  # windows whose figures are reckoned at once, if the network codes fewer at once
 Figures = NDArray[np.float32]
 
 
@@ -106,7 +107,7 @@ def evaluate(
     degrees: dict[int, list[Figures]] = {k: [] for k in iterations}
     centimetres: dict[int, list[Figures]] = {k: [] for k in POSITION_ITERATIONS if k in iterations}
     latents: list[Figures] = []
-    work = [(take, part) for take in takes for part in _parts(take, hop, coder.batch)]
+    work = [(take, part) for take in takes for part in _parts(take, hop, max(coder.batch, PART))]
     if not work:
         raise StudioError(
             "No window of 8 sound poses is left to evaluate. Give a longer or cleaner recording."
@@ -117,13 +118,17 @@ def evaluate(
         frames = starts[:, None] + np.arange(WINDOW)
         whole = take.recording.poses[frames]
         windows = whole[:, :, places].astype(np.float32)
+        recorded = _positions(take, frames, whole) if centimetres else None
         for k in iterations:
             made, found = coder.iterate(windows, k)
             if not np.isfinite(made).all():
                 raise StudioError(f"{coder.facts['file']} outputs no poses: the file is damaged.")
             degrees[k].append(np.degrees(quaternion.angle_between(made, windows)).astype(np.float32))
-            if k in centimetres:
-                centimetres[k].append(_distances(take, frames, whole, places, made))
+            if recorded is not None and k in centimetres:
+                changed = whole.copy()
+                changed[:, :, places] = made
+                apart = (recorded - _positions(take, frames, changed))[:, :, places]
+                centimetres[k].append(np.asarray(100 * np.linalg.norm(apart, axis=-1), dtype=np.float32))
             if k == iterations[0]:
                 latents.append(found)
     return Evaluation(
@@ -167,18 +172,11 @@ def _places(take: Take, coder: Coder) -> list[int]:
         ) from None
 
 
-def _distances(
-    take: Take, frames: NDArray[np.intp], whole: NDArray[Any], places: list[int], made: Poses
-) -> Figures:
-    """(B, 8, M) centimetres between each joint's recorded place and where the made pose puts it."""
+def _positions(take: Take, frames: NDArray[np.intp], poses: NDArray[Any]) -> NDArray[Any]:
+    """(B, 8, J, 3) metres: where poses put the joints, the root at its recorded place."""
     recording = take.recording
-    changed = whole.copy()
-    changed[:, :, places] = made
     bones = None if recording.translations is None else recording.translations[frames]
-    recorded, _ = recording.skeleton.forward_kinematics(whole, recording.roots[frames], bones)
-    put, _ = recording.skeleton.forward_kinematics(changed, recording.roots[frames], bones)
-    distances = np.linalg.norm(recorded[:, :, places] - put[:, :, places], axis=-1)
-    return np.asarray(100 * distances, dtype=np.float32)
+    return recording.skeleton.forward_kinematics(poses, recording.roots[frames], bones)[0]
 
 
 def _spread(values: Figures, p95: bool = False) -> dict[str, float]:
