@@ -28,13 +28,12 @@ LONGEST_SHOWN_MS = 45.0
 def draw_report(path: Path, evidence: Evidence) -> Path:
     """Write the PNG. Needs matplotlib."""
     import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
+    from matplotlib.figure import Figure
 
     way, free = evidence.transports
     with matplotlib.rc_context(LOOK):
-        figure, axes = pyplot.subplots(4, 1, figsize=(11, 14), layout="constrained")
+        figure = Figure(figsize=(11, 14), layout="constrained")
+        axes = figure.subplots(4, 1)
         _histogram(axes[0], way, free)
         _timeline(axes[1], way)
         _sections(axes[2], evidence.locked)
@@ -42,7 +41,6 @@ def draw_report(path: Path, evidence: Evidence) -> Path:
         for one in axes:
             one.spines[["top", "right"]].set_visible(False)
         figure.savefig(path, dpi=110)
-        pyplot.close(figure)
     return path
 
 

@@ -62,7 +62,7 @@ def _light(patch: Patch, values: Values, fixture: FixtureConfig) -> tuple[Array,
         slot = patch.slots[place]
         if slot.channels or slot.base != DIMMER:
             shares.setdefault(slot.base, []).append(float(values[place]))
-    mean = {name: float(np.mean(several)) for name, several in shares.items()}
+    mean = {name: sum(several) / len(several) for name, several in shares.items()}
     lamps = [mean[name] * np.array(tint) for name, tint in _TINTS.items() if name in mean]
     light = np.minimum(np.sum(lamps, axis=0), 1.0) if lamps else np.ones(3)
     light = light * [1.0 - mean.get(name, 0.0) for name in _FILTERS]
