@@ -168,7 +168,7 @@ def run_block(block: Block, checkout: Path, environment: Mapping[str, str]) -> N
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_command_of_a_page_works(page: str, pages: dict[str, Future[None]]) -> None:
-    assert BLOCKS[page], f"{page} shows no command"
+    assert blocks_of(page), f"{page} shows no command"
     pages[page].result()
 
 
